@@ -1,0 +1,453 @@
+//! How a law describes itself: parameters and internal variables are declared once, with
+//! [`parameters!`](crate::parameters) and [`internal_variables!`](crate::internal_variables), and
+//! everything else derives from the declaration.
+
+use crate::raw::{self, Parameter, Variable};
+use std::ffi::{CStr, c_char};
+use std::mem::size_of;
+
+/// A kinematic hypothesis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i32)]
+pub enum Hypothesis {
+    /// Components 11 22 33 12, 33 out of plane.
+    PlaneStrain = raw::PILUM_H_PLANE_STRAIN,
+    /// Components 11 (radial) 22 (axial) 33 (hoop) 12.
+    Axisymmetric = raw::PILUM_H_AXISYMMETRIC,
+    /// Components 11 22 33 12 13 23.
+    ThreeD = raw::PILUM_H_3D,
+    /// Components normal, tangential.
+    Interface2d = raw::PILUM_H_INTERFACE_2D,
+}
+
+impl Hypothesis {
+    /// All hypotheses this version of the host can use.
+    pub const ALL: [Self; 4] = [
+        Self::PlaneStrain,
+        Self::Axisymmetric,
+        Self::ThreeD,
+        Self::Interface2d,
+    ];
+
+    /// The hypothesis with this code.
+    pub fn from_code(code: raw::HypothesisCode) -> Option<Self> {
+        Self::ALL.into_iter().find(|h| *h as i32 == code)
+    }
+
+    /// Name in files: `plane_strain`, `axisymmetric`, `3d`, `interface_2d`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PlaneStrain => "plane_strain",
+            Self::Axisymmetric => "axisymmetric",
+            Self::ThreeD => "3d",
+            Self::Interface2d => "interface_2d",
+        }
+    }
+
+    /// Names of the components of gradient and flux, in order.
+    pub fn components(self) -> &'static [&'static str] {
+        match self {
+            Self::PlaneStrain | Self::Axisymmetric => &["11", "22", "33", "12"],
+            Self::ThreeD => &["11", "22", "33", "12", "13", "23"],
+            Self::Interface2d => &["n", "t"],
+        }
+    }
+
+    /// Number of components of gradient and flux.
+    pub const fn n_components(self) -> usize {
+        match self {
+            Self::PlaneStrain | Self::Axisymmetric => 4,
+            Self::ThreeD => 6,
+            Self::Interface2d => 2,
+        }
+    }
+}
+
+/// What a law is called and where it comes from. Made by [`describe!`](crate::describe).
+#[derive(Clone, Copy, Debug)]
+pub struct Description {
+    /// Identifier `[a-z][a-z0-9_]*`, public interface.
+    pub id: &'static CStr,
+    /// Name in words.
+    pub name: &'static CStr,
+    /// Version of the law's crate.
+    pub version: &'static CStr,
+    /// Authors of the law's crate.
+    pub author: &'static CStr,
+    /// Licence of the law's crate.
+    pub licence: &'static CStr,
+    /// A sentence or two.
+    pub doc: &'static CStr,
+    /// Sources.
+    pub references: &'static CStr,
+}
+
+/// Describes a law; version, authors and licence come from the crate that uses the macro.
+#[macro_export]
+macro_rules! describe {
+    (id: $id:literal, name: $name:literal, doc: $doc:literal, references: $references:literal $(,)?) => {
+        $crate::Description {
+            id: $crate::descriptor::c_str(concat!($id, "\0")),
+            name: $crate::descriptor::c_str(concat!($name, "\0")),
+            version: $crate::descriptor::c_str(concat!(env!("CARGO_PKG_VERSION"), "\0")),
+            author: $crate::descriptor::c_str(concat!(env!("CARGO_PKG_AUTHORS"), "\0")),
+            licence: $crate::descriptor::c_str(concat!(env!("CARGO_PKG_LICENSE"), "\0")),
+            doc: $crate::descriptor::c_str(concat!($doc, "\0")),
+            references: $crate::descriptor::c_str(concat!($references, "\0")),
+        }
+    };
+}
+
+/// A string that ends in NUL, as C sees it.
+///
+/// # Panics
+/// If it does not end in NUL or holds another one; at compile time, where it is used.
+#[expect(clippy::panic, reason = "evaluated at compile time")]
+pub const fn c_str(text: &'static str) -> &'static CStr {
+    match CStr::from_bytes_with_nul(text.as_bytes()) {
+        Ok(text) => text,
+        Err(_) => panic!("the text must end in NUL and hold no other"),
+    }
+}
+
+/// The parameters of a law, as its `new` receives them.
+pub trait Parameters: Sized {
+    /// Declarations, in the order of the values.
+    const TABLE: &'static [Parameter];
+    /// Takes the values, in declared order. Optional ones that were left out are NaN.
+    fn read(values: &[f64]) -> Self;
+}
+
+/// The internal variables of a law; all scalars.
+pub trait InternalVariables: Copy + Send + Sync {
+    /// Declarations, in the order of the values.
+    const TABLE: &'static [Variable];
+    /// Collects the values, number by number.
+    fn read(value: impl Fn(usize) -> f64) -> Self;
+    /// Hands out the values, number by number.
+    fn write(&self, put: impl FnMut(usize, f64));
+    /// The declared initial values.
+    fn initial() -> Self {
+        Self::read(|i| Self::TABLE[i].initial_value)
+    }
+}
+
+impl InternalVariables for () {
+    const TABLE: &'static [Variable] = &[];
+    fn read(_: impl Fn(usize) -> f64) -> Self {}
+    fn write(&self, _: impl FnMut(usize, f64)) {}
+}
+
+/// Declares the parameters of a law: a struct of numbers whose doc comments, units and bounds are
+/// also what the host checks and prints.
+///
+/// ```
+/// use abi::Parameter;
+/// abi::parameters! {
+///     /// Parameters of a spring.
+///     pub struct Spring {
+///         /// Stiffness.
+///         stiffness: Parameter::new(c"k", c"kN/m").above(0.0),
+///         /// Strength; unlimited if left out.
+///         strength: Parameter::new(c"F", c"kN").at_least(0.0).optional(),
+///     }
+/// }
+/// ```
+#[macro_export]
+macro_rules! parameters {
+    ($(#[$meta:meta])* pub struct $name:ident {
+        $( $(#[doc = $doc:literal])+ $field:ident : $spec:expr ),* $(,)?
+    }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug)]
+        pub struct $name { $( $(#[doc = $doc])+ pub $field: f64, )* }
+        impl $crate::Parameters for $name {
+            const TABLE: &'static [$crate::raw::Parameter] = &[ $(
+                $spec.called(
+                    $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
+                    $crate::descriptor::c_str(concat!($($doc),+, "\0")),
+                ),
+            )* ];
+            fn read(values: &[f64]) -> Self {
+                let mut values = values.iter().copied();
+                Self { $( $field: values.next().unwrap_or(f64::NAN), )* }
+            }
+        }
+    };
+}
+
+/// Declares the internal variables of a law: a struct of numbers whose doc comments and units
+/// are also what the host prints.
+///
+/// ```
+/// use abi::Variable;
+/// abi::internal_variables! {
+///     /// Internal variables of a spring.
+///     pub struct State {
+///         /// Accumulated plastic elongation.
+///         elongation: Variable::scalar(c"x", c"m"),
+///     }
+/// }
+/// ```
+#[macro_export]
+macro_rules! internal_variables {
+    ($(#[$meta:meta])* pub struct $name:ident {
+        $( $(#[doc = $doc:literal])+ $field:ident : $spec:expr ),* $(,)?
+    }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name { $( $(#[doc = $doc])+ pub $field: f64, )* }
+        impl $crate::InternalVariables for $name {
+            const TABLE: &'static [$crate::raw::Variable] = &[ $(
+                $spec.called(
+                    $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
+                    $crate::descriptor::c_str(concat!($($doc),+, "\0")),
+                ),
+            )* ];
+            fn read(value: impl Fn(usize) -> f64) -> Self {
+                let mut numbers = 0usize..;
+                Self { $( $field: value(numbers.next().unwrap_or_default()), )* }
+            }
+            fn write(&self, mut put: impl FnMut(usize, f64)) {
+                for (i, value) in [$( self.$field ),*].into_iter().enumerate() {
+                    put(i, value);
+                }
+            }
+        }
+    };
+}
+
+impl Parameter {
+    /// A parameter without bounds or default.
+    pub const fn new(symbol: &'static CStr, unit: &'static CStr) -> Self {
+        Self {
+            struct_size: size_of::<Self>() as u32,
+            flags: 0,
+            id: c"".as_ptr(),
+            symbol: symbol.as_ptr(),
+            unit: unit.as_ptr(),
+            doc: c"".as_ptr(),
+            default_value: f64::NAN,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            usual_lower: f64::NEG_INFINITY,
+            usual_upper: f64::INFINITY,
+            choices: std::ptr::null(),
+        }
+    }
+
+    /// Admits values ≥ `lower`.
+    #[must_use]
+    pub const fn at_least(self, lower: f64) -> Self {
+        Self { lower, ..self }
+    }
+
+    /// Admits values > `lower`.
+    #[must_use]
+    pub const fn above(self, lower: f64) -> Self {
+        Self {
+            lower,
+            flags: self.flags | raw::PILUM_P_OPEN_LOWER,
+            ..self
+        }
+    }
+
+    /// Admits values ≤ `upper`.
+    #[must_use]
+    pub const fn at_most(self, upper: f64) -> Self {
+        Self { upper, ..self }
+    }
+
+    /// Admits values < `upper`.
+    #[must_use]
+    pub const fn below(self, upper: f64) -> Self {
+        Self {
+            upper,
+            flags: self.flags | raw::PILUM_P_OPEN_UPPER,
+            ..self
+        }
+    }
+
+    /// Values outside `lower..=upper` draw a warning.
+    #[must_use]
+    pub const fn usual(self, lower: f64, upper: f64) -> Self {
+        Self {
+            usual_lower: lower,
+            usual_upper: upper,
+            ..self
+        }
+    }
+
+    /// Value if left out.
+    #[must_use]
+    pub const fn default(self, default_value: f64) -> Self {
+        Self {
+            default_value,
+            ..self
+        }
+    }
+
+    /// May be left out; the law then receives NaN.
+    #[must_use]
+    pub const fn optional(self) -> Self {
+        Self {
+            flags: self.flags | raw::PILUM_P_OPTIONAL,
+            ..self
+        }
+    }
+
+    /// One of several labels; the value is the index of the label. The list ends with null, see
+    /// [`choices!`](crate::choices).
+    #[must_use]
+    pub const fn one_of(self, labels: &'static [*const c_char]) -> Self {
+        Self {
+            lower: 0.0,
+            upper: labels.len() as f64 - 2.0,
+            choices: labels.as_ptr(),
+            ..self
+        }
+    }
+
+    /// Gives the parameter its identifier and sentence.
+    #[must_use]
+    pub const fn called(self, id: &'static CStr, doc: &'static CStr) -> Self {
+        Self {
+            id: id.as_ptr(),
+            doc: doc.as_ptr(),
+            ..self
+        }
+    }
+}
+
+/// A null-terminated list of labels for [`Parameter::one_of`].
+#[macro_export]
+macro_rules! choices {
+    ($($label:literal),+ $(,)?) => { &[ $( $label.as_ptr() ),+ , std::ptr::null() ] };
+}
+
+impl Variable {
+    const fn new(symbol: &'static CStr, unit: &'static CStr) -> Self {
+        Self {
+            struct_size: size_of::<Self>() as u32,
+            flags: 0,
+            id: c"".as_ptr(),
+            symbol: symbol.as_ptr(),
+            unit: unit.as_ptr(),
+            doc: c"".as_ptr(),
+            shape: raw::PILUM_SCALAR,
+            n_components: 1,
+            component_names: std::ptr::null(),
+            initial_value: 0.0,
+        }
+    }
+
+    /// A scalar that starts from zero.
+    pub const fn scalar(symbol: &'static CStr, unit: &'static CStr) -> Self {
+        Self::new(symbol, unit)
+    }
+
+    /// Initial value where the law does not compute one.
+    #[must_use]
+    pub const fn initially(self, initial_value: f64) -> Self {
+        Self {
+            initial_value,
+            ..self
+        }
+    }
+
+    /// A result to look at that carries no history.
+    #[must_use]
+    pub const fn output_only(self) -> Self {
+        Self {
+            flags: self.flags | raw::PILUM_V_OUTPUT_ONLY,
+            ..self
+        }
+    }
+
+    /// Gives the variable its identifier and sentence.
+    #[must_use]
+    pub const fn called(self, id: &'static CStr, doc: &'static CStr) -> Self {
+        Self {
+            id: id.as_ptr(),
+            doc: doc.as_ptr(),
+            ..self
+        }
+    }
+
+    const fn with_components(self, shape: raw::Shape, names: &'static [*const c_char]) -> Self {
+        Self {
+            shape,
+            n_components: names.len() as u32,
+            component_names: names.as_ptr(),
+            ..self
+        }
+    }
+
+    /// The strain under a hypothesis.
+    const fn strain(names: &'static [*const c_char]) -> Self {
+        Self::new(c"ε", c"-")
+            .called(c"strain", c"Strain, tension positive, engineering shear.")
+            .with_components(raw::PILUM_SYMMETRIC_TENSOR, names)
+    }
+
+    const fn stress(names: &'static [*const c_char]) -> Self {
+        Self::new(c"σ", c"kPa")
+            .called(c"stress", c"Stress, tension positive.")
+            .with_components(raw::PILUM_SYMMETRIC_TENSOR, names)
+    }
+}
+
+const NAMES_4: &[*const c_char] = &[
+    c"11".as_ptr(),
+    c"22".as_ptr(),
+    c"33".as_ptr(),
+    c"12".as_ptr(),
+];
+const NAMES_6: &[*const c_char] = &[
+    c"11".as_ptr(),
+    c"22".as_ptr(),
+    c"33".as_ptr(),
+    c"12".as_ptr(),
+    c"13".as_ptr(),
+    c"23".as_ptr(),
+];
+const NAMES_NT: &[*const c_char] = &[c"n".as_ptr(), c"t".as_ptr()];
+const STRAIN_4: &Variable = &Variable::strain(NAMES_4);
+const STRESS_4: &Variable = &Variable::stress(NAMES_4);
+const STRAIN_6: &Variable = &Variable::strain(NAMES_6);
+const STRESS_6: &Variable = &Variable::stress(NAMES_6);
+const JUMP: &Variable = &Variable::new(c"[u]", c"m")
+    .called(
+        c"jump",
+        c"Relative displacement across the interface, opening positive.",
+    )
+    .with_components(raw::PILUM_VECTOR, NAMES_NT);
+const TRACTION: &Variable = &Variable::new(c"t", c"kPa")
+    .called(c"traction", c"Traction on the interface, tension positive.")
+    .with_components(raw::PILUM_VECTOR, NAMES_NT);
+
+impl raw::Formulation {
+    /// The formulation of a law under one hypothesis.
+    pub(crate) const fn new(
+        hypothesis: Hypothesis,
+        flags: u32,
+        state: &'static [Variable],
+    ) -> Self {
+        let (gradient, flux): (&'static Variable, &'static Variable) = match hypothesis {
+            Hypothesis::PlaneStrain | Hypothesis::Axisymmetric => (STRAIN_4, STRESS_4),
+            Hypothesis::ThreeD => (STRAIN_6, STRESS_6),
+            Hypothesis::Interface2d => (JUMP, TRACTION),
+        };
+        Self {
+            struct_size: size_of::<Self>() as u32,
+            hypothesis: hypothesis as i32,
+            flags,
+            n_gradients: 1,
+            n_fluxes: 1,
+            n_states: state.len() as u32,
+            gradient,
+            flux,
+            state: state.as_ptr(),
+        }
+    }
+}

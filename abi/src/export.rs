@@ -1,0 +1,749 @@
+//! From the C boundary to the traits of [`law`](crate::law) and back: pointers become arrays,
+//! failures become status codes and messages, panics stop here. This is one of the two files of
+//! the project that hold `unsafe` code; a law's crate forbids it and uses
+//! [`export_laws!`](crate::export_laws).
+#![expect(
+    unsafe_code,
+    clippy::multiple_unsafe_ops_per_block,
+    reason = "the plugin's side of the C boundary; offset and access are one operation"
+)]
+
+use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameters};
+use crate::law::{
+    ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, SolidPoint, SolidResponse, Tangent,
+};
+use crate::raw::{self, Batch, Formulation, Host, Instance, Status, View, ViewMut};
+use crate::status::most_severe;
+use std::any::Any;
+use std::cell::Cell;
+use std::ffi::{CStr, c_char};
+use std::fmt::{self, Write};
+use std::marker::PhantomData;
+use std::mem::size_of;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exports laws from a `cdylib` crate:
+/// `abi::export_laws!(interface Joint, continuum Soil);`.
+#[macro_export]
+macro_rules! export_laws {
+    ($($kind:ident $law:ty),+ $(,)?) => {
+        #[cfg(not(panic = "unwind"))]
+        compile_error!("laws need `panic = \"unwind\"`: a panic must be caught at the boundary");
+
+        const _: () = {
+            #[unsafe(export_name = "pilum_magic")]
+            pub static MAGIC: $crate::raw::MagicBlock = $crate::version::MAGIC_BLOCK;
+
+            const LAWS: &[*const $crate::raw::Law] = &[ $( {
+                static LAW: $crate::export::Shared<$crate::raw::Law> =
+                    $crate::export::Shared::new($crate::export_laws!(@law $kind $law));
+                LAW.as_ptr()
+            } ),+ ];
+            static PLUGIN: $crate::export::Shared<$crate::raw::Plugin> =
+                $crate::export::Shared::new($crate::export::plugin(LAWS));
+
+            #[unsafe(export_name = "pilum_entry")]
+            pub extern "C" fn entry(_: *const $crate::raw::Host) -> *const $crate::raw::Plugin {
+                PLUGIN.as_ptr()
+            }
+
+            // Which laws are here, readable without running anything.
+            #[used]
+            #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__pilum"))]
+            #[cfg_attr(not(target_vendor = "apple"), unsafe(link_section = ".pilum"))]
+            static MANIFEST: [u8; $crate::export::MANIFEST_SIZE] =
+                $crate::export::manifest(&[ $( <$law>::DESCRIPTION ),+ ]);
+
+            $crate::export_rust_layout!();
+            use $crate::law::{ContinuumLaw as _, InterfaceLaw as _};
+        };
+    };
+    (@law continuum $law:ty) => { $crate::export::law::<$crate::export::Continuum<$law>>() };
+    (@law interface $law:ty) => { $crate::export::law::<$crate::export::Interface<$law>>() };
+}
+
+/// Exports the description for the Rust-to-Rust check.
+#[cfg(feature = "abi_stable")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! export_rust_layout {
+    () => {
+        #[unsafe(export_name = "pilum_rust_layout")]
+        pub static RUST_LAYOUT: $crate::export::Shared<$crate::raw::RustLayout> =
+            $crate::export::Shared::new($crate::layout::RUST_LAYOUT);
+    };
+}
+
+/// Nothing to export without `abi_stable`.
+#[cfg(not(feature = "abi_stable"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! export_rust_layout {
+    () => {};
+}
+
+/// Size of the manifest in the section `.pilum` (`__DATA,__pilum` on Apple systems).
+pub const MANIFEST_SIZE: usize = 1024;
+
+/// The manifest: `pilum 1`, then one line `<id> <version>` for each law, padded with NUL.
+pub const fn manifest(laws: &[Description]) -> [u8; MANIFEST_SIZE] {
+    const fn push(out: &mut [u8; MANIFEST_SIZE], mut at: usize, text: &[u8], end: u8) -> usize {
+        let mut i = 0;
+        while i < text.len() {
+            out[at] = text[i];
+            at += 1;
+            i += 1;
+        }
+        out[at] = end;
+        at + 1
+    }
+    let mut out = [0; MANIFEST_SIZE];
+    let mut at = push(&mut out, 0, b"pilum 1", b'\n');
+    let mut l = 0;
+    while l < laws.len() {
+        at = push(&mut out, at, laws[l].id.to_bytes(), b' ');
+        at = push(&mut out, at, laws[l].version.to_bytes(), b'\n');
+        l += 1;
+    }
+    out
+}
+
+/// A description in static storage. It holds pointers, all of them to static data.
+#[repr(transparent)]
+#[derive(Debug)]
+pub struct Shared<T>(T);
+
+// SAFETY: built only from descriptions whose pointers lead to immutable static data.
+unsafe impl<T> Sync for Shared<T> {}
+
+impl<T> Shared<T> {
+    /// Wraps a description.
+    pub const fn new(value: T) -> Self {
+        Self(value)
+    }
+
+    /// Where the description stands.
+    pub const fn as_ptr(&self) -> *const T {
+        &raw const self.0
+    }
+}
+
+/// The description of a library with these laws.
+pub const fn plugin(laws: &'static [*const raw::Law]) -> raw::Plugin {
+    raw::Plugin {
+        struct_size: size_of::<raw::Plugin>() as u32,
+        n_laws: laws.len() as u32,
+        law: laws.as_ptr(),
+        get_extension: None,
+    }
+}
+
+/// What the boundary needs of a law, whichever trait its author chose.
+pub trait Exported: Sized + Send + Sync + 'static {
+    /// What the law is called.
+    const DESCRIPTION: Description;
+    /// Parameters.
+    type Parameters: Parameters;
+    /// Formulations.
+    const FORMULATIONS: &'static [Formulation];
+    /// Fixes the parameters.
+    ///
+    /// # Errors
+    /// The message, starting with the parameter's id and a colon.
+    fn new(parameters: Self::Parameters) -> Result<Self, String>;
+    /// Initial internal variables of point `i`.
+    ///
+    /// # Errors
+    /// Why the law cannot start there.
+    fn init(&self, access: &Access<'_>, i: usize) -> Result<(), Failure>;
+    /// Carries point `i` over the increment.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    fn update(
+        &self,
+        access: &Access<'_>,
+        i: usize,
+        tangent: Tangent,
+    ) -> Result<Option<&'static str>, Failure>;
+}
+
+/// Adapter for laws of solids.
+#[derive(Debug)]
+pub struct Continuum<L>(L);
+
+/// Adapter for laws of interfaces.
+#[derive(Debug)]
+pub struct Interface<L>(L);
+
+struct ContinuumFormulations<L>(PhantomData<L>);
+
+impl<L: ContinuumLaw> ContinuumFormulations<L> {
+    const FLAGS: u32 = flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC)
+        | flag(L::LINEAR, raw::PILUM_T_LINEAR)
+        | flag(L::LOCAL_AXES, raw::PILUM_T_LOCAL_AXES);
+    const TABLE: [Formulation; 3] = {
+        let state = <L::State as InternalVariables>::TABLE;
+        let mut table = [Formulation::new(L::HYPOTHESES[0], Self::FLAGS, state); 3];
+        let mut i = 1;
+        while i < L::HYPOTHESES.len() {
+            table[i] = Formulation::new(L::HYPOTHESES[i], Self::FLAGS, state);
+            i += 1;
+        }
+        table
+    };
+}
+
+const fn flag(set: bool, bit: u32) -> u32 {
+    if set { bit } else { 0 }
+}
+
+impl<L: ContinuumLaw> Exported for Continuum<L> {
+    const DESCRIPTION: Description = L::DESCRIPTION;
+    type Parameters = L::Parameters;
+    const FORMULATIONS: &'static [Formulation] = ContinuumFormulations::<L>::TABLE
+        .split_at(L::HYPOTHESES.len())
+        .0;
+
+    fn new(parameters: L::Parameters) -> Result<Self, String> {
+        L::new(parameters)
+            .map(Self)
+            .map_err(|refusal| refusal.to_string())
+    }
+
+    fn init(&self, access: &Access<'_>, i: usize) -> Result<(), Failure> {
+        let state = if access.n_components == 6 {
+            self.0.initial_state::<6>(&access.flux0(i))?
+        } else {
+            self.0.initial_state::<4>(&access.flux0(i))?
+        };
+        access.put_state(i, &state);
+        Ok(())
+    }
+
+    fn update(
+        &self,
+        access: &Access<'_>,
+        i: usize,
+        tangent: Tangent,
+    ) -> Result<Option<&'static str>, Failure> {
+        if access.n_components == 6 {
+            update_solid::<L, 6>(&self.0, access, i, tangent)
+        } else {
+            update_solid::<L, 4>(&self.0, access, i, tangent)
+        }
+    }
+}
+
+#[inline]
+fn update_solid<L: ContinuumLaw, const N: usize>(
+    law: &L,
+    access: &Access<'_>,
+    i: usize,
+    tangent: Tangent,
+) -> Result<Option<&'static str>, Failure> {
+    let (strain, strain_increment) = access.gradient(i);
+    let point = SolidPoint::<N, L::State> {
+        strain,
+        strain_increment,
+        stress: access.flux0(i),
+        state: access.state0(i),
+        time: access.batch.time,
+        time_increment: access.batch.time_increment,
+    };
+    let SolidResponse {
+        stress,
+        state,
+        tangent: operator,
+        unreliable,
+    } = law.update::<N>(&point, tangent)?;
+    access.put(
+        i,
+        &stress,
+        &state,
+        (tangent != Tangent::None).then_some(&operator),
+    )?;
+    Ok(unreliable)
+}
+
+impl<L: InterfaceLaw> Interface<L> {
+    const FLAGS: u32 =
+        flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC) | flag(L::LINEAR, raw::PILUM_T_LINEAR);
+    const TABLE: [Formulation; 1] = [Formulation::new(
+        Hypothesis::Interface2d,
+        Self::FLAGS,
+        <L::State as InternalVariables>::TABLE,
+    )];
+}
+
+impl<L: InterfaceLaw> Exported for Interface<L> {
+    const DESCRIPTION: Description = L::DESCRIPTION;
+    type Parameters = L::Parameters;
+    const FORMULATIONS: &'static [Formulation] = &Self::TABLE;
+
+    fn new(parameters: L::Parameters) -> Result<Self, String> {
+        L::new(parameters)
+            .map(Self)
+            .map_err(|refusal| refusal.to_string())
+    }
+
+    fn init(&self, access: &Access<'_>, i: usize) -> Result<(), Failure> {
+        let state = self.0.initial_state(&access.flux0(i))?;
+        access.put_state(i, &state);
+        Ok(())
+    }
+
+    fn update(
+        &self,
+        access: &Access<'_>,
+        i: usize,
+        tangent: Tangent,
+    ) -> Result<Option<&'static str>, Failure> {
+        let (jump, jump_increment) = access.gradient(i);
+        let point = InterfacePoint {
+            jump,
+            jump_increment,
+            traction: access.flux0(i),
+            state: access.state0(i),
+            time: access.batch.time,
+            time_increment: access.batch.time_increment,
+        };
+        let end = self.0.update(&point, tangent)?;
+        access.put(
+            i,
+            &end.traction,
+            &end.state,
+            (tangent != Tangent::None).then_some(&end.tangent),
+        )?;
+        Ok(end.unreliable)
+    }
+}
+
+/// A law in C's terms.
+pub const fn law<L: Exported>() -> raw::Law {
+    let description = L::DESCRIPTION;
+    let parameters = <L::Parameters as Parameters>::TABLE;
+    raw::Law {
+        struct_size: size_of::<raw::Law>() as u32,
+        flags: 0,
+        n_parameters: parameters.len() as u32,
+        n_formulations: L::FORMULATIONS.len() as u32,
+        id: description.id.as_ptr(),
+        name: description.name.as_ptr(),
+        version: description.version.as_ptr(),
+        author: description.author.as_ptr(),
+        licence: description.licence.as_ptr(),
+        doc: description.doc.as_ptr(),
+        references: description.references.as_ptr(),
+        parameter: parameters.as_ptr(),
+        formulation: L::FORMULATIONS.as_ptr(),
+        create: Some(create::<L>),
+        init_state: Some(init_state::<L>),
+        integrate: Some(integrate::<L>),
+        destroy: Some(destroy::<L>),
+    }
+}
+
+/// What hides behind [`raw::Instance`].
+struct Boxed<L> {
+    law: L,
+    n_components: usize,
+    n_states: usize,
+    /// A panic was caught: the law is defective and is not called again.
+    poisoned: AtomicBool,
+}
+
+unsafe extern "C" fn create<L: Exported>(
+    _: *const raw::Law,
+    _: *const Host,
+    formulation: u32,
+    parameter: *const f64,
+    n_parameters: u32,
+    out: *mut *mut Instance,
+    message: *mut c_char,
+    message_capacity: usize,
+) -> Status {
+    let mut message = Message {
+        p: message,
+        capacity: message_capacity,
+        length: 0,
+    };
+    let table = <L::Parameters as Parameters>::TABLE;
+    let Some(formulation) = L::FORMULATIONS.get(formulation as usize) else {
+        message.write(format_args!("there is no formulation number {formulation}"));
+        return raw::PILUM_E_ARGUMENT;
+    };
+    if n_parameters as usize != table.len() || out.is_null() {
+        message.write(format_args!(
+            "{n_parameters} parameters given, {} expected",
+            table.len()
+        ));
+        return raw::PILUM_E_ARGUMENT;
+    }
+    let values: &[f64] = if table.is_empty() || parameter.is_null() {
+        &[]
+    } else {
+        // SAFETY: contract of `create`: `parameter` holds `n_parameters` values.
+        unsafe { std::slice::from_raw_parts(parameter, table.len()) }
+    };
+    if let Err((id, value)) = within_bounds(table, values) {
+        message.write(format_args!("{id}: {value} is not admissible"));
+        return raw::PILUM_E_PARAMETER;
+    }
+    match catch_unwind(|| L::new(L::Parameters::read(values))) {
+        Ok(Ok(law)) => {
+            let boxed = Boxed {
+                law,
+                n_components: Hypothesis::from_code(formulation.hypothesis)
+                    .map_or(0, Hypothesis::n_components),
+                n_states: formulation.n_states as usize,
+                poisoned: AtomicBool::new(false),
+            };
+            // SAFETY: contract of `create`: `out` is valid for one pointer.
+            unsafe { out.write(Box::into_raw(Box::new(boxed)).cast()) };
+            raw::PILUM_OK
+        }
+        Ok(Err(reason)) => {
+            message.write(format_args!("{reason}"));
+            raw::PILUM_E_PARAMETER
+        }
+        Err(payload) => {
+            message.write(format_args!("panicked in `new`: {}", panic_text(&*payload)));
+            raw::PILUM_E_INTERNAL
+        }
+    }
+}
+
+/// The first parameter outside its declared bounds. The host checks them too and says it better;
+/// this keeps the law sound under any host.
+fn within_bounds(table: &[raw::Parameter], values: &[f64]) -> Result<(), (&'static str, f64)> {
+    for (declared, &value) in table.iter().zip(values) {
+        let left_out = value.is_nan() && declared.flags & raw::PILUM_P_OPTIONAL != 0;
+        let below = if declared.flags & raw::PILUM_P_OPEN_LOWER != 0 {
+            value <= declared.lower
+        } else {
+            value < declared.lower
+        };
+        let above = if declared.flags & raw::PILUM_P_OPEN_UPPER != 0 {
+            value >= declared.upper
+        } else {
+            value > declared.upper
+        };
+        if !left_out && (!value.is_finite() || below || above) {
+            // SAFETY: `table` comes from `parameters!`, whose strings are static.
+            let id = unsafe { CStr::from_ptr(declared.id) };
+            return Err((id.to_str().unwrap_or("parameter"), value));
+        }
+    }
+    Ok(())
+}
+
+unsafe extern "C" fn destroy<L: Exported>(instance: *mut Instance) {
+    if !instance.is_null() {
+        // SAFETY: contract of `destroy`: the pointer came from `create` and is not used again.
+        drop(unsafe { Box::from_raw(instance.cast::<Boxed<L>>()) });
+    }
+}
+
+unsafe extern "C" fn init_state<L: Exported>(
+    instance: *const Instance,
+    batch: *const Batch,
+) -> Status {
+    // SAFETY: contract of `init_state`: both pointers are valid for this call.
+    unsafe {
+        run::<L>(instance, batch, Work::Init, |law, access, i| {
+            law.init(access, i).map(|()| None)
+        })
+    }
+}
+
+unsafe extern "C" fn integrate<L: Exported>(
+    instance: *const Instance,
+    batch: *const Batch,
+) -> Status {
+    // SAFETY: contract of `integrate`: both pointers are valid for this call.
+    unsafe {
+        run::<L>(instance, batch, Work::Integrate, |law, access, i| {
+            law.update(access, i, access.tangent)
+        })
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Work {
+    Init,
+    Integrate,
+}
+
+/// Runs `point` on every point of the batch and writes outcomes and one message.
+///
+/// # Safety
+/// `instance` is null or came from `create::<L>`; `batch` is null or as [`Batch`] promises.
+unsafe fn run<L: Exported>(
+    instance: *const Instance,
+    batch: *const Batch,
+    work: Work,
+    point: impl Fn(&L, &Access<'_>, usize) -> Result<Option<&'static str>, Failure>,
+) -> Status {
+    // SAFETY: null or valid, see above.
+    let (boxed, batch) = unsafe { (instance.cast::<Boxed<L>>().as_ref(), batch.as_ref()) };
+    let (Some(boxed), Some(batch)) = (boxed, batch) else {
+        return raw::PILUM_E_ARGUMENT;
+    };
+    let mut message = Message {
+        p: batch.message,
+        capacity: batch.message_capacity,
+        length: 0,
+    };
+    let access = match Access::new(batch, boxed.n_components, boxed.n_states, work) {
+        Ok(access) => access,
+        Err((status, why)) => {
+            message.write(format_args!("{why}"));
+            return status;
+        }
+    };
+    if boxed.poisoned.load(Ordering::Relaxed) {
+        message.write(format_args!(
+            "the law panicked before and is not called again"
+        ));
+        return raw::PILUM_E_INTERNAL;
+    }
+    let current = Cell::new(0);
+    let result = catch_unwind(AssertUnwindSafe(|| {
+        let mut worst = raw::PILUM_OK;
+        for i in 0..batch.n_points as usize {
+            current.set(i);
+            let outcome = if access.inputs_are_finite(i) {
+                point(&boxed.law, &access, i)
+            } else {
+                Err(Failure::Numeric("an input is not finite"))
+            };
+            let (status, reason) = match outcome {
+                Ok(None) => (raw::PILUM_OK, None),
+                Ok(Some(reason)) => (raw::PILUM_OK_UNRELIABLE, Some(reason)),
+                Err(failure) => (code(failure), Some(failure.reason())),
+            };
+            access.put_outcome(i, status, outcome.err());
+            if most_severe(worst, status) != worst {
+                worst = status;
+                if let Some(reason) = reason {
+                    message.length = 0;
+                    message.write(format_args!(
+                        "point {}: {reason}",
+                        batch.first_point + i as u64
+                    ));
+                }
+            }
+        }
+        worst
+    }));
+    result.unwrap_or_else(|payload| {
+        boxed.poisoned.store(true, Ordering::Relaxed);
+        let point = batch.first_point + current.get() as u64;
+        message.length = 0;
+        message.write(format_args!(
+            "point {point}: panicked: {}",
+            panic_text(&*payload)
+        ));
+        for i in current.get()..batch.n_points as usize {
+            access.put_outcome(i, raw::PILUM_E_INTERNAL, None);
+        }
+        raw::PILUM_E_INTERNAL
+    })
+}
+
+fn code(failure: Failure) -> Status {
+    match failure {
+        Failure::CutStep { .. } => raw::PILUM_CUT_STEP,
+        Failure::Domain(_) => raw::PILUM_E_DOMAIN,
+        Failure::Numeric(_) => raw::PILUM_E_NUMERIC,
+    }
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}
+
+/// The caller's message buffer.
+struct Message {
+    p: *mut c_char,
+    capacity: usize,
+    length: usize,
+}
+
+impl Message {
+    fn write(&mut self, text: fmt::Arguments<'_>) {
+        if !self.p.is_null() && self.capacity > 0 {
+            // A message that does not fit is cut short; `write_str` never fails.
+            let _ = self.write_fmt(text);
+            // SAFETY: `length < capacity` bytes of the caller's buffer are in use.
+            unsafe { self.p.add(self.length).write(0) };
+        }
+    }
+}
+
+impl Write for Message {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        let mut fits = text.len().min(self.capacity - 1 - self.length);
+        while !text.is_char_boundary(fits) {
+            fits -= 1;
+        }
+        for &byte in &text.as_bytes()[..fits] {
+            // SAFETY: `length + 1 < capacity` holds before each byte.
+            unsafe { self.p.add(self.length).write(byte as c_char) };
+            self.length += 1;
+        }
+        Ok(())
+    }
+}
+
+/// The batch as arrays: checked once per call, then read and written point by point.
+#[derive(Debug)]
+pub struct Access<'a> {
+    batch: &'a Batch,
+    n_components: usize,
+    n_states: usize,
+    tangent: Tangent,
+}
+
+impl<'a> Access<'a> {
+    fn new(
+        batch: &'a Batch,
+        n_components: usize,
+        n_states: usize,
+        work: Work,
+    ) -> Result<Self, (Status, &'static str)> {
+        const KNOWN: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC;
+        if (batch.struct_size as usize) < size_of::<Batch>() {
+            return Err((raw::PILUM_E_ARGUMENT, "`pilum_batch` is too short"));
+        }
+        if batch.request & !KNOWN != 0 {
+            return Err((raw::PILUM_E_UNSUPPORTED, "an unknown request"));
+        }
+        let tangent = if batch.request & raw::PILUM_REQ_ELASTIC != 0 {
+            Tangent::Elastic
+        } else if batch.request & raw::PILUM_REQ_TANGENT != 0 {
+            Tangent::Consistent
+        } else {
+            Tangent::None
+        };
+        let integrating = work == Work::Integrate;
+        let null = batch.n_points > 0
+            && (batch.flux0.p.is_null()
+                || (n_states > 0 && batch.state1.p.is_null())
+                || (integrating
+                    && (batch.gradient0.p.is_null()
+                        || batch.gradient1.p.is_null()
+                        || batch.flux1.p.is_null()
+                        || (n_states > 0 && batch.state0.p.is_null())
+                        || (tangent != Tangent::None && batch.tangent.p.is_null()))));
+        if null {
+            return Err((raw::PILUM_E_ARGUMENT, "a view that is needed is null"));
+        }
+        Ok(Self {
+            batch,
+            n_components,
+            n_states,
+            tangent,
+        })
+    }
+
+    fn inputs_are_finite(&self, i: usize) -> bool {
+        let finite =
+            |view: &View, n| view.p.is_null() || (0..n).all(|c| self.get(view, i, c).is_finite());
+        finite(&self.batch.gradient0, self.n_components)
+            && finite(&self.batch.gradient1, self.n_components)
+            && finite(&self.batch.flux0, self.n_components)
+            && finite(&self.batch.state0, self.n_states)
+    }
+
+    #[expect(
+        clippy::unused_self,
+        reason = "a value can only be read while the batch is alive"
+    )]
+    fn get(&self, view: &View, i: usize, c: usize) -> f64 {
+        // SAFETY: contract of `View`: point `i` and component `c` are within the declared counts.
+        unsafe {
+            *view
+                .p
+                .offset(i as isize * view.point + c as isize * view.component)
+        }
+    }
+
+    #[expect(
+        clippy::unused_self,
+        reason = "a value can only be written while the batch is alive"
+    )]
+    fn set(&self, view: &ViewMut, i: usize, c: usize, value: f64) {
+        // SAFETY: contract of `ViewMut`: within the declared counts, overlapping nothing.
+        unsafe {
+            *view
+                .p
+                .offset(i as isize * view.point + c as isize * view.component) = value;
+        }
+    }
+
+    fn flux0<const N: usize>(&self, i: usize) -> [f64; N] {
+        std::array::from_fn(|c| self.get(&self.batch.flux0, i, c))
+    }
+
+    /// Gradient at the start, and its increment.
+    fn gradient<const N: usize>(&self, i: usize) -> ([f64; N], [f64; N]) {
+        let start: [f64; N] = std::array::from_fn(|c| self.get(&self.batch.gradient0, i, c));
+        let increment = std::array::from_fn(|c| self.get(&self.batch.gradient1, i, c) - start[c]);
+        (start, increment)
+    }
+
+    fn state0<S: InternalVariables>(&self, i: usize) -> S {
+        S::read(|v| self.get(&self.batch.state0, i, v))
+    }
+
+    fn put_state<S: InternalVariables>(&self, i: usize, state: &S) {
+        state.write(|v, value| self.set(&self.batch.state1, i, v, value));
+    }
+
+    fn put<const N: usize, S: InternalVariables>(
+        &self,
+        i: usize,
+        flux: &[f64; N],
+        state: &S,
+        tangent: Option<&[[f64; N]; N]>,
+    ) -> Result<(), Failure> {
+        let mut finite = flux.iter().all(|v| v.is_finite());
+        state.write(|_, value| finite &= value.is_finite());
+        if let Some(tangent) = tangent {
+            finite &= tangent.iter().flatten().all(|v| v.is_finite());
+        }
+        if !finite {
+            return Err(Failure::Numeric("a result is not finite"));
+        }
+        for (c, &value) in flux.iter().enumerate() {
+            self.set(&self.batch.flux1, i, c, value);
+        }
+        self.put_state(i, state);
+        if let Some(tangent) = tangent {
+            for (c, &value) in tangent.iter().flatten().enumerate() {
+                self.set(&self.batch.tangent, i, c, value);
+            }
+        }
+        Ok(())
+    }
+
+    fn put_outcome(&self, i: usize, status: Status, failure: Option<Failure>) {
+        if !self.batch.status.is_null() {
+            // SAFETY: contract of `Batch::status`: `n_points` entries.
+            unsafe { self.batch.status.add(i).write(status) };
+        }
+        if let Some(Failure::CutStep { factor, .. }) = failure
+            && !self.batch.step_factor.is_null()
+        {
+            // SAFETY: contract of `Batch::step_factor`: `n_points` entries.
+            unsafe { self.batch.step_factor.add(i).write(factor) };
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! What an author writes: one trait for laws of solids, one for laws of interfaces.
+//!
+//! Across this boundary tension and opening are positive, shear strains are γ = 2ε, angles in
+//! parameters are in degrees, and interface components come normal first. A law is free to use
+//! other signs inside.
+
+use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameters};
+use std::fmt;
+
+/// Why a law cannot be built from its parameters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// Identifier of the parameter to change.
+    pub parameter: &'static str,
+    /// What is wrong with it, value before bound.
+    pub reason: String,
+}
+
+impl Refusal {
+    /// Refuses a parameter.
+    pub fn new(parameter: &'static str, reason: impl Into<String>) -> Self {
+        Self {
+            parameter,
+            reason: reason.into(),
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.parameter, self.reason)
+    }
+}
+
+/// Why a law cannot carry a point over an increment. Reasons are static, since nothing may be
+/// allocated during an update.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Failure {
+    /// A smaller step would help.
+    CutStep {
+        /// The fraction of the increment, in (0, 1), that the law believes it can follow.
+        factor: f64,
+        /// Why.
+        reason: &'static str,
+    },
+    /// The state or the gradient is outside the law's domain; a smaller step does not help.
+    Domain(&'static str),
+    /// The local computation broke down; a smaller step does not help.
+    Numeric(&'static str),
+}
+
+impl Failure {
+    /// The reason in words.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::CutStep { reason, .. } | Self::Domain(reason) | Self::Numeric(reason) => reason,
+        }
+    }
+}
+
+/// Which operator the host wants beside the update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tangent {
+    /// None: leave the matrix as it is.
+    None,
+    /// The elastic operator in the end state.
+    Elastic,
+    /// The derivative of the update.
+    Consistent,
+}
+
+/// One integration point of a solid at the start of an increment, and the increment.
+#[derive(Clone, Copy, Debug)]
+pub struct SolidPoint<const N: usize, S> {
+    /// Strain at the start.
+    pub strain: [f64; N],
+    /// Strain increment.
+    pub strain_increment: [f64; N],
+    /// Stress at the start, kPa.
+    pub stress: [f64; N],
+    /// Internal variables at the start.
+    pub state: S,
+    /// Time at the start.
+    pub time: f64,
+    /// Time increment.
+    pub time_increment: f64,
+}
+
+/// The same point at the end of the increment.
+#[derive(Clone, Copy, Debug)]
+pub struct SolidResponse<const N: usize, S> {
+    /// Stress, kPa.
+    pub stress: [f64; N],
+    /// Internal variables.
+    pub state: S,
+    /// ∂stress/∂strain, row by row, kPa; ignored unless requested.
+    pub tangent: [[f64; N]; N],
+    /// The outputs are valid but inaccurate, for this reason.
+    pub unreliable: Option<&'static str>,
+}
+
+/// One integration point of an interface at the start of an increment, and the increment.
+#[derive(Clone, Copy, Debug)]
+pub struct InterfacePoint<S> {
+    /// Relative displacement at the start, normal first, m.
+    pub jump: [f64; 2],
+    /// Increment of the relative displacement, m.
+    pub jump_increment: [f64; 2],
+    /// Traction at the start, kPa.
+    pub traction: [f64; 2],
+    /// Internal variables at the start.
+    pub state: S,
+    /// Time at the start.
+    pub time: f64,
+    /// Time increment.
+    pub time_increment: f64,
+}
+
+/// The same point at the end of the increment.
+#[derive(Clone, Copy, Debug)]
+pub struct InterfaceResponse<S> {
+    /// Traction, kPa.
+    pub traction: [f64; 2],
+    /// Internal variables.
+    pub state: S,
+    /// ∂traction/∂jump, row by row, kPa/m; ignored unless requested.
+    pub tangent: [[f64; 2]; 2],
+    /// The outputs are valid but inaccurate, for this reason.
+    pub unreliable: Option<&'static str>,
+}
+
+/// A law for solids. Immutable once built; `update` is a pure function of its arguments.
+pub trait ContinuumLaw: Sized + Send + Sync + 'static {
+    /// What the law is called.
+    const DESCRIPTION: Description;
+    /// Hypotheses offered: any of plane strain, axisymmetry, three dimensions.
+    const HYPOTHESES: &'static [Hypothesis] = &[
+        Hypothesis::PlaneStrain,
+        Hypothesis::Axisymmetric,
+        Hypothesis::ThreeD,
+    ];
+    /// The tangent is symmetric in every state.
+    const SYMMETRIC: bool = false;
+    /// The response is linear: one constant tangent, no internal variables.
+    const LINEAR: bool = false;
+    /// Components are in axes of the material: 1 along the layer, 2 normal to it.
+    const LOCAL_AXES: bool = false;
+    /// Declared with [`parameters!`](crate::parameters).
+    type Parameters: Parameters;
+    /// Declared with [`internal_variables!`](crate::internal_variables), or `()`.
+    type State: InternalVariables;
+
+    /// Fixes the parameters. Each lies within its declared bounds; what is left to check is how
+    /// they go together.
+    ///
+    /// # Errors
+    /// Names the parameter to change.
+    fn new(parameters: Self::Parameters) -> Result<Self, Refusal>;
+
+    /// Internal variables of a point that carries this stress before anything has happened.
+    ///
+    /// # Errors
+    /// [`Failure::Domain`] if the law cannot start from this stress.
+    fn initial_state<const N: usize>(&self, stress: &[f64; N]) -> Result<Self::State, Failure> {
+        let _ = stress;
+        Ok(Self::State::initial())
+    }
+
+    /// Carries one point over an increment. `N` is 4 (11 22 33 12) or 6 (11 22 33 12 13 23). Does
+    /// not allocate, lock or print.
+    ///
+    /// # Errors
+    /// Why it cannot; the outputs are then ignored.
+    fn update<const N: usize>(
+        &self,
+        point: &SolidPoint<N, Self::State>,
+        tangent: Tangent,
+    ) -> Result<SolidResponse<N, Self::State>, Failure>;
+}
+
+/// A law for interfaces in two dimensions. Immutable once built; `update` is a pure function of
+/// its arguments.
+pub trait InterfaceLaw: Sized + Send + Sync + 'static {
+    /// What the law is called.
+    const DESCRIPTION: Description;
+    /// The tangent is symmetric in every state.
+    const SYMMETRIC: bool = false;
+    /// The response is linear: one constant tangent, no internal variables.
+    const LINEAR: bool = false;
+    /// Declared with [`parameters!`](crate::parameters).
+    type Parameters: Parameters;
+    /// Declared with [`internal_variables!`](crate::internal_variables), or `()`.
+    type State: InternalVariables;
+
+    /// Fixes the parameters. Each lies within its declared bounds; what is left to check is how
+    /// they go together.
+    ///
+    /// # Errors
+    /// Names the parameter to change.
+    fn new(parameters: Self::Parameters) -> Result<Self, Refusal>;
+
+    /// Internal variables of a point that carries this traction (normal first, kPa) before
+    /// anything has happened.
+    ///
+    /// # Errors
+    /// [`Failure::Domain`] if the law cannot start from this traction.
+    fn initial_state(&self, traction: &[f64; 2]) -> Result<Self::State, Failure> {
+        let _ = traction;
+        Ok(Self::State::initial())
+    }
+
+    /// Carries one point over an increment. Does not allocate, lock or print.
+    ///
+    /// # Errors
+    /// Why it cannot; the outputs are then ignored.
+    fn update(
+        &self,
+        point: &InterfacePoint<Self::State>,
+        tangent: Tangent,
+    ) -> Result<InterfaceResponse<Self::State>, Failure>;
+}

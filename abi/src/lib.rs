@@ -1,0 +1,17 @@
+#![doc = include_str!("../README.md")]
+
+pub mod descriptor;
+pub mod export;
+pub mod law;
+#[cfg(feature = "abi_stable")]
+pub mod layout;
+pub mod raw;
+pub mod status;
+pub mod version;
+
+pub use descriptor::{Description, Hypothesis, InternalVariables, Parameters};
+pub use law::{
+    ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Refusal, SolidPoint,
+    SolidResponse, Tangent,
+};
+pub use raw::{Parameter, Variable};

@@ -1,0 +1,271 @@
+//! The handshake and the one rule of compatibility.
+
+use crate::raw::{self, MagicBlock};
+use std::ffi::c_char;
+use std::fmt;
+use std::mem::{offset_of, size_of};
+
+/// Lists offset and size of every public field of one struct.
+macro_rules! fields {
+    ($type:ident: $($field:ident),+ $(,)?) => {
+        &[ $( (
+            concat!(stringify!($type), ".", stringify!($field)),
+            offset_of!(raw::$type, $field),
+            field_size(|s: &raw::$type| &s.$field),
+        ) ),+ , (concat!(stringify!($type)), 0, size_of::<raw::$type>()) ]
+    };
+}
+
+const fn field_size<S, T>(_: fn(&S) -> &T) -> usize {
+    size_of::<T>()
+}
+
+/// Name (`Struct.field`, or `Struct` for the whole), offset and size in bytes.
+pub type FieldLayout = (&'static str, usize, usize);
+
+/// Every public field of every struct that crosses the boundary.
+pub const LAYOUT: &[&[FieldLayout]] = &[
+    fields!(MagicBlock: struct_size, magic, abi_major, abi_minor, pointer_bytes, real_bytes,
+        reserved, layout_hash, sdk),
+    fields!(Parameter: struct_size, flags, id, symbol, unit, doc, default_value, lower, upper,
+        usual_lower, usual_upper, choices),
+    fields!(Variable: struct_size, flags, id, symbol, unit, doc, shape, n_components,
+        component_names, initial_value),
+    fields!(Formulation: struct_size, hypothesis, flags, n_gradients, n_fluxes, n_states, gradient,
+        flux, state),
+    fields!(View: p, point, component),
+    fields!(ViewMut: p, point, component),
+    fields!(Batch: struct_size, request, n_points, first_point, time, time_increment, gradient0,
+        gradient1, flux0, state0, flux1, state1, tangent, status, step_factor, message,
+        message_capacity),
+    fields!(Host: struct_size, abi_major, abi_minor, name, version, get_extension),
+    fields!(Law: struct_size, flags, n_parameters, n_formulations, id, name, version, author,
+        licence, doc, references, parameter, formulation, create, init_state, integrate, destroy),
+    fields!(Plugin: struct_size, n_laws, law, get_extension),
+];
+
+/// FNV-1a over the names, offsets and sizes in [`LAYOUT`]; `PILUM_LAYOUT_HASH` of the C header.
+pub const LAYOUT_HASH: u64 = layout_hash();
+
+const fn layout_hash() -> u64 {
+    const fn mix(hash: u64, byte: u8) -> u64 {
+        (hash ^ byte as u64).wrapping_mul(0x0000_0100_0000_01b3)
+    }
+    let mut hash = 0xcbf2_9ce4_8422_2325;
+    let mut s = 0;
+    while s < LAYOUT.len() {
+        let mut f = 0;
+        while f < LAYOUT[s].len() {
+            let (name, offset, size) = LAYOUT[s][f];
+            let mut c = 0;
+            while c < name.len() {
+                hash = mix(hash, name.as_bytes()[c]);
+                c += 1;
+            }
+            hash = mix(mix(hash, offset as u8), (offset >> 8) as u8);
+            hash = mix(mix(hash, size as u8), (size >> 8) as u8);
+            f += 1;
+        }
+        s += 1;
+    }
+    hash
+}
+
+/// What a library built with this crate was built with.
+pub const SDK: &str = concat!("pilum-rs ", env!("CARGO_PKG_VERSION"));
+
+/// The block that a library or host built with this crate carries.
+pub const MAGIC_BLOCK: MagicBlock = MagicBlock {
+    struct_size: size_of::<MagicBlock>() as u32,
+    magic: raw::PILUM_MAGIC,
+    abi_major: raw::PILUM_ABI_MAJOR,
+    abi_minor: raw::PILUM_ABI_MINOR,
+    pointer_bytes: size_of::<*const u8>() as u8,
+    real_bytes: size_of::<f64>() as u8,
+    reserved: [0; 2],
+    layout_hash: LAYOUT_HASH,
+    sdk: padded(SDK),
+};
+
+const fn padded(text: &str) -> [c_char; 40] {
+    let mut out = [0; 40];
+    let mut i = 0;
+    while i < text.len() && i < 39 {
+        out[i] = text.as_bytes()[i] as c_char;
+        i += 1;
+    }
+    out
+}
+
+/// The first field in which a library's block rules it out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mismatch {
+    /// Name of the field in [`MagicBlock`].
+    pub field: &'static str,
+    /// Value here.
+    pub expected: u64,
+    /// Value in the library.
+    pub found: u64,
+    /// Hint for the person who has to mend it.
+    pub hint: &'static str,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            field,
+            expected,
+            found,
+            hint,
+        } = self;
+        write!(
+            f,
+            "`pilum_magic.{field}` is {found:#x}, expected {expected:#x} ({hint})"
+        )
+    }
+}
+
+/// Whether a library with this block can be used.
+///
+/// # Errors
+/// The first field that differs, in an order in which a later field is only meaningful if the
+/// earlier ones agree.
+pub fn check(theirs: &MagicBlock) -> Result<(), Mismatch> {
+    let ours = &MAGIC_BLOCK;
+    let differs = |field, expected: u64, found: u64, hint| {
+        Err(Mismatch {
+            field,
+            expected,
+            found,
+            hint,
+        })
+    };
+    if theirs.magic != ours.magic {
+        let hint = if theirs.magic == ours.magic.swap_bytes() {
+            "the library is for the other endianness"
+        } else {
+            "this is no Pilum law library"
+        };
+        return differs("magic", ours.magic.into(), theirs.magic.into(), hint);
+    }
+    if theirs.struct_size < ours.struct_size {
+        return differs(
+            "struct_size",
+            ours.struct_size.into(),
+            theirs.struct_size.into(),
+            "the handshake block is truncated",
+        );
+    }
+    for (field, expected, found, hint) in [
+        (
+            "pointer_bytes",
+            ours.pointer_bytes,
+            theirs.pointer_bytes,
+            "another pointer width",
+        ),
+        (
+            "real_bytes",
+            ours.real_bytes,
+            theirs.real_bytes,
+            "reals must be doubles",
+        ),
+    ] {
+        if expected != found {
+            return differs(field, expected.into(), found.into(), hint);
+        }
+    }
+    if theirs.abi_major != ours.abi_major {
+        return differs(
+            "abi_major",
+            ours.abi_major.into(),
+            theirs.abi_major.into(),
+            "rebuild the library against this version of the contract",
+        );
+    }
+    if theirs.abi_minor == ours.abi_minor && theirs.layout_hash != ours.layout_hash {
+        return differs(
+            "layout_hash",
+            ours.layout_hash,
+            theirs.layout_hash,
+            "compiler flags or an edited header changed the structs",
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accepts_itself_and_other_minors() {
+        assert_eq!(check(&MAGIC_BLOCK), Ok(()));
+        let later = MagicBlock {
+            abi_minor: 7,
+            layout_hash: 1,
+            struct_size: 80,
+            ..MAGIC_BLOCK
+        };
+        assert_eq!(check(&later), Ok(()));
+    }
+
+    #[test]
+    fn names_the_differing_field() {
+        let cases = [
+            (
+                MagicBlock {
+                    magic: 1,
+                    ..MAGIC_BLOCK
+                },
+                "magic",
+            ),
+            (
+                MagicBlock {
+                    struct_size: 16,
+                    ..MAGIC_BLOCK
+                },
+                "struct_size",
+            ),
+            (
+                MagicBlock {
+                    pointer_bytes: 4,
+                    ..MAGIC_BLOCK
+                },
+                "pointer_bytes",
+            ),
+            (
+                MagicBlock {
+                    real_bytes: 4,
+                    ..MAGIC_BLOCK
+                },
+                "real_bytes",
+            ),
+            (
+                MagicBlock {
+                    abi_major: 2,
+                    ..MAGIC_BLOCK
+                },
+                "abi_major",
+            ),
+            (
+                MagicBlock {
+                    layout_hash: 0,
+                    ..MAGIC_BLOCK
+                },
+                "layout_hash",
+            ),
+        ];
+        for (block, field) in cases {
+            assert_eq!(check(&block).unwrap_err().field, field);
+        }
+    }
+
+    #[test]
+    fn says_when_only_the_endianness_differs() {
+        let swapped = MagicBlock {
+            magic: raw::PILUM_MAGIC.swap_bytes(),
+            ..MAGIC_BLOCK
+        };
+        assert!(check(&swapped).unwrap_err().hint.contains("endianness"));
+    }
+}
