@@ -1,0 +1,300 @@
+//! What all input files share: reading TOML with the place of every error, and building laws from
+//! their parameters.
+
+use crate::error::{Error, Source, suggestion};
+use crate::plugin::{Law, LawDescription, LoadedLaw, ParameterDescription, SearchPath};
+use abi::Hypothesis;
+use indexmap::IndexMap;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use std::ops::Range;
+use toml::Spanned;
+
+/// Reads a whole file. Unknown keys are errors if `T` says `deny_unknown_fields`.
+///
+/// # Errors
+/// [`Error::Input`] at the place that does not fit.
+pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, Error> {
+    toml::from_str(source.text()).map_err(|error| {
+        let span = error.span().unwrap_or(0..0);
+        source.error(span, error.message().to_owned()).into()
+    })
+}
+
+/// Values by name, each with the place of name and value.
+pub type Named<T> = IndexMap<Spanned<String>, Spanned<T>>;
+
+/// The value of a parameter as written in a file.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(untagged)]
+pub enum ParameterValue {
+    /// A number.
+    Number(f64),
+    /// A whole number.
+    Integer(i64),
+    /// The label of a choice.
+    Label(String),
+}
+
+/// Parameters of a law as written in a file.
+pub type ParameterTable = Named<ParameterValue>;
+
+/// A parameter as it was used, for the record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UsedParameter {
+    /// Identifier.
+    pub id: String,
+    /// Value; NaN if it was left out and has no default.
+    pub value: f64,
+    /// It was left out.
+    pub by_default: bool,
+}
+
+/// A law built from a file, with what the user should know about its parameters.
+#[derive(Debug)]
+pub struct BuiltLaw {
+    /// The law.
+    pub law: Law,
+    /// Parameters in declared order.
+    pub parameters: Vec<UsedParameter>,
+    /// Values outside their usual range, in words.
+    pub warnings: Vec<String>,
+}
+
+/// Finds a law and fixes its parameters under a hypothesis.
+///
+/// # Errors
+/// [`Error::Plugin`] if the law is not found or its library is defective; [`Error::Input`] if the
+/// hypothesis or a parameter does not fit, at its place in the file.
+pub fn build_law(
+    source: &Source,
+    search: &SearchPath,
+    id: &Spanned<String>,
+    hypothesis: Hypothesis,
+    parameters: &ParameterTable,
+) -> Result<BuiltLaw, Error> {
+    let loaded = find_law(source, search, id)?;
+    let description = loaded.description();
+    if description.formulation(hypothesis).is_none() {
+        return Err(source
+            .error(
+                id.span(),
+                format!(
+                    "law `{}` is made for {}, expected {}",
+                    description.id,
+                    description.hypotheses(),
+                    hypothesis.name()
+                ),
+            )
+            .into());
+    }
+    let mut used = Vec::new();
+    let mut warnings = Vec::new();
+    refuse_unknown(source, description, parameters)?;
+    for declared in &description.parameters {
+        let given = parameters
+            .iter()
+            .find(|(key, _)| key.get_ref() == &declared.id);
+        let value = match given {
+            Some((_, value)) => {
+                let number = number(source, declared, value)?;
+                if !declared.usual.contain(number) {
+                    warnings.push(format!(
+                        "law `{}`: {} = {} {} is outside its usual range {}",
+                        description.id, declared.id, number, declared.unit, declared.usual
+                    ));
+                }
+                number
+            }
+            None => match declared.default {
+                Some(default) => default,
+                None if declared.optional => f64::NAN,
+                None => {
+                    return Err(source
+                        .error(
+                            id.span(),
+                            format!(
+                                "law `{}` needs parameter `{}` [{}]: {}",
+                                description.id, declared.id, declared.unit, declared.doc
+                            ),
+                        )
+                        .hint(format!("it needs: {}", needed(description)))
+                        .into());
+                }
+            },
+        };
+        used.push(UsedParameter {
+            id: declared.id.clone(),
+            value,
+            by_default: given.is_none(),
+        });
+    }
+    refuse_radians(source, description, &used, parameters)?;
+    let values: Vec<f64> = used.iter().map(|p| p.value).collect();
+    let law = loaded.build(hypothesis, &values).map_err(|failure| {
+        if failure.library_at_fault {
+            return Error::plugin(format!(
+                "law `{}` of library {}: {}",
+                description.id,
+                loaded.library().path().display(),
+                failure.reason
+            ));
+        }
+        let place = failure.parameter.as_deref().and_then(|id| {
+            parameters
+                .iter()
+                .find(|(key, _)| key.get_ref() == id)
+                .map(|(_, value)| value.span())
+        });
+        source
+            .error(
+                place.unwrap_or_else(|| id.span()),
+                format!(
+                    "law `{}` refuses its parameters: {}",
+                    description.id, failure.reason
+                ),
+            )
+            .into()
+    })?;
+    Ok(BuiltLaw {
+        law,
+        parameters: used,
+        warnings,
+    })
+}
+
+/// Finds a law; a missing one is reported with its place in the file.
+fn find_law(
+    source: &Source,
+    search: &SearchPath,
+    id: &Spanned<String>,
+) -> Result<LoadedLaw, Error> {
+    search.law(id.get_ref()).map_err(|error| match error {
+        Error::Plugin { message, hint } => {
+            let (line, column) = line_and_column(source.text(), id.span());
+            let place = format!("{}:{line}:{column}", source.path().display());
+            Error::Plugin {
+                message: format!("{message}\n  needed by {place}"),
+                hint,
+            }
+        }
+        other => other,
+    })
+}
+
+/// Line and column, from 1, of the start of a span.
+pub fn line_and_column(text: &str, span: Range<usize>) -> (usize, usize) {
+    let before = &text[..span.start.min(text.len())];
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+    (line, column)
+}
+
+fn refuse_unknown(
+    source: &Source,
+    description: &LawDescription,
+    parameters: &ParameterTable,
+) -> Result<(), Error> {
+    let ids: Vec<&str> = description
+        .parameters
+        .iter()
+        .map(|p| p.id.as_str())
+        .collect();
+    match parameters
+        .keys()
+        .find(|key| !ids.contains(&key.get_ref().as_str()))
+    {
+        None => Ok(()),
+        Some(key) => Err(source
+            .error(
+                key.span(),
+                format!(
+                    "law `{}` has no parameter `{}`",
+                    description.id,
+                    key.get_ref()
+                ),
+            )
+            .hint(suggestion(key.get_ref(), ids))
+            .into()),
+    }
+}
+
+fn needed(description: &LawDescription) -> String {
+    let needed: Vec<String> = description
+        .parameters
+        .iter()
+        .filter(|p| p.default.is_none() && !p.optional)
+        .map(|p| format!("{} [{}]", p.id, p.unit))
+        .collect();
+    needed.join(", ")
+}
+
+/// The number that a written value stands for, within its bounds.
+fn number(
+    source: &Source,
+    declared: &ParameterDescription,
+    value: &Spanned<ParameterValue>,
+) -> Result<f64, Error> {
+    let id = &declared.id;
+    let choices: Vec<&str> = declared.choices.iter().map(String::as_str).collect();
+    let error = |message: String| source.error(value.span(), message);
+    let number = match value.get_ref() {
+        ParameterValue::Label(label) => {
+            return match choices.iter().position(|choice| choice == label) {
+                Some(index) => Ok(index as f64),
+                None if choices.is_empty() => Err(error(format!("`{id}` is a number")).into()),
+                None => Err(error(format!("`{id}` has no choice `{label}`"))
+                    .hint(suggestion(label, choices))
+                    .into()),
+            };
+        }
+        ParameterValue::Number(number) => *number,
+        ParameterValue::Integer(number) => *number as f64,
+    };
+    if !choices.is_empty() {
+        return Err(error(format!("`{id}` is one of {}", choices.join(", "))).into());
+    }
+    if !number.is_finite() || !declared.bounds.contain(number) {
+        let bounds = declared.bounds;
+        return Err(error(format!(
+            "`{id}`: {number} {} is outside {bounds}",
+            declared.unit
+        ))
+        .label(declared.doc.clone())
+        .into());
+    }
+    Ok(number)
+}
+
+/// Refuses angles that can only be meant in radians: none of them reaches π/2 degrees.
+fn refuse_radians(
+    source: &Source,
+    description: &LawDescription,
+    used: &[UsedParameter],
+    parameters: &ParameterTable,
+) -> Result<(), Error> {
+    let largest = description
+        .parameters
+        .iter()
+        .zip(used)
+        .filter(|(declared, _)| declared.unit == "deg")
+        .map(|(_, used)| used)
+        .max_by(|a, b| a.value.total_cmp(&b.value));
+    let Some(UsedParameter { id, value, .. }) = largest else {
+        return Ok(());
+    };
+    if !(0.05..=std::f64::consts::FRAC_PI_2).contains(value) {
+        return Ok(());
+    }
+    let place = parameters.iter().find(|(key, _)| key.get_ref() == id);
+    Err(source
+        .error(
+            place.map_or(0..0, |(_, value)| value.span()),
+            format!("`{id}`: {value} deg looks like an angle in radians"),
+        )
+        .hint(format!(
+            "angles are given in degrees: {:.1}?",
+            value.to_degrees()
+        ))
+        .into())
+}

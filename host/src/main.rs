@@ -1,0 +1,2 @@
+//! The `pilum` program.
+fn main() {}

@@ -1,0 +1,413 @@
+//! Laws from shared libraries: finding, opening, building and calling them.
+
+mod description;
+mod library;
+mod search;
+
+pub use description::{
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+};
+pub use library::Strided;
+pub use search::SearchPath;
+
+use crate::error::Error;
+use abi::Hypothesis;
+use abi::raw::{self, Status};
+use abi::status::Outcome;
+use library::{Call, LawHandle, OwnedInstance};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// An opened library. It is never unloaded.
+#[derive(Debug)]
+pub struct Library {
+    path: PathBuf,
+    sha256: String,
+    laws: Vec<(LawDescription, LawHandle)>,
+}
+
+impl Library {
+    /// Opens a library: hash, handshake, description, in this order.
+    ///
+    /// # Errors
+    /// [`Error::Plugin`] with the path and what is wrong; [`Error::Unreadable`].
+    pub fn open(path: &Path) -> Result<Arc<Self>, Error> {
+        let bytes = std::fs::read(path).map_err(|source| Error::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
+        let sha256 = hexadecimal_sha256(&bytes);
+        let open = library::open(path)
+            .map_err(|why| Error::plugin(format!("library {}: {why}", path.display())))?;
+        Ok(Arc::new(Self {
+            path: path.to_owned(),
+            sha256,
+            laws: open.laws,
+        }))
+    }
+
+    /// Where the library was found.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// SHA-256 of the file, in hexadecimal digits.
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// Descriptions of its laws.
+    pub fn laws(&self) -> impl Iterator<Item = &LawDescription> {
+        self.laws.iter().map(|(description, _)| description)
+    }
+
+    /// The law with this id.
+    pub fn law(self: &Arc<Self>, id: &str) -> Option<LoadedLaw> {
+        let number = self
+            .laws
+            .iter()
+            .position(|(description, _)| description.id == id)?;
+        Some(LoadedLaw {
+            library: Arc::clone(self),
+            number,
+        })
+    }
+}
+
+/// SHA-256 of some bytes, in hexadecimal digits.
+pub fn hexadecimal_sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes)
+        .iter()
+        .fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}
+
+/// A law of an opened library, without parameters yet.
+#[derive(Clone, Debug)]
+pub struct LoadedLaw {
+    library: Arc<Library>,
+    number: usize,
+}
+
+/// Why a law cannot be built.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CreateFailure {
+    /// The parameter to change, if the law names one.
+    pub parameter: Option<String>,
+    /// Why.
+    pub reason: String,
+    /// The fault is the library's, not the parameter's.
+    pub library_at_fault: bool,
+}
+
+impl LoadedLaw {
+    /// Its description.
+    pub fn description(&self) -> &LawDescription {
+        &self.library.laws[self.number].0
+    }
+
+    /// Its library.
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// Fixes the parameters (in declared order; NaN: left out) under a hypothesis.
+    ///
+    /// # Errors
+    /// The law's refusal, or a defect of the library.
+    pub fn build(&self, hypothesis: Hypothesis, parameters: &[f64]) -> Result<Law, CreateFailure> {
+        let (description, handle) = &self.library.laws[self.number];
+        let defect = |reason: &str| CreateFailure {
+            parameter: None,
+            reason: reason.to_owned(),
+            library_at_fault: true,
+        };
+        let formulation = description
+            .formulation(hypothesis)
+            .ok_or_else(|| defect("the hypothesis is not offered"))?
+            .clone();
+        let instance =
+            handle
+                .create(formulation.index, parameters)
+                .map_err(|(status, message)| {
+                    let parameter = message
+                        .split_once(':')
+                        .map(|(id, _)| id.trim())
+                        .filter(|id| description.parameters.iter().any(|p| p.id == *id))
+                        .map(str::to_owned);
+                    CreateFailure {
+                        parameter,
+                        reason: message,
+                        library_at_fault: status != raw::PILUM_E_PARAMETER
+                            && status != raw::PILUM_E_DOMAIN,
+                    }
+                })?;
+        Ok(Law {
+            loaded: self.clone(),
+            hypothesis,
+            formulation,
+            instance,
+        })
+    }
+}
+
+/// A law with its parameters fixed under a hypothesis: what elements call.
+#[derive(Debug)]
+pub struct Law {
+    loaded: LoadedLaw,
+    hypothesis: Hypothesis,
+    formulation: FormulationDescription,
+    instance: OwnedInstance,
+}
+
+/// Which operator a call computes beside the fluxes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operator {
+    /// None.
+    None,
+    /// The tangent consistent with the update.
+    Consistent,
+    /// The elastic operator.
+    Elastic,
+}
+
+/// Points of a batch at the start of an increment, and the gradients at its end.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// Number of points.
+    pub n_points: usize,
+    /// Gradients at the start, and their place.
+    pub gradient: (&'a [f64], Strided),
+    /// Gradients at the end, and their place.
+    pub gradient_end: (&'a [f64], Strided),
+    /// Fluxes at the start, and their place.
+    pub flux: (&'a [f64], Strided),
+    /// Internal variables at the start, point by point.
+    pub state: &'a [f64],
+    /// Time at the start.
+    pub time: f64,
+    /// Time increment.
+    pub time_increment: f64,
+}
+
+/// Where the results of a call go.
+#[derive(Debug)]
+pub struct End<'a> {
+    /// Fluxes, and their place.
+    pub flux: (&'a mut [f64], Strided),
+    /// Internal variables, point by point.
+    pub state: &'a mut [f64],
+    /// Operators, point by point, row-major; may be empty if none is wanted.
+    pub operator: &'a mut [f64],
+}
+
+/// Why a batch cannot be used. The outputs are garbage then.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BatchFailure {
+    /// The first of the worst points.
+    pub point: usize,
+    /// What the law said of it.
+    pub outcome: Outcome,
+    /// In words; empty if the law gave none.
+    pub message: String,
+    /// The smallest step factor asked for, if only smaller steps are asked for.
+    pub factor: Option<f64>,
+}
+
+/// A batch that can be used.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BatchSuccess {
+    /// Points whose results are valid but inaccurate, and the law's message about them.
+    pub unreliable: Option<(usize, String)>,
+}
+
+impl Law {
+    /// Description of the law.
+    pub fn description(&self) -> &LawDescription {
+        self.loaded.description()
+    }
+
+    /// What it offers under the hypothesis it was built for.
+    pub fn formulation(&self) -> &FormulationDescription {
+        &self.formulation
+    }
+
+    /// Hypothesis it was built for.
+    pub fn hypothesis(&self) -> Hypothesis {
+        self.hypothesis
+    }
+
+    /// Library it comes from.
+    pub fn library(&self) -> &Library {
+        self.loaded.library()
+    }
+
+    /// Number of components of gradient and flux.
+    pub fn n_components(&self) -> usize {
+        self.hypothesis.n_components()
+    }
+
+    /// Number of internal variables.
+    pub fn n_states(&self) -> usize {
+        self.formulation.internal_variables.len()
+    }
+
+    /// Internal variables of points that carry these fluxes before anything has happened.
+    ///
+    /// # Errors
+    /// The law cannot start from one of the fluxes.
+    pub fn initial_state(
+        &self,
+        n_points: usize,
+        flux: (&[f64], Strided),
+    ) -> Result<Vec<f64>, BatchFailure> {
+        let n_states = self.n_states();
+        let initial = self
+            .formulation
+            .internal_variables
+            .iter()
+            .map(|v| v.initial_value);
+        let mut state: Vec<f64> = initial.cycle().take(n_points * n_states).collect();
+        let mut status = vec![raw::PILUM_E_INTERNAL; n_points];
+        let mut factor = vec![0.0; n_points];
+        let result = self.instance.init_state(Call {
+            request: 0,
+            n_points,
+            n_components: self.n_components(),
+            n_states,
+            time: 0.0,
+            time_increment: 0.0,
+            gradient0: None,
+            gradient1: None,
+            flux0: flux,
+            state0: &[],
+            flux1: None,
+            state1: &mut state,
+            tangent: &mut [],
+            status: &mut status,
+            step_factor: &mut factor,
+        });
+        match result {
+            None => Ok(state),
+            Some((worst, message)) => {
+                judge(worst, &status, &factor, message)?;
+                finite(&[(&state, Strided::rows(n_states), n_states)], n_points)?;
+                Ok(state)
+            }
+        }
+    }
+
+    /// Carries points over an increment.
+    ///
+    /// # Errors
+    /// A point asks for a smaller step, or fails; also if it claims success with a result that
+    /// is not finite, or if its outcome contradicts that of the batch.
+    pub fn integrate(
+        &self,
+        start: &Start<'_>,
+        operator: Operator,
+        end: End<'_>,
+    ) -> Result<BatchSuccess, BatchFailure> {
+        let n = self.n_components();
+        let mut status = vec![raw::PILUM_E_INTERNAL; start.n_points];
+        let mut factor = vec![f64::NAN; start.n_points];
+        let (flux, flux_place) = end.flux;
+        let (worst, message) = self.instance.integrate(Call {
+            request: raw::PILUM_REQ_FLUX
+                | match operator {
+                    Operator::None => 0,
+                    Operator::Consistent => raw::PILUM_REQ_TANGENT,
+                    Operator::Elastic => raw::PILUM_REQ_ELASTIC,
+                },
+            n_points: start.n_points,
+            n_components: n,
+            n_states: self.n_states(),
+            time: start.time,
+            time_increment: start.time_increment,
+            gradient0: Some(start.gradient),
+            gradient1: Some(start.gradient_end),
+            flux0: start.flux,
+            state0: start.state,
+            flux1: Some((&mut *flux, flux_place)),
+            state1: &mut *end.state,
+            tangent: &mut *end.operator,
+            status: &mut status,
+            step_factor: &mut factor,
+        });
+        let success = judge(worst, &status, &factor, message)?;
+        let n_states = self.n_states();
+        let mut outputs = vec![
+            (&*flux, flux_place, n),
+            (&*end.state, Strided::rows(n_states), n_states),
+        ];
+        if operator != Operator::None {
+            outputs.push((&*end.operator, Strided::rows(n * n), n * n));
+        }
+        finite(&outputs, start.n_points)?;
+        Ok(success)
+    }
+}
+
+/// Turns status codes into a verdict over the batch.
+fn judge(
+    worst: Status,
+    status: &[Status],
+    factor: &[f64],
+    message: String,
+) -> Result<BatchSuccess, BatchFailure> {
+    let severity = |s: Status| if s < 0 { 100 - s } else { s };
+    let point = (0..status.len())
+        .rev()
+        .max_by_key(|&i| severity(status[i]))
+        .unwrap_or(0);
+    let at_point = status.get(point).copied().unwrap_or(worst);
+    let code = abi::status::most_severe(worst, at_point);
+    match Outcome::from_code(code) {
+        Outcome::Ok => Ok(BatchSuccess::default()),
+        Outcome::Unreliable => Ok(BatchSuccess {
+            unreliable: Some((point, message)),
+        }),
+        Outcome::CutStep => {
+            // A law that leaves the factor alone leaves the choice to the host.
+            let smallest = factor
+                .iter()
+                .zip(status)
+                .filter(|(f, s)| **s == raw::PILUM_CUT_STEP && **f > 0.0 && **f < 1.0)
+                .map(|(f, _)| *f)
+                .fold(f64::INFINITY, f64::min);
+            let factor = if smallest.is_finite() { smallest } else { 0.25 };
+            Err(BatchFailure {
+                point,
+                outcome: Outcome::CutStep,
+                message,
+                factor: Some(factor),
+            })
+        }
+        outcome => Err(BatchFailure {
+            point,
+            outcome,
+            message,
+            factor: None,
+        }),
+    }
+}
+
+/// Distrusts success: every output must be finite.
+fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), BatchFailure> {
+    for point in 0..n_points {
+        for (values, place, n) in outputs {
+            for c in 0..*n {
+                if !values[place.offset + point * place.point + c * place.component].is_finite() {
+                    return Err(BatchFailure {
+                        point,
+                        outcome: Outcome::Numeric,
+                        message: "the law claims success with a result that is not finite"
+                            .to_owned(),
+                        factor: None,
+                    });
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,624 @@
+//! Opening libraries and calling them. This is one of the two files of the project that hold
+//! `unsafe` code; each block names the clause of the contract (`abi/README.md`) it relies on.
+//!
+//! Libraries are opened with `RTLD_NOW | RTLD_LOCAL`, one at a time, and never unloaded, so that
+//! everything a description points to stays valid for the life of the process.
+#![expect(
+    unsafe_code,
+    clippy::multiple_unsafe_ops_per_block,
+    reason = "the host's side of the C boundary; offset and access are one operation"
+)]
+
+use super::description::{
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+};
+use abi::Hypothesis;
+use abi::raw::{self, Batch, Formulation, Host, Instance, Law, MagicBlock, Parameter, Plugin};
+use abi::raw::{Status, Variable, View, ViewMut};
+use abi::version;
+use std::ffi::{CStr, c_char};
+use std::mem::size_of;
+use std::path::Path;
+use std::ptr::{null, null_mut};
+use std::sync::Mutex;
+
+/// Longest text that is copied out of a library, in bytes.
+const LONGEST_TEXT: usize = 4096;
+/// Most entries of any table that is copied out of a library.
+const LONGEST_TABLE: u32 = 256;
+/// Size of the buffer for messages.
+const MESSAGE_CAPACITY: usize = 512;
+
+static HOST: HostBlock = HostBlock(Host {
+    struct_size: size_of::<Host>() as u32,
+    abi_major: raw::PILUM_ABI_MAJOR,
+    abi_minor: raw::PILUM_ABI_MINOR,
+    name: c"pilum".as_ptr(),
+    version: match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+        Ok(version) => version.as_ptr(),
+        Err(_) => c"".as_ptr(),
+    },
+    get_extension: None,
+});
+
+struct HostBlock(Host);
+// SAFETY: it points to static strings only.
+unsafe impl Sync for HostBlock {}
+
+/// The laws of one opened library.
+#[derive(Debug)]
+pub(super) struct OpenLibrary {
+    pub(super) laws: Vec<(LawDescription, LawHandle)>,
+}
+
+/// A law in its library's memory.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LawHandle(&'static Law);
+
+// SAFETY: descriptions are immutable static data (contract, "Lifetime").
+unsafe impl Send for LawHandle {}
+// SAFETY: as above.
+unsafe impl Sync for LawHandle {}
+
+/// Opens a library, shakes hands and copies its description.
+///
+/// # Errors
+/// What is wrong with the library, in words.
+pub(super) fn open(path: &Path) -> Result<OpenLibrary, String> {
+    // `dlerror` is not safe in threads everywhere, so libraries are opened one at a time.
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _guard = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+
+    // SAFETY: running the library's initialisers is what loading means; the user named it.
+    let library: &'static libloading::Library = Box::leak(Box::new(
+        unsafe { load(path) }.map_err(|error| format!("it cannot be loaded: {error}"))?,
+    ));
+    // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
+    let magic = unsafe { library.get::<*const MagicBlock>(b"pilum_magic\0") }
+        .map_err(|_| "it has no symbol `pilum_magic`: this is no Pilum law library".to_owned())?;
+    // SAFETY: as above; the block is at least 64 bytes in every version.
+    let magic = unsafe { (*magic).read_unaligned() };
+    version::check(&magic).map_err(|mismatch| format!("{mismatch}"))?;
+
+    #[cfg(feature = "abi_stable")]
+    check_rust_layout(library)?;
+
+    // SAFETY: contract, "Handshake": once the block is accepted, `pilum_entry` has this type.
+    let entry = unsafe { library.get::<raw::Entry>(b"pilum_entry\0") }
+        .map_err(|_| "it has no symbol `pilum_entry`".to_owned())?;
+    // SAFETY: contract, "Entry": may be called with any valid host block, from any thread.
+    let plugin = unsafe { entry(&raw const HOST.0).as_ref() }
+        .ok_or_else(|| "it refuses this host (`pilum_entry` returned null)".to_owned())?;
+    describe(plugin)
+}
+
+#[cfg(unix)]
+unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
+    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+    // SAFETY: passed on to the caller.
+    unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }.map(Into::into)
+}
+
+#[cfg(not(unix))]
+unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
+    // SAFETY: passed on to the caller.
+    unsafe { libloading::Library::new(path) }
+}
+
+/// The second check, for libraries written in Rust with the same `abi_stable`.
+#[cfg(feature = "abi_stable")]
+fn check_rust_layout(library: &'static libloading::Library) -> Result<(), String> {
+    use abi::raw::RustLayout;
+    // SAFETY: contract, "abi_stable": the symbol is a `RustLayout` where it exists.
+    let Ok(block) = (unsafe { library.get::<*const RustLayout>(b"pilum_rust_layout\0") }) else {
+        return Ok(());
+    };
+    // SAFETY: as above; the block is static.
+    let block: &'static RustLayout = unsafe { &**block };
+    if (block.struct_size as usize) < size_of::<RustLayout>() || block.layout.is_null() {
+        return Ok(());
+    }
+    if text(block.abi_stable_version, "abi_stable_version")?
+        != abi::layout::ABI_STABLE_VERSION.to_string_lossy()
+    {
+        return Ok(());
+    }
+    // SAFETY: equal versions of `abi_stable` describe layouts by the same type.
+    let theirs = unsafe { &*block.layout.cast::<abi_stable::type_layout::TypeLayout>() };
+    abi::layout::check(theirs)
+        .map_err(|difference| format!("`abi_stable` finds another layout: {difference}"))
+}
+
+/// A table of structs that may be longer than ours: the stride is the first entry's own size.
+fn table<T>(first: *const T, n: u32, what: &str) -> Result<Vec<&'static T>, String> {
+    if n == 0 {
+        return Ok(Vec::new());
+    }
+    if n > LONGEST_TABLE {
+        return Err(format!(
+            "{n} {what} are declared, at most {LONGEST_TABLE} are plausible"
+        ));
+    }
+    if first.is_null() {
+        return Err(format!("{n} {what} are declared, but the table is null"));
+    }
+    // SAFETY: contract, "Growing structs": every struct starts with its size as `u32`.
+    let stride = unsafe { first.cast::<u32>().read() } as usize;
+    if stride < size_of::<T>() || !stride.is_multiple_of(align_of::<T>()) {
+        return Err(format!(
+            "the table of {what} has entries of {stride} bytes, expected at least {}",
+            size_of::<T>()
+        ));
+    }
+    (0..n as usize)
+        .map(|i| {
+            // SAFETY: contract, "Descriptions": `n` entries, static, of this stride.
+            let entry = unsafe { &*first.byte_add(i * stride) };
+            Ok(entry)
+        })
+        .collect()
+}
+
+/// Copies a text; null is an empty one.
+fn text(p: *const c_char, what: &str) -> Result<String, String> {
+    if p.is_null() {
+        return Ok(String::new());
+    }
+    let mut bytes = Vec::new();
+    for i in 0..LONGEST_TEXT {
+        // SAFETY: contract, "Descriptions": texts end in NUL; reading stops there.
+        let byte = unsafe { p.add(i).read() } as u8;
+        if byte == 0 {
+            let text = String::from_utf8(bytes)
+                .map_err(|_| format!("the text of `{what}` is not UTF-8"))?;
+            return Ok(text.trim().to_owned());
+        }
+        bytes.push(byte);
+    }
+    Err(format!(
+        "the text of `{what}` is longer than {LONGEST_TEXT} bytes"
+    ))
+}
+
+fn identifier(p: *const c_char, what: &str) -> Result<String, String> {
+    let id = text(p, what)?;
+    let well_formed = id.starts_with(|c: char| c.is_ascii_lowercase())
+        && id
+            .chars()
+            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    if well_formed {
+        Ok(id)
+    } else {
+        Err(format!("the id `{id}` of {what} is malformed"))
+    }
+}
+
+fn unique<'a>(ids: impl Iterator<Item = &'a str>, what: &str) -> Result<(), String> {
+    let mut seen = std::collections::HashSet::new();
+    for id in ids {
+        if !seen.insert(id) {
+            return Err(format!("{what} `{id}` is declared twice"));
+        }
+    }
+    Ok(())
+}
+
+fn describe(plugin: &'static Plugin) -> Result<OpenLibrary, String> {
+    if (plugin.struct_size as usize) < size_of::<Plugin>() {
+        return Err("`pilum_plugin` is truncated".to_owned());
+    }
+    if plugin.n_laws == 0 || plugin.n_laws > LONGEST_TABLE || plugin.law.is_null() {
+        return Err(format!("it declares {} laws", plugin.n_laws));
+    }
+    let laws = (0..plugin.n_laws as usize)
+        .map(|i| {
+            // SAFETY: contract, "Descriptions": `n_laws` pointers to static laws.
+            let law = unsafe { (*plugin.law.add(i)).as_ref() };
+            let law: &'static Law = law.ok_or_else(|| format!("law {i} is null"))?;
+            let described = describe_law(law).map_err(|why| format!("law {i}: {why}"))?;
+            Ok((described, LawHandle(law)))
+        })
+        .collect::<Result<Vec<_>, String>>()?;
+    unique(laws.iter().map(|(law, _)| law.id.as_str()), "law")?;
+    Ok(OpenLibrary { laws })
+}
+
+fn describe_law(law: &'static Law) -> Result<LawDescription, String> {
+    if (law.struct_size as usize) < size_of::<Law>() {
+        return Err("`pilum_law` is truncated".to_owned());
+    }
+    if law.create.is_none() || law.integrate.is_none() || law.destroy.is_none() {
+        return Err("`create`, `integrate` or `destroy` is null".to_owned());
+    }
+    let parameters = table(law.parameter, law.n_parameters, "parameters")?
+        .into_iter()
+        .map(describe_parameter)
+        .collect::<Result<Vec<_>, _>>()?;
+    unique(parameters.iter().map(|p| p.id.as_str()), "parameter")?;
+    let mut formulations = Vec::new();
+    for (index, formulation) in
+        (0..).zip(table(law.formulation, law.n_formulations, "formulations")?)
+    {
+        // Hypotheses that came later than this host are passed over.
+        if let Some(hypothesis) = Hypothesis::from_code(formulation.hypothesis) {
+            formulations.push(describe_formulation(formulation, hypothesis, index)?);
+        }
+    }
+    unique(formulations.iter().map(|f| f.hypothesis), "hypothesis")?;
+    Ok(LawDescription {
+        id: identifier(law.id, "the law")?,
+        name: text(law.name, "name")?,
+        version: text(law.version, "version")?,
+        author: text(law.author, "author")?,
+        licence: text(law.licence, "licence")?,
+        doc: text(law.doc, "doc")?,
+        references: text(law.references, "references")?,
+        parameters,
+        formulations,
+    })
+}
+
+fn describe_parameter(p: &'static Parameter) -> Result<ParameterDescription, String> {
+    let id = identifier(p.id, "a parameter")?;
+    let mut choices = Vec::new();
+    if !p.choices.is_null() {
+        for i in 0..LONGEST_TABLE as usize {
+            // SAFETY: contract, "Parameters": the list of labels ends with null.
+            let label = unsafe { p.choices.add(i).read() };
+            if label.is_null() {
+                break;
+            }
+            choices.push(text(label, &id)?);
+        }
+    }
+    let bounds = Bounds {
+        lower: p.lower,
+        open_lower: p.flags & raw::PILUM_P_OPEN_LOWER != 0,
+        upper: p.upper,
+        open_upper: p.flags & raw::PILUM_P_OPEN_UPPER != 0,
+    };
+    // Comparisons with NaN are false, so a NaN bound fails too.
+    if !(p.lower <= p.upper && p.usual_lower <= p.usual_upper) {
+        return Err(format!("parameter `{id}`: its bounds are not in order"));
+    }
+    let default = (!p.default_value.is_nan()).then_some(p.default_value);
+    if default.is_some_and(|value| !bounds.contain(value)) {
+        return Err(format!(
+            "parameter `{id}`: the default is outside its bounds {bounds}"
+        ));
+    }
+    Ok(ParameterDescription {
+        symbol: text(p.symbol, &id)?,
+        unit: text(p.unit, &id)?,
+        doc: text(p.doc, &id)?,
+        id,
+        default,
+        optional: p.flags & raw::PILUM_P_OPTIONAL != 0,
+        bounds,
+        usual: Bounds {
+            lower: p.usual_lower,
+            open_lower: false,
+            upper: p.usual_upper,
+            open_upper: false,
+        },
+        choices,
+    })
+}
+
+fn describe_formulation(
+    formulation: &'static Formulation,
+    hypothesis: Hypothesis,
+    index: u32,
+) -> Result<FormulationDescription, String> {
+    let name = hypothesis.name();
+    let (gradient_id, flux_id) = match hypothesis {
+        Hypothesis::Interface2d => ("jump", "traction"),
+        _ => ("strain", "stress"),
+    };
+    let pair = [
+        (gradient_id, formulation.gradient, formulation.n_gradients),
+        (flux_id, formulation.flux, formulation.n_fluxes),
+    ];
+    for (expected, variables, n) in pair {
+        let found = table(variables, n, "gradients or fluxes")?;
+        let &[variable] = found.as_slice() else {
+            return Err(format!(
+                "{name}: {n} gradients or fluxes, this host uses one pair"
+            ));
+        };
+        let id = identifier(variable.id, "a gradient or flux")?;
+        let components = hypothesis.n_components();
+        if id != expected || variable.n_components as usize != components {
+            return Err(format!(
+                "{name}: found `{id}` with {} components, expected `{expected}` with {components}",
+                variable.n_components
+            ));
+        }
+    }
+    let mut internal_variables = Vec::new();
+    for variable in table(
+        formulation.state,
+        formulation.n_states,
+        "internal variables",
+    )? {
+        internal_variables.extend(describe_variable(variable)?);
+    }
+    unique(
+        internal_variables.iter().map(|v| v.id.as_str()),
+        "internal variable",
+    )?;
+    Ok(FormulationDescription {
+        hypothesis: name,
+        index,
+        symmetric: formulation.flags & raw::PILUM_T_SYMMETRIC != 0,
+        linear: formulation.flags & raw::PILUM_T_LINEAR != 0 && internal_variables.is_empty(),
+        local_axes: formulation.flags & raw::PILUM_T_LOCAL_AXES != 0,
+        internal_variables,
+    })
+}
+
+fn describe_variable(v: &'static Variable) -> Result<Vec<InternalVariable>, String> {
+    let id = identifier(v.id, "an internal variable")?;
+    if v.n_components == 0 || v.n_components > LONGEST_TABLE {
+        return Err(format!(
+            "internal variable `{id}` has {} components",
+            v.n_components
+        ));
+    }
+    (0..v.n_components as usize)
+        .map(|c| {
+            let id = if v.n_components == 1 {
+                id.clone()
+            } else if v.component_names.is_null() {
+                format!("{id}_{}", c + 1)
+            } else {
+                // SAFETY: contract, "Variables": `n_components` names where the list is not null.
+                let name = unsafe { v.component_names.add(c).read() };
+                format!("{id}_{}", text(name, &id)?)
+            };
+            Ok(InternalVariable {
+                symbol: text(v.symbol, &id)?,
+                unit: text(v.unit, &id)?,
+                doc: text(v.doc, &id)?,
+                id,
+                initial_value: v.initial_value,
+                output_only: v.flags & raw::PILUM_V_OUTPUT_ONLY != 0,
+            })
+        })
+        .collect()
+}
+
+/// A law with its parameters fixed, owned by the host.
+#[derive(Debug)]
+pub(super) struct OwnedInstance {
+    law: LawHandle,
+    instance: *mut Instance,
+}
+
+// SAFETY: contract, "Threads": an instance is immutable after `create` and may be used and freed
+// from any thread.
+unsafe impl Send for OwnedInstance {}
+// SAFETY: as above; concurrent `integrate` on one instance is allowed.
+unsafe impl Sync for OwnedInstance {}
+
+impl Drop for OwnedInstance {
+    fn drop(&mut self) {
+        if let Some(destroy) = self.law.0.destroy {
+            // SAFETY: contract, "create": the pointer came from `create` and is not used again.
+            unsafe { destroy(self.instance) };
+        }
+    }
+}
+
+/// Status and message of a call that failed.
+pub(super) type CallFailure = (Status, String);
+
+impl LawHandle {
+    /// Fixes the parameters.
+    ///
+    /// # Errors
+    /// The law's status and message.
+    pub(super) fn create(
+        self,
+        formulation: u32,
+        parameters: &[f64],
+    ) -> Result<OwnedInstance, CallFailure> {
+        let Some(create) = self.0.create else {
+            return Err((raw::PILUM_E_INTERNAL, "`create` is null".to_owned()));
+        };
+        let mut instance = null_mut();
+        let mut message = [0 as c_char; MESSAGE_CAPACITY];
+        // SAFETY: contract, "create": all pointers are valid for the call, counts are true.
+        let status = unsafe {
+            create(
+                self.0,
+                &raw const HOST.0,
+                formulation,
+                parameters.as_ptr(),
+                parameters.len() as u32,
+                &raw mut instance,
+                message.as_mut_ptr(),
+                message.len(),
+            )
+        };
+        if status != raw::PILUM_OK {
+            return Err((status, read_message(&message)));
+        }
+        if instance.is_null() {
+            return Err((
+                raw::PILUM_E_INTERNAL,
+                "`create` gave no instance".to_owned(),
+            ));
+        }
+        Ok(OwnedInstance {
+            law: self,
+            instance,
+        })
+    }
+}
+
+fn read_message(buffer: &[c_char; MESSAGE_CAPACITY]) -> String {
+    let bytes: Vec<u8> = buffer
+        .iter()
+        .map(|&c| c as u8)
+        .take_while(|&b| b != 0)
+        .collect();
+    String::from_utf8_lossy(&bytes).trim().to_owned()
+}
+
+/// Values of many points in a slice: component `c` of point `i` stands at
+/// `offset + i * point + c * component`.
+#[derive(Clone, Copy, Debug)]
+pub struct Strided {
+    /// Where the first value stands.
+    pub offset: usize,
+    /// Stride from point to point.
+    pub point: usize,
+    /// Stride from component to component.
+    pub component: usize,
+}
+
+impl Strided {
+    /// Points one after the other, `n` components each.
+    pub fn rows(n: usize) -> Self {
+        Self {
+            offset: 0,
+            point: n,
+            component: 1,
+        }
+    }
+
+    /// Panics unless `n_points` × `n_components` values lie inside a slice of length `length`:
+    /// the one check that keeps the pointers below inside their slices.
+    fn assert_fits(self, n_points: usize, n_components: usize, length: usize) {
+        if n_points > 0 && n_components > 0 {
+            let last =
+                self.offset + (n_points - 1) * self.point + (n_components - 1) * self.component;
+            assert!(
+                last < length,
+                "a view of {n_points} points leaves its slice"
+            );
+        }
+    }
+
+    fn view(self, values: &[f64], n_points: usize, n_components: usize) -> View {
+        self.assert_fits(n_points, n_components, values.len());
+        let p = if n_components == 0 || n_points == 0 {
+            null()
+        } else {
+            values[self.offset..].as_ptr()
+        };
+        View {
+            p,
+            point: self.point as isize,
+            component: self.component as isize,
+        }
+    }
+
+    fn view_mut(self, values: &mut [f64], n_points: usize, n_components: usize) -> ViewMut {
+        self.assert_fits(n_points, n_components, values.len());
+        let p = if n_components == 0 || n_points == 0 {
+            null_mut()
+        } else {
+            values[self.offset..].as_mut_ptr()
+        };
+        ViewMut {
+            p,
+            point: self.point as isize,
+            component: self.component as isize,
+        }
+    }
+}
+
+const NOTHING: View = View {
+    p: null(),
+    point: 0,
+    component: 0,
+};
+const NOWHERE: ViewMut = ViewMut {
+    p: null_mut(),
+    point: 0,
+    component: 0,
+};
+
+/// What one call works on, in the host's slices.
+#[derive(Debug)]
+pub(super) struct Call<'a> {
+    pub(super) request: u32,
+    pub(super) n_points: usize,
+    pub(super) n_components: usize,
+    pub(super) n_states: usize,
+    pub(super) time: f64,
+    pub(super) time_increment: f64,
+    pub(super) gradient0: Option<(&'a [f64], Strided)>,
+    pub(super) gradient1: Option<(&'a [f64], Strided)>,
+    pub(super) flux0: (&'a [f64], Strided),
+    pub(super) state0: &'a [f64],
+    pub(super) flux1: Option<(&'a mut [f64], Strided)>,
+    pub(super) state1: &'a mut [f64],
+    pub(super) tangent: &'a mut [f64],
+    pub(super) status: &'a mut [Status],
+    pub(super) step_factor: &'a mut [f64],
+}
+
+impl OwnedInstance {
+    /// Asks for initial internal variables. `None` if the law has no `init_state`.
+    pub(super) fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
+        let init = self.law.0.init_state?;
+        Some(self.call(init, call))
+    }
+
+    /// Carries the points over the increment. Returns the most severe status and a message.
+    pub(super) fn integrate(&self, call: Call<'_>) -> (Status, String) {
+        match self.law.0.integrate {
+            Some(integrate) => self.call(integrate, call),
+            None => (raw::PILUM_E_INTERNAL, "`integrate` is null".to_owned()),
+        }
+    }
+
+    fn call(
+        &self,
+        function: unsafe extern "C" fn(*const Instance, *const Batch) -> Status,
+        call: Call<'_>,
+    ) -> (Status, String) {
+        let n = call.n_points;
+        let c = call.n_components;
+        let wants_tangent = call.request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
+        assert!(call.status.len() >= n && call.step_factor.len() >= n);
+        let mut message = [0 as c_char; MESSAGE_CAPACITY];
+        let read = |values: Option<(&[f64], Strided)>| {
+            values.map_or(NOTHING, |(values, strides)| strides.view(values, n, c))
+        };
+        let batch = Batch {
+            struct_size: size_of::<Batch>() as u32,
+            request: call.request,
+            n_points: n as u64,
+            first_point: 0,
+            time: call.time,
+            time_increment: call.time_increment,
+            gradient0: read(call.gradient0),
+            gradient1: read(call.gradient1),
+            flux0: read(Some(call.flux0)),
+            state0: Strided::rows(call.n_states).view(call.state0, n, call.n_states),
+            flux1: call
+                .flux1
+                .map_or(NOWHERE, |(values, strides)| strides.view_mut(values, n, c)),
+            state1: Strided::rows(call.n_states).view_mut(call.state1, n, call.n_states),
+            tangent: if wants_tangent {
+                Strided::rows(c * c).view_mut(call.tangent, n, c * c)
+            } else {
+                NOWHERE
+            },
+            status: call.status.as_mut_ptr(),
+            step_factor: call.step_factor.as_mut_ptr(),
+            message: message.as_mut_ptr(),
+            message_capacity: message.len(),
+        };
+        // SAFETY: contract, "Batch": every view was checked against its slice above, and the
+        // borrows of `call` last until the call has returned.
+        let status = unsafe { function(self.instance, &raw const batch) };
+        (status, read_message(&message))
+    }
+}

@@ -1,0 +1,163 @@
+//! Where libraries are looked for. Only explicit folders count, never the working directory.
+
+use super::{Library, LoadedLaw};
+use crate::error::{Error, suggestion};
+use object::{Object, ObjectSection};
+use std::collections::BTreeMap;
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Folders to look in, in order, and the libraries opened so far.
+#[derive(Debug)]
+pub struct SearchPath {
+    folders: Vec<PathBuf>,
+    opened: Mutex<BTreeMap<PathBuf, Arc<Library>>>,
+}
+
+impl SearchPath {
+    /// First the given folders (from a case file), then those of `PILUM_LAW_PATH`, then the
+    /// folder of the program and its `deps`.
+    pub fn new(from_case: &[PathBuf]) -> Self {
+        let mut folders = from_case.to_vec();
+        if let Some(list) = std::env::var_os("PILUM_LAW_PATH") {
+            folders.extend(std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty()));
+        }
+        if let Some(program) = std::env::current_exe()
+            .ok()
+            .and_then(|p| p.parent().map(Path::to_owned))
+        {
+            folders.push(program.join("deps"));
+            folders.push(program);
+        }
+        // Beside the program comes first; both exist in a build folder.
+        let n = folders.len();
+        if n >= 2 {
+            folders.swap(n - 2, n - 1);
+        }
+        Self {
+            folders,
+            opened: Mutex::default(),
+        }
+    }
+
+    /// The folders, in order.
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
+    }
+
+    /// Opens the library that holds a law: in the first folder that has one, the library named
+    /// like the law, else the one whose manifest lists it. Libraries are opened once.
+    ///
+    /// # Errors
+    /// [`Error::Plugin`] if there is none, if two libraries of a folder claim the law, or if the
+    /// library cannot be used.
+    pub fn law(&self, id: &str) -> Result<LoadedLaw, Error> {
+        for folder in &self.folders {
+            let named = folder.join(format!("{DLL_PREFIX}{id}{DLL_SUFFIX}"));
+            let path = if named.is_file() {
+                named
+            } else {
+                let mut claims = manifests(folder)
+                    .into_iter()
+                    .filter(|(_, laws)| laws.iter().any(|law| law == id));
+                match (claims.next(), claims.next()) {
+                    (None, _) => continue,
+                    (Some((path, _)), None) => path,
+                    (Some((first, _)), Some((second, _))) => {
+                        return Err(Error::plugin(format!(
+                            "law `{id}` is in two libraries: {} and {}",
+                            first.display(),
+                            second.display()
+                        )));
+                    }
+                }
+            };
+            let library = self.open(&path)?;
+            return library.law(id).ok_or_else(|| Error::Plugin {
+                message: format!("library {} has no law `{id}`", path.display()),
+                hint: Some(suggestion(
+                    id,
+                    library
+                        .laws()
+                        .map(|law| law.id.as_str())
+                        .collect::<Vec<_>>(),
+                )),
+            });
+        }
+        let installed = self.installed();
+        let ids: Vec<&str> = installed.keys().map(String::as_str).collect();
+        let folders: Vec<String> = self
+            .folders
+            .iter()
+            .map(|f| f.display().to_string())
+            .collect();
+        Err(Error::Plugin {
+            message: format!("no library with law `{id}` in {}", folders.join(", ")),
+            hint: Some(format!(
+                "{}; more folders: `law_path` in the file, or PILUM_LAW_PATH",
+                suggestion(id, ids)
+            )),
+        })
+    }
+
+    /// Opens a library, once.
+    ///
+    /// # Errors
+    /// As [`Library::open`].
+    pub fn open(&self, path: &Path) -> Result<Arc<Library>, Error> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(library) = opened.get(path) {
+            return Ok(Arc::clone(library));
+        }
+        let library = Library::open(path)?;
+        opened.insert(path.to_owned(), Arc::clone(&library));
+        Ok(library)
+    }
+
+    /// Ids of all laws found, with their libraries, read from manifests without running anything.
+    pub fn installed(&self) -> BTreeMap<String, PathBuf> {
+        let mut found = BTreeMap::new();
+        for folder in &self.folders {
+            for (path, laws) in manifests(folder) {
+                for law in laws {
+                    found.entry(law).or_insert_with(|| path.clone());
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Libraries of a folder that carry a manifest, sorted by name, with the ids of their laws.
+fn manifests(folder: &Path) -> Vec<(PathBuf, Vec<String>)> {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    let mut paths: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .filter(|path| path.to_string_lossy().ends_with(DLL_SUFFIX))
+        .collect();
+    paths.sort();
+    paths
+        .into_iter()
+        .filter_map(|path| manifest(&path).map(|laws| (path, laws)))
+        .collect()
+}
+
+/// Ids in the manifest section of a library.
+fn manifest(path: &Path) -> Option<Vec<String>> {
+    let bytes = std::fs::read(path).ok()?;
+    let file = object::File::parse(&*bytes).ok()?;
+    let section = file
+        .section_by_name(".pilum")
+        .or_else(|| file.section_by_name("__pilum"))?;
+    let text = std::str::from_utf8(section.data().ok()?).ok()?;
+    let mut lines = text.trim_end_matches('\0').lines();
+    (lines.next()? == "pilum 1").then(|| {
+        lines
+            .filter_map(|line| line.split_whitespace().next())
+            .map(str::to_owned)
+            .collect()
+    })
+}
