@@ -35,7 +35,7 @@ typedef struct pilum_instance pilum_instance;
 /* Minor version of the contract. Minors only append; any two of one major work together. */
 #define PILUM_ABI_MINOR 0
 
-/* Outcome of a call, one of the `PILUM_OK` to `PILUM_E_INTERNAL` values. */
+/* Outcome of a call, one of the `PILUM_OK` ... `PILUM_E_INTERNAL` values. */
 typedef int32_t pilum_status;
 
 /* Outputs are valid. */
@@ -71,7 +71,7 @@ typedef int32_t pilum_hypothesis;
 /* Interface in three dimensions: components normal, tangential 1, tangential 2. */
 #define PILUM_H_INTERFACE_3D 11
 
-/* Shape of a variable, one of the `PILUM_SCALAR` to values. */
+/* Shape of a variable, one of the `PILUM_SCALAR` ... values. */
 typedef int32_t pilum_shape;
 
 /* One number. */
@@ -343,6 +343,7 @@ typedef struct pilum_plugin {
     /* Looks up an optional service by id; null: unknown. May be null. */
     const void *(*get_extension)(const char *id);
 } pilum_plugin;
+
 /* Offsets and sizes of all public fields, for the handshake. */
 #define PILUM_LAYOUT_HASH UINT64_C(0x35be1d04c1c21612)
 

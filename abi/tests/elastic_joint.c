@@ -1,7 +1,8 @@
 /* An elastic interface: the traction changes by K times the change of the jump, with one
- * stiffness for each direction. A complete law library in C:
+ * stiffness for each direction. A complete law library in C; compile it in this folder with
  *
- *     cc -std=c11 -O2 -shared -fPIC -fvisibility=hidden -I include elastic_joint.c -o elastic_joint.so
+ *     cc -std=c11 -O2 -shared -fPIC -fvisibility=hidden -I ../include \
+ *         elastic_joint.c -o libelastic_joint.so -lm
  */
 #include "pilum_law.h"
 
@@ -89,7 +90,9 @@ static pilum_status create(const pilum_law *law, const pilum_host *host, uint32_
     }
     for (uint32_t i = 0; i < N; i++) {
         if (!(parameter[i] > 0.0 && isfinite(parameter[i]))) {
-            snprintf(message, capacity, "%s: must be positive", parameters[i].id);
+            if (message) {
+                snprintf(message, capacity, "%s: must be positive", parameters[i].id);
+            }
             return PILUM_E_PARAMETER;
         }
     }
@@ -141,7 +144,7 @@ static pilum_status integrate(const pilum_instance *instance, const pilum_batch 
             worst = status;
             if (batch->message) {
                 snprintf(batch->message, batch->message_capacity,
-                         "point %" PRIu64 ": an input is not finite", batch->first_point + i);
+                         "point %" PRIu64 ": a value is not finite", batch->first_point + i);
             }
         }
     }

@@ -29,10 +29,11 @@ fn the_committed_header_is_the_generated_one() -> Outcome {
     let path = Path::new(ABI).join("include/pilum_law.h");
     let generated = header()?;
     assert!(generated.is_ascii(), "the header must be plain ASCII");
-    if env::var_os("PILUM_BLESS").is_some_and(|v| v == "1") {
+    let mut committed = fs::read_to_string(&path).unwrap_or_default();
+    if committed != generated && env::var_os("PILUM_BLESS").is_some_and(|v| v == "1") {
         fs::write(&path, &generated)?;
+        committed.clone_from(&generated);
     }
-    let committed = fs::read_to_string(&path).unwrap_or_default();
     let differing = (1..)
         .zip(committed.lines())
         .zip(generated.lines())
@@ -158,7 +159,7 @@ fn a_law_in_c_exports_the_two_symbols_and_the_manifest() -> Outcome {
     Ok(())
 }
 
-/// Two points of three, strides that differ, one NaN: what a host does, in C.
+/// Three points, strides that differ, one NaN: what a host does, in C.
 #[test]
 fn a_law_in_c_keeps_the_contract() -> Outcome {
     let Some(cc) = compiler("CC", "cc") else {
@@ -175,7 +176,7 @@ fn a_law_in_c_keeps_the_contract() -> Outcome {
         run(&mut Command::new(&binary))?,
         format!(
             "{} normal_stiffness: must be positive\n\
-             {} point 12: an input is not finite\n\
+             {} point 12: a value is not finite\n\
              {} -99 3\n{} -98 6\n{}\n\
              1000 0 0 3000\n",
             raw::PILUM_E_PARAMETER,
@@ -302,6 +303,7 @@ fn header() -> Outcome<String> {
         .filter_map(|fields| fields.last())
         .map(|(rust, _, size)| format!("PILUM_SIZE({}, {size});", renames[*rust]))
         .collect();
+    out.push('\n');
     out += &tail
         .replace("@LAYOUT_HASH@", &format!("{LAYOUT_HASH:#018x}"))
         .replace("@SIZES@", &sizes.join("\n"));
@@ -338,7 +340,7 @@ fn plain(item: &str, renames: &HashMap<String, String>) -> String {
         ("−∞", "-infinity"),
         ("+∞", "+infinity"),
         ("γ = 2ε", "gamma = 2 epsilon"),
-        ("…", "to"),
+        ("…", "..."),
         ("(1 << ", "(1u << "),
     ] {
         text = text.replace(from, to);
@@ -361,23 +363,21 @@ fn plain(item: &str, renames: &HashMap<String, String>) -> String {
 /// Comments with their delimiters on the lines of the text.
 fn comments(item: &str) -> String {
     let mut out = String::new();
-    let mut lines = item.lines().peekable();
+    let mut lines = item.lines();
     while let Some(line) = lines.next() {
         let indent = &line[..line.len() - line.trim_start().len()];
-        if line.trim() != "/*" {
-            out += line;
-        } else {
-            let mut opening = "/* ";
-            for text in lines.by_ref().take_while(|line| line.trim() != "*/") {
-                if opening == " * " {
-                    out.push('\n');
-                }
-                out += indent;
-                out += opening;
-                out += text.trim();
-                opening = " * ";
+        if line.trim() == "/*" {
+            let text: Vec<&str> = lines
+                .by_ref()
+                .take_while(|line| line.trim() != "*/")
+                .map(str::trim)
+                .collect();
+            let text = text.join(&format!("\n{indent} * "));
+            for part in [indent, "/* ", &text, " */"] {
+                out += part;
             }
-            out += " */";
+        } else {
+            out += line;
         }
         out.push('\n');
     }

@@ -1,2 +1,135 @@
-//! The `pilum` program.
-fn main() {}
+//! The `pilum` program: arguments to library calls, and their outcome to messages and exit codes.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is where the program prints")]
+
+use clap::{Parser, Subcommand};
+use host::case::Case;
+use host::error::{Error, Place};
+use host::run::{Observer, run};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Finite elements for soil-structure interfaces, with constitutive laws as plugins.
+#[derive(Parser)]
+#[command(name = "pilum", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a case.
+    Run {
+        /// A case file, or a folder with `case.toml`.
+        case: PathBuf,
+        /// Folder for the results [default: results/<case name>].
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+}
+
+fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors; everything else is bad input.
+            let _ = error.print();
+            return ExitCode::from(u8::from(error.use_stderr()));
+        }
+    };
+    let outcome = match arguments.command {
+        Command::Run { case, out } => run_case(&case, out),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let code = error.exit_code();
+            eprintln!("{:?}", miette::Report::new(error));
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn run_case(path: &Path, out: Option<PathBuf>) -> Result<(), Error> {
+    let case = Case::load(path)?;
+    let folder = out.unwrap_or_else(|| Path::new("results").join(case.name()));
+    let mut progress = Progress::new();
+    let outcome = run(&case, &folder, &mut progress);
+    progress.finish();
+    if outcome.is_ok() {
+        println!("results in {}", folder.display());
+    }
+    outcome
+}
+
+/// A bar on a terminal, plain lines elsewhere; both on the error stream.
+struct Progress {
+    bar: Option<ProgressBar>,
+    cut_backs: usize,
+}
+
+impl Progress {
+    fn new() -> Self {
+        Self { bar: None, cut_backs: 0 }
+    }
+
+    fn say(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(line),
+            None => eprintln!("{line}"),
+        }
+    }
+
+    fn finish(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish();
+        }
+    }
+}
+
+impl Observer for Progress {
+    fn phase(&mut self, name: &str, increments: usize) {
+        self.finish();
+        self.cut_backs = 0;
+        if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new(increments as u64);
+            let template = "{prefix:16} {bar:32} {pos}/{len}  {msg}  {eta} left";
+            if let Ok(style) = ProgressStyle::with_template(template) {
+                bar.set_style(style);
+            }
+            bar.set_prefix(name.to_owned());
+            bar.tick();
+            self.bar = Some(bar);
+        } else {
+            eprintln!("phase {name}: {increments} increments");
+        }
+    }
+
+    fn increment(&mut self, place: &Place, of: usize, iterations: usize) {
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position(place.increment as u64);
+                bar.set_message(format!("{iterations} iterations, {} cut-backs", self.cut_backs));
+            }
+            None => eprintln!(
+                "phase {}: increment {}/{of}, {iterations} iterations",
+                place.phase, place.increment
+            ),
+        }
+    }
+
+    fn cut_back(&mut self, place: &Place, reason: &str) {
+        self.cut_backs += 1;
+        if self.cut_backs <= 10 {
+            self.say(&format!("{place}: step cut back: {reason}"));
+        } else if self.cut_backs == 11 {
+            self.say("further cut-backs are only in log.jsonl");
+        }
+    }
+
+    fn warning(&mut self, message: &str) {
+        self.say(&format!("warning: {message}"));
+    }
+}

@@ -601,7 +601,11 @@ impl OwnedInstance {
             gradient0: read(call.gradient0),
             gradient1: read(call.gradient1),
             flux0: read(Some(call.flux0)),
-            state0: Strided::rows(call.n_states).view(call.state0, n, call.n_states),
+            state0: if call.state0.is_empty() {
+                NOTHING
+            } else {
+                Strided::rows(call.n_states).view(call.state0, n, call.n_states)
+            },
             flux1: call
                 .flux1
                 .map_or(NOWHERE, |(values, strides)| strides.view_mut(values, n, c)),

@@ -1,6 +1,9 @@
 #![doc = include_str!("../LAW.md")]
 #![forbid(unsafe_code)]
 
+#[cfg(test)]
+mod tests;
+
 use abi::{
     ContinuumLaw, Description, Failure, Parameter, Refusal, SolidPoint, SolidResponse, Tangent,
 };

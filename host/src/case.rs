@@ -1,0 +1,446 @@
+//! The case file: what a user writes, key by key. Reading it gives these types; references
+//! between them (a group's law, a load's line) are resolved by the modules that use them.
+
+use crate::error::{Error, Source};
+use crate::input::{Named, ParameterTable, parse};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// A case file and its text.
+#[derive(Debug)]
+pub struct Case {
+    /// Text and path, for messages.
+    pub source: Source,
+    /// Contents.
+    pub file: CaseFile,
+}
+
+impl Case {
+    /// Reads a case file, or `case.toml` in a folder.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], or [`Error::Input`] at the place that does not fit.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let path = if path.is_dir() { path.join("case.toml") } else { path.to_owned() };
+        let source = Source::read(&path)?;
+        let file = parse(&source)?;
+        Ok(Self { source, file })
+    }
+
+    /// Name of the case: its folder if the file is called `case.toml`, else the file's stem.
+    pub fn name(&self) -> String {
+        let path = self.source.path();
+        let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let named = if absolute.file_name().is_some_and(|name| name == "case.toml") {
+            absolute.parent().and_then(Path::file_name)
+        } else {
+            absolute.file_stem()
+        };
+        named.map_or_else(|| "case".to_owned(), |name| name.to_string_lossy().into_owned())
+    }
+
+    /// Folders with law libraries that the file names, relative to itself.
+    pub fn law_folders(&self) -> Vec<PathBuf> {
+        let here = self.source.path().parent().unwrap_or(Path::new("."));
+        self.file.law_path.iter().map(|folder| here.join(folder)).collect()
+    }
+}
+
+/// The keys of a case file. Units: kN, m, kPa; angles in degrees.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaseFile {
+    /// What the case is.
+    #[serde(default)]
+    pub title: String,
+    /// Kinematics of the plane.
+    pub analysis: Analysis,
+    /// Folders with law libraries, relative to the case file.
+    #[serde(default)]
+    pub law_path: Vec<PathBuf>,
+    /// The mesh.
+    pub mesh: MeshInput,
+    /// Laws with their parameters, by a name that groups refer to.
+    pub laws: Named<LawInput>,
+    /// Element groups, by a name that regions refer to.
+    pub groups: Named<GroupInput>,
+    /// Displacements held at zero throughout.
+    #[serde(default)]
+    pub supports: Vec<SupportInput>,
+    /// Loading phases, in order.
+    #[serde(rename = "phase")]
+    pub phases: Vec<PhaseInput>,
+    /// Quantities written for every increment.
+    #[serde(default)]
+    pub probes: Named<ProbeInput>,
+    /// Solver settings.
+    #[serde(default)]
+    pub solver: SolverInput,
+    /// What is written.
+    #[serde(default)]
+    pub output: OutputInput,
+}
+
+/// Kinematics of the plane.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Analysis {
+    /// x is the radius r, y the axis z; integrals over the whole turn.
+    Axisymmetric,
+    /// Unit thickness.
+    PlaneStrain,
+}
+
+/// A structured mesh of 8-node quads.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshInput {
+    /// Where columns and rows start.
+    #[serde(default)]
+    pub origin: [f64; 2],
+    /// Columns, in the direction of x (r).
+    pub columns: Vec<Spanned<PartInput>>,
+    /// Rows, in the direction of y (z).
+    pub rows: Vec<Spanned<PartInput>>,
+    /// Which group an element belongs to; later regions override earlier ones.
+    #[serde(rename = "region")]
+    pub regions: Vec<RegionInput>,
+    /// Named lines.
+    #[serde(default)]
+    pub lines: Named<LineInput>,
+}
+
+/// Some columns or rows, following the previous ones.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartInput {
+    /// How many.
+    pub n: usize,
+    /// Coordinate where they end.
+    pub to: f64,
+    /// Size of each divided by the size of the one before.
+    #[serde(default = "one")]
+    pub ratio: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A rectangle of elements.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegionInput {
+    /// The group its elements belong to.
+    pub group: Spanned<String>,
+    /// Extent in x (r); everything if left out.
+    #[serde(alias = "r")]
+    pub x: Option<Spanned<[f64; 2]>>,
+    /// Extent in y (z); everything if left out.
+    #[serde(alias = "z")]
+    pub y: Option<Spanned<[f64; 2]>>,
+}
+
+/// A line along a coordinate, or a point.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineInput {
+    /// Position or extent in x (r).
+    #[serde(alias = "r")]
+    pub x: Option<Coordinate>,
+    /// Position or extent in y (z).
+    #[serde(alias = "z")]
+    pub y: Option<Coordinate>,
+}
+
+/// A position or an extent.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(untagged)]
+pub enum Coordinate {
+    /// A position.
+    At(f64),
+    /// An extent.
+    Between([f64; 2]),
+}
+
+/// A law with its parameters.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LawInput {
+    /// Id of the law.
+    pub law: Spanned<String>,
+    /// Its parameters.
+    #[serde(default)]
+    pub parameters: ParameterTable,
+    /// Initial values of internal variables, overriding those of the law.
+    #[serde(default)]
+    pub initial: Named<f64>,
+}
+
+/// A group of elements.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GroupInput {
+    /// What the elements do.
+    pub formulation: Formulation,
+    /// The law, by its name under `laws`; phases may swap it.
+    pub law: Spanned<String>,
+    /// Where the law is evaluated; the default depends on the formulation.
+    pub integration: Option<Spanned<Integration>>,
+    /// Zero thickness: the line along which the elements are inserted.
+    pub line: Option<Spanned<String>>,
+    /// Thin layer: direction across the layer; the shorter side if left out.
+    pub normal: Option<Spanned<Axis>>,
+    /// Thin layer with an interface law: elasticity along the layer.
+    pub in_plane: Option<Spanned<InPlane>>,
+    /// Stress before the first phase, components 11 22 33 12, tension positive.
+    pub initial_stress: Option<StressInput>,
+}
+
+/// What the elements of a group do.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Formulation {
+    /// 8-node quads with a continuum law in global axes.
+    Solid,
+    /// 8-node quads of a thin layer, with an interface law or a continuum law in its own axes.
+    ThinLayer,
+    /// Three double nodes with an interface law.
+    ZeroThickness,
+}
+
+impl Formulation {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Solid => "solid",
+            Self::ThinLayer => "thin_layer",
+            Self::ZeroThickness => "zero_thickness",
+        }
+    }
+}
+
+/// Where the law is evaluated.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Integration {
+    /// 3 × 3 Gauss points (zero thickness: 3 Gauss points).
+    Full,
+    /// 2 × 2 Gauss points (zero thickness: 2 Gauss points).
+    Reduced,
+    /// Thin layer: 3 points along the layer on its mid-surface, mid-thickness nodes tied.
+    Mean,
+    /// Zero thickness: the three nodes (Newton–Cotes).
+    Nodes,
+}
+
+/// A coordinate direction.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// x, or r.
+    #[serde(alias = "r")]
+    X,
+    /// y, or z.
+    #[serde(alias = "z")]
+    Y,
+}
+
+/// Elasticity along a thin layer with an interface law.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum InPlane {
+    /// E*, ν* of equations (18), (19).
+    Elastic,
+    /// None: stresses along the layer stay as they are.
+    None,
+}
+
+/// A stress, tension positive.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StressInput {
+    /// Along x (r).
+    #[serde(rename = "11")]
+    pub s11: f64,
+    /// Along y (z).
+    #[serde(rename = "22")]
+    pub s22: f64,
+    /// Out of plane (hoop).
+    #[serde(rename = "33")]
+    pub s33: f64,
+    /// Shear.
+    #[serde(rename = "12")]
+    pub s12: f64,
+}
+
+/// Displacements of a line held at zero.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportInput {
+    /// The line.
+    pub line: Spanned<String>,
+    /// The components.
+    pub fixed: Vec<Axis>,
+}
+
+/// A loading phase. Loads and prescribed displacements stay until a later phase changes them.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhaseInput {
+    /// Name, used in results.
+    pub name: Spanned<String>,
+    /// Number of equal increments.
+    pub increments: Spanned<usize>,
+    /// Laws of groups from this phase on.
+    #[serde(default)]
+    pub laws: Named<String>,
+    /// Displacements are counted from the start of this phase.
+    #[serde(default)]
+    pub reset_displacements: bool,
+    /// Prescribed displacements, as totals at the end of the phase.
+    #[serde(default)]
+    pub displacement: Vec<DisplacementInput>,
+    /// Prescribed displacements given up from this phase on.
+    #[serde(default)]
+    pub free: Vec<FreeInput>,
+    /// Pressures, as totals at the end of the phase.
+    #[serde(default)]
+    pub pressure: Vec<PressureInput>,
+}
+
+/// Prescribed displacements of a line, m.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DisplacementInput {
+    /// The line.
+    pub line: Spanned<String>,
+    /// In x (r).
+    #[serde(alias = "r")]
+    pub x: Option<f64>,
+    /// In y (z).
+    #[serde(alias = "z")]
+    pub y: Option<f64>,
+}
+
+/// Displacements of a line that become free.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FreeInput {
+    /// The line.
+    pub line: Spanned<String>,
+    /// The components.
+    pub components: Vec<Axis>,
+}
+
+/// A pressure on a boundary line, kPa.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PressureInput {
+    /// The line.
+    pub line: Spanned<String>,
+    /// Towards the body positive.
+    pub value: f64,
+}
+
+/// A quantity written for every increment.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeInput {
+    /// Over the nodes of this line.
+    pub line: Option<Spanned<String>>,
+    /// Over the integration points of this group; with a line, only its forces.
+    pub group: Option<Spanned<String>>,
+    /// What.
+    pub quantity: Option<Spanned<String>>,
+    /// How values become one; `sum` for forces, else `mean`.
+    pub reduce: Option<Reduce>,
+    /// Only points inside this extent (ends excluded).
+    #[serde(alias = "r")]
+    pub x: Option<[f64; 2]>,
+    /// Only points inside this extent (ends excluded).
+    #[serde(alias = "z")]
+    pub y: Option<[f64; 2]>,
+    /// Factor.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Instead of the above: a sum of other probes with factors.
+    pub combine: Option<Named<f64>>,
+}
+
+/// How values become one.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduce {
+    /// Arithmetic mean.
+    Mean,
+    /// Smallest.
+    Min,
+    /// Largest.
+    Max,
+    /// Sum.
+    Sum,
+}
+
+/// Solver settings.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverInput {
+    /// Largest residual force, relative to the largest of the forces in play (2-norms).
+    pub force_tolerance: f64,
+    /// Largest correction, relative to the displacement increment (2-norms).
+    pub displacement_tolerance: f64,
+    /// Iterations after which an increment is cut back.
+    pub max_iterations: usize,
+    /// An increment is halved at most so many times.
+    pub max_halvings: u32,
+    /// Whether to search along a correction that makes the residual grow.
+    pub line_search: bool,
+}
+
+impl Default for SolverInput {
+    fn default() -> Self {
+        Self {
+            force_tolerance: 1e-9,
+            displacement_tolerance: 1e-7,
+            max_iterations: 25,
+            max_halvings: 10,
+            line_search: true,
+        }
+    }
+}
+
+/// What is written.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputInput {
+    /// When the profile along interfaces is written.
+    pub profile: When,
+    /// When fields for a viewer are written.
+    pub fields: When,
+}
+
+/// When something is written.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum When {
+    /// Never.
+    #[default]
+    Never,
+    /// After the last increment of each phase.
+    Phases,
+    /// After every increment.
+    Increments,
+}
+
+impl When {
+    /// Whether to write after increment `i` of `n`.
+    pub fn includes(self, i: usize, n: usize) -> bool {
+        match self {
+            Self::Never => false,
+            Self::Phases => i == n,
+            Self::Increments => true,
+        }
+    }
+}

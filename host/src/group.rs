@@ -1,0 +1,430 @@
+//! A group of elements with its law: committed and trial state of every integration point.
+//!
+//! An increment starts from the committed state; every iteration computes the trial state anew
+//! from it, so a failed increment leaves nothing behind.
+
+mod layer;
+
+use crate::case::{Formulation, InPlane};
+use crate::element::Kinematics;
+use crate::input::BuiltLaw;
+use crate::plugin::{BatchFailure, BatchSuccess, End, Operator, Start, Strided};
+use layer::Layer;
+use std::sync::Arc;
+
+/// Values of all points, before and during an increment.
+#[derive(Clone, Debug, Default)]
+pub struct Field {
+    /// At the start of the increment.
+    pub committed: Vec<f64>,
+    /// As of the last iteration.
+    pub trial: Vec<f64>,
+}
+
+impl Field {
+    fn new(committed: Vec<f64>) -> Self {
+        Self { trial: committed.clone(), committed }
+    }
+
+    fn commit(&mut self) {
+        self.committed.copy_from_slice(&self.trial);
+    }
+}
+
+/// A law as a group uses it.
+#[derive(Clone, Debug)]
+pub struct GroupLaw {
+    /// Its name in the case file.
+    pub name: String,
+    /// The law.
+    pub built: Arc<BuiltLaw>,
+    /// Initial values of internal variables that override the law's own, by number.
+    pub initial: Vec<(usize, f64)>,
+}
+
+/// A failed point, by element.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointFailure {
+    /// Name of the group.
+    pub group: String,
+    /// Name of the law in the case file.
+    pub law: String,
+    /// Id of the law.
+    pub law_id: String,
+    /// Element within the group, from 1.
+    pub element: usize,
+    /// Integration point within the element, from 1.
+    pub point: usize,
+    /// Coordinates.
+    pub position: [f64; 2],
+    /// What happened.
+    pub failure: BatchFailure,
+}
+
+impl std::fmt::Display for PointFailure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { group, law_id, element, point, position: [x, y], failure, .. } = self;
+        write!(
+            f,
+            "law `{law_id}`, group `{group}`, element {element}, point {point} at ({x:.4}, {y:.4}): {}",
+            if failure.message.is_empty() { "no reason given" } else { &failure.message }
+        )
+    }
+}
+
+/// A group of elements.
+#[derive(Debug)]
+pub struct Group {
+    /// Name in the case file.
+    pub name: String,
+    /// What the elements do.
+    pub formulation: Formulation,
+    /// The elements.
+    pub kinematics: Box<dyn Kinematics>,
+    /// Strains (zero thickness: jumps) in axes of the elements.
+    pub strain: Field,
+    /// Stresses (zero thickness: tractions) in axes of the elements.
+    pub stress: Field,
+    /// Internal variables of the law.
+    pub internal: Field,
+    /// The law.
+    pub law: GroupLaw,
+    /// Points carried through the law so far, calls included that came to nothing.
+    pub law_calls: u64,
+    layer: Option<Layer>,
+    /// Tangents of the element, point by point; of a linear law, those of one element only.
+    tangent: Vec<f64>,
+    tangents_are_constant: bool,
+}
+
+impl Group {
+    /// A group before the first phase. `stress` is in axes of the elements. `thickness` by
+    /// element makes it a thin layer.
+    ///
+    /// # Errors
+    /// The law cannot start from the stress.
+    pub fn new(
+        name: String,
+        formulation: Formulation,
+        kinematics: Box<dyn Kinematics>,
+        stress: Vec<f64>,
+        thickness: Option<(Vec<f64>, InPlane)>,
+        law: GroupLaw,
+    ) -> Result<Self, PointFailure> {
+        let n = kinematics.n_points() * kinematics.n_components();
+        let layer = thickness.map(|(thickness, in_plane)| {
+            Layer::new(thickness, in_plane, kinematics.points_per_element())
+        });
+        let mut group = Self {
+            name,
+            formulation,
+            kinematics,
+            strain: Field::new(vec![0.0; n]),
+            stress: Field::new(stress),
+            internal: Field::default(),
+            law: law.clone(),
+            law_calls: 0,
+            layer,
+            tangent: Vec::new(),
+            tangents_are_constant: false,
+        };
+        group.start_law(law, None)?;
+        Ok(group)
+    }
+
+    /// Swaps the law. The stress stays; internal variables stay if the law is the same one (with
+    /// other parameters), else the new law starts from the current stress.
+    ///
+    /// # Errors
+    /// The law cannot start from the stress.
+    pub fn set_law(&mut self, law: GroupLaw) -> Result<(), PointFailure> {
+        let same = law.built.law.description().id == self.law.built.law.description().id;
+        let kept = same.then(|| std::mem::take(&mut self.internal.committed));
+        self.start_law(law, kept)
+    }
+
+    fn start_law(&mut self, law: GroupLaw, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
+        self.law = law;
+        let law = &self.law.built.law;
+        let n_points = self.kinematics.n_points();
+        let internal = match kept {
+            Some(kept) => kept,
+            None => {
+                let stress = (self.stress.committed.as_slice(), self.flux_place());
+                let mut state = law
+                    .initial_state(n_points, stress)
+                    .map_err(|failure| self.locate(failure))?;
+                for &(number, value) in &self.law.initial {
+                    state.iter_mut().skip(number).step_by(law.n_states()).for_each(|v| *v = value);
+                }
+                state
+            }
+        };
+        self.internal = Field::new(internal);
+        let n = law.n_components();
+        let element_n = self.kinematics.n_components();
+        self.tangents_are_constant = law.formulation().linear && !self.uses_layer();
+        if self.tangents_are_constant {
+            let one = self.operator_of_first_point().map_err(|failure| self.locate(failure))?;
+            self.tangent = one.repeat(self.kinematics.points_per_element());
+            return Ok(());
+        }
+        self.tangent = vec![0.0; n_points * element_n * element_n];
+        if self.uses_layer() {
+            let mut operator = vec![0.0; n_points * n * n];
+            self.run_law(Operator::Elastic, 0.0, 0.0, &mut operator)
+                .map_err(|failure| self.locate(failure))?;
+            let layer = self.layer.as_mut().ok_or_else(|| unreachable_failure(&self.name))?;
+            layer.start(&operator);
+            self.stress.trial.copy_from_slice(&self.stress.committed);
+            self.internal.trial.copy_from_slice(&self.internal.committed);
+        }
+        Ok(())
+    }
+
+    /// A thin layer whose law is an interface law.
+    fn uses_layer(&self) -> bool {
+        self.layer.is_some() && self.law.built.law.n_components() == 2
+    }
+
+    /// Where the law's fluxes stand within the stresses: all of them, or, of a thin layer with an
+    /// interface law, components 22 (normal) and 12 (shear).
+    fn flux_place(&self) -> Strided {
+        if self.uses_layer() {
+            Strided { offset: 1, point: 4, component: 2 }
+        } else {
+            Strided::rows(self.kinematics.n_components())
+        }
+    }
+
+    /// The first point of a thin layer whose normal and shear stiffness cannot be those of an
+    /// elastic layer: (normal, shear).
+    pub fn impossible_layer(&self) -> Option<[f64; 2]> {
+        self.layer.as_ref().filter(|_| self.uses_layer()).and_then(Layer::impossible)
+    }
+
+    /// Computes the trial state under displacement increments (two per node) since the committed
+    /// state, and the tangents if wanted.
+    ///
+    /// # Errors
+    /// The worst point.
+    pub fn evaluate(
+        &mut self,
+        increment: &[f64],
+        operator: Operator,
+        time: f64,
+        time_increment: f64,
+    ) -> Result<BatchSuccess, PointFailure> {
+        self.strain.trial.copy_from_slice(&self.strain.committed);
+        self.kinematics.add_gradients(increment, &mut self.strain.trial);
+        if self.tangents_are_constant {
+            self.evaluate_linear();
+            return Ok(BatchSuccess::default());
+        }
+        if let Some(layer) = self.layer.as_mut().filter(|_| self.law.built.law.n_components() == 2)
+        {
+            layer.jumps_from_strains(&self.strain.committed, &self.strain.trial);
+        }
+        let mut tangent = std::mem::take(&mut self.tangent);
+        let result = if self.uses_layer() {
+            let mut operators = vec![0.0; self.kinematics.n_points() * 4];
+            let result = self.run_law(operator, time, time_increment, &mut operators);
+            if let (Ok(_), Some(layer)) = (&result, &self.layer) {
+                layer.stresses_along(&self.strain, &mut self.stress);
+                layer.tangents(&operators, &mut tangent);
+            }
+            result
+        } else {
+            self.run_law(operator, time, time_increment, &mut tangent)
+        };
+        self.tangent = tangent;
+        self.law_calls += self.kinematics.n_points() as u64;
+        result.map_err(|failure| self.locate(failure))
+    }
+
+    /// σ = σ₀ + D Δε.
+    fn evaluate_linear(&mut self) {
+        let n = self.kinematics.n_components();
+        let points = self
+            .stress
+            .trial
+            .chunks_exact_mut(n)
+            .zip(self.stress.committed.chunks_exact(n))
+            .zip(self.strain.trial.chunks_exact(n).zip(self.strain.committed.chunks_exact(n)));
+        for ((stress, stress_0), (strain, strain_0)) in points {
+            for i in 0..n {
+                let row = &self.tangent[i * n..][..n];
+                let change: f64 = (0..n).map(|j| row[j] * (strain[j] - strain_0[j])).sum();
+                stress[i] = stress_0[i] + change;
+            }
+        }
+    }
+
+    /// The constant tangent of a linear law.
+    fn operator_of_first_point(&mut self) -> Result<Vec<f64>, BatchFailure> {
+        let law = &self.law.built.law;
+        let n = law.n_components();
+        let zero = vec![0.0; n];
+        let mut flux = vec![0.0; n];
+        let mut operator = vec![0.0; n * n];
+        let rows = Strided::rows(n);
+        law.integrate(
+            &Start {
+                n_points: 1,
+                gradient: (&zero, rows),
+                gradient_end: (&zero, rows),
+                flux: (&zero, rows),
+                state: &[],
+                time: 0.0,
+                time_increment: 0.0,
+            },
+            Operator::Consistent,
+            End { flux: (&mut flux, rows), state: &mut [], operator: &mut operator },
+        )?;
+        self.law_calls += 1;
+        Ok(operator)
+    }
+
+    fn run_law(
+        &mut self,
+        operator: Operator,
+        time: f64,
+        time_increment: f64,
+        operators: &mut [f64],
+    ) -> Result<BatchSuccess, BatchFailure> {
+        let place = self.flux_place();
+        let gradient = match &self.layer {
+            Some(layer) if self.law.built.law.n_components() == 2 => &layer.jump,
+            _ => &self.strain,
+        };
+        let rows = Strided::rows(self.law.built.law.n_components());
+        self.law.built.law.integrate(
+            &Start {
+                n_points: self.kinematics.n_points(),
+                gradient: (&gradient.committed, rows),
+                gradient_end: (&gradient.trial, rows),
+                flux: (&self.stress.committed, place),
+                state: &self.internal.committed,
+                time,
+                time_increment,
+            },
+            operator,
+            End {
+                flux: (&mut self.stress.trial, place),
+                state: &mut self.internal.trial,
+                operator: operators,
+            },
+        )
+    }
+
+    fn locate(&self, failure: BatchFailure) -> PointFailure {
+        let per_element = self.kinematics.points_per_element().max(1);
+        let point = failure.point.min(self.kinematics.n_points().saturating_sub(1));
+        PointFailure {
+            group: self.name.clone(),
+            law: self.law.name.clone(),
+            law_id: self.law.built.law.description().id.clone(),
+            element: point / per_element + 1,
+            point: point % per_element + 1,
+            position: self.kinematics.position(point),
+            failure: BatchFailure {
+                // The law counts points of the batch; the element says more.
+                message: failure
+                    .message
+                    .strip_prefix(&format!("point {}: ", failure.point))
+                    .unwrap_or(&failure.message)
+                    .to_owned(),
+                ..failure
+            },
+        }
+    }
+
+    /// Tangents of an element's points as of the last evaluation.
+    pub fn element_tangents(&self, element: usize) -> &[f64] {
+        let n = self.kinematics.n_components();
+        let length = self.kinematics.points_per_element() * n * n;
+        let start = if self.tangents_are_constant { 0 } else { element * length };
+        &self.tangent[start..start + length]
+    }
+
+    /// Makes the trial state the committed one.
+    pub fn commit(&mut self) {
+        self.strain.commit();
+        self.stress.commit();
+        self.internal.commit();
+        if let Some(layer) = &mut self.layer {
+            layer.jump.commit();
+        }
+    }
+
+    /// Stress of a point in global axes (committed); `None` for zero-thickness elements.
+    pub fn global_stress(&self, point: usize) -> Option<[f64; 4]> {
+        let s = self.stress.committed.get(4 * point..4 * point + 4)?;
+        let axes = self.kinematics.axes(point / self.kinematics.points_per_element());
+        (self.kinematics.n_components() == 4)
+            .then(|| axes.stress_to_global([s[0], s[1], s[2], s[3]]))
+    }
+
+    /// Strain of a point in global axes (committed), γ = 2ε; `None` for zero-thickness elements.
+    pub fn global_strain(&self, point: usize) -> Option<[f64; 4]> {
+        let e = self.strain.committed.get(4 * point..4 * point + 4)?;
+        let axes = self.kinematics.axes(point / self.kinematics.points_per_element());
+        (self.kinematics.n_components() == 4).then(|| {
+            let [e_11, e_22, e_33, e_12] = axes.stress_to_global([e[0], e[1], e[2], e[3] / 2.0]);
+            [e_11, e_22, e_33, 2.0 * e_12]
+        })
+    }
+
+    /// An internal variable of a point (committed); `None` if the law has none of this id.
+    pub fn internal_variable(&self, point: usize, id: &str) -> Option<f64> {
+        let variables = &self.law.built.law.formulation().internal_variables;
+        let number = variables.iter().position(|variable| variable.id == id)?;
+        self.internal.committed.get(point * variables.len() + number).copied()
+    }
+
+    /// Nodal forces of this group's elements (committed), by degree of freedom.
+    pub fn forces(&self, n_dofs: usize) -> Vec<f64> {
+        let mut force = vec![0.0; n_dofs];
+        self.kinematics.add_forces(&self.stress.committed, &mut force);
+        force
+    }
+
+    /// Jump and traction (normal, tangential) of a point of a thin layer or zero-thickness
+    /// element (committed); `None` for solids.
+    pub fn jump_and_traction(&self, point: usize) -> Option<([f64; 2], [f64; 2])> {
+        match self.formulation {
+            Formulation::Solid => None,
+            Formulation::ZeroThickness => {
+                let pair = |values: &[f64]| [values[2 * point], values[2 * point + 1]];
+                Some((pair(&self.strain.committed), pair(&self.stress.committed)))
+            }
+            Formulation::ThinLayer => {
+                let layer = self.layer.as_ref()?;
+                let pair = |values: &[f64]| [values[4 * point + 1], values[4 * point + 3]];
+                let jump = if self.uses_layer() {
+                    [layer.jump.committed[2 * point], layer.jump.committed[2 * point + 1]]
+                } else {
+                    pair(&self.strain.committed).map(|strain| strain * layer.thickness_at(point))
+                };
+                Some((jump, pair(&self.stress.committed)))
+            }
+        }
+    }
+}
+
+fn unreachable_failure(group: &str) -> PointFailure {
+    PointFailure {
+        group: group.to_owned(),
+        law: String::new(),
+        law_id: String::new(),
+        element: 0,
+        point: 0,
+        position: [0.0; 2],
+        failure: BatchFailure {
+            point: 0,
+            outcome: abi::status::Outcome::Internal,
+            message: "a thin layer without a thickness".to_owned(),
+            factor: None,
+        },
+    }
+}

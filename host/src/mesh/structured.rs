@@ -1,0 +1,349 @@
+//! Meshes of columns and rows: grid, regions, lines, and elements inserted along lines.
+
+use super::{EDGES, Joint, Line, Mesh, Quad};
+use crate::case::{CaseFile, Coordinate, Formulation, LineInput, PartInput, RegionInput};
+use crate::error::{Error, Source, suggestion};
+use std::collections::HashMap;
+use toml::Spanned;
+
+/// Most columns times rows.
+const MOST_ELEMENTS: usize = 4_000_000;
+/// Two coordinates are the same within this fraction of the mesh's size.
+const SAME: f64 = 1e-9;
+
+pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
+    let input = &file.mesh;
+    let x = grid(source, input.origin[0], &input.columns)?;
+    let y = grid(source, input.origin[1], &input.rows)?;
+    let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
+    if n_columns.saturating_mul(n_rows) > MOST_ELEMENTS {
+        return Err(Error::Usage(format!(
+            "{n_columns} columns × {n_rows} rows: at most {MOST_ELEMENTS} elements are possible"
+        )));
+    }
+    let groups = element_groups(source, file, &x, &y)?;
+    let mut mesh = quads(&x, &y, &groups);
+    let tolerance = SAME * (x[n_columns] - x[0]).max(y[n_rows] - y[0]);
+    for (name, line) in &input.lines {
+        let found = find_line(&mesh, line.get_ref(), tolerance).map_err(|why| {
+            let message = format!("line `{}`: {why}", name.get_ref());
+            source.error(line.span(), message)
+        })?;
+        mesh.lines.insert(name.get_ref().clone(), found);
+    }
+    for (number, (name, group)) in file.groups.iter().enumerate() {
+        let group = group.get_ref();
+        match (group.formulation, &group.line) {
+            (Formulation::ZeroThickness, Some(line)) => {
+                mesh.line(source, line)?;
+                split(&mut mesh, line.get_ref(), number).map_err(|why| {
+                    let message = format!("group `{}`: {why}", name.get_ref());
+                    source.error(line.span(), message)
+                })?;
+            }
+            (Formulation::ZeroThickness, None) => {
+                let message = format!("group `{}` needs a `line` to be inserted along", name.get_ref());
+                return Err(source.error(name.span(), message).into());
+            }
+            (_, Some(line)) => {
+                let message = "`line` only belongs to the formulation `zero_thickness`";
+                return Err(source.error(line.span(), message).into());
+            }
+            (_, None) => {}
+        }
+    }
+    collect_line_nodes(&mut mesh);
+    Ok(mesh)
+}
+
+/// Coordinates of the grid lines.
+fn grid(source: &Source, origin: f64, parts: &[Spanned<PartInput>]) -> Result<Vec<f64>, Error> {
+    let mut at = vec![origin];
+    for part in parts {
+        let PartInput { n, to, ratio } = *part.get_ref();
+        let error = |message: String| Err(source.error(part.span(), message).into());
+        let start = at[at.len() - 1];
+        if n == 0 || n > MOST_ELEMENTS {
+            return error(format!("`n` is {n}, expected 1 to {MOST_ELEMENTS}"));
+        }
+        if !ratio.is_finite() || ratio <= 0.0 {
+            return error(format!("`ratio` is {ratio}, expected a positive number"));
+        }
+        if !to.is_finite() || to <= start {
+            return error(format!("`to` is {to}, expected more than {start}, where the part starts"));
+        }
+        // Sizes first, first·ratio, first·ratio², … add up to the whole part.
+        let sizes: Vec<f64> = (0..n).map(|i| ratio.powi(i as i32)).collect();
+        let total: f64 = sizes.iter().sum();
+        if !total.is_finite() || sizes.iter().any(|s| s / total < 1e-12) {
+            return error(format!("`ratio` {ratio} over {n} parts leaves parts of no size"));
+        }
+        let mut sum = 0.0;
+        for size in &sizes[..n - 1] {
+            sum += size;
+            at.push(start + (to - start) * sum / total);
+        }
+        at.push(to);
+    }
+    if at.len() < 2 || !origin.is_finite() {
+        return Err(Error::Usage(format!(
+            "{}: the mesh needs columns and rows",
+            source.path().display()
+        )));
+    }
+    Ok(at)
+}
+
+/// Group number of every element, row by row.
+fn element_groups(
+    source: &Source,
+    file: &CaseFile,
+    x: &[f64],
+    y: &[f64],
+) -> Result<Vec<usize>, Error> {
+    let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
+    let mut group = vec![usize::MAX; n_columns * n_rows];
+    for region in &file.mesh.regions {
+        let RegionInput { group: name, x: in_x, y: in_y } = region;
+        let number = file.groups.keys().position(|key| key.get_ref() == name.get_ref());
+        let Some(number) = number else {
+            let names: Vec<&str> = file.groups.keys().map(|key| key.get_ref().as_str()).collect();
+            return Err(source
+                .error(name.span(), format!("there is no group `{}`", name.get_ref()))
+                .hint(suggestion(name.get_ref(), names))
+                .into());
+        };
+        if file.groups[number].get_ref().formulation == Formulation::ZeroThickness {
+            let message = "a `zero_thickness` group is inserted along a line, it takes no region";
+            return Err(source.error(name.span(), message).into());
+        }
+        let columns = interval(source, x, in_x.as_ref())?;
+        let rows = interval(source, y, in_y.as_ref())?;
+        for row in rows {
+            group[row * n_columns..][columns.clone()].fill(number);
+        }
+    }
+    if let Some(e) = group.iter().position(|&g| g == usize::MAX) {
+        let (i, j) = (e % n_columns, e / n_columns);
+        return Err(Error::Usage(format!(
+            "{}: the element at ({:.6}, {:.6}) belongs to no region",
+            source.path().display(),
+            0.5 * (x[i] + x[i + 1]),
+            0.5 * (y[j] + y[j + 1])
+        )));
+    }
+    Ok(group)
+}
+
+/// Which columns (or rows) an extent covers. Its ends must be grid lines.
+fn interval(
+    source: &Source,
+    grid: &[f64],
+    extent: Option<&Spanned<[f64; 2]>>,
+) -> Result<std::ops::Range<usize>, Error> {
+    let Some(extent) = extent else {
+        return Ok(0..grid.len() - 1);
+    };
+    let tolerance = SAME * (grid[grid.len() - 1] - grid[0]);
+    let index = |at: f64| {
+        let nearest = (0..grid.len())
+            .min_by(|&a, &b| (grid[a] - at).abs().total_cmp(&(grid[b] - at).abs()))
+            .unwrap_or(0);
+        if (grid[nearest] - at).abs() <= tolerance {
+            Ok(nearest)
+        } else {
+            Err(source
+                .error(extent.span(), format!("{at} is no grid line, the nearest is {}", grid[nearest])))
+        }
+    };
+    let [from, to] = *extent.get_ref();
+    let (from, to) = (index(from)?, index(to)?);
+    if from >= to {
+        let message = "the extent is empty, expected [smaller, larger]";
+        return Err(source.error(extent.span(), message).into());
+    }
+    Ok(from..to)
+}
+
+/// The quads of a grid. Nodes are numbered row by row, mid-sides included.
+fn quads(x: &[f64], y: &[f64], groups: &[usize]) -> Mesh {
+    let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
+    let with_middles = |grid: &[f64]| -> Vec<f64> {
+        let pairs = grid.windows(2).flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
+        pairs.chain([grid[grid.len() - 1]]).collect()
+    };
+    let (fine_x, fine_y) = (with_middles(x), with_middles(y));
+    let mut number = vec![usize::MAX; fine_x.len() * fine_y.len()];
+    let mut mesh = Mesh::default();
+    for (j, &y) in fine_y.iter().enumerate() {
+        for (i, &x) in fine_x.iter().enumerate() {
+            if i % 2 == 0 || j % 2 == 0 {
+                number[j * fine_x.len() + i] = mesh.nodes.len();
+                mesh.nodes.push([x, y]);
+            }
+        }
+    }
+    for row in 0..n_rows {
+        for column in 0..n_columns {
+            let at = |i: usize, j: usize| number[(2 * row + j) * fine_x.len() + 2 * column + i];
+            let nodes = [
+                at(0, 0),
+                at(2, 0),
+                at(2, 2),
+                at(0, 2),
+                at(1, 0),
+                at(2, 1),
+                at(1, 2),
+                at(0, 1),
+            ];
+            mesh.quads.push(Quad { nodes, group: groups[row * n_columns + column] });
+        }
+    }
+    mesh
+}
+
+/// Edges (or the node) of the mesh on a line.
+fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, String> {
+    let on = |node: usize| {
+        [line.x, line.y].iter().zip(mesh.nodes[node]).all(|(wanted, at)| match wanted {
+            None => true,
+            Some(Coordinate::At(position)) => (at - position).abs() <= tolerance,
+            Some(Coordinate::Between([from, to])) => {
+                at >= from - tolerance && at <= to + tolerance
+            }
+        })
+    };
+    match (line.x, line.y) {
+        (Some(Coordinate::At(_)), Some(Coordinate::At(_))) => {
+            let nodes: Vec<usize> = (0..mesh.nodes.len()).filter(|&n| on(n)).collect();
+            if nodes.is_empty() {
+                return Err("there is no node at this point".to_owned());
+            }
+            Ok(Line { edges: Vec::new(), nodes })
+        }
+        (Some(Coordinate::At(_)), _) | (_, Some(Coordinate::At(_))) => {
+            let mut edges = Vec::new();
+            for (q, quad) in mesh.quads.iter().enumerate() {
+                for (e, edge) in EDGES.iter().enumerate() {
+                    if edge.iter().all(|&i| on(quad.nodes[i])) {
+                        edges.push((q, e));
+                    }
+                }
+            }
+            if edges.is_empty() {
+                return Err("no edge of an element lies on it".to_owned());
+            }
+            Ok(Line { edges, nodes: Vec::new() })
+        }
+        _ => Err("one coordinate must be a number, such as `x = 0.0`".to_owned()),
+    }
+}
+
+/// Doubles the nodes of a line and inserts zero-thickness elements between its two sides. Where
+/// the line ends inside the mesh its last node stays single, so the two sides stay joined there.
+fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
+    let line = mesh.lines[name].clone();
+    // Every edge of the line belongs to two quads; the one with smaller coordinates is `minus`.
+    let centre = |q: usize| {
+        let nodes = mesh.quads[q].nodes;
+        [0, 1].map(|c| nodes[..4].iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / 4.0)
+    };
+    let mut sides: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
+    for &(q, e) in &line.edges {
+        sides.entry(mesh.edge((q, e))[2]).or_default().push((q, e));
+    }
+    let mut middles: Vec<usize> = sides.keys().copied().collect();
+    middles.sort_unstable();
+    let mut pairs = Vec::new();
+    for middle in middles {
+        let side = &sides[&middle];
+        let &[a, b] = side.as_slice() else {
+            return Err("the line lies on the boundary: nothing to split".to_owned());
+        };
+        let (ca, cb) = (centre(a.0), centre(b.0));
+        pairs.push(if ca[0] + ca[1] < cb[0] + cb[1] { (a, b) } else { (b, a) });
+    }
+    // A node is doubled if the quads around it fall apart: ends on the boundary and inner nodes
+    // do; an end inside the mesh does not.
+    let mut on_boundary = vec![true; mesh.nodes.len()];
+    let mut owners: HashMap<usize, usize> = HashMap::new();
+    for quad in &mesh.quads {
+        for edge in EDGES {
+            *owners.entry(quad.nodes[edge[2]]).or_default() += 1;
+        }
+    }
+    on_boundary.fill(false);
+    for quad in &mesh.quads {
+        for edge in EDGES {
+            if owners[&quad.nodes[edge[2]]] == 1 {
+                for i in edge {
+                    on_boundary[quad.nodes[i]] = true;
+                }
+            }
+        }
+    }
+    let mut uses: HashMap<usize, usize> = HashMap::new();
+    for &(minus, _) in &pairs {
+        for node in mesh.edge(minus) {
+            *uses.entry(node).or_default() += 1;
+        }
+    }
+    let mut copy: HashMap<usize, usize> = HashMap::new();
+    let mut joints = Vec::new();
+    for &(minus, _) in &pairs {
+        let mut minus = mesh.edge(minus);
+        // Ends in the order of increasing coordinates, whatever way round the quad has them.
+        let [a, b] = [minus[0], minus[1]].map(|n| mesh.nodes[n]);
+        if a[0] + a[1] > b[0] + b[1] {
+            minus.swap(0, 1);
+        }
+        let plus = [0, 1, 2].map(|i| {
+            let node = minus[i];
+            let inner = i == 2 || uses[&node] == 2;
+            if !(inner || on_boundary[node]) {
+                return node;
+            }
+            *copy.entry(node).or_insert_with(|| {
+                mesh.nodes.push(mesh.nodes[node]);
+                mesh.nodes.len() - 1
+            })
+        });
+        joints.push(Joint { minus, plus, group });
+    }
+    // Quads on the far side of the line take the copies, also those that touch it in one node.
+    let vertical = {
+        let ends = [0, 1].map(|i| mesh.nodes[joints[0].minus[i]]);
+        (ends[0][0] - ends[1][0]).abs() < (ends[0][1] - ends[1][1]).abs()
+    };
+    let across = usize::from(!vertical);
+    let position = mesh.nodes[joints[0].minus[0]][across];
+    for q in 0..mesh.quads.len() {
+        let nodes = mesh.quads[q].nodes;
+        let at = nodes[..4].iter().map(|&n| mesh.nodes[n][across]).sum::<f64>() / 4.0;
+        if at > position {
+            for i in 0..8 {
+                if let Some(&new) = copy.get(&nodes[i]) {
+                    mesh.quads[q].nodes[i] = new;
+                }
+            }
+        }
+    }
+    mesh.joints.extend(joints);
+    Ok(())
+}
+
+/// Nodes of every line, after all splitting, in the order of the coordinates.
+fn collect_line_nodes(mesh: &mut Mesh) {
+    let mut lines = std::mem::take(&mut mesh.lines);
+    for line in lines.values_mut() {
+        if !line.edges.is_empty() {
+            line.nodes = line.edges.iter().flat_map(|&edge| mesh.edge(edge)).collect();
+        }
+        line.nodes.sort_unstable_by(|&a, &b| {
+            let (pa, pb) = (mesh.nodes[a], mesh.nodes[b]);
+            pa[0].total_cmp(&pb[0]).then(pa[1].total_cmp(&pb[1])).then(a.cmp(&b))
+        });
+        line.nodes.dedup();
+    }
+    mesh.lines = lines;
+}

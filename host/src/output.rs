@@ -1,0 +1,252 @@
+//! Results in a folder: `history.csv`, `profile.csv`, `fields.pvd` with `*.vtu`, `summary.json`,
+//! `log.jsonl`. Rows are flushed as increments converge, so whatever was reported is on disk.
+
+mod fields;
+mod profile;
+mod summary;
+
+pub use summary::PhaseRecord;
+
+use crate::case::{Case, OutputInput};
+use crate::error::{Error, Place};
+use crate::group::Group;
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::probe::{Probes, Snapshot};
+use crate::solver::Iteration;
+use fields::Fields;
+use profile::Profile;
+use serde_json::{Value, json};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use summary::Summary;
+
+/// A number with 17 significant digits: reading it back gives the same bits.
+pub fn number(value: f64) -> String {
+    format!("{value:.16e}")
+}
+
+/// An increment of a phase, for the record.
+#[derive(Clone, Debug, Default)]
+pub struct IncrementRecord {
+    /// Pseudo-time at its end.
+    pub time: f64,
+    /// Values of the probes.
+    pub probes: Vec<Option<f64>>,
+    /// Iterations, failed attempts included.
+    pub iterations: usize,
+    /// Reactions at its end, while they are needed.
+    pub reaction: Option<Vec<f64>>,
+    /// A law called a result inaccurate.
+    pub warning: Option<String>,
+}
+
+/// The results of a run, as they are written.
+#[derive(Debug)]
+pub struct Results {
+    folder: PathBuf,
+    settings: OutputInput,
+    history: Table,
+    profile: Option<Profile>,
+    fields: Option<Fields>,
+    log: LogFile,
+    summary: Summary,
+    seconds: Duration,
+}
+
+/// A CSV file.
+#[derive(Debug)]
+struct Table {
+    path: PathBuf,
+    writer: csv::Writer<File>,
+}
+
+impl Table {
+    fn create<'a>(
+        path: PathBuf,
+        columns: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Self, Error> {
+        let file = create(&path)?;
+        let mut table = Self { path, writer: csv::Writer::from_writer(file) };
+        table.row(columns)?;
+        table.flush()?;
+        Ok(table)
+    }
+
+    fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(&mut self, cells: I) -> Result<(), Error> {
+        self.writer
+            .write_record(cells)
+            .map_err(|error| unwritable(&self.path, std::io::Error::other(error)))
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        self.writer.flush().map_err(|error| unwritable(&self.path, error))
+    }
+}
+
+fn create(path: &Path) -> Result<File, Error> {
+    File::create(path).map_err(|error| unwritable(path, error))
+}
+
+fn unwritable(path: &Path, source: std::io::Error) -> Error {
+    Error::Unwritable { path: path.to_owned(), source }
+}
+
+#[derive(Debug)]
+struct LogFile {
+    path: PathBuf,
+    file: File,
+}
+
+impl LogFile {
+    fn line(&mut self, value: &Value) -> Result<(), Error> {
+        writeln!(self.file, "{value}").map_err(|error| unwritable(&self.path, error))
+    }
+}
+
+impl Results {
+    /// Creates the folder and its files.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn create(
+        folder: &Path,
+        case: &Case,
+        model: &Model,
+        probes: &Probes,
+    ) -> Result<Self, Error> {
+        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
+        let settings = case.file.output;
+        let columns = ["phase", "increment", "time"]
+            .into_iter()
+            .chain(probes.names())
+            .chain(["iterations"]);
+        let log_path = folder.join("log.jsonl");
+        Ok(Self {
+            history: Table::create(folder.join("history.csv"), columns)?,
+            profile: Profile::create(folder, settings.profile, model)?,
+            fields: Fields::create(folder, settings.fields, model),
+            log: LogFile { file: create(&log_path)?, path: log_path },
+            summary: Summary::new(case, model, probes),
+            folder: folder.to_owned(),
+            settings,
+            seconds: Duration::ZERO,
+        })
+    }
+
+    /// Logs the iterations of an attempt.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn iterations(
+        &mut self,
+        place: &Place,
+        lambda: f64,
+        iterations: &[Iteration],
+    ) -> Result<(), Error> {
+        for (number, iteration) in iterations.iter().enumerate() {
+            self.log.line(&json!({
+                "event": "iteration",
+                "phase": place.phase,
+                "increment": place.increment,
+                "load_factor": lambda,
+                "iteration": number,
+                "residual": iteration.residual,
+                "correction": iteration.correction,
+                "step_length": iteration.step_length,
+            }))?;
+        }
+        Ok(())
+    }
+
+    /// Logs a cut-back.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn cut_back(
+        &mut self,
+        place: &Place,
+        lambda: f64,
+        step: f64,
+        reason: &str,
+    ) -> Result<(), Error> {
+        self.log.line(&json!({
+            "event": "cut_back",
+            "phase": place.phase,
+            "increment": place.increment,
+            "load_factor": lambda,
+            "next_step": step,
+            "reason": reason,
+        }))
+    }
+
+    /// Writes an increment that reached equilibrium.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn increment(
+        &mut self,
+        place: &Place,
+        of: usize,
+        record: &IncrementRecord,
+        snapshot: &Snapshot<'_>,
+        mesh: &Mesh,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        let mut row =
+            vec![place.phase.clone(), place.increment.to_string(), number(record.time)];
+        row.extend(record.probes.iter().map(|value| value.map(number).unwrap_or_default()));
+        row.push(record.iterations.to_string());
+        self.history.row(&row)?;
+        self.history.flush()?;
+        if self.settings.profile.includes(place.increment, of)
+            && let Some(profile) = &mut self.profile
+        {
+            profile.write(place, snapshot.groups)?;
+        }
+        if self.settings.fields.includes(place.increment, of)
+            && let Some(fields) = &mut self.fields
+        {
+            fields.write(record.time, snapshot, mesh)?;
+        }
+        if let Some(warning) = &record.warning {
+            self.log.line(&json!({
+                "event": "unreliable",
+                "phase": place.phase,
+                "increment": place.increment,
+                "reason": warning,
+            }))?;
+        }
+        self.summary.last_increment(place, &record.probes);
+        self.seconds += start.elapsed();
+        Ok(())
+    }
+
+    /// Takes the record of a phase.
+    pub fn phase(&mut self, record: PhaseRecord) {
+        self.summary.phase(record);
+    }
+
+    /// Writes the summary; the run's error, if there is one, goes into it.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn finish(
+        &mut self,
+        groups: &[Group],
+        total: Duration,
+        error: Option<&Error>,
+    ) -> Result<(), Error> {
+        let summary = self.summary.finish(groups, total, self.seconds, error);
+        self.log.line(&json!({ "event": "end", "status": summary["status"] }))?;
+        let path = self.folder.join("summary.json");
+        // Written whole or not at all.
+        let partial = self.folder.join("summary.json.part");
+        let text = serde_json::to_string_pretty(&summary)
+            .map_err(|error| Error::Internal(error.to_string()))?;
+        std::fs::write(&partial, text + "\n").map_err(|error| unwritable(&partial, error))?;
+        std::fs::rename(&partial, &path).map_err(|error| unwritable(&path, error))
+    }
+}

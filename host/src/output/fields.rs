@@ -1,0 +1,146 @@
+//! Fields for viewers that read VTK files: `fields.pvd` lists one `fields_<n>.vtu` per time.
+
+use super::unwritable;
+use crate::case::When;
+use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::probe::Snapshot;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// VTK's numbers for cells with these nodes.
+const QUADRATIC_QUAD: u8 = 23;
+const QUADRATIC_EDGE: u8 = 21;
+
+/// Fields at the times asked for.
+#[derive(Debug)]
+pub(super) struct Fields {
+    folder: PathBuf,
+    /// Times written so far.
+    times: Vec<f64>,
+}
+
+impl Fields {
+    /// `None` if fields are not asked for.
+    pub(super) fn create(folder: &Path, when: When, _: &Model) -> Option<Self> {
+        (when != When::Never).then(|| Self { folder: folder.to_owned(), times: Vec::new() })
+    }
+
+    pub(super) fn write(
+        &mut self,
+        time: f64,
+        snapshot: &Snapshot<'_>,
+        mesh: &Mesh,
+    ) -> Result<(), Error> {
+        let file = |number: usize| format!("fields_{number:05}.vtu");
+        let path = self.folder.join(file(self.times.len()));
+        std::fs::write(&path, unstructured_grid(snapshot, mesh))
+            .map_err(|error| unwritable(&path, error))?;
+        self.times.push(time);
+        let mut list = String::from("<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n");
+        for (number, time) in self.times.iter().enumerate() {
+            let _ = writeln!(list, "<DataSet timestep=\"{time}\" file=\"{}\"/>", file(number));
+        }
+        list.push_str("</Collection>\n</VTKFile>\n");
+        let path = self.folder.join("fields.pvd");
+        std::fs::write(&path, list).map_err(|error| unwritable(&path, error))
+    }
+}
+
+/// Means over the integration points of every element, by name of the quantity.
+fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
+    let mut names: Vec<String> =
+        ["stress_11", "stress_22", "stress_33", "stress_12"].map(str::to_owned).to_vec();
+    names.extend(["jump_n", "jump_t", "traction_n", "traction_t"].map(str::to_owned));
+    for group in snapshot.groups {
+        for variable in &group.law.built.law.formulation().internal_variables {
+            if !names.contains(&variable.id) {
+                names.push(variable.id.clone());
+            }
+        }
+    }
+    let columns = names.iter().enumerate().map(|(number, name)| {
+        let mut values = Vec::new();
+        for group in snapshot.groups {
+            let n = group.kinematics.points_per_element();
+            for element in 0..group.kinematics.n_elements() {
+                let points = element * n..(element + 1) * n;
+                let sum: f64 = points
+                    .map(|point| match number {
+                        0..4 => group.global_stress(point).map(|s| s[number]),
+                        4..6 => group.jump_and_traction(point).map(|(jump, _)| jump[number - 4]),
+                        6..8 => group.jump_and_traction(point).map(|(_, t)| t[number - 6]),
+                        _ => group.internal_variable(point, name),
+                    })
+                    .map(Option::unwrap_or_default)
+                    .sum();
+                values.push(sum / n as f64);
+            }
+        }
+        (name.clone(), values)
+    });
+    columns.collect()
+}
+
+/// Cells stand group by group, as `cell_data` has them.
+fn unstructured_grid(snapshot: &Snapshot<'_>, mesh: &Mesh) -> String {
+    let mut connectivity = String::new();
+    let (mut offsets, mut types, mut groups) = (Vec::new(), Vec::new(), Vec::new());
+    let mut end = 0;
+    for (number, group) in snapshot.groups.iter().enumerate() {
+        for element in 0..group.kinematics.n_elements() {
+            let nodes = group.kinematics.nodes(element);
+            let is_quad = nodes.len() == 8;
+            let shown = if is_quad { nodes } else { &nodes[..3] };
+            for node in shown {
+                let _ = write!(connectivity, "{node} ");
+            }
+            end += shown.len();
+            offsets.push(end);
+            types.push(if is_quad { QUADRATIC_QUAD } else { QUADRATIC_EDGE });
+            groups.push(number);
+        }
+    }
+    let list = |values: &[usize]| {
+        values.iter().fold(String::new(), |mut text, value| {
+            let _ = write!(text, "{value} ");
+            text
+        })
+    };
+    let reals = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold(String::new(), |mut text, value| {
+            let _ = write!(text, "{value:e} ");
+            text
+        })
+    };
+    let points = reals(&mut mesh.nodes.iter().flat_map(|[x, y]| [*x, *y, 0.0]));
+    let u = reals(&mut snapshot.displacement.chunks_exact(2).flat_map(|u| [u[0], u[1], 0.0]));
+    let types: Vec<usize> = types.into_iter().map(usize::from).collect();
+    let mut cells = String::new();
+    for (name, values) in cell_data(snapshot) {
+        let values = reals(&mut values.into_iter());
+        let _ = writeln!(
+            cells,
+            "<DataArray type=\"Float64\" Name=\"{name}\" format=\"ascii\">{values}</DataArray>"
+        );
+    }
+    format!(
+        "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
+         <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n\
+         <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{points}\
+         </DataArray></Points>\n\
+         <Cells>\n<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">{connectivity}\
+         </DataArray>\n<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">{}</DataArray>\n\
+         <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">{}</DataArray>\n</Cells>\n\
+         <PointData Vectors=\"displacement\"><DataArray type=\"Float64\" Name=\"displacement\" \
+         NumberOfComponents=\"3\" format=\"ascii\">{u}</DataArray></PointData>\n\
+         <CellData>\n<DataArray type=\"Int64\" Name=\"group\" format=\"ascii\">{}</DataArray>\n\
+         {cells}</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+        mesh.nodes.len(),
+        offsets.len(),
+        list(&offsets),
+        list(&types),
+        list(&groups),
+    )
+}

@@ -1,0 +1,69 @@
+//! Values along interfaces.
+
+use super::{Table, number};
+use crate::case::When;
+use crate::error::{Error, Place};
+use crate::group::Group;
+use crate::model::Model;
+use std::path::Path;
+
+/// `profile.csv`: one row per integration point of every thin layer and zero-thickness group.
+#[derive(Debug)]
+pub(super) struct Profile {
+    table: Table,
+    /// Internal variables of all laws of these groups, each once.
+    variables: Vec<String>,
+}
+
+impl Profile {
+    /// `None` if it is not asked for or there is no interface.
+    pub(super) fn create(folder: &Path, when: When, model: &Model) -> Result<Option<Self>, Error> {
+        let is_interface = |group: &Group| group.jump_and_traction(0).is_some();
+        if when == When::Never || !model.groups.iter().any(is_interface) {
+            return Ok(None);
+        }
+        let mut variables: Vec<String> = Vec::new();
+        let swapped = model.swaps.iter().flatten().map(|(group, law)| (&model.groups[*group], law));
+        let first = model.groups.iter().map(|group| (group, &group.law));
+        for (group, law) in first.chain(swapped) {
+            for variable in &law.built.law.formulation().internal_variables {
+                if is_interface(group) && !variables.contains(&variable.id) {
+                    variables.push(variable.id.clone());
+                }
+            }
+        }
+        let columns = [
+            "phase", "increment", "group", "element", "point", "x", "y", "s", "jump_n", "jump_t",
+            "traction_n", "traction_t",
+        ];
+        let columns = columns.into_iter().chain(variables.iter().map(String::as_str));
+        let table = Table::create(folder.join("profile.csv"), columns)?;
+        Ok(Some(Self { table, variables }))
+    }
+
+    pub(super) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
+        for group in groups {
+            let per_element = group.kinematics.points_per_element();
+            for point in 0..group.kinematics.n_points() {
+                let Some((jump, traction)) = group.jump_and_traction(point) else { break };
+                let [x, y] = group.kinematics.position(point);
+                let along = group.kinematics.axes(point / per_element).along;
+                let s = along[0] * x + along[1] * y;
+                let mut row = vec![
+                    place.phase.clone(),
+                    place.increment.to_string(),
+                    group.name.clone(),
+                    (point / per_element + 1).to_string(),
+                    (point % per_element + 1).to_string(),
+                ];
+                let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]];
+                row.extend(values.map(number));
+                row.extend(self.variables.iter().map(|id| {
+                    group.internal_variable(point, id).map(number).unwrap_or_default()
+                }));
+                self.table.row(&row)?;
+            }
+        }
+        self.table.flush()
+    }
+}

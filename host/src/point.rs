@@ -1,0 +1,454 @@
+//! The single-point driver: one law, one integration point, mixed control of its components.
+//!
+//! A driver file leads a point through segments; each component follows a jump or strain, a
+//! traction or stress, or a stiffness. [`Driver`] is the checked file, [`Driver::run`] follows its
+//! path. An increment lasts one unit of time.
+
+mod equilibrium;
+mod file;
+mod table;
+
+pub use file::Driver;
+pub use table::{Row, Table};
+
+use crate::error::Error;
+use abi::status::Outcome;
+use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
+use file::{Control, Segment, words};
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Most components of gradient and flux.
+const N_MAX: usize = 6;
+/// Components of gradient or flux, padded with zeros.
+type Vector = [f64; N_MAX];
+
+/// Steps below this fraction of an increment are not tried.
+const SMALLEST_STEP: f64 = 1.0 / (1 << 20) as f64;
+/// Calls of the law after which an increment is given up.
+const MAX_CALLS: usize = 1_000_000;
+/// Relative change of the initial flux that is worth a warning.
+const OUTSIDE: f64 = 1e-9;
+
+/// What came out of a driver file.
+#[derive(Clone, Debug)]
+pub struct PointReport {
+    /// Law.
+    pub law: String,
+    /// Version of the law.
+    pub version: String,
+    /// Library the law comes from.
+    pub library: PathBuf,
+    /// SHA-256 of the library.
+    pub sha256: String,
+    /// Hypothesis.
+    pub hypothesis: &'static str,
+    /// Increments done.
+    pub increments: usize,
+    /// Calls of the law.
+    pub calls: usize,
+    /// Steps repeated with a smaller size.
+    pub cut_backs: usize,
+    /// Columns of the last row, with their values.
+    pub last: Vec<(String, f64)>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Where the rows are, unless they went to the standard output.
+    pub csv: Option<PathBuf>,
+}
+
+impl fmt::Display for PointReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "law `{}` {} of {}, {}",
+            self.law,
+            self.version,
+            self.library.display(),
+            self.hypothesis
+        )?;
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        write!(
+            f,
+            "{} increments, {} calls of the law, {} cut-backs",
+            self.increments, self.calls, self.cut_backs
+        )?;
+        for (name, value) in &self.last {
+            write!(f, "\n  {name:<20} {value:>14.6e}")?;
+        }
+        if let Some(csv) = &self.csv {
+            write!(f, "\nrows in {}", csv.display())?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs a driver file. Rows go to `csv`, or to the standard output.
+///
+/// # Errors
+/// Bad input and plugin trouble, before anything is written; [`Error::Unwritable`];
+/// [`Error::NoEquilibrium`] after the rows found until then have been written.
+pub fn run_file(path: &Path, csv: Option<&Path>) -> Result<PointReport, Error> {
+    let driver = Driver::read(path)?;
+    driver.start()?;
+    let Some(csv) = csv else {
+        return driver.write_csv(io::stdout().lock(), Path::new("the standard output"));
+    };
+    let same = path.canonicalize().ok().zip(csv.canonicalize().ok());
+    if same.is_some_and(|(driver, csv)| driver == csv) {
+        return Err(Error::Usage(format!(
+            "--csv {} would overwrite the driver file",
+            csv.display()
+        )));
+    }
+    let file = File::create(csv).map_err(|source| Error::Unwritable {
+        path: csv.to_owned(),
+        source,
+    })?;
+    let mut report = driver.write_csv(file, csv)?;
+    report.csv = Some(csv.to_owned());
+    Ok(report)
+}
+
+/// A goal that was not reached.
+#[derive(Debug)]
+struct Shortfall {
+    /// Fraction of the increment that was reached.
+    reached: f64,
+    obstacle: Obstacle,
+}
+
+/// Why a walk stopped.
+#[derive(Debug)]
+enum Stop {
+    Shortfall(Box<Shortfall>),
+    Fatal(Fatal),
+}
+
+impl From<Fatal> for Stop {
+    fn from(failure: Fatal) -> Self {
+        Self::Fatal(failure)
+    }
+}
+
+impl Driver {
+    /// Follows the path and writes its rows as comma-separated values; `name` is for messages.
+    ///
+    /// # Errors
+    /// As [`Driver::run`]; the rows found until then have been written.
+    pub fn write_csv(&self, out: impl Write, name: &Path) -> Result<PointReport, Error> {
+        let unwritable = |source| Error::Unwritable {
+            path: name.to_owned(),
+            source,
+        };
+        let mut table = Table::new(out, self);
+        let result = self.run(|row| table.write(row).map_err(unwritable));
+        if !matches!(result, Err(Error::Unwritable { .. })) {
+            table.flush().map_err(unwritable)?;
+        }
+        result
+    }
+
+    /// Follows the path and hands out its rows, the initial state first.
+    ///
+    /// # Errors
+    /// [`Error::NoEquilibrium`] where a controlled flux cannot be reached or the law cannot
+    /// follow; [`Error::Plugin`] if the library breaks down; whatever `sink` fails with.
+    pub fn run(
+        &self,
+        mut sink: impl FnMut(&Row<'_>) -> Result<(), Error>,
+    ) -> Result<PointReport, Error> {
+        let (point, search, mut warnings) = self.start()?;
+        let mut walk = Walk {
+            point,
+            search,
+            rate: None,
+            first_step: 1.0,
+            cut_backs: 0,
+        };
+        let n = self.law.n_components();
+        let row = |point: &Point, increment, iterations, sink: &mut dyn FnMut(&Row<'_>) -> _| {
+            sink(&Row {
+                increment,
+                gradient: &point.gradient[..n],
+                flux: &point.flux[..n],
+                internal: &point.internal,
+                iterations,
+            })
+        };
+        row(&walk.point, 0, 0, &mut sink)?;
+        let mut increment = 0;
+        let mut held = walk.point.flux;
+        for (number, segment) in self.segments.iter().enumerate() {
+            let ramp = walk.enter(segment, n, &held);
+            let mut goal = ramp.from;
+            for k in 1..=segment.increments {
+                let next = ramp.goal(k, segment.increments);
+                let calls = walk.search.calls;
+                walk.advance(&goal, &next, increment as f64)
+                    .map_err(|stop| {
+                        let place = format!(
+                            "segment {}, increment {k} of {} ({} of the file)",
+                            number + 1,
+                            segment.increments,
+                            increment + 1
+                        );
+                        self.explain(stop, &place, &warnings)
+                    })?;
+                increment += 1;
+                row(
+                    &walk.point,
+                    increment,
+                    walk.search.calls - calls,
+                    &mut sink,
+                )?;
+                goal = next;
+            }
+            // A flux that was led keeps its goal; what is left of its residual does not pile up.
+            for i in 0..n {
+                held[i] = match segment.control[i] {
+                    Control::Keep | Control::Flux(_) => goal.flux[i],
+                    Control::Gradient(_) | Control::Stiffness(_) => walk.point.flux[i],
+                };
+            }
+        }
+        let (times, words) = &walk.search.unreliable;
+        if *times > 0 {
+            warnings.push(format!(
+                "law `{}` calls {times} updates unreliable; the first: {words}",
+                self.law.description().id
+            ));
+        }
+        let Point {
+            gradient,
+            flux,
+            internal,
+        } = &walk.point;
+        let values = gradient[..n].iter().chain(&flux[..n]).chain(internal);
+        Ok(PointReport {
+            law: self.law.description().id.clone(),
+            version: self.law.description().version.clone(),
+            library: self.law.library().path().to_owned(),
+            sha256: self.law.library().sha256().to_owned(),
+            hypothesis: self.law.hypothesis().name(),
+            increments: increment,
+            calls: walk.search.calls,
+            cut_backs: walk.cut_backs,
+            last: self.columns().into_iter().zip(values.copied()).collect(),
+            warnings,
+            csv: None,
+        })
+    }
+
+    /// The initial state, checked by an update of no size.
+    fn start(&self) -> Result<(Point, Search<'_>, Vec<String>), Error> {
+        let point = Point {
+            gradient: [0.0; N_MAX],
+            flux: self.flux,
+            internal: self.internal.clone(),
+        };
+        let mut search = Search::new(&self.law, &point);
+        let mut warnings = self.warnings.clone();
+        let answer = search
+            .at_rest(&point)
+            .map_err(|failure| self.explain(Stop::Fatal(failure), "initial state", &warnings))?;
+        let Some(returned) = answer else {
+            let words = search.take_obstacle().law.unwrap_or_default();
+            return Err(self.initial_error(&words));
+        };
+        let n = self.law.n_components();
+        let scale = self.flux.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
+        if (0..n).any(|i| (returned[i] - self.flux[i]).abs() > OUTSIDE * scale) {
+            let (_, word) = words(self.law.hypothesis());
+            let list = |flux: &Vector| {
+                let components = self.law.hypothesis().components();
+                let values: Vec<String> = components
+                    .iter()
+                    .zip(flux)
+                    .map(|(name, value)| format!("{name} = {value:.6}"))
+                    .collect();
+                values.join(", ")
+            };
+            warnings.push(format!(
+                "the initial {word} {} lies outside the surface of law `{}`, which returns it to \
+                 {}",
+                list(&self.flux),
+                self.law.description().id,
+                list(&returned)
+            ));
+        }
+        Ok((point, search, warnings))
+    }
+
+    /// The error that a stop stands for.
+    fn explain(&self, stop: Stop, place: &str, warnings: &[String]) -> Error {
+        let id = &self.law.description().id;
+        match stop {
+            Stop::Fatal(failure) => {
+                let what = match failure.outcome {
+                    Outcome::Unsupported => "offers neither a tangent nor an elastic operator",
+                    Outcome::Argument => "says that the host broke the contract",
+                    Outcome::Internal => "broke down",
+                    _ => "failed with a code that fits no update",
+                };
+                Error::plugin(format!(
+                    "{place}: law `{id}` of library {} {what}: {}",
+                    self.law.library().path().display(),
+                    failure.message
+                ))
+            }
+            Stop::Shortfall(shortfall) => {
+                let Shortfall { reached, obstacle } = *shortfall;
+                let (gradient, flux) = words(self.law.hypothesis());
+                let mut message = format!("{place}: no equilibrium");
+                let mut hint = None;
+                if let Some(miss) = obstacle.miss {
+                    let name = self.law.hypothesis().components()[miss.component];
+                    message += &describe(&miss, name, flux);
+                    hint = Some(format!(
+                        "a {flux} beyond strength has no equilibrium; control the {gradient} of \
+                         `{name}` instead"
+                    ));
+                } else {
+                    message += &format!(": law `{id}` cannot follow the {gradient}s");
+                }
+                message += &format!("\n  reached: {reached:.6} of the increment");
+                if let Some(words) = obstacle.law {
+                    message += &format!("\n  law `{id}`: {words}");
+                }
+                for warning in warnings {
+                    message += &format!("\n  warning: {warning}");
+                }
+                Error::NoEquilibrium { message, hint }
+            }
+        }
+    }
+}
+
+fn describe(miss: &Miss, name: &str, flux: &str) -> String {
+    format!(
+        "; {flux} `{name}` is {:.9e} kPa at best, {:.9e} kPa is asked for (residual {:.2e}, \
+         tolerance {:.1e})",
+        miss.flux, miss.goal, miss.residual, miss.tolerance
+    )
+}
+
+/// A straight line of goals.
+#[derive(Clone, Copy, Debug)]
+struct Ramp {
+    from: Goal,
+    to: Goal,
+}
+
+impl Ramp {
+    /// The goal of increment k of n, the last one without rounding.
+    fn goal(&self, k: usize, n: usize) -> Goal {
+        if k == n {
+            self.to
+        } else {
+            between(&self.from, &self.to, k as f64 / n as f64)
+        }
+    }
+}
+
+fn between(from: &Goal, to: &Goal, fraction: f64) -> Goal {
+    let on_line = |a: &Vector, b: &Vector| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * fraction);
+    Goal {
+        gradient: on_line(&from.gradient, &to.gradient),
+        flux: on_line(&from.flux, &to.flux),
+    }
+}
+
+/// A point on its way.
+#[derive(Debug)]
+struct Walk<'a> {
+    point: Point,
+    search: Search<'a>,
+    /// Gradient per increment of the last step, within a segment.
+    rate: Option<Vector>,
+    /// Fraction of the increment that the first step tries.
+    first_step: f64,
+    cut_backs: usize,
+}
+
+impl Walk<'_> {
+    /// Starts a segment. `held` is the flux that components without control keep.
+    fn enter(&mut self, segment: &Segment, n: usize, held: &Vector) -> Ramp {
+        let from = Goal {
+            gradient: self.point.gradient,
+            flux: *held,
+        };
+        let mut to = from;
+        let mut stiffness = [0.0; N_MAX];
+        for i in 0..n {
+            match segment.control[i] {
+                Control::Keep => {}
+                Control::Gradient(end) => to.gradient[i] = end,
+                Control::Flux(end) => to.flux[i] = end,
+                Control::Stiffness(k) => stiffness[i] = k,
+            }
+        }
+        let free = (0..n).filter(|&i| !matches!(segment.control[i], Control::Gradient(_)));
+        self.search.control(free, stiffness, from.gradient);
+        self.rate = None;
+        self.first_step = 1.0;
+        Ramp { from, to }
+    }
+
+    /// Carries the point over one increment, in as many steps as it takes.
+    fn advance(&mut self, from: &Goal, to: &Goal, time: f64) -> Result<(), Stop> {
+        let first_call = self.search.calls;
+        let mut done = 0.0;
+        let mut size = self.first_step;
+        let mut may_grow = true;
+        while done < 1.0 {
+            let end = if done + size > 1.0 - SMALLEST_STEP {
+                1.0
+            } else {
+                done + size
+            };
+            let length = end - done;
+            let goal = if end < 1.0 {
+                between(from, to, end)
+            } else {
+                *to
+            };
+            let step = Step {
+                start: &self.point,
+                goal: &goal,
+                time: time + done,
+                time_increment: length,
+            };
+            let guess = self.rate.map(|rate| rate.map(|rate| rate * length));
+            if self.search.find(&step, guess.as_ref())? {
+                let before = self.point.gradient;
+                self.search.commit(&mut self.point);
+                let after = &self.point.gradient;
+                self.rate = Some(std::array::from_fn(|i| (after[i] - before[i]) / length));
+                done = end;
+                if may_grow {
+                    size = (2.0 * size).min(1.0);
+                }
+                may_grow = true;
+                continue;
+            }
+            let obstacle = self.search.take_obstacle();
+            let factor = obstacle.factor.map_or(0.5, |f| f.clamp(0.1, 0.9));
+            size = factor * length;
+            may_grow = false;
+            self.cut_backs += 1;
+            if size < SMALLEST_STEP || self.search.calls - first_call > MAX_CALLS {
+                return Err(Stop::Shortfall(Box::new(Shortfall {
+                    reached: done,
+                    obstacle,
+                })));
+            }
+        }
+        self.first_step = size;
+        Ok(())
+    }
+}

@@ -1,0 +1,643 @@
+//! One step: the free gradient components that bring the controlled fluxes to their goal.
+//!
+//! | symbol | here | |
+//! |---|---|---|
+//! | f | `free` | components whose flux or stiffness is controlled |
+//! | K | `stiffness` | stiffness control; 0 under flux control |
+//! | F | `flux` of [`Goal`] | what flux + K (gradient − origin) has to become |
+//! | r | `residual` | flux + K (gradient − origin) − F, in the components f |
+//!
+//! Newton's method with the law's tangent, restricted to f, comes first. Where that matrix is
+//! singular, the step is the least-squares solution of minimum norm. A line search keeps ‖r‖
+//! falling. Where this ends, fixed-point iterations with the elastic operator go on, accelerated
+//! after Anderson (type II); they need no tangent and reach contact, edges and apices.
+
+use super::{N_MAX, Vector};
+use crate::plugin::{BatchFailure, End, Law, Operator, Start, Strided};
+use abi::status::Outcome;
+use nalgebra::{SMatrix, SVector};
+use std::mem::swap;
+
+/// Residual against the component's own flux, or against the largest flux where no iteration
+/// comes closer.
+const RELATIVE_TOLERANCE: f64 = 1e-10;
+/// Residuals that summing fluxes and rounding gradients leave behind: a law computes the flux from
+/// the difference of two totals, each known to half a unit in the last place.
+const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+/// Ratio of singular values below which a direction counts as flat.
+const FLAT: f64 = 1e-10;
+const MAX_NEWTON: usize = 40;
+const MAX_HALVINGS: usize = 10;
+const MAX_RELAXATIONS: usize = 160;
+/// Iterations spent on coming closer than [`RELATIVE_TOLERANCE`] of the largest flux.
+const MAX_POLISH: usize = 3;
+/// Newton is tried again after so many fixed-point iterations.
+const NEWTON_EVERY: usize = 8;
+/// Differences that Anderson's acceleration remembers.
+const MEMORY: usize = 4;
+
+/// A point that carries its history.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    pub(super) gradient: Vector,
+    pub(super) flux: Vector,
+    pub(super) internal: Vec<f64>,
+}
+
+/// What a step has to reach: gradients where they are prescribed, F where the flux is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Goal {
+    pub(super) gradient: Vector,
+    pub(super) flux: Vector,
+}
+
+/// A step: where it starts, where it goes, and its time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step<'a> {
+    pub(super) start: &'a Point,
+    pub(super) goal: &'a Goal,
+    pub(super) time: f64,
+    pub(super) time_increment: f64,
+}
+
+/// How near the goal a sample is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verdict {
+    Far,
+    /// Within the tolerance relative to the largest flux.
+    Close,
+    /// Within the tolerance relative to each component.
+    Tight,
+}
+
+/// The law's answer to one gradient.
+#[derive(Clone, Debug)]
+struct Sample {
+    point: Point,
+    operator: Vec<f64>,
+    residual: Vector,
+    norm: f64,
+    verdict: Verdict,
+}
+
+/// The controlled component that missed its goal by most, in the best attempt.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Miss {
+    pub(super) component: usize,
+    pub(super) flux: f64,
+    pub(super) goal: f64,
+    pub(super) residual: f64,
+    pub(super) tolerance: f64,
+}
+
+/// Why a step failed: what is known for the next try and for the message.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Obstacle {
+    /// The smallest step factor a law asked for.
+    pub(super) factor: Option<f64>,
+    /// The law's last words, if it refused an update.
+    pub(super) law: Option<String>,
+    /// How near the best attempt came.
+    pub(super) miss: Option<Miss>,
+    norm: f64,
+}
+
+/// Failures that no smaller step mends.
+pub(super) type Fatal = Box<BatchFailure>;
+
+/// Finds equilibrium steps of one law; keeps its buffers.
+#[derive(Debug)]
+pub(super) struct Search<'a> {
+    law: &'a Law,
+    n: usize,
+    free: [usize; N_MAX],
+    n_free: usize,
+    stiffness: Vector,
+    origin: Vector,
+    /// The elastic operator, for predictors.
+    elastic: Vec<f64>,
+    elastic_norm: f64,
+    tangent: Operator,
+    relaxation: Operator,
+    base: Sample,
+    trial: Sample,
+    obstacle: Obstacle,
+    /// Calls of the law.
+    pub(super) calls: usize,
+    /// Number of updates that the law called unreliable, and its first words about them.
+    pub(super) unreliable: (usize, String),
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(law: &'a Law, start: &Point) -> Self {
+        let n = law.n_components();
+        let sample = Sample {
+            point: start.clone(),
+            operator: vec![0.0; n * n],
+            residual: [0.0; N_MAX],
+            norm: 0.0,
+            verdict: Verdict::Far,
+        };
+        Self {
+            law,
+            n,
+            free: [0; N_MAX],
+            n_free: 0,
+            stiffness: [0.0; N_MAX],
+            origin: [0.0; N_MAX],
+            elastic: vec![0.0; n * n],
+            elastic_norm: 0.0,
+            tangent: Operator::Consistent,
+            relaxation: Operator::Elastic,
+            base: sample.clone(),
+            trial: sample,
+            obstacle: Obstacle::default(),
+            calls: 0,
+            unreliable: (0, String::new()),
+        }
+    }
+
+    /// Says which components are free, and their stiffness control.
+    pub(super) fn control(
+        &mut self,
+        free: impl Iterator<Item = usize>,
+        stiffness: Vector,
+        origin: Vector,
+    ) {
+        self.n_free = 0;
+        for i in free {
+            self.free[self.n_free] = i;
+            self.n_free += 1;
+        }
+        self.stiffness = stiffness;
+        self.origin = origin;
+    }
+
+    /// The answer to a step of no size, and with it the elastic operator. `None` if the law
+    /// refuses, with its words in [`Self::take_obstacle`].
+    pub(super) fn at_rest(&mut self, start: &Point) -> Result<Option<Vector>, Fatal> {
+        let goal = Goal {
+            gradient: start.gradient,
+            flux: start.flux,
+        };
+        let step = Step {
+            start,
+            goal: &goal,
+            time: 0.0,
+            time_increment: 0.0,
+        };
+        self.obstacle = Obstacle::default();
+        if !self.evaluate(&step, start.gradient, self.relaxation)? {
+            return Ok(None);
+        }
+        self.elastic.copy_from_slice(&self.trial.operator);
+        self.elastic_norm = largest(&self.elastic);
+        Ok(Some(self.trial.point.flux))
+    }
+
+    /// Why the last step failed.
+    pub(super) fn take_obstacle(&mut self) -> Obstacle {
+        std::mem::take(&mut self.obstacle)
+    }
+
+    /// Finds the end of a step, from a guess of the free gradient increments if there is one.
+    /// `false`: not found; see [`Self::take_obstacle`].
+    pub(super) fn find(&mut self, step: &Step<'_>, guess: Option<&Vector>) -> Result<bool, Fatal> {
+        self.obstacle = Obstacle::default();
+        let mut gradient = step.goal.gradient;
+        if self.n_free == 0 {
+            let found = self.evaluate(step, gradient, Operator::None)?;
+            swap(&mut self.base, &mut self.trial);
+            return Ok(found);
+        }
+        if let Some(guess) = guess {
+            for &i in &self.free[..self.n_free] {
+                gradient[i] = step.start.gradient[i] + guess[i];
+            }
+            if self.newton(step, gradient)? {
+                return Ok(true);
+            }
+        }
+        let elastic = self.elastic_guess(step);
+        Ok(self.newton(step, elastic)? || self.relax(step, elastic)?)
+    }
+
+    /// Hands over the end of the step found; the point becomes the start of the next.
+    pub(super) fn commit(&mut self, point: &mut Point) {
+        swap(point, &mut self.base.point);
+    }
+
+    /// Calls the law. `false`: it refuses this gradient.
+    fn evaluate(
+        &mut self,
+        step: &Step<'_>,
+        gradient: Vector,
+        operator: Operator,
+    ) -> Result<bool, Fatal> {
+        let rows = Strided::rows(self.n);
+        let start = Start {
+            n_points: 1,
+            gradient: (&step.start.gradient[..self.n], rows),
+            gradient_end: (&gradient[..self.n], rows),
+            flux: (&step.start.flux[..self.n], rows),
+            state: &step.start.internal,
+            time: step.time,
+            time_increment: step.time_increment,
+        };
+        let end = End {
+            flux: (&mut self.trial.point.flux[..self.n], rows),
+            state: &mut self.trial.point.internal,
+            operator: &mut self.trial.operator,
+        };
+        self.calls += 1;
+        match self.law.integrate(&start, operator, end) {
+            Ok(success) => {
+                if let Some((_, message)) = success.unreliable {
+                    if self.unreliable.0 == 0 {
+                        self.unreliable.1 = message;
+                    }
+                    self.unreliable.0 += 1;
+                }
+                self.trial.point.gradient = gradient;
+                self.assess(step);
+                Ok(true)
+            }
+            Err(failure) => match failure.outcome {
+                Outcome::CutStep | Outcome::Domain | Outcome::Numeric => {
+                    let smallest = self.obstacle.factor.unwrap_or(1.0);
+                    self.obstacle.factor = failure
+                        .factor
+                        .map(|f| f.min(smallest))
+                        .or(self.obstacle.factor);
+                    self.obstacle.law = Some(failure.message);
+                    Ok(false)
+                }
+                Outcome::Unsupported if self.do_without(operator) => {
+                    let other = if operator == Operator::Elastic {
+                        self.relaxation
+                    } else {
+                        self.tangent
+                    };
+                    self.evaluate(step, gradient, other)
+                }
+                _ => Err(Box::new(failure)),
+            },
+        }
+    }
+
+    /// The law may offer one operator only. `false`: there is nothing left to fall back on.
+    fn do_without(&mut self, operator: Operator) -> bool {
+        match operator {
+            Operator::Consistent if self.relaxation == Operator::Elastic => {
+                self.tangent = Operator::Elastic;
+                true
+            }
+            Operator::Elastic if self.tangent == Operator::Consistent => {
+                self.relaxation = Operator::Consistent;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Residual of the trial sample, and how near it is.
+    fn assess(&mut self, step: &Step<'_>) {
+        let sample = &mut self.trial;
+        let (flux, gradient) = (&sample.point.flux[..self.n], &sample.point.gradient);
+        let reach = largest(&gradient[..self.n]).max(largest(&step.start.gradient[..self.n]));
+        let mut scale = largest(flux).max(largest(&step.start.flux[..self.n]));
+        let mut springs = [0.0; N_MAX];
+        for (k, &i) in self.free[..self.n_free].iter().enumerate() {
+            springs[k] = self.stiffness[i] * (gradient[i] - self.origin[i]);
+            scale = scale.max(f64::abs(springs[k])).max(step.goal.flux[i].abs());
+        }
+        let mut verdict = Verdict::Tight;
+        let mut worst = 0.0;
+        let mut miss = None;
+        for (k, &i) in self.free[..self.n_free].iter().enumerate() {
+            let r = flux[i] + springs[k] - step.goal.flux[i];
+            let own = step.goal.flux[i].abs().max(step.start.flux[i].abs());
+            let own = own.max(f64::abs(springs[k]));
+            let floor = ROUND_OFF * (scale + (self.elastic_norm + self.stiffness[i]) * reach);
+            let close = RELATIVE_TOLERANCE * scale + floor;
+            // Negations, so that a residual that is not a number is far.
+            if !(r.abs() <= close) {
+                verdict = Verdict::Far;
+            } else if verdict == Verdict::Tight && !(r.abs() <= RELATIVE_TOLERANCE * own + floor) {
+                verdict = Verdict::Close;
+            }
+            if r.abs() > worst {
+                worst = r.abs();
+                miss = Some(Miss {
+                    component: i,
+                    flux: flux[i],
+                    goal: step.goal.flux[i] - springs[k],
+                    residual: r,
+                    tolerance: close,
+                });
+            }
+            sample.residual[k] = r;
+        }
+        sample.norm = norm(&sample.residual[..self.n_free]);
+        sample.verdict = verdict;
+        let first = self.obstacle.miss.is_none();
+        if verdict == Verdict::Far && (first || sample.norm < self.obstacle.norm) {
+            self.obstacle.miss = miss;
+            self.obstacle.norm = sample.norm;
+        }
+    }
+
+    /// −(operator + K)⁻¹ r in the free components, of minimum norm where there is no inverse.
+    fn descent(&self, operator: &[f64], r: &Vector) -> Vector {
+        let mut matrix = SMatrix::<f64, N_MAX, N_MAX>::zeros();
+        for (a, &i) in self.free[..self.n_free].iter().enumerate() {
+            for (b, &j) in self.free[..self.n_free].iter().enumerate() {
+                matrix[(a, b)] = operator[i * self.n + j];
+            }
+            matrix[(a, a)] += self.stiffness[i];
+        }
+        let by_free = solve(&matrix, r, self.n_free, FLAT * 1e-4 * self.elastic_norm);
+        let mut d = [0.0; N_MAX];
+        for (k, &i) in self.free[..self.n_free].iter().enumerate() {
+            d[i] = -by_free[k];
+        }
+        d
+    }
+
+    /// The end of the step if the law were elastic.
+    fn elastic_guess(&self, step: &Step<'_>) -> Vector {
+        let (goal, start) = (step.goal, step.start);
+        let mut gradient = goal.gradient;
+        for &i in &self.free[..self.n_free] {
+            gradient[i] = start.gradient[i];
+        }
+        let mut r = [0.0; N_MAX];
+        for (k, &i) in self.free[..self.n_free].iter().enumerate() {
+            let spring = self.stiffness[i] * (start.gradient[i] - self.origin[i]);
+            let prescribed: f64 = (0..self.n)
+                .map(|j| self.elastic[i * self.n + j] * (gradient[j] - start.gradient[j]))
+                .sum();
+            r[k] = start.flux[i] + spring - goal.flux[i] + prescribed;
+        }
+        let d = self.descent(&self.elastic, &r);
+        for &i in &self.free[..self.n_free] {
+            gradient[i] += d[i];
+        }
+        gradient
+    }
+
+    /// Newton's method with a line search. The solution, or the best sample, is in `base`.
+    fn newton(&mut self, step: &Step<'_>, guess: Vector) -> Result<bool, Fatal> {
+        if !self.evaluate(step, guess, self.tangent)? {
+            return Ok(false);
+        }
+        swap(&mut self.base, &mut self.trial);
+        let mut polish = 0;
+        for _ in 0..MAX_NEWTON {
+            match self.base.verdict {
+                Verdict::Tight => return Ok(true),
+                Verdict::Close if polish == MAX_POLISH => return Ok(true),
+                Verdict::Close => polish += 1,
+                Verdict::Far => {}
+            }
+            let d = self.descent(&self.base.operator, &self.base.residual);
+            if !self.line_search(step, &d)? {
+                break;
+            }
+        }
+        Ok(self.base.verdict != Verdict::Far)
+    }
+
+    /// Moves `base` along d as far as the residual falls enough. `false`: it does not fall.
+    fn line_search(&mut self, step: &Step<'_>, d: &Vector) -> Result<bool, Fatal> {
+        let mut fraction = 1.0;
+        for _ in 0..MAX_HALVINGS {
+            let Some(gradient) = self.moved(d, fraction) else {
+                return Ok(false);
+            };
+            if self.evaluate(step, gradient, self.tangent)?
+                && self.trial.norm <= (1.0 - 1e-4 * fraction) * self.base.norm
+            {
+                swap(&mut self.base, &mut self.trial);
+                return Ok(true);
+            }
+            fraction *= 0.5;
+        }
+        Ok(false)
+    }
+
+    /// The gradient of `base` moved by a part of d; `None` if rounding leaves it where it is.
+    fn moved(&self, d: &Vector, fraction: f64) -> Option<Vector> {
+        let mut gradient = self.base.point.gradient;
+        for &i in &self.free[..self.n_free] {
+            gradient[i] += fraction * d[i];
+        }
+        let moves = gradient
+            .iter()
+            .zip(&self.base.point.gradient)
+            .any(|(a, b)| a.to_bits() != b.to_bits());
+        moves.then_some(gradient)
+    }
+
+    /// Fixed-point iterations with the elastic operator. Where the flux does not answer (an open
+    /// gap, an apex), steps double until it does.
+    fn relax(&mut self, step: &Step<'_>, guess: Vector) -> Result<bool, Fatal> {
+        if !self.evaluate(step, guess, self.relaxation)? {
+            return Ok(false);
+        }
+        swap(&mut self.base, &mut self.trial);
+        let mut history = History::default();
+        let mut stretch = 1.0;
+        let mut polish = 0;
+        for k in 1..=MAX_RELAXATIONS {
+            match self.base.verdict {
+                Verdict::Tight => return Ok(true),
+                Verdict::Close if polish == MAX_POLISH => return Ok(true),
+                Verdict::Close => polish += 1,
+                Verdict::Far => {}
+            }
+            let f = self.descent(&self.base.operator, &self.base.residual);
+            let d = history.accelerated(&f, stretch);
+            let longest = 8.0 * (largest(&step.start.gradient) + largest(&guess) + largest(&f));
+            let Some(gradient) = self.moved(&d, 1.0) else {
+                break;
+            };
+            if largest(&d) > longest {
+                break;
+            }
+            if !self.evaluate(step, gradient, self.relaxation)? {
+                history.forget();
+                stretch *= 0.5;
+                if stretch < 1e-3 {
+                    break;
+                }
+                continue;
+            }
+            let answer: f64 = (0..self.n_free)
+                .map(|k| (self.trial.residual[k] - self.base.residual[k]).abs())
+                .fold(0.0, f64::max);
+            if answer <= 1e-12 * self.base.norm {
+                history.forget();
+                stretch *= 2.0;
+                swap(&mut self.base, &mut self.trial);
+                continue;
+            }
+            if self.trial.norm > 2.0 * self.base.norm && stretch <= 1.0 {
+                if history.is_empty() {
+                    stretch *= 0.5;
+                    if stretch < 1e-3 {
+                        break;
+                    }
+                }
+                history.forget();
+                continue;
+            }
+            let f_new = self.descent(&self.trial.operator, &self.trial.residual);
+            history.add(&d, &f, &f_new);
+            stretch = f64::min(1.0, 2.0 * stretch);
+            swap(&mut self.base, &mut self.trial);
+            if k % NEWTON_EVERY == 0 && self.base.verdict == Verdict::Far {
+                let gradient = self.base.point.gradient;
+                if self.newton(step, gradient)? {
+                    return Ok(true);
+                }
+                if !self.evaluate(step, gradient, self.relaxation)? {
+                    break;
+                }
+                swap(&mut self.base, &mut self.trial);
+            }
+        }
+        Ok(self.base.verdict != Verdict::Far)
+    }
+}
+
+/// The last steps x and the differences of f = −E⁻¹ r over them.
+#[derive(Debug, Default)]
+struct History {
+    steps: [Vector; MEMORY],
+    changes: [Vector; MEMORY],
+    n: usize,
+}
+
+impl History {
+    fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
+    fn forget(&mut self) {
+        self.n = 0;
+    }
+
+    fn add(&mut self, step: &Vector, f: &Vector, f_new: &Vector) {
+        self.steps.rotate_right(1);
+        self.changes.rotate_right(1);
+        self.steps[0] = *step;
+        self.changes[0] = std::array::from_fn(|i| f_new[i] - f[i]);
+        self.n = MEMORY.min(self.n + 1);
+    }
+
+    /// f + … : the step that would cancel f if f were linear in what is remembered.
+    fn accelerated(&self, f: &Vector, stretch: f64) -> Vector {
+        if self.n == 0 {
+            return f.map(|f| stretch * f);
+        }
+        let changes = SMatrix::<f64, N_MAX, MEMORY>::from_fn(|i, k| {
+            if k < self.n { self.changes[k][i] } else { 0.0 }
+        });
+        let right = SVector::<f64, N_MAX>::from_column_slice(f);
+        let svd = changes.svd(true, true);
+        let threshold = FLAT * svd.singular_values.max();
+        let Ok(weights) = svd.solve(&right, threshold) else {
+            return *f;
+        };
+        std::array::from_fn(|i| {
+            let correction: f64 = (0..self.n)
+                .map(|k| weights[k] * (self.steps[k][i] + self.changes[k][i]))
+                .sum();
+            f[i] - correction
+        })
+    }
+}
+
+/// x with A x = b in the leading m components: by elimination if A is regular, otherwise of minimum
+/// norm among the least-squares solutions. Singular values up to `flat` count as zero.
+fn solve(a: &SMatrix<f64, N_MAX, N_MAX>, b: &Vector, m: usize, flat: f64) -> Vector {
+    macro_rules! sized {
+        ($m:literal) => {{
+            let a = a.fixed_view::<$m, $m>(0, 0).into_owned();
+            let b = SVector::<f64, $m>::from_column_slice(&b[..$m]);
+            let lu = a.full_piv_lu();
+            let pivots = lu.u().diagonal().abs();
+            let x = if pivots.min() > (FLAT * pivots.max()).max(flat) {
+                lu.solve(&b)
+            } else {
+                let svd = a.svd(true, true);
+                let threshold = (FLAT * svd.singular_values.max()).max(flat);
+                svd.solve(&b, threshold).ok()
+            };
+            let mut padded = [0.0; N_MAX];
+            if let Some(x) = x {
+                padded[..$m].copy_from_slice(x.as_slice());
+            }
+            padded
+        }};
+    }
+    match m {
+        1 => sized!(1),
+        2 => sized!(2),
+        3 => sized!(3),
+        4 => sized!(4),
+        5 => sized!(5),
+        _ => sized!(6),
+    }
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |max, v| max.max(v.abs()))
+}
+
+/// Euclidean norm without overflow.
+fn norm(values: &[f64]) -> f64 {
+    let scale = largest(values);
+    if scale > 0.0 && scale.is_finite() {
+        let sum: f64 = values.iter().map(|v| (v / scale) * (v / scale)).sum();
+        scale * sum.sqrt()
+    } else {
+        scale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn singular_matrices_give_the_solution_of_minimum_norm() {
+        let mut a = SMatrix::<f64, N_MAX, N_MAX>::zeros();
+        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            a[(i, j)] = 3.0;
+        }
+        let x = solve(&a, &[6.0, 6.0, 0.0, 0.0, 0.0, 0.0], 2, 0.0);
+        assert_relative_eq!(x[0], 1.0, epsilon = 1e-14);
+        assert_relative_eq!(x[1], 1.0, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn a_vanishing_matrix_gives_no_step() {
+        let a = SMatrix::<f64, N_MAX, N_MAX>::zeros();
+        for m in 1..=N_MAX {
+            assert!(
+                solve(&a, &[1.0; N_MAX], m, 0.0)
+                    .iter()
+                    .all(|x| x.abs() == 0.0)
+            );
+        }
+    }
+
+    #[test]
+    fn the_norm_does_not_overflow() {
+        assert_relative_eq!(norm(&[3e200, 4e200]), 5e200, max_relative = 1e-15);
+        assert!(norm(&[]).abs() == 0.0);
+    }
+}

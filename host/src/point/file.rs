@@ -1,0 +1,407 @@
+//! The driver file: reading it, and checking everything that can be checked before the first call.
+
+use super::{N_MAX, Vector};
+use crate::error::{Error, Source, suggestion};
+use crate::input::{self, Named, ParameterTable};
+use crate::plugin::{Law, SearchPath, Strided};
+use abi::Hypothesis;
+use abi::status::Outcome;
+use indexmap::IndexMap;
+use serde::Deserialize;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// Most increments of one file; a slip of the pen beyond.
+const MAX_INCREMENTS: usize = 100_000_000;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    law: Spanned<String>,
+    #[serde(default)]
+    law_path: Vec<PathBuf>,
+    hypothesis: Spanned<String>,
+    #[serde(default)]
+    parameters: ParameterTable,
+    initial: Option<Spanned<Initial>>,
+    #[serde(default)]
+    segment: Vec<SegmentTable>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Initial {
+    traction: Option<Spanned<Named<f64>>>,
+    stress: Option<Spanned<Named<f64>>>,
+    #[serde(default)]
+    internal: Named<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SegmentTable {
+    increments: Spanned<i64>,
+    control: IndexMap<Spanned<String>, Spanned<ControlTable>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ControlTable {
+    jump: Option<Spanned<f64>>,
+    traction: Option<Spanned<f64>>,
+    stiffness: Option<Spanned<f64>>,
+    strain: Option<Spanned<f64>>,
+    stress: Option<Spanned<f64>>,
+}
+
+/// How one component is led through a segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Control {
+    /// The flux stays what it is at the start of the segment.
+    Keep,
+    /// Gradient at the end of the segment.
+    Gradient(f64),
+    /// Flux at the end of the segment.
+    Flux(f64),
+    /// The flux changes by −stiffness × jump.
+    Stiffness(f64),
+}
+
+/// A stretch of the path.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    pub(super) increments: usize,
+    pub(super) control: [Control; N_MAX],
+}
+
+/// Names of gradient and flux of a hypothesis.
+pub(super) fn words(hypothesis: Hypothesis) -> (&'static str, &'static str) {
+    match hypothesis {
+        Hypothesis::Interface2d => ("jump", "traction"),
+        Hypothesis::PlaneStrain | Hypothesis::Axisymmetric | Hypothesis::ThreeD => {
+            ("strain", "stress")
+        }
+    }
+}
+
+/// A driver file, checked, with its law built.
+#[derive(Debug)]
+pub struct Driver {
+    pub(super) law: Law,
+    pub(super) warnings: Vec<String>,
+    pub(super) flux: Vector,
+    pub(super) internal: Vec<f64>,
+    pub(super) segments: Vec<Segment>,
+    source: Source,
+    place_of_initial: Range<usize>,
+}
+
+impl Driver {
+    /// Reads a driver file and builds its law.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], and those of [`Driver::from_source`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Self::from_source(&Source::read(path)?)
+    }
+
+    /// Takes the text of a driver file and builds its law.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the place that does not fit; [`Error::Plugin`] if the law is not found
+    /// or its library is defective.
+    pub fn from_source(source: &Source) -> Result<Self, Error> {
+        let file: File = input::parse(source)?;
+        let hypothesis = hypothesis(source, &file.hypothesis)?;
+        let segments = segments(source, &file, hypothesis)?;
+        let place_of_initial = file
+            .initial
+            .as_ref()
+            .map_or_else(|| file.law.span(), Spanned::span);
+        let none = Initial::default();
+        let initial = file.initial.as_ref().map_or(&none, Spanned::get_ref);
+        let flux = initial_flux(source, initial, hypothesis)?;
+
+        let folder = source.path().parent().unwrap_or(Path::new(""));
+        let folders: Vec<PathBuf> = file.law_path.iter().map(|p| folder.join(p)).collect();
+        let search = SearchPath::new(&folders);
+        let built = input::build_law(source, &search, &file.law, hypothesis, &file.parameters)?;
+        let mut driver = Self {
+            law: built.law,
+            warnings: built.warnings,
+            flux,
+            internal: Vec::new(),
+            segments,
+            source: source.clone(),
+            place_of_initial,
+        };
+        driver.internal = driver.initial_internal(&initial.internal)?;
+        Ok(driver)
+    }
+
+    /// The law.
+    pub fn law(&self) -> &Law {
+        &self.law
+    }
+
+    /// Number of increments of all segments.
+    pub fn n_increments(&self) -> usize {
+        self.segments.iter().map(|segment| segment.increments).sum()
+    }
+
+    /// An error about the initial state.
+    pub(super) fn initial_error(&self, why: &str) -> Error {
+        self.source
+            .error(
+                self.place_of_initial.clone(),
+                format!(
+                    "law `{}` refuses the initial state: {why}",
+                    self.law.description().id
+                ),
+            )
+            .hint("tension is positive; a compressive stress is negative")
+            .into()
+    }
+
+    fn initial_internal(&self, given: &Named<f64>) -> Result<Vec<f64>, Error> {
+        let n = self.law.n_components();
+        let mut internal = self
+            .law
+            .initial_state(1, (&self.flux[..n], Strided::rows(n)))
+            .map_err(|failure| match failure.outcome {
+                Outcome::Domain | Outcome::Numeric | Outcome::CutStep => {
+                    self.initial_error(&failure.message)
+                }
+                outcome => Error::plugin(format!(
+                    "law `{}` of library {}: the initial state failed ({outcome:?}): {}",
+                    self.law.description().id,
+                    self.law.library().path().display(),
+                    failure.message
+                )),
+            })?;
+        let variables = &self.law.formulation().internal_variables;
+        for (name, value) in given {
+            let Some(number) = variables.iter().position(|v| &v.id == name.get_ref()) else {
+                return Err(self
+                    .source
+                    .error(
+                        name.span(),
+                        format!(
+                            "law `{}` has no internal variable `{}`",
+                            self.law.description().id,
+                            name.get_ref()
+                        ),
+                    )
+                    .hint(suggestion(
+                        name.get_ref(),
+                        variables.iter().map(|v| v.id.as_str()),
+                    ))
+                    .into());
+            };
+            internal[number] = finite(&self.source, name.get_ref(), value)?;
+        }
+        Ok(internal)
+    }
+}
+
+fn hypothesis(source: &Source, name: &Spanned<String>) -> Result<Hypothesis, Error> {
+    Hypothesis::ALL
+        .into_iter()
+        .find(|h| h.name() == name.get_ref())
+        .ok_or_else(|| {
+            source
+                .error(
+                    name.span(),
+                    format!("there is no hypothesis `{}`", name.get_ref()),
+                )
+                .hint(suggestion(
+                    name.get_ref(),
+                    Hypothesis::ALL.map(Hypothesis::name),
+                ))
+                .into()
+        })
+}
+
+fn finite(source: &Source, what: &str, value: &Spanned<f64>) -> Result<f64, Error> {
+    let number = *value.get_ref();
+    if number.is_finite() {
+        Ok(number)
+    } else {
+        Err(source
+            .error(value.span(), format!("`{what}`: {number} is not finite"))
+            .into())
+    }
+}
+
+/// Number of the component that a key names.
+fn component(
+    source: &Source,
+    name: &Spanned<String>,
+    hypothesis: Hypothesis,
+) -> Result<usize, Error> {
+    let names = hypothesis.components();
+    names
+        .iter()
+        .position(|candidate| candidate == name.get_ref())
+        .ok_or_else(|| {
+            source
+                .error(
+                    name.span(),
+                    format!(
+                        "there is no component `{}` under {}",
+                        name.get_ref(),
+                        hypothesis.name()
+                    ),
+                )
+                .hint(format!("components: {}", names.join(", ")))
+                .into()
+        })
+}
+
+fn initial_flux(
+    source: &Source,
+    initial: &Initial,
+    hypothesis: Hypothesis,
+) -> Result<Vector, Error> {
+    let (_, word) = words(hypothesis);
+    let (fits, misfit) = if hypothesis == Hypothesis::Interface2d {
+        (&initial.traction, &initial.stress)
+    } else {
+        (&initial.stress, &initial.traction)
+    };
+    if let Some(misfit) = misfit {
+        return Err(source
+            .error(
+                misfit.span(),
+                format!(
+                    "under {} the initial state is a {word}, components {}",
+                    hypothesis.name(),
+                    hypothesis.components().join(", ")
+                ),
+            )
+            .into());
+    }
+    let mut flux = [0.0; N_MAX];
+    for (name, value) in fits.iter().flat_map(|table| table.get_ref()) {
+        flux[component(source, name, hypothesis)?] = finite(source, name.get_ref(), value)?;
+    }
+    Ok(flux)
+}
+
+fn segments(source: &Source, file: &File, hypothesis: Hypothesis) -> Result<Vec<Segment>, Error> {
+    if file.segment.is_empty() {
+        return Err(source
+            .error(file.law.span(), "the driver has no [[segment]]")
+            .hint("a path is a list of [[segment]] tables with `increments` and `control`")
+            .into());
+    }
+    let mut total = 0_usize;
+    file.segment
+        .iter()
+        .map(|table| {
+            let increments = usize::try_from(*table.increments.get_ref()).unwrap_or(0);
+            total = total.saturating_add(increments);
+            if increments == 0 || total > MAX_INCREMENTS {
+                return Err(source
+                    .error(
+                        table.increments.span(),
+                        format!(
+                            "`increments`: {} is outside [1, {MAX_INCREMENTS}], all segments \
+                             together",
+                            table.increments.get_ref()
+                        ),
+                    )
+                    .into());
+            }
+            let mut control = [Control::Keep; N_MAX];
+            if hypothesis == Hypothesis::PlaneStrain {
+                control[OUT_OF_PLANE] = Control::Gradient(0.0);
+            }
+            for (name, written) in &table.control {
+                let i = component(source, name, hypothesis)?;
+                control[i] = read_control(source, name.get_ref(), written, hypothesis)?;
+                if hypothesis == Hypothesis::PlaneStrain
+                    && i == OUT_OF_PLANE
+                    && control[i] != Control::Gradient(0.0)
+                {
+                    return Err(source
+                        .error(
+                            written.span(),
+                            "the strain 33 is 0 in plane strain and cannot be controlled",
+                        )
+                        .hint("leave `33` out, write `{ strain = 0.0 }`, or use another hypothesis")
+                        .into());
+                }
+            }
+            Ok(Segment {
+                increments,
+                control,
+            })
+        })
+        .collect()
+}
+
+/// Number of the component 33.
+const OUT_OF_PLANE: usize = 2;
+
+fn read_control(
+    source: &Source,
+    component: &str,
+    written: &Spanned<ControlTable>,
+    hypothesis: Hypothesis,
+) -> Result<Control, Error> {
+    type Kind = fn(f64) -> Control;
+    let table = written.get_ref();
+    let interface = hypothesis == Hypothesis::Interface2d;
+    // Keyword, value, whether it is made for interfaces, what it becomes.
+    let kinds: [(&str, &Option<Spanned<f64>>, bool, Kind); 5] = [
+        ("jump", &table.jump, true, Control::Gradient),
+        ("traction", &table.traction, true, Control::Flux),
+        ("stiffness", &table.stiffness, true, Control::Stiffness),
+        ("strain", &table.strain, false, Control::Gradient),
+        ("stress", &table.stress, false, Control::Flux),
+    ];
+    let choices: Vec<&str> = kinds
+        .iter()
+        .filter(|kind| kind.2 == interface)
+        .map(|kind| kind.0)
+        .collect();
+    let mut given = kinds
+        .iter()
+        .filter_map(|(keyword, value, fits, kind)| Some((keyword, value.as_ref()?, fits, kind)));
+    let (Some((keyword, value, fits, kind)), None) = (given.next(), given.next()) else {
+        return Err(source
+            .error(
+                written.span(),
+                format!(
+                    "component `{component}` needs exactly one control, one of {}",
+                    choices.join(", ")
+                ),
+            )
+            .into());
+    };
+    if *fits != interface {
+        return Err(source
+            .error(
+                value.span(),
+                format!(
+                    "component `{component}` cannot be controlled by `{keyword}` under {}",
+                    hypothesis.name()
+                ),
+            )
+            .hint(format!("it is controlled by one of {}", choices.join(", ")))
+            .into());
+    }
+    let number = finite(source, keyword, value)?;
+    if *keyword == "stiffness" && number < 0.0 {
+        return Err(source
+            .error(
+                value.span(),
+                format!("`stiffness`: {number} kPa/m is outside [0, ∞)"),
+            )
+            .hint("the traction changes by −stiffness × jump")
+            .into());
+    }
+    Ok(kind(number))
+}

@@ -1,0 +1,377 @@
+//! Running a case: phases, increments, cut-back and regrowth, results.
+
+use crate::assembly::System;
+use crate::case::{Axis, Case, CaseFile, PhaseInput};
+use crate::error::{Error, Place};
+use crate::group::Group;
+use crate::mesh::Mesh;
+use crate::model::{Model, cannot_start, unit_pressure};
+use crate::output::{IncrementRecord, PhaseRecord, Results};
+use crate::probe::{Probes, Snapshot};
+use crate::solver::{LinearSolver, Loads, Newton, StepFailure, StepSuccess};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+
+/// Progress of a run, for whoever shows it.
+pub trait Observer {
+    /// A phase begins.
+    fn phase(&mut self, name: &str, increments: usize);
+    /// An increment reached equilibrium.
+    fn increment(&mut self, place: &Place, of: usize, iterations: usize);
+    /// An increment is repeated with smaller steps.
+    fn cut_back(&mut self, place: &Place, reason: &str);
+    /// Something the user should know.
+    fn warning(&mut self, message: &str);
+}
+
+/// Fastest growth of steps after a cut-back.
+const REGROWTH: f64 = 2.0;
+/// Iterations up to which a step counts as easy, so that the next one may be larger.
+const EASY: usize = 8;
+/// Smallest and largest reduction of a step at a cut-back.
+const CUT: [f64; 2] = [0.1, 0.5];
+
+/// Runs a case and writes its results into `folder`.
+///
+/// # Errors
+/// Bad input before anything is written; no equilibrium or plugin trouble after the last state
+/// of equilibrium has been written.
+pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<(), Error> {
+    let started = Instant::now();
+    let model = Model::build(case)?;
+    let probes = Probes::new(case, &model)?;
+    for law in model.laws.values() {
+        for warning in &law.warnings {
+            observer.warning(warning);
+        }
+    }
+    let mut results = Results::create(folder, case, &model, &probes)?;
+    let mut run = Run::new(case, model, probes);
+    let outcome = run.phases(&mut results, observer);
+    let finished = results.finish(&run.groups, started.elapsed(), outcome.as_ref().err());
+    outcome.and(finished)
+}
+
+struct Run<'a> {
+    case: &'a Case,
+    mesh: Mesh,
+    groups: Vec<Group>,
+    model: ModelRest,
+    probes: Probes,
+    /// Displacements by degree of freedom, as counted since the last reset.
+    displacement: Vec<f64>,
+    /// Prescribed displacements by degree of freedom.
+    prescribed: BTreeMap<usize, f64>,
+    /// Pressures by line.
+    pressure: BTreeMap<String, f64>,
+    /// External forces.
+    force: Vec<f64>,
+    /// Pseudo-time: one unit for every phase.
+    time: f64,
+}
+
+/// What is left of a model once mesh and groups are taken out.
+struct ModelRest {
+    ties: Vec<crate::assembly::Tie>,
+    swaps: Vec<Vec<(usize, crate::group::GroupLaw)>>,
+}
+
+impl<'a> Run<'a> {
+    fn new(case: &'a Case, model: Model, probes: Probes) -> Self {
+        let Model { mesh, groups, ties, swaps, .. } = model;
+        let n_dofs = 2 * mesh.nodes.len();
+        let mut run = Self {
+            case,
+            mesh,
+            groups,
+            model: ModelRest { ties, swaps },
+            probes,
+            displacement: vec![0.0; n_dofs],
+            prescribed: BTreeMap::new(),
+            pressure: BTreeMap::new(),
+            force: vec![0.0; n_dofs],
+            time: 0.0,
+        };
+        for support in &case.file.supports {
+            for dof in run.dofs(support.line.get_ref(), &support.fixed) {
+                run.prescribed.insert(dof, 0.0);
+            }
+        }
+        run
+    }
+
+    fn file(&self) -> &'a CaseFile {
+        &self.case.file
+    }
+
+    /// Degrees of freedom of a line's nodes.
+    fn dofs(&self, line: &str, components: &[Axis]) -> Vec<usize> {
+        let nodes = self.mesh.lines.get(line).map_or(&[][..], |line| &line.nodes);
+        let offset = |axis: &Axis| usize::from(*axis == Axis::Y);
+        nodes.iter().flat_map(|&n| components.iter().map(move |c| 2 * n + offset(c))).collect()
+    }
+
+    fn phases(&mut self, results: &mut Results, observer: &mut dyn Observer) -> Result<(), Error> {
+        let file = self.file();
+        for (number, phase) in file.phases.iter().enumerate() {
+            observer.phase(phase.name.get_ref(), *phase.increments.get_ref());
+            self.phase(number, phase, results, observer)?;
+        }
+        Ok(())
+    }
+
+    fn phase(
+        &mut self,
+        number: usize,
+        phase: &PhaseInput,
+        results: &mut Results,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Error> {
+        let name = phase.name.get_ref();
+        for (group, law) in self.model.swaps[number].clone() {
+            self.groups[group]
+                .set_law(law)
+                .map_err(|failure| cannot_start(&self.case.source, self.file(), &failure))?;
+        }
+        Model::check_layers(self.case, &self.groups)?;
+        let mut loads = self.loads(phase);
+        let is_prescribed: Vec<bool> =
+            (0..self.displacement.len()).map(|dof| self.prescribed.contains_key(&dof)).collect();
+        let system =
+            System::new(self.mesh.nodes.len(), &self.groups, &is_prescribed, &self.model.ties);
+        system.fold(&mut loads.force_start);
+        system.fold(&mut loads.force_end);
+        let imbalance = self.out_of_balance(&system, &mut loads);
+        let mut solver = LinearSolver::new(&system.pattern).map_err(|_| Error::NoEquilibrium {
+            message: format!("phase `{name}`: the equations are singular"),
+            hint: Some("a part of the model is not supported".to_owned()),
+        })?;
+        let mut record = PhaseRecord::new(name, system.n_equations(), imbalance);
+        if imbalance > 1e-6 {
+            observer.warning(&format!(
+                "phase `{name}` starts out of balance: {:.2} % of the forces in play, carried to \
+                 equilibrium in its course",
+                100.0 * imbalance
+            ));
+        }
+        let outcome =
+            self.increments(phase, &loads, &system, &mut solver, &mut record, results, observer);
+        record.factorisations = solver.factorisations;
+        self.time += 1.0;
+        results.phase(record);
+        outcome
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the parts of one phase, each used once")]
+    fn increments(
+        &mut self,
+        phase: &PhaseInput,
+        loads: &Loads,
+        system: &System,
+        solver: &mut LinearSolver,
+        record: &mut PhaseRecord,
+        results: &mut Results,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Error> {
+        let n = *phase.increments.get_ref();
+        let mut step = 1.0 / n as f64;
+        let smallest = step / f64::powi(2.0, self.file().solver.max_halvings as i32);
+        // The last step of this phase: its length and displacement increments.
+        let mut last: Option<(f64, Vec<f64>)> = None;
+        let mut lambda = 0.0;
+        for increment in 1..=n {
+            let place = Place { phase: phase.name.get_ref().clone(), increment };
+            let target = if increment == n { 1.0 } else { increment as f64 / n as f64 };
+            let mut done = IncrementRecord::default();
+            while lambda < target {
+                // A remainder that is hardly longer than the step is taken at once.
+                let end = if target - lambda <= 1.0001 * step { target } else { lambda + step };
+                let length = end - lambda;
+                let attempt =
+                    self.attempt(loads, [lambda, end], last.as_ref(), system, solver, record);
+                match attempt {
+                    Ok(success) => {
+                        results.iterations(&place, end, &success.iterations)?;
+                        done.iterations += success.iterations.len();
+                        if let Some(why) = &success.unreliable {
+                            record.unreliable += 1;
+                            done.warning.get_or_insert_with(|| why.clone());
+                        }
+                        if success.iterations.len() <= EASY {
+                            step = (REGROWTH * step).min(1.0 / n as f64);
+                        }
+                        self.accept(&success, loads, end);
+                        last = Some((length, success.increment));
+                        done.reaction = Some(self.reaction(&success.internal));
+                        lambda = end;
+                    }
+                    Err(failure) => {
+                        results.iterations(&place, end, &failure.iterations)?;
+                        done.iterations += failure.iterations.len();
+                        record.cut_backs += 1;
+                        let factor = failure.factor.unwrap_or(CUT[1]).clamp(CUT[0], CUT[1]);
+                        step = factor * length;
+                        results.cut_back(&place, end, step, &failure.reason)?;
+                        observer.cut_back(&place, &failure.reason);
+                        if let Some(defect) = &failure.defect {
+                            return Err(Error::plugin(format!("{place}: {defect}")));
+                        }
+                        if step < smallest {
+                            return Err(self.no_equilibrium(&place, lambda, n, &failure));
+                        }
+                    }
+                }
+            }
+            let reaction = done.reaction.take().unwrap_or_default();
+            let snapshot = Snapshot {
+                groups: &self.groups,
+                displacement: &self.displacement,
+                reaction: &reaction,
+            };
+            done.probes = self.probes.values(&snapshot);
+            done.time = self.time + lambda;
+            record.iterations += done.iterations;
+            record.increments += 1;
+            results.increment(&place, n, &done, &snapshot, &self.mesh)?;
+            observer.increment(&place, n, done.iterations);
+        }
+        Ok(())
+    }
+
+    /// One step; with a guess from the last one if there is one, else from the tangent.
+    fn attempt(
+        &mut self,
+        loads: &Loads,
+        [from, to]: [f64; 2],
+        last: Option<&(f64, Vec<f64>)>,
+        system: &System,
+        solver: &mut LinearSolver,
+        record: &mut PhaseRecord,
+    ) -> Result<StepSuccess, StepFailure> {
+        let guess = last.map(|(length, increment)| {
+            let ratio = (to - from) / length;
+            increment.iter().map(|u| ratio * u).collect()
+        });
+        let mut newton = Newton {
+            system,
+            solver,
+            groups: &mut self.groups,
+            settings: &self.case.file.solver,
+            costs: &mut record.costs,
+        };
+        newton.step(loads, from, to, self.time + from, guess)
+    }
+
+    fn accept(&mut self, success: &StepSuccess, loads: &Loads, lambda: f64) {
+        for group in &mut self.groups {
+            group.commit();
+        }
+        for (u, increment) in self.displacement.iter_mut().zip(&success.increment) {
+            *u += increment;
+        }
+        let ends = loads.force_start.iter().zip(&loads.force_end);
+        for (force, (start, end)) in self.force.iter_mut().zip(ends) {
+            *force = start + lambda * (end - start);
+        }
+        if lambda >= 1.0 {
+            // Totals that were asked for are met exactly, whatever the increments added up to.
+            for &(dof, _, end) in &loads.prescribed {
+                self.displacement[dof] = end;
+            }
+        }
+    }
+
+    /// Internal less external forces.
+    fn reaction(&self, internal: &[f64]) -> Vec<f64> {
+        internal.iter().zip(&self.force).map(|(internal, external)| internal - external).collect()
+    }
+
+    /// Loads of a phase; takes over its changes of constraints.
+    fn loads(&mut self, phase: &PhaseInput) -> Loads {
+        if phase.reset_displacements {
+            self.displacement.fill(0.0);
+            self.prescribed.values_mut().for_each(|value| *value = 0.0);
+        }
+        for input in &phase.free {
+            for dof in self.dofs(input.line.get_ref(), &input.components) {
+                self.prescribed.remove(&dof);
+            }
+        }
+        for input in &phase.displacement {
+            for (value, axis) in [(input.x, Axis::X), (input.y, Axis::Y)] {
+                if let Some(value) = value {
+                    for dof in self.dofs(input.line.get_ref(), &[axis]) {
+                        self.prescribed.insert(dof, value);
+                    }
+                }
+            }
+        }
+        let force_start = self.force.clone();
+        for input in &phase.pressure {
+            self.pressure.insert(input.line.get_ref().clone(), input.value);
+        }
+        let mut force_end = vec![0.0; self.displacement.len()];
+        for (line, value) in &self.pressure {
+            if let Some(line) = self.mesh.lines.get(line) {
+                let unit = unit_pressure(self.case.file.analysis, &self.mesh, &line.edges);
+                force_end.iter_mut().zip(unit).for_each(|(force, unit)| *force += value * unit);
+            }
+        }
+        Loads {
+            force_start,
+            force_end,
+            prescribed: self
+                .prescribed
+                .iter()
+                .map(|(&dof, &end)| (dof, self.displacement[dof], end))
+                .collect(),
+            out_of_balance: Vec::new(),
+        }
+    }
+
+    /// Internal less external forces at the start of a phase where nothing holds them (after a
+    /// swap of laws, a support given up, an initial stress). Returns their size relative to the
+    /// forces in play.
+    fn out_of_balance(&self, system: &System, loads: &mut Loads) -> f64 {
+        let n_dofs = self.displacement.len();
+        let mut internal = vec![0.0; n_dofs];
+        for group in &self.groups {
+            group.kinematics.add_forces(&group.stress.committed, &mut internal);
+        }
+        system.fold(&mut internal);
+        loads.out_of_balance = vec![0.0; n_dofs];
+        let (mut rest, mut play) = (0.0, 0.0);
+        for &dof in system.free() {
+            let difference = internal[dof] - loads.force_start[dof];
+            loads.out_of_balance[dof] = difference;
+            rest += difference * difference;
+        }
+        for (internal, external) in internal.iter().zip(&loads.force_start) {
+            play += f64::max(internal * internal, external * external);
+        }
+        if play > 0.0 { f64::sqrt(rest / play) } else { 0.0 }
+    }
+
+    fn no_equilibrium(
+        &self,
+        place: &Place,
+        lambda: f64,
+        n: usize,
+        failure: &StepFailure,
+    ) -> Error {
+        let reached = lambda * n as f64;
+        Error::NoEquilibrium {
+            message: format!(
+                "{place}: no equilibrium beyond {reached:.4} of {n} increments\n  last attempt: {}",
+                failure.reason
+            ),
+            hint: Some(
+                "results up to the last state of equilibrium are written; \
+                 log.jsonl lists the iterations"
+                    .to_owned(),
+            ),
+        }
+    }
+}
+

@@ -1,0 +1,347 @@
+//! Full Newton iterations with consistent tangents and a line search.
+
+use super::linear::LinearSolver;
+use crate::assembly::System;
+use crate::case::SolverInput;
+use crate::group::{Group, PointFailure};
+use crate::plugin::Operator;
+use serde::Serialize;
+use std::time::{Duration, Instant};
+
+/// Lengths of a correction that the line search tries, in order.
+const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
+/// The displacement criterion is waived where the residual is this far below its tolerance: a
+/// linear step ends after one correction, which is as large as the increment itself.
+const EXACT: f64 = 1e-3;
+
+/// Loads over a phase, as functions of the load factor λ from 0 to 1.
+#[derive(Clone, Debug, Default)]
+pub struct Loads {
+    /// External forces at λ = 0, by degree of freedom.
+    pub force_start: Vec<f64>,
+    /// External forces at λ = 1.
+    pub force_end: Vec<f64>,
+    /// Prescribed displacements: degree of freedom, value at λ = 0, value at λ = 1.
+    pub prescribed: Vec<(usize, f64, f64)>,
+    /// Forces out of balance at the start, carried to equilibrium in proportion to λ.
+    pub out_of_balance: Vec<f64>,
+}
+
+impl Loads {
+    /// External forces and what is left of the forces out of balance.
+    fn external(&self, lambda: f64) -> Vec<f64> {
+        let ends = self.force_start.iter().zip(&self.force_end);
+        ends.zip(&self.out_of_balance)
+            .map(|((start, end), rest)| start + lambda * (end - start) + (1.0 - lambda) * rest)
+            .collect()
+    }
+
+    /// Value of a prescribed displacement; exact at both ends.
+    fn value(start: f64, end: f64, lambda: f64) -> f64 {
+        if lambda >= 1.0 { end } else { start + lambda * (end - start) }
+    }
+}
+
+/// One iteration, for the log.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Iteration {
+    /// Relative residual after it.
+    pub residual: f64,
+    /// Relative correction; null before the first one.
+    pub correction: Option<f64>,
+    /// Fraction of the correction that was taken.
+    pub step_length: f64,
+}
+
+/// Seconds by part, and counts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Costs {
+    /// Laws, with the strains before and the forces after them.
+    pub laws: Duration,
+    /// Assembly of matrices.
+    pub assembly: Duration,
+    /// Factorisation and solution.
+    pub equations: Duration,
+    /// Evaluations of all groups.
+    pub evaluations: u64,
+    /// Matrices factorised.
+    pub factorisations: u64,
+}
+
+/// A step that reached equilibrium. The groups' trial state is that of equilibrium.
+#[derive(Clone, Debug)]
+pub struct StepSuccess {
+    /// Displacement increments, by degree of freedom.
+    pub increment: Vec<f64>,
+    /// Internal forces, by degree of freedom (those of tied ones moved to what they follow).
+    pub internal: Vec<f64>,
+    /// What happened.
+    pub iterations: Vec<Iteration>,
+    /// Points whose laws call their result inaccurate.
+    pub unreliable: Option<String>,
+}
+
+/// A step that did not. The committed state is untouched.
+#[derive(Clone, Debug)]
+pub struct StepFailure {
+    /// What happened until then.
+    pub iterations: Vec<Iteration>,
+    /// Why.
+    pub reason: String,
+    /// Size of the next attempt that a law asks for, as a fraction of this one.
+    pub factor: Option<f64>,
+    /// A law that no smaller step will help.
+    pub defect: Option<PointFailure>,
+}
+
+/// What iterations work on.
+#[derive(Debug)]
+pub struct Newton<'a> {
+    /// Unknowns.
+    pub system: &'a System,
+    /// Equations.
+    pub solver: &'a mut LinearSolver,
+    /// Elements and their state.
+    pub groups: &'a mut [Group],
+    /// Settings.
+    pub settings: &'a SolverInput,
+    /// Costs so far.
+    pub costs: &'a mut Costs,
+}
+
+/// Internal forces, residual by equation, and the residual's norm relative to the forces in play.
+struct Balance {
+    internal: Vec<f64>,
+    residual: Vec<f64>,
+    relative: f64,
+    unreliable: Option<String>,
+}
+
+impl Newton<'_> {
+    /// Seeks equilibrium at the end of a step, starting from a guess of the displacement
+    /// increments or, without one, from the tangent at the start.
+    ///
+    /// # Errors
+    /// No equilibrium within the allowed iterations, or a law or the equations failed.
+    pub fn step(
+        &mut self,
+        loads: &Loads,
+        lambda_start: f64,
+        lambda_end: f64,
+        time: f64,
+        guess: Option<Vec<f64>>,
+    ) -> Result<StepSuccess, StepFailure> {
+        let mut iterations = Vec::new();
+        let outcome = self.iterate(loads, [lambda_start, lambda_end], time, guess, &mut iterations);
+        outcome.map_err(|failure| StepFailure { iterations, ..failure })
+    }
+
+    fn iterate(
+        &mut self,
+        loads: &Loads,
+        [lambda_start, lambda_end]: [f64; 2],
+        time: f64,
+        guess: Option<Vec<f64>>,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<StepSuccess, StepFailure> {
+        let external = loads.external(lambda_end);
+        let period = (time, lambda_end - lambda_start);
+        let mut prescribed = vec![0.0; external.len()];
+        for &(dof, start, end) in &loads.prescribed {
+            prescribed[dof] = Loads::value(start, end, lambda_end)
+                - Loads::value(start, end, lambda_start);
+        }
+        let mut increment = match guess {
+            Some(mut guess) => {
+                for &(dof, ..) in &loads.prescribed {
+                    guess[dof] = prescribed[dof];
+                }
+                self.system.follow(&mut guess);
+                guess
+            }
+            None => self.from_tangent(&external, &prescribed, period)?,
+        };
+        let mut balance = self.evaluate(&increment, &external, period).map_err(failed_law)?;
+        iterations.push(Iteration {
+            residual: balance.relative,
+            correction: None,
+            step_length: 1.0,
+        });
+        for _ in 0..=self.settings.max_iterations {
+            let last = iterations[iterations.len() - 1];
+            let tolerance = self.settings.force_tolerance;
+            let small_correction = last.step_length >= 1.0
+                && last.correction.is_some_and(|c| c <= self.settings.displacement_tolerance);
+            if balance.relative <= EXACT * tolerance
+                || (balance.relative <= tolerance && small_correction)
+            {
+                return Ok(StepSuccess {
+                    increment,
+                    internal: balance.internal,
+                    iterations: std::mem::take(iterations),
+                    unreliable: balance.unreliable,
+                });
+            }
+            if iterations.len() > self.settings.max_iterations {
+                break;
+            }
+            let correction = self.correction(&balance.residual, None)?;
+            let (step_length, next, at) =
+                self.search(&increment, &correction, &balance, &external, period)?;
+            increment = next;
+            balance = at;
+            iterations.push(Iteration {
+                residual: balance.relative,
+                correction: Some(norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE)),
+                step_length,
+            });
+        }
+        Err(StepFailure {
+            reason: format!(
+                "no equilibrium after {} iterations: residual {:.1e}, tolerance {:.1e}",
+                self.settings.max_iterations, balance.relative, self.settings.force_tolerance
+            ),
+            ..plain("")
+        })
+    }
+
+    /// Displacement increments that the tangent at the start predicts.
+    fn from_tangent(
+        &mut self,
+        external: &[f64],
+        prescribed: &[f64],
+        period: (f64, f64),
+    ) -> Result<Vec<f64>, StepFailure> {
+        let still = vec![0.0; external.len()];
+        let balance = self.evaluate(&still, external, period).map_err(failed_law)?;
+        let mut increment = self.correction(&balance.residual, Some(prescribed))?;
+        for (value, prescribed) in increment.iter_mut().zip(prescribed) {
+            *value += prescribed;
+        }
+        self.system.follow(&mut increment);
+        Ok(increment)
+    }
+
+    /// Solves K δ = residual − K_fp Δp with the tangents of the last evaluation.
+    fn correction(
+        &mut self,
+        residual: &[f64],
+        prescribed: Option<&[f64]>,
+    ) -> Result<Vec<f64>, StepFailure> {
+        let start = Instant::now();
+        let mut values = Vec::new();
+        let mut coupling = vec![0.0; residual.len()];
+        let with_coupling = prescribed.map(|p| (p, coupling.as_mut_slice()));
+        self.system.assemble(self.groups, &mut values, with_coupling);
+        self.costs.assembly += start.elapsed();
+        let start = Instant::now();
+        let right: Vec<f64> = residual.iter().zip(&coupling).map(|(r, c)| r - c).collect();
+        let solution =
+            self.solver.factorise(&values).and_then(|()| self.solver.solve(&right));
+        self.costs.equations += start.elapsed();
+        self.costs.factorisations += 1;
+        let solution = solution.map_err(|_| {
+            plain("the tangent matrix is singular: a part of the model can move freely")
+        })?;
+        let mut correction = vec![0.0; self.system.n_dofs()];
+        for (&dof, value) in self.system.free().iter().zip(solution) {
+            correction[dof] = value;
+        }
+        self.system.follow(&mut correction);
+        Ok(correction)
+    }
+
+    /// Takes the longest of a few fractions of the correction that does not make the residual
+    /// grow; if all do, the one with the smallest residual. A law that fails is treated like a
+    /// residual that grows, unless every fraction fails.
+    fn search(
+        &mut self,
+        increment: &[f64],
+        correction: &[f64],
+        before: &Balance,
+        external: &[f64],
+        period: (f64, f64),
+    ) -> Result<(f64, Vec<f64>, Balance), StepFailure> {
+        let mut best: Option<(f64, Vec<f64>, Balance)> = None;
+        let mut first_failure = None;
+        let tries = if self.settings.line_search { STEP_LENGTHS.len() } else { 1 };
+        for &length in &STEP_LENGTHS[..tries] {
+            let moved: Vec<f64> =
+                increment.iter().zip(correction).map(|(u, d)| u + length * d).collect();
+            match self.evaluate(&moved, external, period) {
+                Ok(balance) if balance.relative <= before.relative => {
+                    return Ok((length, moved, balance));
+                }
+                Ok(balance) => {
+                    if best.as_ref().is_none_or(|(_, _, b)| balance.relative < b.relative) {
+                        best = Some((length, moved, balance));
+                    }
+                }
+                Err(failure) => first_failure = first_failure.or(Some(failure)),
+            }
+        }
+        match (best, first_failure) {
+            // The groups hold the state of the last fraction tried.
+            (Some((length, moved, _)), _) => {
+                let balance = self.evaluate(&moved, external, period).map_err(failed_law)?;
+                Ok((length, moved, balance))
+            }
+            (None, Some(failure)) => Err(failed_law(failure)),
+            (None, None) => Err(plain("the line search found no state")),
+        }
+    }
+
+    /// Trial state, internal forces and residual under displacement increments.
+    fn evaluate(
+        &mut self,
+        increment: &[f64],
+        external: &[f64],
+        (time, time_increment): (f64, f64),
+    ) -> Result<Balance, PointFailure> {
+        let start = Instant::now();
+        self.costs.evaluations += 1;
+        let mut internal = vec![0.0; increment.len()];
+        let mut unreliable = None;
+        for group in &mut *self.groups {
+            let success =
+                group.evaluate(increment, Operator::Consistent, time, time_increment)?;
+            group.kinematics.add_forces(&group.stress.trial, &mut internal);
+            unreliable = unreliable
+                .or(success.unreliable.map(|(_, why)| format!("group `{}`: {why}", group.name)));
+        }
+        self.system.fold(&mut internal);
+        let residual: Vec<f64> =
+            self.system.free().iter().map(|&dof| external[dof] - internal[dof]).collect();
+        let scale = norm(&internal).max(norm(external));
+        let relative = if scale > 0.0 { norm(&residual) / scale } else { 0.0 };
+        self.costs.laws += start.elapsed();
+        Ok(Balance { internal, residual, relative, unreliable })
+    }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn plain(reason: &str) -> StepFailure {
+    StepFailure {
+        iterations: Vec::new(),
+        reason: reason.to_owned(),
+        factor: None,
+        defect: None,
+    }
+}
+
+fn failed_law(failure: PointFailure) -> StepFailure {
+    use abi::status::Outcome::{Argument, Internal, Unknown, Unsupported};
+    let defective = matches!(
+        failure.failure.outcome,
+        Argument | Internal | Unknown(_) | Unsupported
+    );
+    StepFailure {
+        iterations: Vec::new(),
+        reason: failure.to_string(),
+        factor: failure.failure.factor,
+        defect: defective.then_some(failure),
+    }
+}

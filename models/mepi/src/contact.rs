@@ -1,0 +1,249 @@
+//! One update: elastic trial, plastic flow, loss of contact and its return.
+
+use crate::interface::{Constants, Interface, State};
+use crate::return_mapping::{Flow, Increment, Sample, last_that};
+use abi::{Failure, InterfacePoint, InterfaceResponse, Tangent};
+
+type Matrix = [[f64; 2]; 2];
+
+/// The part of the increment that acts on a point in contact, compression and contraction positive.
+#[derive(Clone, Copy, Debug)]
+struct Contact {
+    /// `σ_n` and τ at the start.
+    sigma: f64,
+    tau: f64,
+    /// Relative displacement: contraction and slip.
+    contraction: f64,
+    slip: f64,
+    /// ∂slip/∂[`u_n`] and ∂slip/∂[`u_t`]: slip before the contact re-forms does not act.
+    slip_by_jump: [f64; 2],
+}
+
+/// Carries a point over an increment.
+#[inline]
+pub(crate) fn update(
+    law: &Interface,
+    point: &InterfacePoint<State>,
+    tangent: Tangent,
+) -> Result<InterfaceResponse<State>, Failure> {
+    let state = point.state;
+    if !(state.sigma_ni > 0.0 && state.plastic_slip >= 0.0) {
+        return Err(Failure::Domain(
+            "`sigma_ni` must be positive and `plastic_slip` not negative",
+        ));
+    }
+    let constants = law.constants(state.sigma_ni);
+    let mut end = match contact(&constants, point) {
+        Ok(contact) => close_or_slide(&constants, state, &contact)?,
+        Err(gap) => open(State { gap, ..state }),
+    };
+    if tangent == Tangent::Elastic {
+        // Eq. (6).
+        end.tangent = [
+            [constants.normal_stiffness, 0.0],
+            [0.0, constants.shear_stiffness],
+        ];
+    }
+    Ok(end)
+}
+
+/// The part of the increment in contact, or the gap at its end if there is none.
+#[inline]
+fn contact(constants: &Constants, point: &InterfacePoint<State>) -> Result<Contact, f64> {
+    let [opening, slip] = point.jump_increment;
+    let sigma = -point.traction[0];
+    let gap = if point.state.gap > 0.0 {
+        point.state.gap
+    } else if sigma < 0.0 {
+        // A tension carried in is released; contact is where it vanishes.
+        -sigma / constants.normal_stiffness
+    } else {
+        return Ok(Contact {
+            sigma,
+            tau: point.traction[1],
+            contraction: -opening,
+            slip,
+            slip_by_jump: [0.0, 1.0],
+        });
+    };
+    if gap + opening >= 0.0 {
+        return Err(gap + opening);
+    }
+    // Contact re-forms on the way; the path within the increment is straight.
+    let fraction = 1.0 + gap / opening;
+    Ok(Contact {
+        sigma: 0.0,
+        tau: 0.0,
+        contraction: -(gap + opening),
+        slip: slip * fraction,
+        slip_by_jump: [-slip * gap / (opening * opening), fraction],
+    })
+}
+
+/// No traction, no stiffness.
+fn open(state: State) -> InterfaceResponse<State> {
+    InterfaceResponse {
+        traction: [0.0; 2],
+        state,
+        tangent: [[0.0; 2]; 2],
+        unreliable: None,
+    }
+}
+
+#[inline]
+fn close_or_slide(
+    constants: &Constants,
+    state: State,
+    contact: &Contact,
+) -> Result<InterfaceResponse<State>, Failure> {
+    let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
+    let hardening = &constants.hardening;
+    let xi = state.plastic_slip;
+    // Elastic trial, Eq. (6).
+    let sigma_trial = contact.sigma + k_n * contact.contraction;
+    let tau_trial = contact.tau + k_t * contact.slip;
+    let mu = hardening.friction(hardening.branch(xi), xi).value;
+    let increment = Increment {
+        constants,
+        xi,
+        mu,
+        sigma: sigma_trial,
+        highest: sigma_trial.max(contact.sigma),
+        tau: tau_trial.abs(),
+    };
+    // Eq. (9).
+    let strength = mu * sigma_trial;
+    let round_off = 4.0 * f64::EPSILON * strength;
+    let elastic = [[1.0, 0.0], [0.0, 1.0]];
+    if sigma_trial >= 0.0 && increment.tau <= strength + round_off {
+        return Ok(response(
+            constants,
+            contact,
+            [sigma_trial, tau_trial],
+            State { gap: 0.0, ..state },
+            elastic,
+        ));
+    }
+    let sign = 1.0_f64.copysign(tau_trial);
+    match increment.flow()? {
+        Flow::Slides(end) => {
+            let sigma = end.sigma.max(0.0);
+            Ok(response(
+                constants,
+                contact,
+                [sigma, sign * end.mu * sigma],
+                slid(state, end.d_lambda, end.contraction),
+                derivative(constants, &end, sign)?,
+            ))
+        }
+        Flow::StopsAtPeak(end) => {
+            let mut state = slid(state, end.d_lambda, end.contraction);
+            if let Some(softening) = hardening.softening {
+                state.plastic_slip = softening.start;
+            }
+            let tau = sign * (increment.tau - k_t * end.d_lambda);
+            Ok(response(
+                constants,
+                contact,
+                [end.sigma, tau],
+                state,
+                elastic,
+            ))
+        }
+        Flow::LosesContact { exhausted } => Ok(open(lose_contact(
+            constants, state, contact, &increment, exhausted,
+        ))),
+    }
+}
+
+/// The state after plastic flow in contact, Eq. (14).
+fn slid(state: State, d_lambda: f64, contraction: f64) -> State {
+    State {
+        plastic_slip: state.plastic_slip + d_lambda,
+        gap: 0.0,
+        plastic_contraction: state.plastic_contraction + contraction,
+        ..state
+    }
+}
+
+/// The state after contact is lost: `σ_n` = τ = 0 at that moment, and nothing flows afterwards.
+#[cold]
+fn lose_contact(
+    constants: &Constants,
+    state: State,
+    contact: &Contact,
+    increment: &Increment<'_>,
+    exhausted: Option<f64>,
+) -> State {
+    let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
+    // At the fraction s of the increment, τ = 0 and σ_n = 0 with the slip λ that makes τ vanish.
+    let lambda = |s: f64| (contact.tau + s * k_t * contact.slip).abs() / k_t;
+    let sigma = |s: f64| {
+        contact.sigma + s * k_n * contact.contraction - k_n * increment.contraction(lambda(s))
+    };
+    let d_lambda = if contact.contraction < 0.0 && sigma(1.0) < 0.0 {
+        if sigma(0.0) >= 0.0 {
+            lambda(last_that(|s| sigma(s) >= 0.0, 0.0, 1.0))
+        } else {
+            let left = |x: f64| contact.sigma - k_n * increment.contraction(x);
+            last_that(|x| left(x) >= 0.0, 0.0, lambda(0.0))
+        }
+    } else {
+        // The contraction uses up the approach of the two faces and no more.
+        exhausted.unwrap_or(0.0)
+    };
+    let contraction = increment.contraction(d_lambda);
+    // Where contact was lost the faces would touch again.
+    let gap = if contact.contraction < 0.0 {
+        (contraction - increment.sigma / k_n).max(0.0)
+    } else {
+        0.0
+    };
+    State {
+        gap,
+        ..slid(state, d_lambda, contraction)
+    }
+}
+
+/// ∂(`σ_n`, τ)/∂(σ*, τ*) on the yield surface.
+#[inline]
+fn derivative(constants: &Constants, end: &Sample, sign: f64) -> Result<Matrix, Failure> {
+    let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
+    // From |τ*| − K_t Δλ − μ (σ* − K_n c) = 0, with H = −dg/dΔλ.
+    let friction = end.mu_slope * end.sigma;
+    let coupling = k_n * end.contraction_slope;
+    let h = -end.residual_slope;
+    if h <= 1e-13 * (k_t + friction.abs() + end.mu * coupling.abs()) {
+        return Err(Failure::CutStep {
+            factor: 0.5,
+            reason: "the response turns back at the end of the increment",
+        });
+    }
+    Ok([
+        [(k_t + friction) / h, -sign * coupling / h],
+        [sign * end.mu * k_t / h, (friction - end.mu * coupling) / h],
+    ])
+}
+
+/// Back to the signs of the contract: ∂t/∂[u] from ∂(`σ_n`, τ)/∂(σ*, τ*).
+#[inline]
+fn response(
+    constants: &Constants,
+    contact: &Contact,
+    [sigma, tau]: [f64; 2],
+    state: State,
+    by_trial: Matrix,
+) -> InterfaceResponse<State> {
+    let k_n = constants.normal_stiffness;
+    let [by_normal, by_tangential] = contact.slip_by_jump.map(|d| d * constants.shear_stiffness);
+    let [[a, b], [c, d]] = by_trial;
+    InterfaceResponse {
+        traction: [-sigma, tau],
+        state,
+        tangent: [
+            [a * k_n - b * by_normal, -b * by_tangential],
+            [d * by_normal - c * k_n, d * by_tangential],
+        ],
+        unreliable: None,
+    }
+}

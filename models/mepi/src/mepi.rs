@@ -1,0 +1,83 @@
+//! MEPI without softening.
+
+use crate::contact;
+use crate::interface::{Common, Interface, State};
+use abi::{
+    Description, Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Parameter, Refusal,
+    Tangent,
+};
+
+abi::parameters! {
+    /// Parameters of `mepi`.
+    pub struct Parameters {
+        /// Normal stiffness at a normal stress of 1 kPa.
+        k_n: Parameter::new(c"k_n", c"kPa^(1-N)/m").above(0.0).usual(1e2, 1e9),
+        /// Shear stiffness at a normal stress of 1 kPa.
+        k_t: Parameter::new(c"k_t", c"kPa^(1-N)/m").above(0.0).usual(1e2, 1e9),
+        /// Exponent of the normal stress in the stiffnesses.
+        n: Parameter::new(c"N", c"-").at_least(0.0).usual(0.0, 1.0),
+        /// Friction coefficient at the end of the elastic range.
+        mu_0: Parameter::new(c"μ_0", c"-").at_least(0.0).usual(0.0, 1.0),
+        /// Friction coefficient at failure.
+        mu_p: Parameter::new(c"μ_p", c"-").above(0.0).usual(0.1, 1.5),
+        /// Friction coefficient at the characteristic state, where contraction turns to dilation.
+        mu_c0: Parameter::new(c"μ_c0", c"-").at_least(0.0).usual(0.1, 1.5),
+        /// Slip that hardening takes; larger is softer.
+        a: Parameter::new(c"A", c"-").above(0.0).usual(1e-5, 1e-1),
+        /// Rate at which dilation dies out.
+        c_0: Parameter::new(c"C_0", c"-").at_least(0.0).usual(1e-3, 1e2),
+        /// Thickness of the interface, its internal length.
+        t: Parameter::new(c"t", c"m").above(0.0).usual(1e-5, 1e-1),
+        /// Reference pressure.
+        p_0: Parameter::new(c"p_0", c"kPa").above(0.0).usual(1.0, 1e3).default(1.0),
+        /// Initial normal stress, compression positive; taken from the initial state if left out.
+        sigma_ni: Parameter::new(c"σ_ni", c"kPa").above(0.0).usual(1e-1, 1e5).optional(),
+    }
+}
+
+/// MEPI without softening.
+#[derive(Clone, Copy, Debug)]
+pub struct Mepi(pub(crate) Interface);
+
+impl InterfaceLaw for Mepi {
+    const DESCRIPTION: Description = abi::describe! {
+        id: "mepi",
+        name: "MEPI, soil-structure interface without softening",
+        doc: "Elastoplastic interface with hyperbolic friction hardening, contraction before and \
+              dilation after the characteristic state, and separation.",
+        references: "De Gennaro & Frank, eq. 6-10, 12-17; De Gennaro & Frank, Computers and \
+                     Geotechnics 29 (2002)",
+    };
+    type Parameters = Parameters;
+    type State = State;
+
+    fn new(p: Parameters) -> Result<Self, Refusal> {
+        let common = Common {
+            k_n: p.k_n,
+            k_t: p.k_t,
+            n: p.n,
+            mu_0: p.mu_0,
+            mu_p: p.mu_p,
+            mu_c0: p.mu_c0,
+            a: p.a,
+            c_0: p.c_0,
+            t: p.t,
+            p_0: p.p_0,
+            sigma_ni: p.sigma_ni,
+        };
+        Interface::new(common, None).map(Self)
+    }
+
+    fn initial_state(&self, traction: &[f64; 2]) -> Result<State, Failure> {
+        self.0.initial_state(traction)
+    }
+
+    #[inline]
+    fn update(
+        &self,
+        point: &InterfacePoint<State>,
+        tangent: Tangent,
+    ) -> Result<InterfaceResponse<State>, Failure> {
+        contact::update(&self.0, point, tangent)
+    }
+}

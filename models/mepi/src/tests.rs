@@ -1,0 +1,330 @@
+//! The mathematics of the laws, held against truth computed here from Eq. (6)-(17) by other means.
+
+mod contact;
+mod extremes;
+mod paths;
+mod scalar_equation;
+mod tangent;
+
+use crate::{Mepi, MepiSoftening, State, mepi, mepi_softening};
+use abi::{Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Tangent};
+
+/// Table IV with the reference pressure that makes it dilate.
+const TABLE_4: mepi::Parameters = mepi::Parameters {
+    k_n: 0.86e5,
+    k_t: 0.37e5,
+    n: 0.55,
+    mu_0: 0.27,
+    mu_p: 0.7,
+    mu_c0: 0.46,
+    a: 0.008,
+    c_0: 40.0,
+    t: 2e-3,
+    p_0: 100.0,
+    sigma_ni: f64::NAN,
+};
+
+/// Table II, thickness for L/t = 25.
+const TABLE_2: mepi::Parameters = mepi::Parameters {
+    k_n: 1e6,
+    k_t: 0.5e6,
+    n: 0.0,
+    mu_0: 0.0,
+    mu_p: 0.7,
+    mu_c0: 0.4,
+    a: 0.008,
+    c_0: 19.0,
+    t: 4e-4,
+    p_0: 100.0,
+    sigma_ni: 100.0,
+};
+
+/// Table I, Fontainebleau sand, loose.
+const FONTAINEBLEAU: mepi_softening::Parameters = mepi_softening::Parameters {
+    k_n: 0.86e5,
+    k_t: 0.37e5,
+    n: 0.55,
+    mu_0: 0.0,
+    mu_p: 0.78,
+    mu_c0: 0.67,
+    a: 0.000_45,
+    c_0: 0.05,
+    t: 2e-3,
+    p_0: 1.0,
+    sigma_ni: f64::NAN,
+    mu_r: 0.7,
+    a_0: 4.0,
+    u_tp: 1.4e-3,
+    peak: 0.0,
+};
+
+/// Table I, silica sand, dense.
+const SILICA: mepi_softening::Parameters = mepi_softening::Parameters {
+    k_n: 6e6,
+    k_t: 1e6,
+    n: 0.0,
+    mu_0: 0.0,
+    mu_p: 0.81,
+    mu_c0: 0.49,
+    a: 0.000_06,
+    c_0: 0.05,
+    t: 6e-3,
+    p_0: 1.0,
+    sigma_ni: f64::NAN,
+    mu_r: 0.6,
+    a_0: 12.0,
+    u_tp: 4.3e-4,
+    peak: 0.0,
+};
+
+fn published(p: mepi_softening::Parameters) -> mepi_softening::Parameters {
+    mepi_softening::Parameters { peak: 1.0, ..p }
+}
+
+fn mepi(p: mepi::Parameters) -> Mepi {
+    Mepi::new(p).unwrap()
+}
+
+fn softening(p: mepi_softening::Parameters) -> MepiSoftening {
+    MepiSoftening::new(p).unwrap()
+}
+
+/// One integration point on a path. Compression and contraction positive here, as in the paper.
+#[derive(Clone)]
+struct Walker<'a, L> {
+    law: &'a L,
+    traction: [f64; 2],
+    state: State,
+    /// Relative displacement so far: contraction, slip.
+    u: [f64; 2],
+    /// Σ (σ_n d[u_n^p] + τ d[u_t^p]).
+    dissipation: f64,
+}
+
+impl<'a, L: InterfaceLaw<State = State>> Walker<'a, L> {
+    fn new(law: &'a L, sigma: f64) -> Self {
+        let traction = [-sigma, 0.0];
+        Self {
+            law,
+            traction,
+            state: law.initial_state(&traction).unwrap(),
+            u: [0.0; 2],
+            dissipation: 0.0,
+        }
+    }
+
+    fn sigma(&self) -> f64 {
+        -self.traction[0]
+    }
+
+    fn tau(&self) -> f64 {
+        self.traction[1]
+    }
+
+    /// The response to a further contraction and slip.
+    fn respond(&self, du: [f64; 2], tangent: Tangent) -> Result<InterfaceResponse<State>, Failure> {
+        let point = InterfacePoint {
+            jump: [-self.u[0], self.u[1]],
+            jump_increment: [-du[0], du[1]],
+            traction: self.traction,
+            state: self.state,
+            time: 0.0,
+            time_increment: 1.0,
+        };
+        self.law.update(&point, tangent)
+    }
+
+    /// Contracts and slips.
+    fn step(&mut self, du: [f64; 2]) {
+        let end = self.respond(du, Tangent::Consistent).unwrap();
+        self.u = [self.u[0] + du[0], self.u[1] + du[1]];
+        let slip = (end.state.plastic_slip - self.state.plastic_slip) * end.traction[1].abs();
+        let normal = end.state.plastic_contraction - self.state.plastic_contraction;
+        self.dissipation += slip - normal * end.traction[0];
+        self.traction = end.traction;
+        self.state = end.state;
+    }
+
+    /// Slips against a normal spring: dσ_n = −stiffness · d[u_n]. 0 is constant normal stress.
+    fn slip(&mut self, stiffness: f64, du_t: f64) {
+        // The contraction rate is below 1, and so is the opening per slip.
+        let (mut low, mut high) = (-du_t.abs(), du_t.abs());
+        let mut du_n = 0.0;
+        for _ in 0..200 {
+            let end = self.respond([du_n, du_t], Tangent::Consistent).unwrap();
+            let residual = -end.traction[0] - self.sigma() + stiffness * du_n;
+            if residual.abs() <= 1e-13 * self.sigma() || high - low < 1e-16 * du_t.abs() {
+                return self.step([du_n, du_t]);
+            }
+            if residual < 0.0 {
+                low = du_n;
+            } else {
+                high = du_n;
+            }
+            du_n -= residual / (end.tangent[0][0] + stiffness);
+            if !(du_n > low && du_n < high) {
+                du_n = 0.5 * (low + high);
+            }
+        }
+        panic!("no equilibrium at {:?} {:?}", self.traction, self.state);
+    }
+}
+
+/// Eq. (10), (11), (16), (17) and their integrals, for a point with this initial normal stress.
+#[derive(Clone, Copy, Debug)]
+struct Truth {
+    p: mepi_softening::Parameters,
+    softens: bool,
+    sigma_ni: f64,
+}
+
+impl Truth {
+    fn softening(p: mepi_softening::Parameters, sigma_ni: f64) -> Self {
+        Self {
+            p,
+            softens: true,
+            sigma_ni,
+        }
+    }
+
+    fn hardening(p: mepi::Parameters, sigma_ni: f64) -> Self {
+        let p = mepi_softening::Parameters {
+            k_n: p.k_n,
+            k_t: p.k_t,
+            n: p.n,
+            mu_0: p.mu_0,
+            mu_p: p.mu_p,
+            mu_c0: p.mu_c0,
+            a: p.a,
+            c_0: p.c_0,
+            t: p.t,
+            p_0: p.p_0,
+            ..FONTAINEBLEAU
+        };
+        Self {
+            p,
+            softens: false,
+            sigma_ni,
+        }
+    }
+
+    fn k_n(&self) -> f64 {
+        self.p.k_n * self.sigma_ni.powf(self.p.n)
+    }
+
+    fn k_t(&self) -> f64 {
+        self.p.k_t * self.sigma_ni.powf(self.p.n)
+    }
+
+    fn mu(&self, xi: f64) -> f64 {
+        let p = &self.p;
+        let hardening =
+            |xi: f64| p.mu_0 + (p.mu_p - p.mu_0) * xi / (p.a * self.sigma_ni / p.p_0 * p.t + xi);
+        if self.softens && xi > p.u_tp {
+            let peak = if p.peak > 0.5 {
+                p.mu_p
+            } else {
+                hardening(p.u_tp)
+            };
+            p.mu_r + (peak - p.mu_r) / (p.a_0 / p.t * (xi - p.u_tp)).cosh()
+        } else {
+            hardening(xi)
+        }
+    }
+
+    fn mu_c(&self, xi: f64) -> f64 {
+        let (p, mu) = (&self.p, self.mu(xi));
+        if mu < p.mu_c0 {
+            p.mu_c0
+        } else {
+            let d = 1.0 - 1.0 / (p.c_0 / p.t * self.sigma_ni / p.p_0 * xi).cosh();
+            p.mu_c0 + (mu - p.mu_c0) * d
+        }
+    }
+
+    /// ∫ (μ_c − μ) dξ from 0.
+    fn plastic_contraction(&self, xi: f64) -> f64 {
+        let f = |xi: f64| self.mu_c(xi) - self.mu(xi);
+        // Integrated piece by piece between the kinks, in the variable that resolves small slips.
+        let scale = self.p.a * self.sigma_ni / self.p.p_0 * self.p.t;
+        let transformed = |y: f64| f(scale * y.exp_m1()) * scale * y.exp();
+        let end = (xi / scale).ln_1p();
+        let peak = (self.p.u_tp / scale).ln_1p();
+        let characteristic = (self.p.mu_c0 - self.p.mu_0) / (self.p.mu_p - self.p.mu_c0);
+        let mut kinks = vec![0.0, end];
+        if self.softens {
+            // Just beyond, where the published μ has jumped.
+            kinks.extend([peak * (1.0 - 1e-15), peak * (1.0 + 1e-15)]);
+        }
+        kinks.push(characteristic.max(0.0).ln_1p());
+        kinks.retain(|&k| k <= end);
+        kinks.sort_by(f64::total_cmp);
+        kinks
+            .windows(2)
+            .map(|w| gauss(transformed, w[0], w[1]))
+            .sum()
+    }
+
+    /// σ_n after plastic slip ξ against a normal spring in series with the interface's own.
+    fn sigma(&self, xi: f64, stiffness: f64) -> f64 {
+        let series = if stiffness.is_infinite() {
+            self.k_n()
+        } else {
+            self.k_n() * stiffness / (self.k_n() + stiffness)
+        };
+        self.sigma_ni - series * self.plastic_contraction(xi)
+    }
+
+    /// ξ, σ_n, τ at the slip u_t on a monotonic path.
+    fn at_slip(&self, u_t: f64, stiffness: f64) -> [f64; 3] {
+        let (mut low, mut high) = (0.0, u_t);
+        for _ in 0..80 {
+            let xi = 0.5 * (low + high);
+            let tau = self.mu(xi) * self.sigma(xi, stiffness);
+            if xi + tau / self.k_t() < u_t {
+                low = xi;
+            } else {
+                high = xi;
+            }
+        }
+        let sigma = self.sigma(low, stiffness);
+        [low, sigma, self.mu(low) * sigma]
+    }
+}
+
+/// Composite Gauss-Legendre rule with three points.
+fn gauss(f: impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+    const N: usize = 400;
+    let h = (b - a) / N as f64;
+    let offset = 0.5 * h * 0.6_f64.sqrt();
+    (0..N)
+        .map(|i| {
+            let middle = a + (i as f64 + 0.5) * h;
+            h / 18.0 * (5.0 * (f(middle - offset) + f(middle + offset)) + 8.0 * f(middle))
+        })
+        .sum()
+}
+
+/// A linear congruential generator (Knuth's MMIX constants).
+struct Random(u64);
+
+impl Random {
+    /// Uniform in [0, 1).
+    fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Uniform in [a, b).
+    fn between(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.unit()
+    }
+
+    /// Uniform in the logarithm.
+    fn decades(&mut self, a: f64, b: f64) -> f64 {
+        a * (b / a).powf(self.unit())
+    }
+}

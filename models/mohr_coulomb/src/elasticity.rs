@@ -1,0 +1,75 @@
+//! Isotropic elasticity.
+//!
+//! `E`, `ν` Young's modulus and Poisson's ratio, `λ`, `G` Lamé's constants; Voigt components
+//! 11 22 33 12 \[13 23\] with engineering shear strains.
+
+use nalgebra::{Matrix3, SVector, Vector3};
+
+/// Isotropic elastic constants.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Elasticity {
+    pub(crate) young_modulus: f64,
+    pub(crate) poisson_ratio: f64,
+    pub(crate) lambda: f64,
+    pub(crate) shear_modulus: f64,
+}
+
+impl Elasticity {
+    pub(crate) fn new(e: f64, nu: f64) -> Self {
+        Self {
+            young_modulus: e,
+            poisson_ratio: nu,
+            lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
+            shear_modulus: e / (2.0 * (1.0 + nu)),
+        }
+    }
+
+    /// Stress after an elastic increment, Eq. (1).
+    #[inline]
+    pub(crate) fn trial_stress<const N: usize>(
+        &self,
+        stress: &[f64; N],
+        strain_increment: &[f64; N],
+    ) -> SVector<f64, N> {
+        let (lambda, g) = (self.lambda, self.shear_modulus);
+        let volumetric = strain_increment[0] + strain_increment[1] + strain_increment[2];
+        SVector::from_fn(|i, _| {
+            stress[i]
+                + if i < 3 {
+                    lambda * volumetric + 2.0 * g * strain_increment[i]
+                } else {
+                    g * strain_increment[i]
+                }
+        })
+    }
+
+    /// Elastic operator, Eq. (1), row by row.
+    pub(crate) fn operator<const N: usize>(&self) -> [[f64; N]; N] {
+        let mut d = [[0.0; N]; N];
+        for i in 0..N {
+            if i < 3 {
+                d[i][..3].fill(self.lambda);
+                d[i][i] += 2.0 * self.shear_modulus;
+            } else {
+                d[i][i] = self.shear_modulus;
+            }
+        }
+        d
+    }
+
+    /// The operator between principal strains and principal stresses.
+    pub(crate) fn principal_operator(&self) -> Matrix3<f64> {
+        Matrix3::from_element(self.lambda)
+            + Matrix3::from_diagonal_element(2.0 * self.shear_modulus)
+    }
+
+    /// Equivalent shear strain and volumetric strain that belong to principal stresses, Eq. (13).
+    #[inline]
+    pub(crate) fn equivalent_strains(&self, stress: &Vector3<f64>) -> (f64, f64) {
+        let sum = stress.sum();
+        let deviator = stress.add_scalar(-sum / 3.0);
+        let g = self.shear_modulus;
+        let shear = (2.0 / 3.0 * deviator.norm_squared()).sqrt() / (2.0 * g);
+        (shear, sum / (3.0 * self.lambda + 2.0 * g))
+    }
+}

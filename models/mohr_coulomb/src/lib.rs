@@ -1,0 +1,181 @@
+#![doc = include_str!("../LAW.md")]
+#![forbid(unsafe_code)]
+
+mod elasticity;
+mod return_mapping;
+mod spectral;
+mod surface;
+#[cfg(test)]
+mod tests;
+
+use abi::{
+    ContinuumLaw, Description, Failure, Parameter, Refusal, SolidPoint, SolidResponse, Tangent,
+    Variable,
+};
+use elasticity::Elasticity;
+use nalgebra::SMatrix;
+use return_mapping::Returned;
+use spectral::Principal;
+use surface::Pyramid;
+
+abi::parameters! {
+    /// Parameters of the law.
+    pub struct Parameters {
+        /// Young's modulus.
+        young_modulus: Parameter::new(c"E", c"kPa").above(0.0).usual(1e3, 1e9),
+        /// Poisson's ratio.
+        poisson_ratio: Parameter::new(c"ν", c"-").above(-1.0).below(0.5),
+        /// Cohesion.
+        cohesion: Parameter::new(c"c", c"kPa").at_least(0.0),
+        /// Angle of internal friction.
+        friction_angle: Parameter::new(c"φ", c"deg").at_least(0.0).below(90.0).usual(0.0, 60.0),
+        /// Angle of dilatancy, at most the angle of friction.
+        dilatancy_angle: Parameter::new(c"ψ", c"deg").at_least(0.0).below(90.0).usual(0.0, 30.0),
+        /// Bound on the largest principal stress, at most c cot φ; none if left out.
+        tensile_strength: Parameter::new(c"R_t", c"kPa").at_least(0.0).optional(),
+    }
+}
+
+abi::internal_variables! {
+    /// Internal variables of the law.
+    pub struct State {
+        /// Accumulated equivalent plastic shear strain, the sum of √(2/3 e:e) over the increments,
+        /// e the deviator of the plastic strain increment.
+        plastic_strain: Variable::scalar(c"ε_q", c"-"),
+        /// Plastic volumetric strain, dilation positive.
+        plastic_dilation: Variable::scalar(c"ε_v", c"-"),
+    }
+}
+
+/// Elastic, perfectly plastic Mohr–Coulomb.
+#[derive(Debug)]
+pub struct MohrCoulomb {
+    elasticity: Elasticity,
+    pyramid: Pyramid,
+}
+
+impl ContinuumLaw for MohrCoulomb {
+    const DESCRIPTION: Description = abi::describe! {
+        id: "mohr_coulomb",
+        name: "elastic, perfectly plastic Mohr–Coulomb",
+        doc: "Exact pyramid with edges and apex, non-associated flow, optional tension cut-off.",
+        references: "De Gennaro & Frank, Table III; de Souza Neto, Perić & Owen (2008), ch. 8",
+    };
+    type Parameters = Parameters;
+    type State = State;
+
+    fn new(p: Parameters) -> Result<Self, Refusal> {
+        check(&p)?;
+        let elasticity = Elasticity::new(p.young_modulus, p.poisson_ratio);
+        let apex = surface::apex(p.cohesion, p.friction_angle);
+        // At c cot φ the cut-off touches the apex and changes nothing.
+        let below_apex = |t: &f64| *t < apex * (1.0 - APEX_ROUNDING);
+        Ok(Self {
+            elasticity,
+            pyramid: Pyramid::new(
+                &elasticity,
+                p.cohesion,
+                p.friction_angle,
+                p.dilatancy_angle,
+                Some(p.tensile_strength).filter(below_apex),
+            ),
+        })
+    }
+
+    #[inline]
+    fn update<const N: usize>(
+        &self,
+        point: &SolidPoint<N, State>,
+        tangent: Tangent,
+    ) -> Result<SolidResponse<N, State>, Failure> {
+        // Eq. (1).
+        let trial = self
+            .elasticity
+            .trial_stress(&point.stress, &point.strain_increment);
+        if !trial.norm_squared().is_finite() {
+            return Err(Failure::Numeric("the elastic predictor overflows"));
+        }
+        let (largest, smallest) = spectral::extremes(&trial);
+        let elastic = || SolidResponse {
+            stress: trial.into(),
+            state: point.state,
+            tangent: self.elasticity.operator(),
+            unreliable: None,
+        };
+        // Eqs. (2) and (3).
+        if self.pyramid.admits(largest, smallest) {
+            return Ok(elastic());
+        }
+        let principal = Principal::of(&trial);
+        if N > 4
+            && self
+                .pyramid
+                .admits(principal.stress[0], principal.stress[2])
+        {
+            return Ok(elastic());
+        }
+        let end = self.pyramid.return_stress(&principal.stress);
+        // Eq. (13).
+        let lost = principal.stress - end.stress;
+        let (shear, dilation) = self.elasticity.equivalent_strains(&lost);
+        Ok(SolidResponse {
+            stress: principal.compose(&end.stress),
+            state: State {
+                plastic_strain: point.state.plastic_strain + shear,
+                plastic_dilation: point.state.plastic_dilation + dilation,
+            },
+            tangent: match tangent {
+                Tangent::None => [[0.0; N]; N],
+                Tangent::Elastic => self.elasticity.operator(),
+                Tangent::Consistent => self.consistent_tangent(&principal, &end),
+            },
+            unreliable: None,
+        })
+    }
+}
+
+impl MohrCoulomb {
+    /// Eq. (11), row by row.
+    #[inline]
+    fn consistent_tangent<const N: usize>(
+        &self,
+        principal: &Principal<N>,
+        end: &Returned,
+    ) -> [[f64; N]; N] {
+        let spin = end.spin(&principal.stress);
+        let mut operator = SMatrix::<f64, N, N>::zeros();
+        operator
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(self.pyramid.moduli(end.zone));
+        for i in 3..N {
+            operator[(i, i)] = self.elasticity.shear_modulus * spin[principal.pairs[i - 3]];
+        }
+        let tangent = principal.axes.tr_mul(&(operator * principal.axes));
+        tangent.transpose().into()
+    }
+}
+
+/// Relative rounding of c cot φ.
+const APEX_ROUNDING: f64 = 1e-12;
+
+/// What the bounds of single parameters cannot say.
+fn check(p: &Parameters) -> Result<(), Refusal> {
+    let (c, phi, psi) = (p.cohesion, p.friction_angle, p.dilatancy_angle);
+    if psi > phi {
+        let reason = format!("{psi} deg exceeds the friction angle of {phi} deg");
+        return Err(Refusal::new("dilatancy_angle", reason));
+    }
+    let apex = surface::apex(c, phi);
+    if phi <= 0.0 && c <= 0.0 {
+        let reason = "0 kPa with a friction angle of 0 deg leaves no strength";
+        return Err(Refusal::new("cohesion", reason));
+    }
+    if p.tensile_strength > apex * (1.0 + APEX_ROUNDING) {
+        let t = p.tensile_strength;
+        let reason = format!("{t} kPa exceeds c cot φ = {apex} kPa, the apex of the pyramid");
+        return Err(Refusal::new("tensile_strength", reason));
+    }
+    Ok(())
+}
+
+abi::export_laws!(continuum MohrCoulomb);

@@ -1,0 +1,191 @@
+//! Return mapping to the Mohr–Coulomb pyramid and its tension cut-off, in principal stresses.
+//!
+//! | symbol | here | |
+//! |---|---|---|
+//! | `s₁ ≥ s₂ ≥ s₃` | `s` | trial principal stresses, tension positive |
+//! | `Δ` | `d` | G times the plastic multiplier, kPa |
+
+use crate::surface::{CutOff, Pyramid};
+use nalgebra::Vector3;
+
+/// Where a trial stress returns to. Each inadmissible trial stress has exactly one zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Zone {
+    /// A face of the pyramid.
+    Face,
+    /// The edge s₁ = s₂ of the pyramid (triaxial compression).
+    Edge12,
+    /// The edge s₂ = s₃ of the pyramid (triaxial extension).
+    Edge23,
+    /// The apex of the pyramid.
+    Apex,
+    /// s₁ at the tensile strength.
+    TensionPlane,
+    /// s₁ = s₂ at the tensile strength.
+    TensionEdge,
+    /// All three at the tensile strength.
+    TensionCorner,
+    /// The edge between a face and the tension plane.
+    FaceAndTension,
+    /// The vertex between the edge s₁ = s₂ and the tension edge.
+    Vertex12,
+    /// The vertex between the edge s₂ = s₃ and the tension plane.
+    Vertex23,
+}
+
+/// A stress on the surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Returned {
+    pub(crate) zone: Zone,
+    /// Principal stresses, in the order of the trial stress.
+    pub(crate) stress: Vector3<f64>,
+    /// s₁ − s₂ and s₂ − s₃, free of the cancellation in `stress`.
+    gaps: [f64; 2],
+}
+
+impl Returned {
+    /// `(s_i − s_j)/(s_i* − s_j*)` for the pairs 12, 13, 23: what the return leaves of a shear
+    /// increment in the principal axes, Eq. (11).
+    #[inline]
+    pub(crate) fn spin(&self, trial: &Vector3<f64>) -> [f64; 3] {
+        // Where two trial values coincide the return leaves both alone or merges both.
+        let merged = [0.0, 0.0, f64::from(self.zone == Zone::TensionPlane)];
+        let [x, y] = self.gaps;
+        let trial_gaps = [
+            trial[0] - trial[1],
+            trial[0] - trial[2],
+            trial[1] - trial[2],
+        ];
+        let gaps = [x, x + y, y];
+        std::array::from_fn(|p| {
+            if trial_gaps[p] > 0.0 {
+                gaps[p] / trial_gaps[p]
+            } else {
+                merged[p]
+            }
+        })
+    }
+}
+
+impl Pyramid {
+    /// Returns an inadmissible trial stress, largest principal value first, Eq. (10).
+    #[inline]
+    pub(crate) fn return_stress(&self, s: &Vector3<f64>) -> Returned {
+        let Some(cut) = &self.cut_off else {
+            return self.to_pyramid(s);
+        };
+        if s[0] > cut.strength {
+            let end = self.to_cut_off(s, cut);
+            if self.yield_function(end.stress[0], end.stress[2]) <= 0.0 {
+                return end;
+            }
+        }
+        let end = self.to_pyramid(s);
+        if end.stress[0] <= cut.strength {
+            end
+        } else {
+            self.to_intersection(s, cut)
+        }
+    }
+
+    /// Face, edges and apex.
+    #[inline]
+    fn to_pyramid(&self, s: &Vector3<f64>) -> Returned {
+        // Eq. (5).
+        let d = self.yield_function(s[0], s[2]) / self.face.hardness;
+        let x = s[0] - s[1] - 2.0 * d * self.psi.upper;
+        let y = s[1] - s[2] - 2.0 * d * self.psi.lower;
+        if x >= 0.0 && y >= 0.0 {
+            let s3 = s[2] - d * self.face.relief[2];
+            if self.gap_above(s3) >= 0.0 {
+                let s1 = self.s1_above(s3);
+                // Held in order: s₂ has the rounding of the trial stress.
+                let s2 = (s[1] - d * self.face.relief[1]).min(s1).max(s3);
+                return Returned {
+                    zone: Zone::Face,
+                    stress: Vector3::new(s1, s2, s3),
+                    gaps: [x, y],
+                };
+            }
+        }
+        // Eq. (6).
+        if x < 0.0 {
+            let mean = 0.5 * (s[0] + s[1]);
+            let d = self.yield_function(mean, s[2]) / self.edge_12.hardness;
+            let s3 = s[2] - d * self.edge_12.relief[2];
+            let gap = self.gap_above(s3);
+            if gap >= 0.0 {
+                let s1 = self.s1_above(s3);
+                return Returned {
+                    zone: Zone::Edge12,
+                    stress: Vector3::new(s1, s1, s3),
+                    gaps: [0.0, gap],
+                };
+            }
+        }
+        if y < 0.0 {
+            let mean = 0.5 * (s[1] + s[2]);
+            let d = self.yield_function(s[0], mean) / self.edge_23.hardness;
+            let s3 = mean - d * self.edge_23.relief[2];
+            let gap = self.gap_above(s3);
+            if gap >= 0.0 {
+                return Returned {
+                    zone: Zone::Edge23,
+                    stress: Vector3::new(self.s1_above(s3), s3, s3),
+                    gaps: [gap, 0.0],
+                };
+            }
+        }
+        // Eq. (7). For φ = 0 the gap is 2c and the apex is never reached.
+        Returned {
+            zone: Zone::Apex,
+            stress: Vector3::from_element(self.apex),
+            gaps: [0.0, 0.0],
+        }
+    }
+
+    /// Tension plane, edge and corner, Eq. (8), for s₁\* above the tensile strength.
+    #[inline]
+    fn to_cut_off(&self, s: &Vector3<f64>, cut: &CutOff) -> Returned {
+        let (t, nu) = (cut.strength, self.poisson_ratio);
+        let relief = (s[0] - t) * nu / (1.0 - nu);
+        let s2 = s[1] - relief;
+        if s2 <= t {
+            return Returned {
+                zone: Zone::TensionPlane,
+                stress: Vector3::new(t, s2, s[2] - relief),
+                gaps: [t - s2, s[1] - s[2]],
+            };
+        }
+        let s3 = s[2] - nu * ((s[0] - t) + (s[1] - t));
+        let (zone, s3) = if s3 <= t {
+            (Zone::TensionEdge, s3)
+        } else {
+            (Zone::TensionCorner, t)
+        };
+        Returned {
+            zone,
+            stress: Vector3::new(t, t, s3),
+            gaps: [0.0, t - s3],
+        }
+    }
+
+    /// Where the pyramid meets the cut-off, Eq. (9).
+    #[inline]
+    fn to_intersection(&self, s: &Vector3<f64>, cut: &CutOff) -> Returned {
+        let (s1, s3) = (cut.strength, cut.s3);
+        let s2 = s[1] - self.poisson_ratio * ((s[0] - s1) + (s[2] - s3));
+        let (zone, s2) = if s2 >= s1 {
+            (Zone::Vertex12, s1)
+        } else if s2 <= s3 {
+            (Zone::Vertex23, s3)
+        } else {
+            (Zone::FaceAndTension, s2)
+        };
+        Returned {
+            zone,
+            stress: Vector3::new(s1, s2, s3),
+            gaps: [s1 - s2, s2 - s3],
+        }
+    }
+}
