@@ -249,7 +249,7 @@ typedef struct pilum_batch {
     /* `n_points` outcomes (written), or null. */
     pilum_status *status;
     /* `n_points` factors (written where the outcome is `PILUM_CUT_STEP`), or null: the fraction
-     * of the increment, in (0, 1), that the law believes it can follow. */
+     * of the increment, in (0, 1), that the law believes it can follow; NaN: the host decides. */
     double *step_factor;
     /* Buffer for one message, NUL-terminated on return; may be null. */
     char *message;

@@ -2,9 +2,10 @@
 //! [`parameters!`](crate::parameters) and [`internal_variables!`](crate::internal_variables), and
 //! everything else derives from the declaration.
 
-use crate::raw::{self, Parameter, Variable};
+use crate::raw;
 use std::ffi::{CStr, c_char};
 use std::mem::size_of;
+use std::ptr::null;
 
 /// A kinematic hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,13 +123,15 @@ pub trait Parameters: Sized {
 pub trait InternalVariables: Copy + Send + Sync {
     /// Declarations, in the order of the values.
     const TABLE: &'static [Variable];
-    /// Collects the values, number by number.
+    /// Collects the values, number by number. Asking for one that [`TABLE`](Self::TABLE) does not
+    /// declare panics.
     fn read(value: impl Fn(usize) -> f64) -> Self;
-    /// Hands out the values, number by number.
+    /// Hands out the values, number by number, each declared one once. Handing out one that
+    /// [`TABLE`](Self::TABLE) does not declare panics.
     fn write(&self, put: impl FnMut(usize, f64));
     /// The declared initial values.
     fn initial() -> Self {
-        Self::read(|i| Self::TABLE[i].initial_value)
+        Self::read(|i| Self::TABLE[i].0.initial_value)
     }
 }
 
@@ -162,7 +165,7 @@ macro_rules! parameters {
         #[derive(Clone, Copy, Debug)]
         pub struct $name { $( $(#[doc = $doc])+ pub $field: f64, )* }
         impl $crate::Parameters for $name {
-            const TABLE: &'static [$crate::raw::Parameter] = &[ $(
+            const TABLE: &'static [$crate::Parameter] = &[ $(
                 $spec.called(
                     $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
                     $crate::descriptor::c_str(concat!($($doc),+, "\0")),
@@ -198,7 +201,7 @@ macro_rules! internal_variables {
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct $name { $( $(#[doc = $doc])+ pub $field: f64, )* }
         impl $crate::InternalVariables for $name {
-            const TABLE: &'static [$crate::raw::Variable] = &[ $(
+            const TABLE: &'static [$crate::Variable] = &[ $(
                 $spec.called(
                     $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
                     $crate::descriptor::c_str(concat!($($doc),+, "\0")),
@@ -217,11 +220,17 @@ macro_rules! internal_variables {
     };
 }
 
+/// The declaration of a parameter, as [`parameters!`](crate::parameters) takes it: a
+/// [`raw::Parameter`] whose pointers all lead to static data.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter(raw::Parameter);
+
 impl Parameter {
     /// A parameter without bounds or default.
     pub const fn new(symbol: &'static CStr, unit: &'static CStr) -> Self {
-        Self {
-            struct_size: size_of::<Self>() as u32,
+        Self(raw::Parameter {
+            struct_size: size_of::<raw::Parameter>() as u32,
             flags: 0,
             id: c"".as_ptr(),
             symbol: symbol.as_ptr(),
@@ -232,103 +241,131 @@ impl Parameter {
             upper: f64::INFINITY,
             usual_lower: f64::NEG_INFINITY,
             usual_upper: f64::INFINITY,
-            choices: std::ptr::null(),
-        }
+            choices: null(),
+        })
     }
 
     /// Admits values ≥ `lower`.
     #[must_use]
-    pub const fn at_least(self, lower: f64) -> Self {
-        Self { lower, ..self }
+    pub const fn at_least(mut self, lower: f64) -> Self {
+        self.0.lower = lower;
+        self
     }
 
     /// Admits values > `lower`.
     #[must_use]
-    pub const fn above(self, lower: f64) -> Self {
-        Self {
-            lower,
-            flags: self.flags | raw::PILUM_P_OPEN_LOWER,
-            ..self
-        }
+    pub const fn above(mut self, lower: f64) -> Self {
+        self.0.lower = lower;
+        self.0.flags |= raw::PILUM_P_OPEN_LOWER;
+        self
     }
 
     /// Admits values ≤ `upper`.
     #[must_use]
-    pub const fn at_most(self, upper: f64) -> Self {
-        Self { upper, ..self }
+    pub const fn at_most(mut self, upper: f64) -> Self {
+        self.0.upper = upper;
+        self
     }
 
     /// Admits values < `upper`.
     #[must_use]
-    pub const fn below(self, upper: f64) -> Self {
-        Self {
-            upper,
-            flags: self.flags | raw::PILUM_P_OPEN_UPPER,
-            ..self
-        }
+    pub const fn below(mut self, upper: f64) -> Self {
+        self.0.upper = upper;
+        self.0.flags |= raw::PILUM_P_OPEN_UPPER;
+        self
     }
 
     /// Values outside `lower..=upper` draw a warning.
     #[must_use]
-    pub const fn usual(self, lower: f64, upper: f64) -> Self {
-        Self {
-            usual_lower: lower,
-            usual_upper: upper,
-            ..self
-        }
+    pub const fn usual(mut self, lower: f64, upper: f64) -> Self {
+        self.0.usual_lower = lower;
+        self.0.usual_upper = upper;
+        self
     }
 
     /// Value if left out.
     #[must_use]
-    pub const fn default(self, default_value: f64) -> Self {
-        Self {
-            default_value,
-            ..self
-        }
+    pub const fn default(mut self, default_value: f64) -> Self {
+        self.0.default_value = default_value;
+        self
     }
 
     /// May be left out; the law then receives NaN.
     #[must_use]
-    pub const fn optional(self) -> Self {
-        Self {
-            flags: self.flags | raw::PILUM_P_OPTIONAL,
-            ..self
-        }
+    pub const fn optional(mut self) -> Self {
+        self.0.flags |= raw::PILUM_P_OPTIONAL;
+        self
     }
 
-    /// One of several labels; the value is the index of the label. The list ends with null, see
-    /// [`choices!`](crate::choices).
+    /// One of several labels, made by [`choices!`](crate::choices); the value is the index of the
+    /// label.
     #[must_use]
-    pub const fn one_of(self, labels: &'static [*const c_char]) -> Self {
-        Self {
-            lower: 0.0,
-            upper: labels.len() as f64 - 2.0,
-            choices: labels.as_ptr(),
-            ..self
-        }
+    pub const fn one_of<const N: usize>(mut self, labels: &'static Choices<N>) -> Self {
+        self.0.lower = 0.0;
+        self.0.upper = N as f64 - 2.0;
+        self.0.choices = labels.0.as_ptr();
+        self
     }
 
     /// Gives the parameter its identifier and sentence.
     #[must_use]
-    pub const fn called(self, id: &'static CStr, doc: &'static CStr) -> Self {
-        Self {
-            id: id.as_ptr(),
-            doc: doc.as_ptr(),
-            ..self
-        }
+    pub const fn called(mut self, id: &'static CStr, doc: &'static CStr) -> Self {
+        self.0.id = id.as_ptr();
+        self.0.doc = doc.as_ptr();
+        self
+    }
+
+    /// The declaration as it crosses the boundary.
+    pub const fn raw(&self) -> &raw::Parameter {
+        &self.0
     }
 }
 
-/// A null-terminated list of labels for [`Parameter::one_of`].
+/// Labels of a parameter, ended by null: the one or more that [`choices!`](crate::choices) names.
+#[derive(Debug)]
+pub struct Choices<const N: usize>([*const c_char; N]);
+
+impl<const N: usize> Choices<N> {
+    /// Ends the labels with null.
+    ///
+    /// # Panics
+    /// If `N` is not the number of labels and one more; at compile time, where it is used.
+    pub const fn new(labels: &[&'static CStr]) -> Self {
+        assert!(
+            !labels.is_empty() && N == labels.len() + 1,
+            "a choice needs labels, and room for the null behind them"
+        );
+        let mut pointers = [null(); N];
+        let mut i = 0;
+        while i < labels.len() {
+            pointers[i] = labels[i].as_ptr();
+            i += 1;
+        }
+        Self(pointers)
+    }
+}
+
+/// The labels of [`Parameter::one_of`]: `abi::choices!(c"drained", c"undrained")`.
 #[macro_export]
 macro_rules! choices {
-    ($($label:literal),+ $(,)?) => { &[ $( $label.as_ptr() ),+ , std::ptr::null() ] };
+    ($($label:literal),+ $(,)?) => {
+        const {
+            const LABELS: &[&::std::ffi::CStr] = &[ $($label),+ ];
+            &$crate::descriptor::Choices::<{ LABELS.len() + 1 }>::new(LABELS)
+        }
+    };
 }
+
+/// The declaration of an internal variable, as [`internal_variables!`](crate::internal_variables)
+/// takes it: a [`raw::Variable`] whose pointers all lead to static data.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug)]
+pub struct Variable(raw::Variable);
 
 impl Variable {
     const fn new(symbol: &'static CStr, unit: &'static CStr) -> Self {
-        Self {
-            struct_size: size_of::<Self>() as u32,
+        Self(raw::Variable {
+            struct_size: size_of::<raw::Variable>() as u32,
             flags: 0,
             id: c"".as_ptr(),
             symbol: symbol.as_ptr(),
@@ -336,9 +373,9 @@ impl Variable {
             doc: c"".as_ptr(),
             shape: raw::PILUM_SCALAR,
             n_components: 1,
-            component_names: std::ptr::null(),
+            component_names: null(),
             initial_value: 0.0,
-        }
+        })
     }
 
     /// A scalar that starts from zero.
@@ -348,52 +385,46 @@ impl Variable {
 
     /// Initial value where the law does not compute one.
     #[must_use]
-    pub const fn initially(self, initial_value: f64) -> Self {
-        Self {
-            initial_value,
-            ..self
-        }
+    pub const fn initially(mut self, initial_value: f64) -> Self {
+        self.0.initial_value = initial_value;
+        self
     }
 
     /// A result to look at that carries no history.
     #[must_use]
-    pub const fn output_only(self) -> Self {
-        Self {
-            flags: self.flags | raw::PILUM_V_OUTPUT_ONLY,
-            ..self
-        }
+    pub const fn output_only(mut self) -> Self {
+        self.0.flags |= raw::PILUM_V_OUTPUT_ONLY;
+        self
     }
 
     /// Gives the variable its identifier and sentence.
     #[must_use]
-    pub const fn called(self, id: &'static CStr, doc: &'static CStr) -> Self {
-        Self {
-            id: id.as_ptr(),
-            doc: doc.as_ptr(),
-            ..self
-        }
+    pub const fn called(mut self, id: &'static CStr, doc: &'static CStr) -> Self {
+        self.0.id = id.as_ptr();
+        self.0.doc = doc.as_ptr();
+        self
     }
 
-    const fn with_components(self, shape: raw::Shape, names: &'static [*const c_char]) -> Self {
-        Self {
-            shape,
-            n_components: names.len() as u32,
-            component_names: names.as_ptr(),
-            ..self
-        }
+    const fn with_components(mut self, shape: raw::Shape, names: &'static [*const c_char]) -> Self {
+        self.0.shape = shape;
+        self.0.n_components = names.len() as u32;
+        self.0.component_names = names.as_ptr();
+        self
     }
 
     /// The strain under a hypothesis.
-    const fn strain(names: &'static [*const c_char]) -> Self {
+    const fn strain(names: &'static [*const c_char]) -> raw::Variable {
         Self::new(c"ε", c"-")
             .called(c"strain", c"Strain, tension positive, engineering shear.")
             .with_components(raw::PILUM_SYMMETRIC_TENSOR, names)
+            .0
     }
 
-    const fn stress(names: &'static [*const c_char]) -> Self {
+    const fn stress(names: &'static [*const c_char]) -> raw::Variable {
         Self::new(c"σ", c"kPa")
             .called(c"stress", c"Stress, tension positive.")
             .with_components(raw::PILUM_SYMMETRIC_TENSOR, names)
+            .0
     }
 }
 
@@ -412,19 +443,21 @@ const NAMES_6: &[*const c_char] = &[
     c"23".as_ptr(),
 ];
 const NAMES_NT: &[*const c_char] = &[c"n".as_ptr(), c"t".as_ptr()];
-const STRAIN_4: &Variable = &Variable::strain(NAMES_4);
-const STRESS_4: &Variable = &Variable::stress(NAMES_4);
-const STRAIN_6: &Variable = &Variable::strain(NAMES_6);
-const STRESS_6: &Variable = &Variable::stress(NAMES_6);
-const JUMP: &Variable = &Variable::new(c"[u]", c"m")
+const STRAIN_4: &raw::Variable = &Variable::strain(NAMES_4);
+const STRESS_4: &raw::Variable = &Variable::stress(NAMES_4);
+const STRAIN_6: &raw::Variable = &Variable::strain(NAMES_6);
+const STRESS_6: &raw::Variable = &Variable::stress(NAMES_6);
+const JUMP: &raw::Variable = &Variable::new(c"[u]", c"m")
     .called(
         c"jump",
         c"Relative displacement across the interface, opening positive.",
     )
-    .with_components(raw::PILUM_VECTOR, NAMES_NT);
-const TRACTION: &Variable = &Variable::new(c"t", c"kPa")
+    .with_components(raw::PILUM_VECTOR, NAMES_NT)
+    .0;
+const TRACTION: &raw::Variable = &Variable::new(c"t", c"kPa")
     .called(c"traction", c"Traction on the interface, tension positive.")
-    .with_components(raw::PILUM_VECTOR, NAMES_NT);
+    .with_components(raw::PILUM_VECTOR, NAMES_NT)
+    .0;
 
 impl raw::Formulation {
     /// The formulation of a law under one hypothesis.
@@ -433,7 +466,7 @@ impl raw::Formulation {
         flags: u32,
         state: &'static [Variable],
     ) -> Self {
-        let (gradient, flux): (&'static Variable, &'static Variable) = match hypothesis {
+        let (gradient, flux): (&'static raw::Variable, &'static raw::Variable) = match hypothesis {
             Hypothesis::PlaneStrain | Hypothesis::Axisymmetric => (STRAIN_4, STRESS_4),
             Hypothesis::ThreeD => (STRAIN_6, STRESS_6),
             Hypothesis::Interface2d => (JUMP, TRACTION),
@@ -447,7 +480,7 @@ impl raw::Formulation {
             n_states: state.len() as u32,
             gradient,
             flux,
-            state: state.as_ptr(),
+            state: state.as_ptr().cast(),
         }
     }
 }

@@ -8,18 +8,19 @@
     reason = "the plugin's side of the C boundary; offset and access are one operation"
 )]
 
-use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameters};
+use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameter, Parameters};
 use crate::law::{
     ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, SolidPoint, SolidResponse, Tangent,
 };
 use crate::raw::{self, Batch, Formulation, Host, Instance, Status, View, ViewMut};
 use crate::status::most_severe;
+use crate::version::BATCH_SIZE_1_0;
 use std::any::Any;
 use std::cell::Cell;
 use std::ffi::{CStr, c_char};
 use std::fmt::{self, Write};
 use std::marker::PhantomData;
-use std::mem::size_of;
+use std::mem::{MaybeUninit, forget, size_of};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -114,8 +115,13 @@ pub const fn manifest(laws: &[Description]) -> [u8; MANIFEST_SIZE] {
 #[derive(Debug)]
 pub struct Shared<T>(T);
 
-// SAFETY: built only from descriptions whose pointers lead to immutable static data.
-unsafe impl<T> Sync for Shared<T> {}
+// SAFETY: plain data that nothing changes; what its pointers lead to is only read in `unsafe`.
+unsafe impl Sync for Shared<raw::Law> {}
+// SAFETY: as above.
+unsafe impl Sync for Shared<raw::Plugin> {}
+// SAFETY: as above.
+#[cfg(feature = "abi_stable")]
+unsafe impl Sync for Shared<raw::RustLayout> {}
 
 impl<T> Shared<T> {
     /// Wraps a description.
@@ -139,8 +145,15 @@ pub const fn plugin(laws: &'static [*const raw::Law]) -> raw::Plugin {
     }
 }
 
+mod sealed {
+    /// Keeps [`Exported`](super::Exported) to this file: its formulations are pointers.
+    pub trait Sealed {}
+    impl<L> Sealed for super::Continuum<L> {}
+    impl<L> Sealed for super::Interface<L> {}
+}
+
 /// What the boundary needs of a law, whichever trait its author chose.
-pub trait Exported: Sized + Send + Sync + 'static {
+pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
     /// What the law is called.
     const DESCRIPTION: Description;
     /// Parameters.
@@ -184,6 +197,7 @@ impl<L: ContinuumLaw> ContinuumFormulations<L> {
         | flag(L::LINEAR, raw::PILUM_T_LINEAR)
         | flag(L::LOCAL_AXES, raw::PILUM_T_LOCAL_AXES);
     const TABLE: [Formulation; 3] = {
+        assert_solid(L::HYPOTHESES);
         let state = <L::State as InternalVariables>::TABLE;
         let mut table = [Formulation::new(L::HYPOTHESES[0], Self::FLAGS, state); 3];
         let mut i = 1;
@@ -193,6 +207,27 @@ impl<L: ContinuumLaw> ContinuumFormulations<L> {
         }
         table
     };
+}
+
+/// Refuses hypotheses whose points a law for solids cannot read: what it is called with has four
+/// or six components.
+///
+/// # Panics
+/// At compile time, where a law is exported.
+const fn assert_solid(hypotheses: &[Hypothesis]) {
+    assert!(!hypotheses.is_empty(), "`HYPOTHESES` is empty");
+    assert!(
+        hypotheses.len() <= 3,
+        "`HYPOTHESES` has more than three entries"
+    );
+    let mut i = 0;
+    while i < hypotheses.len() {
+        assert!(
+            !matches!(hypotheses[i], Hypothesis::Interface2d),
+            "`HYPOTHESES` of a `ContinuumLaw` holds an interface: implement `InterfaceLaw`"
+        );
+        i += 1;
+    }
 }
 
 const fn flag(set: bool, bit: u32) -> u32 {
@@ -336,7 +371,7 @@ pub const fn law<L: Exported>() -> raw::Law {
         licence: description.licence.as_ptr(),
         doc: description.doc.as_ptr(),
         references: description.references.as_ptr(),
-        parameter: parameters.as_ptr(),
+        parameter: parameters.as_ptr().cast(),
         formulation: L::FORMULATIONS.as_ptr(),
         create: Some(create::<L>),
         init_state: Some(init_state::<L>),
@@ -364,11 +399,8 @@ unsafe extern "C" fn create<L: Exported>(
     message: *mut c_char,
     message_capacity: usize,
 ) -> Status {
-    let mut message = Message {
-        p: message,
-        capacity: message_capacity,
-        length: 0,
-    };
+    // SAFETY: contract of `create`: null, or `message_capacity` bytes.
+    let mut message = unsafe { Message::new(message, message_capacity) };
     let table = <L::Parameters as Parameters>::TABLE;
     let Some(formulation) = L::FORMULATIONS.get(formulation as usize) else {
         message.write(format_args!("there is no formulation number {formulation}"));
@@ -381,8 +413,11 @@ unsafe extern "C" fn create<L: Exported>(
         ));
         return raw::PILUM_E_ARGUMENT;
     }
-    let values: &[f64] = if table.is_empty() || parameter.is_null() {
+    let values: &[f64] = if table.is_empty() {
         &[]
+    } else if parameter.is_null() {
+        message.write(format_args!("the parameters are null"));
+        return raw::PILUM_E_ARGUMENT;
     } else {
         // SAFETY: contract of `create`: `parameter` holds `n_parameters` values.
         unsafe { std::slice::from_raw_parts(parameter, table.len()) }
@@ -417,8 +452,8 @@ unsafe extern "C" fn create<L: Exported>(
 
 /// The first parameter outside its declared bounds. The host checks them too and says it better;
 /// this keeps the law sound under any host.
-fn within_bounds(table: &[raw::Parameter], values: &[f64]) -> Result<(), (&'static str, f64)> {
-    for (declared, &value) in table.iter().zip(values) {
+fn within_bounds(table: &[Parameter], values: &[f64]) -> Result<(), (&'static str, f64)> {
+    for (declared, &value) in table.iter().map(Parameter::raw).zip(values) {
         let left_out = value.is_nan() && declared.flags & raw::PILUM_P_OPTIONAL != 0;
         let below = if declared.flags & raw::PILUM_P_OPEN_LOWER != 0 {
             value <= declared.lower
@@ -430,8 +465,9 @@ fn within_bounds(table: &[raw::Parameter], values: &[f64]) -> Result<(), (&'stat
         } else {
             value > declared.upper
         };
-        if !left_out && (!value.is_finite() || below || above) {
-            // SAFETY: `table` comes from `parameters!`, whose strings are static.
+        let between_labels = !declared.choices.is_null() && value.fract() != 0.0;
+        if !left_out && (!value.is_finite() || below || above || between_labels) {
+            // SAFETY: a `Parameter` can only be made from static strings.
             let id = unsafe { CStr::from_ptr(declared.id) };
             return Err((id.to_str().unwrap_or("parameter"), value));
         }
@@ -442,7 +478,11 @@ fn within_bounds(table: &[raw::Parameter], values: &[f64]) -> Result<(), (&'stat
 unsafe extern "C" fn destroy<L: Exported>(instance: *mut Instance) {
     if !instance.is_null() {
         // SAFETY: contract of `destroy`: the pointer came from `create` and is not used again.
-        drop(unsafe { Box::from_raw(instance.cast::<Boxed<L>>()) });
+        let boxed = unsafe { Box::from_raw(instance.cast::<Boxed<L>>()) };
+        // There is nobody to tell. Dropping the payload could panic again.
+        if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(boxed))) {
+            forget(payload);
+        }
     }
 }
 
@@ -487,16 +527,18 @@ unsafe fn run<L: Exported>(
     point: impl Fn(&L, &Access<'_>, usize) -> Result<Option<&'static str>, Failure>,
 ) -> Status {
     // SAFETY: null or valid, see above.
-    let (boxed, batch) = unsafe { (instance.cast::<Boxed<L>>().as_ref(), batch.as_ref()) };
-    let (Some(boxed), Some(batch)) = (boxed, batch) else {
+    let Some(batch) = (unsafe { known(batch) }) else {
+        // A batch too short for version 1.0 does not tell where its message is.
         return raw::PILUM_E_ARGUMENT;
     };
-    let mut message = Message {
-        p: batch.message,
-        capacity: batch.message_capacity,
-        length: 0,
+    // SAFETY: contract of `Batch::message`: null, or `message_capacity` bytes.
+    let mut message = unsafe { Message::new(batch.message, batch.message_capacity) };
+    // SAFETY: null or valid, see above.
+    let Some(boxed) = (unsafe { instance.cast::<Boxed<L>>().as_ref() }) else {
+        message.write(format_args!("the instance is null"));
+        return raw::PILUM_E_ARGUMENT;
     };
-    let access = match Access::new(batch, boxed.n_components, boxed.n_states, work) {
+    let access = match Access::new(&batch, boxed.n_components, boxed.n_states, work) {
         Ok(access) => access,
         Err((status, why)) => {
             message.write(format_args!("{why}"));
@@ -528,10 +570,9 @@ unsafe fn run<L: Exported>(
             if most_severe(worst, status) != worst {
                 worst = status;
                 if let Some(reason) = reason {
-                    message.length = 0;
                     message.write(format_args!(
                         "point {}: {reason}",
-                        batch.first_point + i as u64
+                        batch.first_point.wrapping_add(i as u64)
                     ));
                 }
             }
@@ -540,8 +581,7 @@ unsafe fn run<L: Exported>(
     }));
     result.unwrap_or_else(|payload| {
         boxed.poisoned.store(true, Ordering::Relaxed);
-        let point = batch.first_point + current.get() as u64;
-        message.length = 0;
+        let point = batch.first_point.wrapping_add(current.get() as u64);
         message.write(format_args!(
             "point {point}: panicked: {}",
             panic_text(&*payload)
@@ -551,6 +591,32 @@ unsafe fn run<L: Exported>(
         }
         raw::PILUM_E_INTERNAL
     })
+}
+
+/// The batch as far as its writer knew it: the rule of growing structs in one place. `struct_size`
+/// is read before anything else, and no reference to the caller's struct is made, since one would
+/// promise all of today's fields. A field later than version 1.0 reads as zero if the writer did
+/// not know it. `None`: null, or shorter than version 1.0.
+///
+/// # Safety
+/// `batch` is null or as [`Batch`] promises, for as many bytes as its `struct_size` says.
+unsafe fn known(batch: *const Batch) -> Option<Batch> {
+    if batch.is_null() {
+        return None;
+    }
+    // SAFETY: contract, "Growing structs": every struct starts with its size as `u32`.
+    let size = unsafe { batch.cast::<u32>().read() } as usize;
+    if size < BATCH_SIZE_1_0 {
+        return None;
+    }
+    let mut copy = MaybeUninit::<Batch>::zeroed();
+    // SAFETY: both sides hold that many bytes; all-zero is a valid `Batch`.
+    unsafe {
+        batch
+            .cast::<u8>()
+            .copy_to_nonoverlapping(copy.as_mut_ptr().cast(), size.min(size_of::<Batch>()));
+        Some(copy.assume_init())
+    }
 }
 
 fn code(failure: Failure) -> Status {
@@ -577,9 +643,25 @@ struct Message {
 }
 
 impl Message {
+    /// An empty message, so that the buffer ends in NUL whatever happens.
+    ///
+    /// # Safety
+    /// `p` is null or valid for `capacity` bytes as long as the message lives.
+    unsafe fn new(p: *mut c_char, capacity: usize) -> Self {
+        let mut message = Self {
+            p,
+            capacity,
+            length: 0,
+        };
+        message.write(format_args!(""));
+        message
+    }
+
+    /// Replaces the message.
     fn write(&mut self, text: fmt::Arguments<'_>) {
         if !self.p.is_null() && self.capacity > 0 {
-            // A message that does not fit is cut short; `write_str` never fails.
+            self.length = 0;
+            // A message that does not fit is cut short.
             let _ = self.write_fmt(text);
             // SAFETY: `length < capacity` bytes of the caller's buffer are in use.
             unsafe { self.p.add(self.length).write(0) };
@@ -597,6 +679,9 @@ impl Write for Message {
             // SAFETY: `length + 1 < capacity` holds before each byte.
             unsafe { self.p.add(self.length).write(byte as c_char) };
             self.length += 1;
+        }
+        if fits < text.len() {
+            return Err(fmt::Error);
         }
         Ok(())
     }
@@ -619,9 +704,6 @@ impl<'a> Access<'a> {
         work: Work,
     ) -> Result<Self, (Status, &'static str)> {
         const KNOWN: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC;
-        if (batch.struct_size as usize) < size_of::<Batch>() {
-            return Err((raw::PILUM_E_ARGUMENT, "`pilum_batch` is too short"));
-        }
         if batch.request & !KNOWN != 0 {
             return Err((raw::PILUM_E_UNSUPPORTED, "an unknown request"));
         }
@@ -700,11 +782,17 @@ impl<'a> Access<'a> {
     }
 
     fn state0<S: InternalVariables>(&self, i: usize) -> S {
-        S::read(|v| self.get(&self.batch.state0, i, v))
+        S::read(|v| {
+            assert_declared::<S>(v);
+            self.get(&self.batch.state0, i, v)
+        })
     }
 
     fn put_state<S: InternalVariables>(&self, i: usize, state: &S) {
-        state.write(|v, value| self.set(&self.batch.state1, i, v, value));
+        state.write(|v, value| {
+            assert_declared::<S>(v);
+            self.set(&self.batch.state1, i, v, value);
+        });
     }
 
     fn put<const N: usize, S: InternalVariables>(
@@ -742,8 +830,66 @@ impl<'a> Access<'a> {
         if let Some(Failure::CutStep { factor, .. }) = failure
             && !self.batch.step_factor.is_null()
         {
+            let factor = if factor > 0.0 && factor < 1.0 {
+                factor
+            } else {
+                f64::NAN
+            };
             // SAFETY: contract of `Batch::step_factor`: `n_points` entries.
             unsafe { self.batch.step_factor.add(i).write(factor) };
         }
     }
 }
+
+/// Keeps the views of internal variables within their bounds, for hand-written
+/// [`InternalVariables`] too. The host sizes them by the same table, and the numbers that
+/// [`internal_variables!`](crate::internal_variables) uses are constants, so for those nothing is
+/// left of it.
+#[inline]
+fn assert_declared<S: InternalVariables>(v: usize) {
+    assert!(v < S::TABLE.len(), "internal variable {v} is not declared");
+}
+
+#[cfg(test)]
+mod tests;
+
+/// What a law for solids may not declare stops the compiler; the same law with a solid's
+/// hypothesis compiles.
+///
+/// ```compile_fail
+/// use abi::{ContinuumLaw, Description, Failure, Hypothesis, Refusal};
+/// use abi::{SolidPoint, SolidResponse, Tangent};
+/// abi::parameters! { pub struct Nothing {} }
+/// struct Astray;
+/// impl ContinuumLaw for Astray {
+///     const DESCRIPTION: Description =
+///         abi::describe! { id: "astray", name: "", doc: "", references: "" };
+///     const HYPOTHESES: &'static [Hypothesis] = &[Hypothesis::Interface2d];
+///     type Parameters = Nothing;
+///     type State = ();
+///     fn new(_: Nothing) -> Result<Self, Refusal> { Ok(Self) }
+///     fn update<const N: usize>(&self, _: &SolidPoint<N, ()>, _: Tangent)
+///         -> Result<SolidResponse<N, ()>, Failure> { Err(Failure::Domain("")) }
+/// }
+/// const _: abi::raw::Law = abi::export::law::<abi::export::Continuum<Astray>>();
+/// ```
+///
+/// ```
+/// use abi::{ContinuumLaw, Description, Failure, Hypothesis, Refusal};
+/// use abi::{SolidPoint, SolidResponse, Tangent};
+/// abi::parameters! { pub struct Nothing {} }
+/// struct Astray;
+/// impl ContinuumLaw for Astray {
+///     const DESCRIPTION: Description =
+///         abi::describe! { id: "astray", name: "", doc: "", references: "" };
+///     const HYPOTHESES: &'static [Hypothesis] = &[Hypothesis::PlaneStrain];
+///     type Parameters = Nothing;
+///     type State = ();
+///     fn new(_: Nothing) -> Result<Self, Refusal> { Ok(Self) }
+///     fn update<const N: usize>(&self, _: &SolidPoint<N, ()>, _: Tangent)
+///         -> Result<SolidResponse<N, ()>, Failure> { Err(Failure::Domain("")) }
+/// }
+/// const _: abi::raw::Law = abi::export::law::<abi::export::Continuum<Astray>>();
+/// ```
+#[cfg(doctest)]
+struct HypothesesOfSolids;

@@ -38,7 +38,8 @@ impl fmt::Display for Refusal {
 pub enum Failure {
     /// A smaller step would help.
     CutStep {
-        /// The fraction of the increment, in (0, 1), that the law believes it can follow.
+        /// The fraction of the increment, in (0, 1), that the law believes it can follow. NaN, or
+        /// anything else outside (0, 1), leaves the choice to the host.
         factor: f64,
         /// Why.
         reason: &'static str,
@@ -102,7 +103,7 @@ pub struct SolidResponse<const N: usize, S> {
 /// One integration point of an interface at the start of an increment, and the increment.
 #[derive(Clone, Copy, Debug)]
 pub struct InterfacePoint<S> {
-    /// Relative displacement at the start, normal first, m.
+    /// Relative displacement u⁺ − u⁻ at the start, normal first, m.
     pub jump: [f64; 2],
     /// Increment of the relative displacement, m.
     pub jump_increment: [f64; 2],
@@ -133,7 +134,8 @@ pub struct InterfaceResponse<S> {
 pub trait ContinuumLaw: Sized + Send + Sync + 'static {
     /// What the law is called.
     const DESCRIPTION: Description;
-    /// Hypotheses offered: any of plane strain, axisymmetry, three dimensions.
+    /// Hypotheses offered: any of plane strain, axisymmetry, three dimensions, at least one.
+    /// Exporting a law with any other list does not compile.
     const HYPOTHESES: &'static [Hypothesis] = &[
         Hypothesis::PlaneStrain,
         Hypothesis::Axisymmetric,

@@ -9,9 +9,8 @@ pub mod raw;
 pub mod status;
 pub mod version;
 
-pub use descriptor::{Description, Hypothesis, InternalVariables, Parameters};
+pub use descriptor::{Description, Hypothesis, InternalVariables, Parameter, Parameters, Variable};
 pub use law::{
     ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Refusal, SolidPoint,
     SolidResponse, Tangent,
 };
-pub use raw::{Parameter, Variable};

@@ -1,9 +1,10 @@
 //! The types that cross the boundary, exactly as C sees them: `include/pilum_law.h` is generated
 //! from this file. Nothing here allocates, owns or computes.
 //!
-//! Every struct starts with `struct_size`, the size its writer knows. Structs only ever grow at
-//! the end, so a reader tests `struct_size` before it touches a field that came later, and walks
-//! an array of such structs with the stride of its first element's `struct_size`.
+//! Every struct but the two views starts with `struct_size`, the size its writer knows. Structs
+//! only ever grow at the end, so a reader tests `struct_size` before it touches a field that came
+//! later, and walks an array of such structs with the stride of its first element's `struct_size`.
+//! The views never change.
 //!
 //! Strings are UTF-8, NUL-terminated, static and never null unless a field says so.
 
@@ -245,7 +246,7 @@ pub struct Batch {
     /// `n_points` outcomes (written), or null.
     pub status: *mut Status,
     /// `n_points` factors (written where the outcome is `PILUM_CUT_STEP`), or null: the fraction
-    /// of the increment, in (0, 1), that the law believes it can follow.
+    /// of the increment, in (0, 1), that the law believes it can follow; NaN: the host decides.
     pub step_factor: *mut f64,
     /// Buffer for one message, NUL-terminated on return; may be null.
     pub message: *mut c_char,

@@ -20,6 +20,25 @@ const fn field_size<S, T>(_: fn(&S) -> &T) -> usize {
     size_of::<T>()
 }
 
+/// Size of [`raw::Batch`] in version 1.0. This and the following ones never change: they are all a
+/// reader may demand of a struct. A field that came later is there only if `struct_size` covers
+/// it, so a reader copies what is covered into zeroes rather than refer to the writer's struct.
+pub const BATCH_SIZE_1_0: usize = 240;
+/// Size of [`Parameter`](raw::Parameter) in version 1.0.
+pub const PARAMETER_SIZE_1_0: usize = 88;
+/// Size of [`Variable`](raw::Variable) in version 1.0.
+pub const VARIABLE_SIZE_1_0: usize = 64;
+/// Size of [`Formulation`](raw::Formulation) in version 1.0.
+pub const FORMULATION_SIZE_1_0: usize = 48;
+/// Size of [`Host`](raw::Host) in version 1.0.
+pub const HOST_SIZE_1_0: usize = 32;
+/// Size of [`Law`](raw::Law) in version 1.0.
+pub const LAW_SIZE_1_0: usize = 120;
+/// Size of [`Plugin`](raw::Plugin) in version 1.0.
+pub const PLUGIN_SIZE_1_0: usize = 24;
+/// Size of [`RustLayout`](raw::RustLayout) in version 1.0.
+pub const RUST_LAYOUT_SIZE_1_0: usize = 24;
+
 /// Name (`Struct.field`, or `Struct` for the whole), offset and size in bytes.
 pub type FieldLayout = (&'static str, usize, usize);
 
@@ -207,6 +226,31 @@ mod tests {
             ..MAGIC_BLOCK
         };
         assert_eq!(check(&later), Ok(()));
+    }
+
+    /// Sizes of version 1.0 end where its last field does, now and when more follow.
+    #[test]
+    fn the_sizes_of_version_1_0_stay() {
+        macro_rules! ends {
+            ($($type:ident.$field:ident: $size:ident),+ $(,)?) => { $(
+                let end = offset_of!(raw::$type, $field)
+                    + field_size(|s: &raw::$type| &s.$field);
+                assert_eq!(end, $size, "{}", stringify!($type));
+                if raw::PILUM_ABI_MINOR == 0 {
+                    assert_eq!(size_of::<raw::$type>(), $size, "{}", stringify!($type));
+                }
+            )+ };
+        }
+        ends!(
+            Batch.message_capacity: BATCH_SIZE_1_0,
+            Parameter.choices: PARAMETER_SIZE_1_0,
+            Variable.initial_value: VARIABLE_SIZE_1_0,
+            Formulation.state: FORMULATION_SIZE_1_0,
+            Host.get_extension: HOST_SIZE_1_0,
+            Law.destroy: LAW_SIZE_1_0,
+            Plugin.get_extension: PLUGIN_SIZE_1_0,
+            RustLayout.layout: RUST_LAYOUT_SIZE_1_0,
+        );
     }
 
     #[test]

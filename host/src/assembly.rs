@@ -84,7 +84,13 @@ impl System {
         for map in elements.iter_mut().flatten() {
             map.find_slots(&equation, &pattern);
         }
-        Self { equation, free, ties: ties.to_vec(), elements, pattern }
+        Self {
+            equation,
+            free,
+            ties: ties.to_vec(),
+            elements,
+            pattern,
+        }
     }
 
     /// Number of equations.
@@ -135,7 +141,9 @@ impl System {
             for (e, map) in maps.iter().enumerate() {
                 let n_own = 2 * group.kinematics.nodes(e).len();
                 own.resize(n_own * n_own, 0.0);
-                group.kinematics.stiffness(e, group.element_tangents(e), &mut own);
+                group
+                    .kinematics
+                    .stiffness(e, group.element_tangents(e), &mut own);
                 let n = map.dofs.len();
                 let matrix = match &map.transform {
                     None => &own,
@@ -151,7 +159,9 @@ impl System {
                 }
                 if let Some((increment, coupling)) = &mut prescribed {
                     for i in 0..n {
-                        let Some(row) = self.equation[map.dofs[i]] else { continue };
+                        let Some(row) = self.equation[map.dofs[i]] else {
+                            continue;
+                        };
                         for j in 0..n {
                             if self.equation[map.dofs[j]].is_none() {
                                 coupling[row] += matrix[i * n + j] * increment[map.dofs[j]];
@@ -189,7 +199,11 @@ impl ElementMap {
     fn new(nodes: &[usize], tie_of: &[Option<usize>], ties: &[Tie]) -> Self {
         let own: Vec<usize> = nodes.iter().flat_map(|&n| [2 * n, 2 * n + 1]).collect();
         if own.iter().all(|&dof| tie_of[dof].is_none()) {
-            return Self { dofs: own, transform: None, slots: Vec::new() };
+            return Self {
+                dofs: own,
+                transform: None,
+                slots: Vec::new(),
+            };
         }
         let expand = |dof: usize| match tie_of[dof] {
             Some(i) => ties[i].masters.to_vec(),
@@ -208,14 +222,20 @@ impl ElementMap {
                 transform[i * dofs.len() + j] += weight;
             }
         }
-        Self { dofs, transform: Some(transform), slots: Vec::new() }
+        Self {
+            dofs,
+            transform: Some(transform),
+            slots: Vec::new(),
+        }
     }
 
     fn find_slots(&mut self, equation: &[Option<usize>], pattern: &Pattern) {
         let n = self.dofs.len();
         self.slots = vec![u32::MAX; n * n];
         for (j, &column) in self.dofs.iter().enumerate() {
-            let Some(column) = equation[column] else { continue };
+            let Some(column) = equation[column] else {
+                continue;
+            };
             let start = pattern.column_start[column];
             let rows = &pattern.rows[start..pattern.column_start[column + 1]];
             for (i, &row) in self.dofs.iter().enumerate() {
@@ -237,7 +257,10 @@ impl Pattern {
                 columns[column].extend_from_slice(&equations);
             }
         }
-        let mut pattern = Self { column_start: vec![0], rows: Vec::new() };
+        let mut pattern = Self {
+            column_start: vec![0],
+            rows: Vec::new(),
+        };
         for mut rows in columns {
             rows.sort_unstable();
             rows.dedup();
@@ -260,11 +283,15 @@ mod tests {
         let v = [1.0, 2.0, 3.0];
         let mut out = Vec::new();
         congruent(&k, &t, 2, 3, &mut out);
-        let u: Vec<f64> = (0..2).map(|i| (0..3).map(|j| t[i * 3 + j] * v[j]).sum()).collect();
-        let own: f64 = (0..2).flat_map(|i| (0..2).map(move |j| (i, j)))
+        let u: Vec<f64> = (0..2)
+            .map(|i| (0..3).map(|j| t[i * 3 + j] * v[j]).sum())
+            .collect();
+        let own: f64 = (0..2)
+            .flat_map(|i| (0..2).map(move |j| (i, j)))
             .map(|(i, j)| u[i] * k[i * 2 + j] * u[j])
             .sum();
-        let reduced: f64 = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)))
+        let reduced: f64 = (0..3)
+            .flat_map(|i| (0..3).map(move |j| (i, j)))
             .map(|(i, j)| v[i] * out[i * 3 + j] * v[j])
             .sum();
         assert!((own - reduced).abs() < 1e-13 * own.abs());

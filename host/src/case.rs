@@ -1,8 +1,10 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
+mod base;
+
 use crate::error::{Error, Source};
-use crate::input::{Named, ParameterTable, parse};
+use crate::input::{Named, ParameterTable};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -22,9 +24,12 @@ impl Case {
     /// # Errors
     /// [`Error::Unreadable`], or [`Error::Input`] at the place that does not fit.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let path = if path.is_dir() { path.join("case.toml") } else { path.to_owned() };
-        let source = Source::read(&path)?;
-        let file = parse(&source)?;
+        let path = if path.is_dir() {
+            path.join("case.toml")
+        } else {
+            path.to_owned()
+        };
+        let (source, file) = base::read(Source::read(&path)?)?;
         Ok(Self { source, file })
     }
 
@@ -37,13 +42,20 @@ impl Case {
         } else {
             absolute.file_stem()
         };
-        named.map_or_else(|| "case".to_owned(), |name| name.to_string_lossy().into_owned())
+        named.map_or_else(
+            || "case".to_owned(),
+            |name| name.to_string_lossy().into_owned(),
+        )
     }
 
     /// Folders with law libraries that the file names, relative to itself.
     pub fn law_folders(&self) -> Vec<PathBuf> {
         let here = self.source.path().parent().unwrap_or(Path::new("."));
-        self.file.law_path.iter().map(|folder| here.join(folder)).collect()
+        self.file
+            .law_path
+            .iter()
+            .map(|folder| here.join(folder))
+            .collect()
     }
 }
 
@@ -74,6 +86,9 @@ pub struct CaseFile {
     /// Quantities written for every increment.
     #[serde(default)]
     pub probes: Named<ProbeInput>,
+    /// Curves of probes, drawn when the run ends.
+    #[serde(default, rename = "figure")]
+    pub figures: Vec<FigureInput>,
     /// Solver settings.
     #[serde(default)]
     pub solver: SolverInput,
@@ -381,6 +396,26 @@ pub enum Reduce {
     Max,
     /// Sum.
     Sum,
+}
+
+/// Curves of probes over another probe.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FigureInput {
+    /// Name of the file, without `.svg`.
+    pub name: Spanned<String>,
+    /// Title; the case's if left out.
+    pub title: Option<String>,
+    /// Probe along the horizontal axis.
+    pub x: Spanned<String>,
+    /// Text of the horizontal axis.
+    pub x_label: Option<String>,
+    /// Probes along the vertical axis.
+    pub y: Vec<Spanned<String>>,
+    /// Text of the vertical axis.
+    pub y_label: Option<String>,
+    /// Only this phase; all if left out.
+    pub phase: Option<Spanned<String>>,
 }
 
 /// Solver settings.

@@ -25,7 +25,10 @@ pub struct Axes {
 
 impl Axes {
     /// The global axes.
-    pub const GLOBAL: Self = Self { along: [1.0, 0.0], across: [0.0, 1.0] };
+    pub const GLOBAL: Self = Self {
+        along: [1.0, 0.0],
+        across: [0.0, 1.0],
+    };
 
     /// Axes of a facet in this direction. Both point towards increasing coordinates, so that the
     /// shear stress of a horizontal or vertical facet is the global σ₁₂.
@@ -33,7 +36,10 @@ impl Axes {
         let towards_increase = |v: [f64; 2]| {
             let length = v[0].hypot(v[1]);
             let dominant = if v[0].abs() > v[1].abs() { v[0] } else { v[1] };
-            [v[0] / length.copysign(dominant), v[1] / length.copysign(dominant)]
+            [
+                v[0] / length.copysign(dominant),
+                v[1] / length.copysign(dominant),
+            ]
         };
         Self {
             along: towards_increase(direction),
@@ -122,7 +128,11 @@ mod tests {
         let (s, c) = alpha.sin_cos();
         let [s11, s22, s12] = [1.0, 2.0, 4.0];
         let local = Axes::of_facet([c, s]).stress_from_global([s11, s22, 3.0, s12]);
-        assert_relative_eq!(local[1], s * s * s11 + c * c * s22 - 2.0 * s * c * s12, epsilon = 1e-14);
+        assert_relative_eq!(
+            local[1],
+            s * s * s11 + c * c * s22 - 2.0 * s * c * s12,
+            epsilon = 1e-14
+        );
         let tau = -s * c * s11 + s * c * s22 + (c * c - s * s) * s12;
         assert_relative_eq!(local[3], tau, epsilon = 1e-14);
     }

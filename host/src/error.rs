@@ -7,11 +7,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
 
-/// An input file, kept for messages that point into it.
+/// An input file with the files it is based on, kept for messages that point into them.
+///
+/// The texts stand one after the other, so that one span says file and place.
 #[derive(Clone, Debug)]
 pub struct Source {
     path: PathBuf,
     text: Arc<str>,
+    /// Where each file starts in the text, in order.
+    files: Vec<(usize, PathBuf)>,
 }
 
 impl Source {
@@ -24,17 +28,31 @@ impl Source {
             path: path.to_owned(),
             source,
         })?;
-        Ok(Self {
-            path: path.to_owned(),
-            text: text.into(),
-        })
+        Ok(Self::new(path, text))
     }
 
     /// Takes a text as if it came from a file of this name.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<Arc<str>>) -> Self {
+        let path = path.into();
         Self {
-            path: path.into(),
+            files: vec![(0, path.clone())],
+            path,
             text: text.into(),
+        }
+    }
+
+    /// This file after the one it is based on.
+    #[must_use]
+    pub fn based_on(&self, base: &Self) -> Self {
+        let offset = base.text.len() + 1;
+        let own = self
+            .files
+            .iter()
+            .map(|(start, path)| (start + offset, path.clone()));
+        Self {
+            path: self.path.clone(),
+            text: format!("{}\n{}", base.text, self.text).into(),
+            files: base.files.iter().cloned().chain(own).collect(),
         }
     }
 
@@ -43,19 +61,56 @@ impl Source {
         &self.path
     }
 
-    /// Text of the file.
+    /// Text of the file, after those it is based on.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// An error about the bytes `span` of this file.
+    /// Where the files stand in the text.
+    pub fn files(&self) -> impl Iterator<Item = Range<usize>> {
+        (0..self.files.len()).map(|number| {
+            let end = self
+                .files
+                .get(number + 1)
+                .map_or(self.text.len(), |(next, _)| next - 1);
+            self.files[number].0..end
+        })
+    }
+
+    /// The file a span lies in, where it starts, and its text.
+    fn file(&self, at: usize) -> (&Path, usize, &str) {
+        let number = self
+            .files
+            .iter()
+            .rposition(|(start, _)| *start <= at)
+            .unwrap_or(0);
+        let range = self.files().nth(number).unwrap_or_default();
+        (&self.files[number].1, range.start, &self.text[range])
+    }
+
+    /// File, line and column (from 1) of the start of a span.
+    pub fn place(&self, span: &Range<usize>) -> String {
+        let (path, start, text) = self.file(span.start);
+        let before = &text[..(span.start - start).min(text.len())];
+        let line = before.matches('\n').count() + 1;
+        let column = before
+            .rsplit('\n')
+            .next()
+            .map_or(0, |line| line.chars().count())
+            + 1;
+        format!("{}:{line}:{column}", path.display())
+    }
+
+    /// An error about the bytes `span`.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> InputError {
+        let (path, start, text) = self.file(span.start);
+        let span = span.start - start..span.end.saturating_sub(start).min(text.len());
         InputError {
             message: message.into(),
             label: String::new(),
             hint: None,
             span: span.into(),
-            source_code: NamedSource::new(self.path.display().to_string(), self.text.to_string())
+            source_code: NamedSource::new(path.display().to_string(), text.to_owned())
                 .with_language("TOML"),
         }
     }

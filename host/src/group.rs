@@ -23,7 +23,10 @@ pub struct Field {
 
 impl Field {
     fn new(committed: Vec<f64>) -> Self {
-        Self { trial: committed.clone(), committed }
+        Self {
+            trial: committed.clone(),
+            committed,
+        }
     }
 
     fn commit(&mut self) {
@@ -63,11 +66,23 @@ pub struct PointFailure {
 
 impl std::fmt::Display for PointFailure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { group, law_id, element, point, position: [x, y], failure, .. } = self;
+        let Self {
+            group,
+            law_id,
+            element,
+            point,
+            position: [x, y],
+            failure,
+            ..
+        } = self;
         write!(
             f,
             "law `{law_id}`, group `{group}`, element {element}, point {point} at ({x:.4}, {y:.4}): {}",
-            if failure.message.is_empty() { "no reason given" } else { &failure.message }
+            if failure.message.is_empty() {
+                "no reason given"
+            } else {
+                &failure.message
+            }
         )
     }
 }
@@ -155,7 +170,11 @@ impl Group {
                     .initial_state(n_points, stress)
                     .map_err(|failure| self.locate(failure))?;
                 for &(number, value) in &self.law.initial {
-                    state.iter_mut().skip(number).step_by(law.n_states()).for_each(|v| *v = value);
+                    state
+                        .iter_mut()
+                        .skip(number)
+                        .step_by(law.n_states())
+                        .for_each(|v| *v = value);
                 }
                 state
             }
@@ -165,7 +184,9 @@ impl Group {
         let element_n = self.kinematics.n_components();
         self.tangents_are_constant = law.formulation().linear && !self.uses_layer();
         if self.tangents_are_constant {
-            let one = self.operator_of_first_point().map_err(|failure| self.locate(failure))?;
+            let one = self
+                .operator_of_first_point()
+                .map_err(|failure| self.locate(failure))?;
             self.tangent = one.repeat(self.kinematics.points_per_element());
             return Ok(());
         }
@@ -174,10 +195,15 @@ impl Group {
             let mut operator = vec![0.0; n_points * n * n];
             self.run_law(Operator::Elastic, 0.0, 0.0, &mut operator)
                 .map_err(|failure| self.locate(failure))?;
-            let layer = self.layer.as_mut().ok_or_else(|| unreachable_failure(&self.name))?;
+            let layer = self
+                .layer
+                .as_mut()
+                .ok_or_else(|| unreachable_failure(&self.name))?;
             layer.start(&operator);
             self.stress.trial.copy_from_slice(&self.stress.committed);
-            self.internal.trial.copy_from_slice(&self.internal.committed);
+            self.internal
+                .trial
+                .copy_from_slice(&self.internal.committed);
         }
         Ok(())
     }
@@ -191,7 +217,11 @@ impl Group {
     /// interface law, components 22 (normal) and 12 (shear).
     fn flux_place(&self) -> Strided {
         if self.uses_layer() {
-            Strided { offset: 1, point: 4, component: 2 }
+            Strided {
+                offset: 1,
+                point: 4,
+                component: 2,
+            }
         } else {
             Strided::rows(self.kinematics.n_components())
         }
@@ -200,7 +230,10 @@ impl Group {
     /// The first point of a thin layer whose normal and shear stiffness cannot be those of an
     /// elastic layer: (normal, shear).
     pub fn impossible_layer(&self) -> Option<[f64; 2]> {
-        self.layer.as_ref().filter(|_| self.uses_layer()).and_then(Layer::impossible)
+        self.layer
+            .as_ref()
+            .filter(|_| self.uses_layer())
+            .and_then(Layer::impossible)
     }
 
     /// Computes the trial state under displacement increments (two per node) since the committed
@@ -216,12 +249,16 @@ impl Group {
         time_increment: f64,
     ) -> Result<BatchSuccess, PointFailure> {
         self.strain.trial.copy_from_slice(&self.strain.committed);
-        self.kinematics.add_gradients(increment, &mut self.strain.trial);
+        self.kinematics
+            .add_gradients(increment, &mut self.strain.trial);
         if self.tangents_are_constant {
             self.evaluate_linear();
             return Ok(BatchSuccess::default());
         }
-        if let Some(layer) = self.layer.as_mut().filter(|_| self.law.built.law.n_components() == 2)
+        if let Some(layer) = self
+            .layer
+            .as_mut()
+            .filter(|_| self.law.built.law.n_components() == 2)
         {
             layer.jumps_from_strains(&self.strain.committed, &self.strain.trial);
         }
@@ -250,7 +287,12 @@ impl Group {
             .trial
             .chunks_exact_mut(n)
             .zip(self.stress.committed.chunks_exact(n))
-            .zip(self.strain.trial.chunks_exact(n).zip(self.strain.committed.chunks_exact(n)));
+            .zip(
+                self.strain
+                    .trial
+                    .chunks_exact(n)
+                    .zip(self.strain.committed.chunks_exact(n)),
+            );
         for ((stress, stress_0), (strain, strain_0)) in points {
             for i in 0..n {
                 let row = &self.tangent[i * n..][..n];
@@ -279,7 +321,11 @@ impl Group {
                 time_increment: 0.0,
             },
             Operator::Consistent,
-            End { flux: (&mut flux, rows), state: &mut [], operator: &mut operator },
+            End {
+                flux: (&mut flux, rows),
+                state: &mut [],
+                operator: &mut operator,
+            },
         )?;
         self.law_calls += 1;
         Ok(operator)
@@ -319,7 +365,9 @@ impl Group {
 
     fn locate(&self, failure: BatchFailure) -> PointFailure {
         let per_element = self.kinematics.points_per_element().max(1);
-        let point = failure.point.min(self.kinematics.n_points().saturating_sub(1));
+        let point = failure
+            .point
+            .min(self.kinematics.n_points().saturating_sub(1));
         PointFailure {
             group: self.name.clone(),
             law: self.law.name.clone(),
@@ -343,7 +391,11 @@ impl Group {
     pub fn element_tangents(&self, element: usize) -> &[f64] {
         let n = self.kinematics.n_components();
         let length = self.kinematics.points_per_element() * n * n;
-        let start = if self.tangents_are_constant { 0 } else { element * length };
+        let start = if self.tangents_are_constant {
+            0
+        } else {
+            element * length
+        };
         &self.tangent[start..start + length]
     }
 
@@ -360,7 +412,9 @@ impl Group {
     /// Stress of a point in global axes (committed); `None` for zero-thickness elements.
     pub fn global_stress(&self, point: usize) -> Option<[f64; 4]> {
         let s = self.stress.committed.get(4 * point..4 * point + 4)?;
-        let axes = self.kinematics.axes(point / self.kinematics.points_per_element());
+        let axes = self
+            .kinematics
+            .axes(point / self.kinematics.points_per_element());
         (self.kinematics.n_components() == 4)
             .then(|| axes.stress_to_global([s[0], s[1], s[2], s[3]]))
     }
@@ -368,7 +422,9 @@ impl Group {
     /// Strain of a point in global axes (committed), γ = 2ε; `None` for zero-thickness elements.
     pub fn global_strain(&self, point: usize) -> Option<[f64; 4]> {
         let e = self.strain.committed.get(4 * point..4 * point + 4)?;
-        let axes = self.kinematics.axes(point / self.kinematics.points_per_element());
+        let axes = self
+            .kinematics
+            .axes(point / self.kinematics.points_per_element());
         (self.kinematics.n_components() == 4).then(|| {
             let [e_11, e_22, e_33, e_12] = axes.stress_to_global([e[0], e[1], e[2], e[3] / 2.0]);
             [e_11, e_22, e_33, 2.0 * e_12]
@@ -379,13 +435,17 @@ impl Group {
     pub fn internal_variable(&self, point: usize, id: &str) -> Option<f64> {
         let variables = &self.law.built.law.formulation().internal_variables;
         let number = variables.iter().position(|variable| variable.id == id)?;
-        self.internal.committed.get(point * variables.len() + number).copied()
+        self.internal
+            .committed
+            .get(point * variables.len() + number)
+            .copied()
     }
 
     /// Nodal forces of this group's elements (committed), by degree of freedom.
     pub fn forces(&self, n_dofs: usize) -> Vec<f64> {
         let mut force = vec![0.0; n_dofs];
-        self.kinematics.add_forces(&self.stress.committed, &mut force);
+        self.kinematics
+            .add_forces(&self.stress.committed, &mut force);
         force
     }
 
@@ -402,7 +462,10 @@ impl Group {
                 let layer = self.layer.as_ref()?;
                 let pair = |values: &[f64]| [values[4 * point + 1], values[4 * point + 3]];
                 let jump = if self.uses_layer() {
-                    [layer.jump.committed[2 * point], layer.jump.committed[2 * point + 1]]
+                    [
+                        layer.jump.committed[2 * point],
+                        layer.jump.committed[2 * point + 1],
+                    ]
                 } else {
                     pair(&self.strain.committed).map(|strain| strain * layer.thickness_at(point))
                 };

@@ -7,7 +7,6 @@ use abi::Hypothesis;
 use indexmap::IndexMap;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use std::ops::Range;
 use toml::Spanned;
 
 /// Reads a whole file. Unknown keys are errors if `T` says `deny_unknown_fields`.
@@ -171,8 +170,7 @@ fn find_law(
 ) -> Result<LoadedLaw, Error> {
     search.law(id.get_ref()).map_err(|error| match error {
         Error::Plugin { message, hint } => {
-            let (line, column) = line_and_column(source.text(), id.span());
-            let place = format!("{}:{line}:{column}", source.path().display());
+            let place = source.place(&id.span());
             Error::Plugin {
                 message: format!("{message}\n  needed by {place}"),
                 hint,
@@ -180,14 +178,6 @@ fn find_law(
         }
         other => other,
     })
-}
-
-/// Line and column, from 1, of the start of a span.
-pub fn line_and_column(text: &str, span: Range<usize>) -> (usize, usize) {
-    let before = &text[..span.start.min(text.len())];
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
-    (line, column)
 }
 
 fn refuse_unknown(

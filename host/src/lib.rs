@@ -1,16 +1,16 @@
 //! The Pilum host: a finite-element program that knows no constitutive law.
 
-pub mod error;
-pub mod input;
-pub mod plugin;
-pub mod point;
-pub mod case;
-pub mod mesh;
-pub mod element;
 pub mod assembly;
+pub mod case;
+pub mod element;
+pub mod error;
 pub mod group;
-pub mod solver;
+pub mod input;
+pub mod mesh;
 pub mod model;
 pub mod output;
+pub mod plugin;
+pub mod point;
 pub mod probe;
 pub mod run;
+pub mod solver;

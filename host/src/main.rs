@@ -1,5 +1,9 @@
 //! The `pilum` program: arguments to library calls, and their outcome to messages and exit codes.
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is where the program prints")]
+#![expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "this is where the program prints"
+)]
 
 use clap::{Parser, Subcommand};
 use host::case::Case;
@@ -72,7 +76,10 @@ struct Progress {
 
 impl Progress {
     fn new() -> Self {
-        Self { bar: None, cut_backs: 0 }
+        Self {
+            bar: None,
+            cut_backs: 0,
+        }
     }
 
     fn say(&self, line: &str) {
@@ -111,7 +118,10 @@ impl Observer for Progress {
         match &self.bar {
             Some(bar) => {
                 bar.set_position(place.increment as u64);
-                bar.set_message(format!("{iterations} iterations, {} cut-backs", self.cut_backs));
+                bar.set_message(format!(
+                    "{iterations} iterations, {} cut-backs",
+                    self.cut_backs
+                ));
             }
             None => eprintln!(
                 "phase {}: increment {}/{of}, {iterations} iterations",

@@ -69,7 +69,10 @@ impl Mesh {
     pub fn line(&self, source: &Source, name: &Spanned<String>) -> Result<&Line, Error> {
         self.lines.get(name.get_ref()).ok_or_else(|| {
             source
-                .error(name.span(), format!("there is no line `{}`", name.get_ref()))
+                .error(
+                    name.span(),
+                    format!("there is no line `{}`", name.get_ref()),
+                )
                 .hint(suggestion(
                     name.get_ref(),
                     self.lines.keys().map(String::as_str).collect::<Vec<_>>(),

@@ -41,7 +41,12 @@ impl Model {
         let Case { source, file } = case;
         let mesh = Mesh::build(source, file)?;
         let search = SearchPath::new(&case.law_folders());
-        let mut library = LawShelf { source, file, search, laws: IndexMap::new() };
+        let mut library = LawShelf {
+            source,
+            file,
+            search,
+            laws: IndexMap::new(),
+        };
         check_phases(source, file, &mesh)?;
         // A phase's laws hold from it on; the first phase's replace those of the groups at once,
         // so that a law that is never used is never loaded.
@@ -50,7 +55,10 @@ impl Model {
         for (number, (name, group)) in file.groups.iter().enumerate() {
             let mut current = &group.get_ref().law;
             for (phase, input) in file.phases.iter().enumerate() {
-                let swap = input.laws.iter().find(|(key, _)| key.get_ref() == name.get_ref());
+                let swap = input
+                    .laws
+                    .iter()
+                    .find(|(key, _)| key.get_ref() == name.get_ref());
                 if let Some((_, law)) = swap {
                     current = law;
                 }
@@ -65,16 +73,32 @@ impl Model {
         let mut groups = Vec::new();
         let mut ties = Vec::new();
         for ((number, (name, group)), law) in file.groups.iter().enumerate().zip(first_laws) {
-            let builder = GroupBuilder { source, file, mesh: &mesh, number, name, group: group.get_ref() };
+            let builder = GroupBuilder {
+                source,
+                file,
+                mesh: &mesh,
+                number,
+                name,
+                group: group.get_ref(),
+            };
             groups.push(builder.build(law, &mut ties)?);
         }
-        Ok(Self { mesh, groups, ties, swaps, laws: library.laws })
+        Ok(Self {
+            mesh,
+            groups,
+            ties,
+            swaps,
+            laws: library.laws,
+        })
     }
 }
 
 /// The error of a law that cannot start from the stress it finds, at the law's place in the file.
 pub fn cannot_start(source: &Source, file: &CaseFile, failure: &PointFailure) -> Error {
-    let entry = file.laws.iter().find(|(key, _)| key.get_ref() == &failure.law);
+    let entry = file
+        .laws
+        .iter()
+        .find(|(key, _)| key.get_ref() == &failure.law);
     let its_own_reason = matches!(
         failure.failure.outcome,
         Outcome::Domain | Outcome::Parameter | Outcome::Numeric | Outcome::CutStep
@@ -82,7 +106,9 @@ pub fn cannot_start(source: &Source, file: &CaseFile, failure: &PointFailure) ->
     match entry {
         Some((_, law)) if its_own_reason => {
             let span = law.get_ref().law.span();
-            source.error(span, format!("cannot start: {failure}")).into()
+            source
+                .error(span, format!("cannot start: {failure}"))
+                .into()
         }
         _ => Error::plugin(format!("cannot start: {failure}")),
     }
@@ -110,10 +136,17 @@ fn check_phases(source: &Source, file: &CaseFile, mesh: &Mesh) -> Result<(), Err
             return Err(source.error(phase.increments.span(), message).into());
         }
         for group in phase.laws.keys() {
-            if !file.groups.keys().any(|key| key.get_ref() == group.get_ref()) {
+            if !file
+                .groups
+                .keys()
+                .any(|key| key.get_ref() == group.get_ref())
+            {
                 let groups: Vec<&str> = file.groups.keys().map(|k| k.get_ref().as_str()).collect();
                 return Err(source
-                    .error(group.span(), format!("there is no group `{}`", group.get_ref()))
+                    .error(
+                        group.span(),
+                        format!("there is no group `{}`", group.get_ref()),
+                    )
                     .hint(suggestion(group.get_ref(), groups))
                     .into());
             }
@@ -145,11 +178,17 @@ fn check_values(source: &Source, mesh: &Mesh, phase: &PhaseInput) -> Result<(), 
         let line = mesh.line(source, &input.line)?;
         let shared = |edge: (usize, usize)| {
             let middle = mesh.edge(edge)[2];
-            mesh.quads.iter().filter(|quad| quad.nodes.contains(&middle)).count() > 1
+            mesh.quads
+                .iter()
+                .filter(|quad| quad.nodes.contains(&middle))
+                .count()
+                > 1
         };
         if line.edges.is_empty() || line.edges.iter().any(|&edge| shared(edge)) {
-            let message =
-                format!("a pressure needs a boundary, line `{}` is not", input.line.get_ref());
+            let message = format!(
+                "a pressure needs a boundary, line `{}` is not",
+                input.line.get_ref()
+            );
             return Err(source.error(input.line.span(), message).into());
         }
     }
@@ -172,12 +211,24 @@ impl LawShelf<'_> {
         group: &GroupInput,
         name: &Spanned<String>,
     ) -> Result<GroupLaw, Error> {
-        let entry = self.file.laws.iter().find(|(key, _)| key.get_ref() == name.get_ref());
+        let entry = self
+            .file
+            .laws
+            .iter()
+            .find(|(key, _)| key.get_ref() == name.get_ref());
         let Some((_, entry)) = entry else {
-            let names: Vec<&str> = self.file.laws.keys().map(|k| k.get_ref().as_str()).collect();
+            let names: Vec<&str> = self
+                .file
+                .laws
+                .keys()
+                .map(|k| k.get_ref().as_str())
+                .collect();
             return Err(self
                 .source
-                .error(name.span(), format!("there is no law `{}` under [laws]", name.get_ref()))
+                .error(
+                    name.span(),
+                    format!("there is no law `{}` under [laws]", name.get_ref()),
+                )
                 .hint(suggestion(name.get_ref(), names))
                 .into());
         };
@@ -190,11 +241,16 @@ impl LawShelf<'_> {
             Formulation::Solid => plane,
             Formulation::ZeroThickness => Hypothesis::Interface2d,
             Formulation::ThinLayer => {
-                let is_interface_law = self
-                    .search
-                    .law(entry.law.get_ref())
-                    .is_ok_and(|law| law.description().formulation(Hypothesis::Interface2d).is_some());
-                if is_interface_law { Hypothesis::Interface2d } else { plane }
+                let is_interface_law = self.search.law(entry.law.get_ref()).is_ok_and(|law| {
+                    law.description()
+                        .formulation(Hypothesis::Interface2d)
+                        .is_some()
+                });
+                if is_interface_law {
+                    Hypothesis::Interface2d
+                } else {
+                    plane
+                }
             }
         };
         let key = (name.get_ref().clone(), hypothesis.name());
@@ -202,9 +258,8 @@ impl LawShelf<'_> {
             Some(built) => Arc::clone(built),
             None => {
                 let (source, parameters) = (self.source, &entry.parameters);
-                let built =
-                    build_law(source, &self.search, &entry.law, hypothesis, parameters)
-                        .map_err(|error| self.explain(error, group_name, group))?;
+                let built = build_law(source, &self.search, &entry.law, hypothesis, parameters)
+                    .map_err(|error| self.explain(error, group_name, group))?;
                 let built = Arc::new(built);
                 self.laws.insert(key, Arc::clone(&built));
                 built
@@ -235,7 +290,10 @@ impl LawShelf<'_> {
                     initial.push((number, *value.get_ref()));
                 }
                 Some(_) => {
-                    return Err(self.source.error(value.span(), "expected a finite number").into());
+                    return Err(self
+                        .source
+                        .error(value.span(), "expected a finite number")
+                        .into());
                 }
                 None => {
                     let ids: Vec<&str> = variables.iter().map(|v| v.id.as_str()).collect();
@@ -252,7 +310,11 @@ impl LawShelf<'_> {
                 }
             }
         }
-        let law = GroupLaw { name: name.get_ref().clone(), built, initial };
+        let law = GroupLaw {
+            name: name.get_ref().clone(),
+            built,
+            initial,
+        };
         self.refuse_impossible_layer(group, &law, name)?;
         Ok(law)
     }
@@ -283,7 +345,10 @@ impl LawShelf<'_> {
         law: &GroupLaw,
         name: &Spanned<String>,
     ) -> Result<(), Error> {
-        let elastic = group.in_plane.as_ref().is_none_or(|p| *p.get_ref() == InPlane::Elastic);
+        let elastic = group
+            .in_plane
+            .as_ref()
+            .is_none_or(|p| *p.get_ref() == InPlane::Elastic);
         let law = &law.built.law;
         let applies = group.formulation == Formulation::ThinLayer && elastic;
         if !applies || law.hypothesis() != Hypothesis::Interface2d {
@@ -291,7 +356,9 @@ impl LawShelf<'_> {
         }
         let rows = Strided::rows(2);
         let (zero, traction) = ([0.0; 2], [-100.0, 0.0]);
-        let Ok(state) = law.initial_state(1, (&traction, rows)) else { return Ok(()) };
+        let Ok(state) = law.initial_state(1, (&traction, rows)) else {
+            return Ok(());
+        };
         let (mut flux, mut state_end, mut operator) = ([0.0; 2], state.clone(), [0.0; 4]);
         let start = Start {
             n_points: 1,
@@ -302,11 +369,17 @@ impl LawShelf<'_> {
             time: 0.0,
             time_increment: 0.0,
         };
-        let end = End { flux: (&mut flux, rows), state: &mut state_end, operator: &mut operator };
+        let end = End {
+            flux: (&mut flux, rows),
+            state: &mut state_end,
+            operator: &mut operator,
+        };
         match law.integrate(&start, Operator::Elastic, end) {
-            Ok(_) if operator[0] <= 4.0 / 3.0 * operator[3] => {
-                Err(impossible_layer(self.source, name, [operator[0], operator[3]]))
-            }
+            Ok(_) if operator[0] <= 4.0 / 3.0 * operator[3] => Err(impossible_layer(
+                self.source,
+                name,
+                [operator[0], operator[3]],
+            )),
             _ => Ok(()),
         }
     }
@@ -334,7 +407,11 @@ impl Model {
     pub fn check_layers(case: &Case, groups: &[Group]) -> Result<(), Error> {
         for group in groups {
             if let Some(stiffness) = group.impossible_layer() {
-                let law = case.file.laws.iter().find(|(key, _)| key.get_ref() == &group.law.name);
+                let law = case
+                    .file
+                    .laws
+                    .iter()
+                    .find(|(key, _)| key.get_ref() == &group.law.name);
                 if let Some((name, _)) = law {
                     return Err(impossible_layer(&case.source, name, stiffness));
                 }
@@ -369,14 +446,23 @@ impl GroupBuilder<'_> {
         let kinematics: Box<dyn Kinematics> = match formulation {
             Formulation::Solid => self.solid()?,
             Formulation::ThinLayer => {
-                let in_plane = self.group.in_plane.as_ref().map_or(InPlane::Elastic, |p| *p.get_ref());
+                let in_plane = self
+                    .group
+                    .in_plane
+                    .as_ref()
+                    .map_or(InPlane::Elastic, |p| *p.get_ref());
                 let (elements, t) = self.thin_layer(ties)?;
                 thickness = Some((t, in_plane));
                 elements
             }
             Formulation::ZeroThickness => {
-                let joints: Vec<_> =
-                    self.mesh.joints.iter().filter(|j| j.group == self.number).copied().collect();
+                let joints: Vec<_> = self
+                    .mesh
+                    .joints
+                    .iter()
+                    .filter(|j| j.group == self.number)
+                    .copied()
+                    .collect();
                 let rule = self.integration(Integration::Nodes);
                 let analysis = self.file.analysis;
                 Box::new(Joint6::new(analysis, &self.mesh.nodes, &joints, rule))
@@ -392,14 +478,26 @@ impl GroupBuilder<'_> {
     }
 
     fn integration(&self, default: Integration) -> Integration {
-        self.group.integration.as_ref().map_or(default, |i| *i.get_ref())
+        self.group
+            .integration
+            .as_ref()
+            .map_or(default, |i| *i.get_ref())
     }
 
     /// Keys and values that do not go with the formulation.
     fn refuse_misplaced_keys(&self) -> Result<(), Error> {
-        let GroupInput { formulation, integration, normal, in_plane, .. } = self.group;
+        let GroupInput {
+            formulation,
+            integration,
+            normal,
+            in_plane,
+            ..
+        } = self.group;
         let misplaced = |span: std::ops::Range<usize>, what: &str| {
-            let message = format!("{what} does not go with the formulation `{}`", formulation.name());
+            let message = format!(
+                "{what} does not go with the formulation `{}`",
+                formulation.name()
+            );
             Err(self.source.error(span, message).into())
         };
         if *formulation != Formulation::ThinLayer {
@@ -427,7 +525,10 @@ impl GroupBuilder<'_> {
     }
 
     fn quads(&self) -> impl Iterator<Item = &Quad> {
-        self.mesh.quads.iter().filter(|quad| quad.group == self.number)
+        self.mesh
+            .quads
+            .iter()
+            .filter(|quad| quad.group == self.number)
     }
 
     fn bad_shape(&self) -> Error {
@@ -440,7 +541,11 @@ impl GroupBuilder<'_> {
 
     fn solid(&self) -> Result<Box<dyn Kinematics>, Error> {
         let nodes: Vec<_> = self.quads().map(|quad| quad.nodes).collect();
-        let n = if self.integration(Integration::Full) == Integration::Reduced { 2 } else { 3 };
+        let n = if self.integration(Integration::Full) == Integration::Reduced {
+            2
+        } else {
+            3
+        };
         let axes = vec![Axes::GLOBAL; nodes.len()];
         let (analysis, coordinates) = (self.file.analysis, &self.mesh.nodes);
         let elements = Quad8::new(analysis, coordinates, nodes, axes, |_| (n, n));
@@ -489,7 +594,11 @@ impl GroupBuilder<'_> {
             Some(normal) => {
                 let xi_is_x = (at(5)[0] - at(7)[0]).abs() >= (at(5)[1] - at(7)[1]).abs();
                 let xi = (*normal.get_ref() == Axis::X) == xi_is_x;
-                Ok(if xi { (Across::Xi, along_xi) } else { (Across::Eta, along_eta) })
+                Ok(if xi {
+                    (Across::Xi, along_xi)
+                } else {
+                    (Across::Eta, along_eta)
+                })
             }
             None if along_xi < 0.8 * along_eta => Ok((Across::Xi, along_xi)),
             None if along_eta < 0.8 * along_xi => Ok((Across::Eta, along_eta)),
@@ -562,4 +671,3 @@ pub fn unit_pressure(analysis: Analysis, mesh: &Mesh, edges: &[(usize, usize)]) 
     }
     force
 }
-

@@ -2,9 +2,11 @@
 //! `log.jsonl`. Rows are flushed as increments converge, so whatever was reported is on disk.
 
 mod fields;
+mod figure;
 mod profile;
 mod summary;
 
+pub use figure::check_figures;
 pub use summary::PhaseRecord;
 
 use crate::case::{Case, OutputInput};
@@ -15,6 +17,7 @@ use crate::model::Model;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::Iteration;
 use fields::Fields;
+use figure::Figures;
 use profile::Profile;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -53,6 +56,7 @@ pub struct Results {
     fields: Option<Fields>,
     log: LogFile,
     summary: Summary,
+    figures: Figures,
     seconds: Duration,
 }
 
@@ -69,7 +73,10 @@ impl Table {
         columns: impl IntoIterator<Item = &'a str>,
     ) -> Result<Self, Error> {
         let file = create(&path)?;
-        let mut table = Self { path, writer: csv::Writer::from_writer(file) };
+        let mut table = Self {
+            path,
+            writer: csv::Writer::from_writer(file),
+        };
         table.row(columns)?;
         table.flush()?;
         Ok(table)
@@ -82,7 +89,9 @@ impl Table {
     }
 
     fn flush(&mut self) -> Result<(), Error> {
-        self.writer.flush().map_err(|error| unwritable(&self.path, error))
+        self.writer
+            .flush()
+            .map_err(|error| unwritable(&self.path, error))
     }
 }
 
@@ -91,7 +100,10 @@ fn create(path: &Path) -> Result<File, Error> {
 }
 
 fn unwritable(path: &Path, source: std::io::Error) -> Error {
-    Error::Unwritable { path: path.to_owned(), source }
+    Error::Unwritable {
+        path: path.to_owned(),
+        source,
+    }
 }
 
 #[derive(Debug)]
@@ -128,8 +140,12 @@ impl Results {
             history: Table::create(folder.join("history.csv"), columns)?,
             profile: Profile::create(folder, settings.profile, model)?,
             fields: Fields::create(folder, settings.fields, model),
-            log: LogFile { file: create(&log_path)?, path: log_path },
+            log: LogFile {
+                file: create(&log_path)?,
+                path: log_path,
+            },
             summary: Summary::new(case, model, probes),
+            figures: Figures::new(case, probes),
             folder: folder.to_owned(),
             settings,
             seconds: Duration::ZERO,
@@ -195,9 +211,17 @@ impl Results {
         mesh: &Mesh,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        let mut row =
-            vec![place.phase.clone(), place.increment.to_string(), number(record.time)];
-        row.extend(record.probes.iter().map(|value| value.map(number).unwrap_or_default()));
+        let mut row = vec![
+            place.phase.clone(),
+            place.increment.to_string(),
+            number(record.time),
+        ];
+        row.extend(
+            record
+                .probes
+                .iter()
+                .map(|value| value.map(number).unwrap_or_default()),
+        );
         row.push(record.iterations.to_string());
         self.history.row(&row)?;
         self.history.flush()?;
@@ -220,6 +244,7 @@ impl Results {
             }))?;
         }
         self.summary.last_increment(place, &record.probes);
+        self.figures.increment(place, &record.probes);
         self.seconds += start.elapsed();
         Ok(())
     }
@@ -239,8 +264,10 @@ impl Results {
         total: Duration,
         error: Option<&Error>,
     ) -> Result<(), Error> {
+        self.figures.draw(&self.folder)?;
         let summary = self.summary.finish(groups, total, self.seconds, error);
-        self.log.line(&json!({ "event": "end", "status": summary["status"] }))?;
+        self.log
+            .line(&json!({ "event": "end", "status": summary["status"] }))?;
         let path = self.folder.join("summary.json");
         // Written whole or not at all.
         let partial = self.folder.join("summary.json.part");

@@ -200,12 +200,7 @@ impl Driver {
                         self.explain(stop, &place, &warnings)
                     })?;
                 increment += 1;
-                row(
-                    &walk.point,
-                    increment,
-                    walk.search.calls - calls,
-                    &mut sink,
-                )?;
+                row(&walk.point, increment, walk.search.calls - calls, &mut sink)?;
                 goal = next;
             }
             // A flux that was led keeps its goal; what is left of its residual does not pile up.

@@ -19,11 +19,27 @@ pub struct Probes {
 #[derive(Debug)]
 enum Probe {
     /// A quantity of integration points.
-    Points { group: usize, points: Vec<usize>, quantity: PointQuantity, reduce: Reduce, scale: f64 },
+    Points {
+        group: usize,
+        points: Vec<usize>,
+        quantity: PointQuantity,
+        reduce: Reduce,
+        scale: f64,
+    },
     /// Displacement component of nodes.
-    Displacement { nodes: Vec<usize>, component: usize, reduce: Reduce, scale: f64 },
+    Displacement {
+        nodes: Vec<usize>,
+        component: usize,
+        reduce: Reduce,
+        scale: f64,
+    },
     /// Sum of internal forces at nodes: of all elements (the reaction), or of one group.
-    Force { nodes: Vec<usize>, component: usize, group: Option<usize>, scale: f64 },
+    Force {
+        nodes: Vec<usize>,
+        component: usize,
+        group: Option<usize>,
+        scale: f64,
+    },
     /// Sum of earlier probes with factors.
     Combination(Vec<(usize, f64)>),
 }
@@ -57,7 +73,13 @@ impl Probes {
     pub fn new(case: &Case, model: &Model) -> Result<Self, Error> {
         let mut probes: Vec<(String, Probe)> = Vec::new();
         for (name, input) in &case.file.probes {
-            let resolver = Resolver { case, model, name, input: input.get_ref(), span: input.span() };
+            let resolver = Resolver {
+                case,
+                model,
+                name,
+                input: input.get_ref(),
+                span: input.span(),
+            };
             let probe = match &input.get_ref().combine {
                 Some(combine) => resolver.combination(combine, &probes)?,
                 None => resolver.measured()?,
@@ -86,16 +108,34 @@ impl Probes {
 impl Probe {
     fn value(&self, snapshot: &Snapshot<'_>, earlier: &[Option<f64>]) -> Option<f64> {
         match self {
-            Self::Points { group, points, quantity, reduce, scale } => {
+            Self::Points {
+                group,
+                points,
+                quantity,
+                reduce,
+                scale,
+            } => {
                 let group = &snapshot.groups[*group];
                 let values = points.iter().map(|&point| quantity.at(group, point));
                 reduced(*reduce, values).map(|value| scale * value)
             }
-            Self::Displacement { nodes, component, reduce, scale } => {
-                let values = nodes.iter().map(|&n| Some(snapshot.displacement[2 * n + component]));
+            Self::Displacement {
+                nodes,
+                component,
+                reduce,
+                scale,
+            } => {
+                let values = nodes
+                    .iter()
+                    .map(|&n| Some(snapshot.displacement[2 * n + component]));
                 reduced(*reduce, values).map(|value| scale * value)
             }
-            Self::Force { nodes, component, group, scale } => {
+            Self::Force {
+                nodes,
+                component,
+                group,
+                scale,
+            } => {
                 let of_group;
                 let forces = match group {
                     None => snapshot.reaction,
@@ -104,11 +144,18 @@ impl Probe {
                         &of_group
                     }
                 };
-                Some(scale * nodes.iter().map(|&n| forces[2 * n + component]).sum::<f64>())
+                Some(
+                    scale
+                        * nodes
+                            .iter()
+                            .map(|&n| forces[2 * n + component])
+                            .sum::<f64>(),
+                )
             }
-            Self::Combination(terms) => {
-                terms.iter().map(|&(i, factor)| earlier[i].map(|v| factor * v)).sum()
-            }
+            Self::Combination(terms) => terms
+                .iter()
+                .map(|&(i, factor)| earlier[i].map(|v| factor * v))
+                .sum(),
         }
     }
 }
@@ -119,7 +166,9 @@ impl PointQuantity {
             Self::Stress(c) => group.global_stress(point).map(|s| s[*c]),
             Self::Strain(c) => group.global_strain(point).map(|e| e[*c]),
             Self::Jump(c) => group.jump_and_traction(point).map(|(jump, _)| jump[*c]),
-            Self::Traction(c) => group.jump_and_traction(point).map(|(_, traction)| traction[*c]),
+            Self::Traction(c) => group
+                .jump_and_traction(point)
+                .map(|(_, traction)| traction[*c]),
             Self::Internal(id) => group.internal_variable(point, id),
         }
     }
@@ -156,21 +205,42 @@ impl Resolver<'_> {
         self.source().error(self.span.clone(), message).into()
     }
 
-    fn combination(&self, combine: &Named<f64>, earlier: &[(String, Probe)]) -> Result<Probe, Error> {
-        let ProbeInput { line, group, quantity, reduce, x, y, .. } = self.input;
-        if line.is_some() || group.is_some() || quantity.is_some() || reduce.is_some()
-            || x.is_some() || y.is_some()
+    fn combination(
+        &self,
+        combine: &Named<f64>,
+        earlier: &[(String, Probe)],
+    ) -> Result<Probe, Error> {
+        let ProbeInput {
+            line,
+            group,
+            quantity,
+            reduce,
+            x,
+            y,
+            ..
+        } = self.input;
+        if line.is_some()
+            || group.is_some()
+            || quantity.is_some()
+            || reduce.is_some()
+            || x.is_some()
+            || y.is_some()
         {
             return Err(self.wrong("`combine` stands alone (with `scale`)"));
         }
         let names: Vec<&str> = earlier.iter().map(|(name, _)| name.as_str()).collect();
         let terms = combine.iter().map(|(name, factor)| {
             let found = names.iter().position(|n| n == name.get_ref());
-            found.map(|i| (i, self.input.scale * factor.get_ref())).ok_or_else(|| {
-                let message = format!("there is no probe `{}` before this one", name.get_ref());
-                let names = names.clone();
-                self.source().error(name.span(), message).hint(suggestion(name.get_ref(), names)).into()
-            })
+            found
+                .map(|i| (i, self.input.scale * factor.get_ref()))
+                .ok_or_else(|| {
+                    let message = format!("there is no probe `{}` before this one", name.get_ref());
+                    let names = names.clone();
+                    self.source()
+                        .error(name.span(), message)
+                        .hint(suggestion(name.get_ref(), names))
+                        .into()
+                })
         });
         terms.collect::<Result<_, Error>>().map(Probe::Combination)
     }
@@ -188,13 +258,19 @@ impl Resolver<'_> {
 
     fn group_number(&self, name: &Spanned<String>) -> Result<usize, Error> {
         let groups = &self.model.groups;
-        groups.iter().position(|g| g.name == *name.get_ref()).ok_or_else(|| {
-            let names: Vec<&str> = groups.iter().map(|g| g.name.as_str()).collect();
-            self.source()
-                .error(name.span(), format!("there is no group `{}`", name.get_ref()))
-                .hint(suggestion(name.get_ref(), names))
-                .into()
-        })
+        groups
+            .iter()
+            .position(|g| g.name == *name.get_ref())
+            .ok_or_else(|| {
+                let names: Vec<&str> = groups.iter().map(|g| g.name.as_str()).collect();
+                self.source()
+                    .error(
+                        name.span(),
+                        format!("there is no group `{}`", name.get_ref()),
+                    )
+                    .hint(suggestion(name.get_ref(), names))
+                    .into()
+            })
     }
 
     fn on_line(
@@ -204,8 +280,10 @@ impl Resolver<'_> {
         quantity: &Spanned<String>,
     ) -> Result<Probe, Error> {
         let nodes = self.model.mesh.line(self.source(), line)?.nodes.clone();
-        let nodes: Vec<usize> =
-            nodes.into_iter().filter(|&n| self.inside(self.model.mesh.nodes[n])).collect();
+        let nodes: Vec<usize> = nodes
+            .into_iter()
+            .filter(|&n| self.inside(self.model.mesh.nodes[n]))
+            .collect();
         if nodes.is_empty() {
             return Err(self.wrong("no node of the line lies inside the extent"));
         }
@@ -221,14 +299,28 @@ impl Resolver<'_> {
         match (what, group) {
             ("displacement", None) => {
                 let reduce = self.input.reduce.unwrap_or(Reduce::Mean);
-                Ok(Probe::Displacement { nodes, component, reduce, scale })
+                Ok(Probe::Displacement {
+                    nodes,
+                    component,
+                    reduce,
+                    scale,
+                })
             }
             ("reaction", None) | ("force", Some(_)) => {
-                if self.input.reduce.is_some_and(|reduce| reduce != Reduce::Sum) {
+                if self
+                    .input
+                    .reduce
+                    .is_some_and(|reduce| reduce != Reduce::Sum)
+                {
                     return Err(self.wrong("forces are summed"));
                 }
                 let group = group.map(|name| self.group_number(name)).transpose()?;
-                Ok(Probe::Force { nodes, component, group, scale })
+                Ok(Probe::Force {
+                    nodes,
+                    component,
+                    group,
+                    scale,
+                })
             }
             ("force", None) => Err(self.wrong("`force` needs the `group` whose forces are meant")),
             (_, Some(_)) => Err(self.wrong("with a line and a group, the quantity is a `force`")),
@@ -237,7 +329,14 @@ impl Resolver<'_> {
     }
 
     fn unknown_line_quantity(&self, quantity: &Spanned<String>) -> Error {
-        let all = ["displacement_x", "displacement_y", "reaction_x", "reaction_y", "force_x", "force_y"];
+        let all = [
+            "displacement_x",
+            "displacement_y",
+            "reaction_x",
+            "reaction_y",
+            "force_x",
+            "force_y",
+        ];
         let message = format!("a line has no quantity `{}`", quantity.get_ref());
         self.source()
             .error(quantity.span(), message)
@@ -263,16 +362,28 @@ impl Resolver<'_> {
                 known.push((format!("traction_{component}"), PointQuantity::Traction(c)));
             }
         }
-        let later = self.model.swaps.iter().flatten().filter(|(g, _)| *g == number);
+        let later = self
+            .model
+            .swaps
+            .iter()
+            .flatten()
+            .filter(|(g, _)| *g == number);
         for law in later.map(|(_, law)| law).chain([&group.law]) {
             for variable in &law.built.law.formulation().internal_variables {
-                known.push((variable.id.clone(), PointQuantity::Internal(variable.id.clone())));
+                known.push((
+                    variable.id.clone(),
+                    PointQuantity::Internal(variable.id.clone()),
+                ));
             }
         }
-        let Some((_, point_quantity)) = known.iter().find(|(id, _)| id == quantity.get_ref()) else {
+        let Some((_, point_quantity)) = known.iter().find(|(id, _)| id == quantity.get_ref())
+        else {
             let names: Vec<&str> = known.iter().map(|(id, _)| id.as_str()).collect();
-            let message =
-                format!("group `{}` has no quantity `{}`", name.get_ref(), quantity.get_ref());
+            let message = format!(
+                "group `{}` has no quantity `{}`",
+                name.get_ref(),
+                quantity.get_ref()
+            );
             return Err(self
                 .source()
                 .error(quantity.span(), message)

@@ -6,7 +6,7 @@ use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::{Model, cannot_start, unit_pressure};
-use crate::output::{IncrementRecord, PhaseRecord, Results};
+use crate::output::{IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{LinearSolver, Loads, Newton, StepFailure, StepSuccess};
 use std::collections::BTreeMap;
@@ -41,6 +41,7 @@ pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<()
     let started = Instant::now();
     let model = Model::build(case)?;
     let probes = Probes::new(case, &model)?;
+    check_figures(case, &probes)?;
     for law in model.laws.values() {
         for warning in &law.warnings {
             observer.warning(warning);
@@ -79,7 +80,13 @@ struct ModelRest {
 
 impl<'a> Run<'a> {
     fn new(case: &'a Case, model: Model, probes: Probes) -> Self {
-        let Model { mesh, groups, ties, swaps, .. } = model;
+        let Model {
+            mesh,
+            groups,
+            ties,
+            swaps,
+            ..
+        } = model;
         let n_dofs = 2 * mesh.nodes.len();
         let mut run = Self {
             case,
@@ -107,9 +114,16 @@ impl<'a> Run<'a> {
 
     /// Degrees of freedom of a line's nodes.
     fn dofs(&self, line: &str, components: &[Axis]) -> Vec<usize> {
-        let nodes = self.mesh.lines.get(line).map_or(&[][..], |line| &line.nodes);
+        let nodes = self
+            .mesh
+            .lines
+            .get(line)
+            .map_or(&[][..], |line| &line.nodes);
         let offset = |axis: &Axis| usize::from(*axis == Axis::Y);
-        nodes.iter().flat_map(|&n| components.iter().map(move |c| 2 * n + offset(c))).collect()
+        nodes
+            .iter()
+            .flat_map(|&n| components.iter().map(move |c| 2 * n + offset(c)))
+            .collect()
     }
 
     fn phases(&mut self, results: &mut Results, observer: &mut dyn Observer) -> Result<(), Error> {
@@ -136,10 +150,15 @@ impl<'a> Run<'a> {
         }
         Model::check_layers(self.case, &self.groups)?;
         let mut loads = self.loads(phase);
-        let is_prescribed: Vec<bool> =
-            (0..self.displacement.len()).map(|dof| self.prescribed.contains_key(&dof)).collect();
-        let system =
-            System::new(self.mesh.nodes.len(), &self.groups, &is_prescribed, &self.model.ties);
+        let is_prescribed: Vec<bool> = (0..self.displacement.len())
+            .map(|dof| self.prescribed.contains_key(&dof))
+            .collect();
+        let system = System::new(
+            self.mesh.nodes.len(),
+            &self.groups,
+            &is_prescribed,
+            &self.model.ties,
+        );
         system.fold(&mut loads.force_start);
         system.fold(&mut loads.force_end);
         let imbalance = self.out_of_balance(&system, &mut loads);
@@ -155,15 +174,25 @@ impl<'a> Run<'a> {
                 100.0 * imbalance
             ));
         }
-        let outcome =
-            self.increments(phase, &loads, &system, &mut solver, &mut record, results, observer);
+        let outcome = self.increments(
+            phase,
+            &loads,
+            &system,
+            &mut solver,
+            &mut record,
+            results,
+            observer,
+        );
         record.factorisations = solver.factorisations;
         self.time += 1.0;
         results.phase(record);
         outcome
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the parts of one phase, each used once")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the parts of one phase, each used once"
+    )]
     fn increments(
         &mut self,
         phase: &PhaseInput,
@@ -181,12 +210,23 @@ impl<'a> Run<'a> {
         let mut last: Option<(f64, Vec<f64>)> = None;
         let mut lambda = 0.0;
         for increment in 1..=n {
-            let place = Place { phase: phase.name.get_ref().clone(), increment };
-            let target = if increment == n { 1.0 } else { increment as f64 / n as f64 };
+            let place = Place {
+                phase: phase.name.get_ref().clone(),
+                increment,
+            };
+            let target = if increment == n {
+                1.0
+            } else {
+                increment as f64 / n as f64
+            };
             let mut done = IncrementRecord::default();
             while lambda < target {
                 // A remainder that is hardly longer than the step is taken at once.
-                let end = if target - lambda <= 1.0001 * step { target } else { lambda + step };
+                let end = if target - lambda <= 1.0001 * step {
+                    target
+                } else {
+                    lambda + step
+                };
                 let length = end - lambda;
                 let attempt =
                     self.attempt(loads, [lambda, end], last.as_ref(), system, solver, record);
@@ -284,7 +324,11 @@ impl<'a> Run<'a> {
 
     /// Internal less external forces.
     fn reaction(&self, internal: &[f64]) -> Vec<f64> {
-        internal.iter().zip(&self.force).map(|(internal, external)| internal - external).collect()
+        internal
+            .iter()
+            .zip(&self.force)
+            .map(|(internal, external)| internal - external)
+            .collect()
     }
 
     /// Loads of a phase; takes over its changes of constraints.
@@ -309,13 +353,17 @@ impl<'a> Run<'a> {
         }
         let force_start = self.force.clone();
         for input in &phase.pressure {
-            self.pressure.insert(input.line.get_ref().clone(), input.value);
+            self.pressure
+                .insert(input.line.get_ref().clone(), input.value);
         }
         let mut force_end = vec![0.0; self.displacement.len()];
         for (line, value) in &self.pressure {
             if let Some(line) = self.mesh.lines.get(line) {
                 let unit = unit_pressure(self.case.file.analysis, &self.mesh, &line.edges);
-                force_end.iter_mut().zip(unit).for_each(|(force, unit)| *force += value * unit);
+                force_end
+                    .iter_mut()
+                    .zip(unit)
+                    .for_each(|(force, unit)| *force += value * unit);
             }
         }
         Loads {
@@ -337,7 +385,9 @@ impl<'a> Run<'a> {
         let n_dofs = self.displacement.len();
         let mut internal = vec![0.0; n_dofs];
         for group in &self.groups {
-            group.kinematics.add_forces(&group.stress.committed, &mut internal);
+            group
+                .kinematics
+                .add_forces(&group.stress.committed, &mut internal);
         }
         system.fold(&mut internal);
         loads.out_of_balance = vec![0.0; n_dofs];
@@ -350,16 +400,14 @@ impl<'a> Run<'a> {
         for (internal, external) in internal.iter().zip(&loads.force_start) {
             play += f64::max(internal * internal, external * external);
         }
-        if play > 0.0 { f64::sqrt(rest / play) } else { 0.0 }
+        if play > 0.0 {
+            f64::sqrt(rest / play)
+        } else {
+            0.0
+        }
     }
 
-    fn no_equilibrium(
-        &self,
-        place: &Place,
-        lambda: f64,
-        n: usize,
-        failure: &StepFailure,
-    ) -> Error {
+    fn no_equilibrium(&self, place: &Place, lambda: f64, n: usize, failure: &StepFailure) -> Error {
         let reached = lambda * n as f64;
         Error::NoEquilibrium {
             message: format!(
@@ -374,4 +422,3 @@ impl<'a> Run<'a> {
         }
     }
 }
-

@@ -58,7 +58,12 @@ impl Joint6 {
             .iter()
             .map(|j| std::array::from_fn(|i| if i < 3 { j.minus[i] } else { j.plus[i - 3] }))
             .collect();
-        Self { nodes, axes, points_per_element: xi.len(), points }
+        Self {
+            nodes,
+            axes,
+            points_per_element: xi.len(),
+            points,
+        }
     }
 
     fn points_of(&self, element: usize) -> &[Point] {
@@ -101,7 +106,9 @@ impl Kinematics for Joint6 {
             let u = |node: usize, c: usize| displacement[2 * node + c];
             for (point, jump) in self.points_of(element).iter().zip(&mut jumps) {
                 let opening: [f64; 2] = std::array::from_fn(|c| {
-                    (0..3).map(|i| point.n[i] * (u(nodes[i + 3], c) - u(nodes[i], c))).sum()
+                    (0..3)
+                        .map(|i| point.n[i] * (u(nodes[i + 3], c) - u(nodes[i], c)))
+                        .sum()
                 });
                 jump[0] += axes.across[0] * opening[0] + axes.across[1] * opening[1];
                 jump[1] += axes.along[0] * opening[0] + axes.along[1] * opening[1];
@@ -133,7 +140,9 @@ impl Kinematics for Joint6 {
             // The law's 2 × 2 tangent in global axes.
             let d = |c: usize, e: usize| -> f64 {
                 let pairs = (0..2).flat_map(|i| (0..2).map(move |j| (i, j)));
-                pairs.map(|(i, j)| directions[i][c] * tangent[2 * i + j] * directions[j][e]).sum()
+                pairs
+                    .map(|(i, j)| directions[i][c] * tangent[2 * i + j] * directions[j][e])
+                    .sum()
             };
             let d = [[d(0, 0), d(0, 1)], [d(1, 0), d(1, 1)]];
             for i in 0..6 {

@@ -59,11 +59,19 @@ impl Quad8 {
                 for (xi, w_xi) in xi.iter().zip(w_xi) {
                     let point = Point::new(analysis, &corners, &axes[element], *xi, *eta)
                         .ok_or(BadShape { element })?;
-                    points.push(Point { weight: point.weight * w_xi * w_eta, ..point });
+                    points.push(Point {
+                        weight: point.weight * w_xi * w_eta,
+                        ..point
+                    });
                 }
             }
         }
-        Ok(Self { nodes, axes, points_per_element, points })
+        Ok(Self {
+            nodes,
+            axes,
+            points_per_element,
+            points,
+        })
     }
 
     /// Points of an element.

@@ -9,7 +9,10 @@ pub fn gauss(n: usize) -> (&'static [f64], &'static [f64]) {
     // 1/√3 and √(3/5).
     match n {
         1 => (&[0.0], &[2.0]),
-        2 => (&[-0.577_350_269_189_625_8, 0.577_350_269_189_625_8], &[1.0, 1.0]),
+        2 => (
+            &[-0.577_350_269_189_625_8, 0.577_350_269_189_625_8],
+            &[1.0, 1.0],
+        ),
         3 => (
             &[-0.774_596_669_241_483_4, 0.0, 0.774_596_669_241_483_4],
             &[5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0],
@@ -97,8 +100,16 @@ mod tests {
         for n in 1..=3 {
             let (points, weights) = gauss(n);
             for degree in 0..2 * n as i32 {
-                let sum: f64 = points.iter().zip(weights).map(|(x, w)| w * x.powi(degree)).sum();
-                let exact = if degree % 2 == 0 { 2.0 / f64::from(degree + 1) } else { 0.0 };
+                let sum: f64 = points
+                    .iter()
+                    .zip(weights)
+                    .map(|(x, w)| w * x.powi(degree))
+                    .sum();
+                let exact = if degree % 2 == 0 {
+                    2.0 / f64::from(degree + 1)
+                } else {
+                    0.0
+                };
                 assert_relative_eq!(sum, exact, epsilon = 1e-14);
             }
         }

@@ -64,7 +64,12 @@ impl Layer {
     /// E* of (18) is positive only for K_n > 4/3 K_t; the first point where it is not.
     pub(super) fn impossible(&self) -> Option<[f64; 2]> {
         (self.in_plane == InPlane::Elastic)
-            .then(|| self.stiffness.iter().find(|[k_n, k_t]| *k_n <= 4.0 / 3.0 * k_t).copied())
+            .then(|| {
+                self.stiffness
+                    .iter()
+                    .find(|[k_n, k_t]| *k_n <= 4.0 / 3.0 * k_t)
+                    .copied()
+            })
             .flatten()
     }
 
@@ -74,9 +79,19 @@ impl Layer {
         match self.in_plane {
             InPlane::Elastic => {
                 let kappa = 1.0 - 2.0 * k_t / k_n;
-                Moduli { t, kappa, lambda: kappa * k_n * t, m: k_n * t }
+                Moduli {
+                    t,
+                    kappa,
+                    lambda: kappa * k_n * t,
+                    m: k_n * t,
+                }
             }
-            InPlane::None => Moduli { t, kappa: 0.0, lambda: 0.0, m: 0.0 },
+            InPlane::None => Moduli {
+                t,
+                kappa: 0.0,
+                lambda: 0.0,
+                m: 0.0,
+            },
         }
     }
 
@@ -85,7 +100,10 @@ impl Layer {
         for point in 0..self.stiffness.len() {
             let Moduli { t, kappa, .. } = self.moduli(point);
             let change = |c: usize| strain[4 * point + c] - strain_0[4 * point + c];
-            let jump = [t * (change(1) + kappa * (change(0) + change(2))), t * change(3)];
+            let jump = [
+                t * (change(1) + kappa * (change(0) + change(2))),
+                t * change(3),
+            ];
             for c in 0..2 {
                 self.jump.trial[2 * point + c] = self.jump.committed[2 * point + c] + jump[c];
             }
@@ -95,12 +113,14 @@ impl Layer {
     /// Trial stresses along the layer, equation (2); those across it are already there.
     pub(super) fn stresses_along(&self, strain: &Field, stress: &mut Field) {
         for point in 0..self.stiffness.len() {
-            let Moduli { kappa, lambda, m, .. } = self.moduli(point);
+            let Moduli {
+                kappa, lambda, m, ..
+            } = self.moduli(point);
             let at = |c: usize| 4 * point + c;
             let change = |c: usize| strain.trial[at(c)] - strain.committed[at(c)];
             let (e_m, e_theta) = (change(0), change(2));
-            let common = kappa
-                * (stress.trial[at(1)] - stress.committed[at(1)] - lambda * (e_m + e_theta));
+            let common =
+                kappa * (stress.trial[at(1)] - stress.committed[at(1)] - lambda * (e_m + e_theta));
             stress.trial[at(0)] = stress.committed[at(0)] + common + m * e_m + lambda * e_theta;
             stress.trial[at(2)] = stress.committed[at(2)] + common + m * e_theta + lambda * e_m;
         }
@@ -110,7 +130,12 @@ impl Layer {
     pub(super) fn tangents(&self, operators: &[f64], tangents: &mut [f64]) {
         let points = operators.chunks_exact(4).zip(tangents.chunks_exact_mut(16));
         for (point, (d, tangent)) in points.enumerate() {
-            let Moduli { t, kappa, lambda, m } = self.moduli(point);
+            let Moduli {
+                t,
+                kappa,
+                lambda,
+                m,
+            } = self.moduli(point);
             // Derivatives of normal and shear stress by (ε_m, ε_n, ε_θ, γ).
             let normal = [t * d[0] * kappa, t * d[0], t * d[0] * kappa, t * d[1]];
             let shear = [t * d[2] * kappa, t * d[2], t * d[2] * kappa, t * d[3]];

@@ -42,7 +42,10 @@ pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
                 })?;
             }
             (Formulation::ZeroThickness, None) => {
-                let message = format!("group `{}` needs a `line` to be inserted along", name.get_ref());
+                let message = format!(
+                    "group `{}` needs a `line` to be inserted along",
+                    name.get_ref()
+                );
                 return Err(source.error(name.span(), message).into());
             }
             (_, Some(line)) => {
@@ -70,13 +73,17 @@ fn grid(source: &Source, origin: f64, parts: &[Spanned<PartInput>]) -> Result<Ve
             return error(format!("`ratio` is {ratio}, expected a positive number"));
         }
         if !to.is_finite() || to <= start {
-            return error(format!("`to` is {to}, expected more than {start}, where the part starts"));
+            return error(format!(
+                "`to` is {to}, expected more than {start}, where the part starts"
+            ));
         }
         // Sizes first, first·ratio, first·ratio², … add up to the whole part.
         let sizes: Vec<f64> = (0..n).map(|i| ratio.powi(i as i32)).collect();
         let total: f64 = sizes.iter().sum();
         if !total.is_finite() || sizes.iter().any(|s| s / total < 1e-12) {
-            return error(format!("`ratio` {ratio} over {n} parts leaves parts of no size"));
+            return error(format!(
+                "`ratio` {ratio} over {n} parts leaves parts of no size"
+            ));
         }
         let mut sum = 0.0;
         for size in &sizes[..n - 1] {
@@ -104,12 +111,26 @@ fn element_groups(
     let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
     let mut group = vec![usize::MAX; n_columns * n_rows];
     for region in &file.mesh.regions {
-        let RegionInput { group: name, x: in_x, y: in_y } = region;
-        let number = file.groups.keys().position(|key| key.get_ref() == name.get_ref());
+        let RegionInput {
+            group: name,
+            x: in_x,
+            y: in_y,
+        } = region;
+        let number = file
+            .groups
+            .keys()
+            .position(|key| key.get_ref() == name.get_ref());
         let Some(number) = number else {
-            let names: Vec<&str> = file.groups.keys().map(|key| key.get_ref().as_str()).collect();
+            let names: Vec<&str> = file
+                .groups
+                .keys()
+                .map(|key| key.get_ref().as_str())
+                .collect();
             return Err(source
-                .error(name.span(), format!("there is no group `{}`", name.get_ref()))
+                .error(
+                    name.span(),
+                    format!("there is no group `{}`", name.get_ref()),
+                )
                 .hint(suggestion(name.get_ref(), names))
                 .into());
         };
@@ -152,8 +173,10 @@ fn interval(
         if (grid[nearest] - at).abs() <= tolerance {
             Ok(nearest)
         } else {
-            Err(source
-                .error(extent.span(), format!("{at} is no grid line, the nearest is {}", grid[nearest])))
+            Err(source.error(
+                extent.span(),
+                format!("{at} is no grid line, the nearest is {}", grid[nearest]),
+            ))
         }
     };
     let [from, to] = *extent.get_ref();
@@ -169,7 +192,9 @@ fn interval(
 fn quads(x: &[f64], y: &[f64], groups: &[usize]) -> Mesh {
     let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
     let with_middles = |grid: &[f64]| -> Vec<f64> {
-        let pairs = grid.windows(2).flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
+        let pairs = grid
+            .windows(2)
+            .flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
         pairs.chain([grid[grid.len() - 1]]).collect()
     };
     let (fine_x, fine_y) = (with_middles(x), with_middles(y));
@@ -196,7 +221,10 @@ fn quads(x: &[f64], y: &[f64], groups: &[usize]) -> Mesh {
                 at(1, 2),
                 at(0, 1),
             ];
-            mesh.quads.push(Quad { nodes, group: groups[row * n_columns + column] });
+            mesh.quads.push(Quad {
+                nodes,
+                group: groups[row * n_columns + column],
+            });
         }
     }
     mesh
@@ -205,13 +233,16 @@ fn quads(x: &[f64], y: &[f64], groups: &[usize]) -> Mesh {
 /// Edges (or the node) of the mesh on a line.
 fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, String> {
     let on = |node: usize| {
-        [line.x, line.y].iter().zip(mesh.nodes[node]).all(|(wanted, at)| match wanted {
-            None => true,
-            Some(Coordinate::At(position)) => (at - position).abs() <= tolerance,
-            Some(Coordinate::Between([from, to])) => {
-                at >= from - tolerance && at <= to + tolerance
-            }
-        })
+        [line.x, line.y]
+            .iter()
+            .zip(mesh.nodes[node])
+            .all(|(wanted, at)| match wanted {
+                None => true,
+                Some(Coordinate::At(position)) => (at - position).abs() <= tolerance,
+                Some(Coordinate::Between([from, to])) => {
+                    at >= from - tolerance && at <= to + tolerance
+                }
+            })
     };
     match (line.x, line.y) {
         (Some(Coordinate::At(_)), Some(Coordinate::At(_))) => {
@@ -219,7 +250,10 @@ fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, Stri
             if nodes.is_empty() {
                 return Err("there is no node at this point".to_owned());
             }
-            Ok(Line { edges: Vec::new(), nodes })
+            Ok(Line {
+                edges: Vec::new(),
+                nodes,
+            })
         }
         (Some(Coordinate::At(_)), _) | (_, Some(Coordinate::At(_))) => {
             let mut edges = Vec::new();
@@ -233,7 +267,10 @@ fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, Stri
             if edges.is_empty() {
                 return Err("no edge of an element lies on it".to_owned());
             }
-            Ok(Line { edges, nodes: Vec::new() })
+            Ok(Line {
+                edges,
+                nodes: Vec::new(),
+            })
         }
         _ => Err("one coordinate must be a number, such as `x = 0.0`".to_owned()),
     }
@@ -261,7 +298,11 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
             return Err("the line lies on the boundary: nothing to split".to_owned());
         };
         let (ca, cb) = (centre(a.0), centre(b.0));
-        pairs.push(if ca[0] + ca[1] < cb[0] + cb[1] { (a, b) } else { (b, a) });
+        pairs.push(if ca[0] + ca[1] < cb[0] + cb[1] {
+            (a, b)
+        } else {
+            (b, a)
+        });
     }
     // A node is doubled if the quads around it fall apart: ends on the boundary and inner nodes
     // do; an end inside the mesh does not.
@@ -319,7 +360,11 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
     let position = mesh.nodes[joints[0].minus[0]][across];
     for q in 0..mesh.quads.len() {
         let nodes = mesh.quads[q].nodes;
-        let at = nodes[..4].iter().map(|&n| mesh.nodes[n][across]).sum::<f64>() / 4.0;
+        let at = nodes[..4]
+            .iter()
+            .map(|&n| mesh.nodes[n][across])
+            .sum::<f64>()
+            / 4.0;
         if at > position {
             for i in 0..8 {
                 if let Some(&new) = copy.get(&nodes[i]) {
@@ -337,11 +382,18 @@ fn collect_line_nodes(mesh: &mut Mesh) {
     let mut lines = std::mem::take(&mut mesh.lines);
     for line in lines.values_mut() {
         if !line.edges.is_empty() {
-            line.nodes = line.edges.iter().flat_map(|&edge| mesh.edge(edge)).collect();
+            line.nodes = line
+                .edges
+                .iter()
+                .flat_map(|&edge| mesh.edge(edge))
+                .collect();
         }
         line.nodes.sort_unstable_by(|&a, &b| {
             let (pa, pb) = (mesh.nodes[a], mesh.nodes[b]);
-            pa[0].total_cmp(&pb[0]).then(pa[1].total_cmp(&pb[1])).then(a.cmp(&b))
+            pa[0]
+                .total_cmp(&pb[0])
+                .then(pa[1].total_cmp(&pb[1]))
+                .then(a.cmp(&b))
         });
         line.nodes.dedup();
     }

@@ -24,7 +24,10 @@ pub(super) struct Fields {
 impl Fields {
     /// `None` if fields are not asked for.
     pub(super) fn create(folder: &Path, when: When, _: &Model) -> Option<Self> {
-        (when != When::Never).then(|| Self { folder: folder.to_owned(), times: Vec::new() })
+        (when != When::Never).then(|| Self {
+            folder: folder.to_owned(),
+            times: Vec::new(),
+        })
     }
 
     pub(super) fn write(
@@ -38,9 +41,14 @@ impl Fields {
         std::fs::write(&path, unstructured_grid(snapshot, mesh))
             .map_err(|error| unwritable(&path, error))?;
         self.times.push(time);
-        let mut list = String::from("<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n");
+        let mut list =
+            String::from("<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n");
         for (number, time) in self.times.iter().enumerate() {
-            let _ = writeln!(list, "<DataSet timestep=\"{time}\" file=\"{}\"/>", file(number));
+            let _ = writeln!(
+                list,
+                "<DataSet timestep=\"{time}\" file=\"{}\"/>",
+                file(number)
+            );
         }
         list.push_str("</Collection>\n</VTKFile>\n");
         let path = self.folder.join("fields.pvd");
@@ -50,8 +58,9 @@ impl Fields {
 
 /// Means over the integration points of every element, by name of the quantity.
 fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
-    let mut names: Vec<String> =
-        ["stress_11", "stress_22", "stress_33", "stress_12"].map(str::to_owned).to_vec();
+    let mut names: Vec<String> = ["stress_11", "stress_22", "stress_33", "stress_12"]
+        .map(str::to_owned)
+        .to_vec();
     names.extend(["jump_n", "jump_t", "traction_n", "traction_t"].map(str::to_owned));
     for group in snapshot.groups {
         for variable in &group.law.built.law.formulation().internal_variables {
@@ -69,7 +78,9 @@ fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
                 let sum: f64 = points
                     .map(|point| match number {
                         0..4 => group.global_stress(point).map(|s| s[number]),
-                        4..6 => group.jump_and_traction(point).map(|(jump, _)| jump[number - 4]),
+                        4..6 => group
+                            .jump_and_traction(point)
+                            .map(|(jump, _)| jump[number - 4]),
                         6..8 => group.jump_and_traction(point).map(|(_, t)| t[number - 6]),
                         _ => group.internal_variable(point, name),
                     })
@@ -98,7 +109,11 @@ fn unstructured_grid(snapshot: &Snapshot<'_>, mesh: &Mesh) -> String {
             }
             end += shown.len();
             offsets.push(end);
-            types.push(if is_quad { QUADRATIC_QUAD } else { QUADRATIC_EDGE });
+            types.push(if is_quad {
+                QUADRATIC_QUAD
+            } else {
+                QUADRATIC_EDGE
+            });
             groups.push(number);
         }
     }
@@ -115,7 +130,12 @@ fn unstructured_grid(snapshot: &Snapshot<'_>, mesh: &Mesh) -> String {
         })
     };
     let points = reals(&mut mesh.nodes.iter().flat_map(|[x, y]| [*x, *y, 0.0]));
-    let u = reals(&mut snapshot.displacement.chunks_exact(2).flat_map(|u| [u[0], u[1], 0.0]));
+    let u = reals(
+        &mut snapshot
+            .displacement
+            .chunks_exact(2)
+            .flat_map(|u| [u[0], u[1], 0.0]),
+    );
     let types: Vec<usize> = types.into_iter().map(usize::from).collect();
     let mut cells = String::new();
     for (name, values) in cell_data(snapshot) {

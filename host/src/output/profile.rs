@@ -23,7 +23,11 @@ impl Profile {
             return Ok(None);
         }
         let mut variables: Vec<String> = Vec::new();
-        let swapped = model.swaps.iter().flatten().map(|(group, law)| (&model.groups[*group], law));
+        let swapped = model
+            .swaps
+            .iter()
+            .flatten()
+            .map(|(group, law)| (&model.groups[*group], law));
         let first = model.groups.iter().map(|group| (group, &group.law));
         for (group, law) in first.chain(swapped) {
             for variable in &law.built.law.formulation().internal_variables {
@@ -33,10 +37,22 @@ impl Profile {
             }
         }
         let columns = [
-            "phase", "increment", "group", "element", "point", "x", "y", "s", "jump_n", "jump_t",
-            "traction_n", "traction_t",
+            "phase",
+            "increment",
+            "group",
+            "element",
+            "point",
+            "x",
+            "y",
+            "s",
+            "jump_n",
+            "jump_t",
+            "traction_n",
+            "traction_t",
         ];
-        let columns = columns.into_iter().chain(variables.iter().map(String::as_str));
+        let columns = columns
+            .into_iter()
+            .chain(variables.iter().map(String::as_str));
         let table = Table::create(folder.join("profile.csv"), columns)?;
         Ok(Some(Self { table, variables }))
     }
@@ -45,7 +61,9 @@ impl Profile {
         for group in groups {
             let per_element = group.kinematics.points_per_element();
             for point in 0..group.kinematics.n_points() {
-                let Some((jump, traction)) = group.jump_and_traction(point) else { break };
+                let Some((jump, traction)) = group.jump_and_traction(point) else {
+                    break;
+                };
                 let [x, y] = group.kinematics.position(point);
                 let along = group.kinematics.axes(point / per_element).along;
                 let s = along[0] * x + along[1] * y;
@@ -59,7 +77,10 @@ impl Profile {
                 let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]];
                 row.extend(values.map(number));
                 row.extend(self.variables.iter().map(|id| {
-                    group.internal_variable(point, id).map(number).unwrap_or_default()
+                    group
+                        .internal_variable(point, id)
+                        .map(number)
+                        .unwrap_or_default()
                 }));
                 self.table.row(&row)?;
             }

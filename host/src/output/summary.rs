@@ -76,7 +76,10 @@ impl Summary {
             .map(|g| (g.name.clone(), g.kinematics.n_elements().into()))
             .collect();
         let mut head = Map::new();
-        head.insert("program".to_owned(), json!(format!("pilum {}", env!("CARGO_PKG_VERSION"))));
+        head.insert(
+            "program".to_owned(),
+            json!(format!("pilum {}", env!("CARGO_PKG_VERSION"))),
+        );
         head.insert("case".to_owned(), json!(case.name()));
         head.insert("title".to_owned(), json!(case.file.title));
         head.insert(
@@ -105,14 +108,20 @@ impl Summary {
     }
 
     pub(super) fn phase(&mut self, record: PhaseRecord) {
-        let last = self.last.as_ref().filter(|(place, _)| place.phase == record.name);
+        let last = self
+            .last
+            .as_ref()
+            .filter(|(place, _)| place.phase == record.name);
         let probes = last.map(|(_, probes)| probes.clone()).unwrap_or_default();
         self.phases.push(PhaseRecord { probes, ..record });
     }
 
     fn probes(&self, values: &[Option<f64>]) -> Value {
         let pairs = self.probe_names.iter().zip(values);
-        pairs.map(|(name, value)| (name.clone(), json!(value))).collect::<Map<_, _>>().into()
+        pairs
+            .map(|(name, value)| (name.clone(), json!(value)))
+            .collect::<Map<_, _>>()
+            .into()
     }
 
     pub(super) fn finish(
@@ -123,12 +132,15 @@ impl Summary {
         error: Option<&Error>,
     ) -> Value {
         let mut summary = self.head.clone();
-        summary.insert("status".to_owned(), json!(match error {
-            None => "done",
-            Some(Error::NoEquilibrium { .. }) => "no equilibrium",
-            Some(Error::Plugin { .. }) => "plugin trouble",
-            Some(_) => "stopped",
-        }));
+        summary.insert(
+            "status".to_owned(),
+            json!(match error {
+                None => "done",
+                Some(Error::NoEquilibrium { .. }) => "no equilibrium",
+                Some(Error::Plugin { .. }) => "plugin trouble",
+                Some(_) => "stopped",
+            }),
+        );
         summary.insert("error".to_owned(), json!(error.map(ToString::to_string)));
         let phases: Vec<Value> = self
             .phases
@@ -167,7 +179,9 @@ impl Summary {
                 "increment": place.increment,
             }))),
         );
-        let values = last.map(|(_, values)| values.as_slice()).unwrap_or_default();
+        let values = last
+            .map(|(_, values)| values.as_slice())
+            .unwrap_or_default();
         summary.insert("probes".to_owned(), self.probes(values));
         summary.insert(
             "seconds".to_owned(),
@@ -183,7 +197,16 @@ fn law(built: &BuiltLaw) -> Value {
     let parameters: Map<String, Value> = built
         .parameters
         .iter()
-        .map(|p| (p.id.clone(), if p.value.is_nan() { Value::Null } else { json!(p.value) }))
+        .map(|p| {
+            (
+                p.id.clone(),
+                if p.value.is_nan() {
+                    Value::Null
+                } else {
+                    json!(p.value)
+                },
+            )
+        })
         .collect();
     json!({
         "law": description.id,

@@ -15,9 +15,10 @@ use super::description::{
 use abi::Hypothesis;
 use abi::raw::{self, Batch, Formulation, Host, Instance, Law, MagicBlock, Parameter, Plugin};
 use abi::raw::{Status, Variable, View, ViewMut};
-use abi::version;
+use abi::version::{self, FORMULATION_SIZE_1_0, LAW_SIZE_1_0, PARAMETER_SIZE_1_0};
+use abi::version::{PLUGIN_SIZE_1_0, VARIABLE_SIZE_1_0};
 use std::ffi::{CStr, c_char};
-use std::mem::size_of;
+use std::mem::{MaybeUninit, size_of};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
@@ -51,9 +52,13 @@ pub(super) struct OpenLibrary {
     pub(super) laws: Vec<(LawDescription, LawHandle)>,
 }
 
-/// A law in its library's memory.
+/// A law in its library's memory, and what this host knows of it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LawHandle(&'static Law);
+pub(super) struct LawHandle {
+    /// For the law's own eyes.
+    at: *const Law,
+    known: Law,
+}
 
 // SAFETY: descriptions are immutable static data (contract, "Lifetime").
 unsafe impl Send for LawHandle {}
@@ -89,9 +94,14 @@ pub(super) fn open(path: &Path) -> Result<OpenLibrary, String> {
     let entry = unsafe { library.get::<raw::Entry>(b"pilum_entry\0") }
         .map_err(|_| "it has no symbol `pilum_entry`".to_owned())?;
     // SAFETY: contract, "Entry": may be called with any valid host block, from any thread.
-    let plugin = unsafe { entry(&raw const HOST.0).as_ref() }
-        .ok_or_else(|| "it refuses this host (`pilum_entry` returned null)".to_owned())?;
-    describe(plugin)
+    let plugin = unsafe { entry(&raw const HOST.0) };
+    if plugin.is_null() {
+        return Err("it refuses this host (`pilum_entry` returned null)".to_owned());
+    }
+    // SAFETY: contract, "Descriptions": static.
+    let plugin = unsafe { known(plugin, PLUGIN_SIZE_1_0) }
+        .ok_or_else(|| "`pilum_plugin` is truncated".to_owned())?;
+    describe(&plugin)
 }
 
 #[cfg(unix)]
@@ -116,10 +126,10 @@ fn check_rust_layout(library: &'static libloading::Library) -> Result<(), String
         return Ok(());
     };
     // SAFETY: as above; the block is static.
-    let block: &'static RustLayout = unsafe { &**block };
-    if (block.struct_size as usize) < size_of::<RustLayout>() || block.layout.is_null() {
+    let block = unsafe { known(*block, version::RUST_LAYOUT_SIZE_1_0) };
+    let Some(block) = block.filter(|block| !block.layout.is_null()) else {
         return Ok(());
-    }
+    };
     if text(block.abi_stable_version, "abi_stable_version")?
         != abi::layout::ABI_STABLE_VERSION.to_string_lossy()
     {
@@ -131,8 +141,39 @@ fn check_rust_layout(library: &'static libloading::Library) -> Result<(), String
         .map_err(|difference| format!("`abi_stable` finds another layout: {difference}"))
 }
 
-/// A table of structs that may be longer than ours: the stride is the first entry's own size.
-fn table<T>(first: *const T, n: u32, what: &str) -> Result<Vec<&'static T>, String> {
+/// The struct at `p` as far as its writer knew it, see [`known_part`]. `None` if it is shorter than
+/// it was in version 1.0.
+///
+/// # Safety
+/// `p` points to a struct of the contract with as many bytes as its `struct_size` says; all-zero is
+/// a valid `T`.
+unsafe fn known<T: Copy>(p: *const T, size_1_0: usize) -> Option<T> {
+    // SAFETY: contract, "Growing structs": every struct starts with its size as `u32`.
+    let size = unsafe { p.cast::<u32>().read() } as usize;
+    // SAFETY: passed on to the caller.
+    (size >= size_1_0).then(|| unsafe { known_part(p, size) })
+}
+
+/// The first `size` bytes at `p` as a `T`: the rule of growing structs in one place. No reference
+/// to the library's struct is made, since one would promise all of today's fields. A field later
+/// than version 1.0 reads as zero (null, none) if its writer did not know it, and what a later
+/// writer knows beyond `T` is left alone.
+///
+/// # Safety
+/// `p` is valid for `size` bytes, which cover at least version 1.0; all-zero is a valid `T`.
+unsafe fn known_part<T: Copy>(p: *const T, size: usize) -> T {
+    let mut copy = MaybeUninit::<T>::zeroed();
+    // SAFETY: both sides hold that many bytes, see above.
+    unsafe {
+        p.cast::<u8>()
+            .copy_to_nonoverlapping(copy.as_mut_ptr().cast(), size.min(size_of::<T>()));
+        copy.assume_init()
+    }
+}
+
+/// A table of structs that may be longer than ours, or end sooner where ours have grown since
+/// version 1.0: the stride is the first entry's own size.
+fn table<T: Copy>(first: *const T, n: u32, size_1_0: usize, what: &str) -> Result<Vec<T>, String> {
     if n == 0 {
         return Ok(Vec::new());
     }
@@ -146,19 +187,17 @@ fn table<T>(first: *const T, n: u32, what: &str) -> Result<Vec<&'static T>, Stri
     }
     // SAFETY: contract, "Growing structs": every struct starts with its size as `u32`.
     let stride = unsafe { first.cast::<u32>().read() } as usize;
-    if stride < size_of::<T>() || !stride.is_multiple_of(align_of::<T>()) {
+    if stride < size_1_0 || !stride.is_multiple_of(align_of::<T>()) {
         return Err(format!(
-            "the table of {what} has entries of {stride} bytes, expected at least {}",
-            size_of::<T>()
+            "the table of {what} has entries of {stride} bytes, expected at least {size_1_0}"
         ));
     }
-    (0..n as usize)
-        .map(|i| {
-            // SAFETY: contract, "Descriptions": `n` entries, static, of this stride.
-            let entry = unsafe { &*first.byte_add(i * stride) };
-            Ok(entry)
-        })
-        .collect()
+    let entries = (0..n as usize).map(|i| {
+        // SAFETY: contract, "Descriptions": `n` entries, static, of this stride; they are numbers
+        // and pointers, of which zero is one.
+        unsafe { known_part(first.byte_add(i * stride), stride) }
+    });
+    Ok(entries.collect())
 }
 
 /// Copies a text; null is an empty one.
@@ -205,42 +244,50 @@ fn unique<'a>(ids: impl Iterator<Item = &'a str>, what: &str) -> Result<(), Stri
     Ok(())
 }
 
-fn describe(plugin: &'static Plugin) -> Result<OpenLibrary, String> {
-    if (plugin.struct_size as usize) < size_of::<Plugin>() {
-        return Err("`pilum_plugin` is truncated".to_owned());
-    }
+fn describe(plugin: &Plugin) -> Result<OpenLibrary, String> {
     if plugin.n_laws == 0 || plugin.n_laws > LONGEST_TABLE || plugin.law.is_null() {
         return Err(format!("it declares {} laws", plugin.n_laws));
     }
     let laws = (0..plugin.n_laws as usize)
         .map(|i| {
             // SAFETY: contract, "Descriptions": `n_laws` pointers to static laws.
-            let law = unsafe { (*plugin.law.add(i)).as_ref() };
-            let law: &'static Law = law.ok_or_else(|| format!("law {i} is null"))?;
-            let described = describe_law(law).map_err(|why| format!("law {i}: {why}"))?;
-            Ok((described, LawHandle(law)))
+            let at = unsafe { plugin.law.add(i).read() };
+            if at.is_null() {
+                return Err(format!("law {i} is null"));
+            }
+            // SAFETY: as above.
+            let law = unsafe { known(at, LAW_SIZE_1_0) }
+                .ok_or_else(|| format!("law {i}: `pilum_law` is truncated"))?;
+            let described = describe_law(&law).map_err(|why| format!("law {i}: {why}"))?;
+            Ok((described, LawHandle { at, known: law }))
         })
         .collect::<Result<Vec<_>, String>>()?;
     unique(laws.iter().map(|(law, _)| law.id.as_str()), "law")?;
     Ok(OpenLibrary { laws })
 }
 
-fn describe_law(law: &'static Law) -> Result<LawDescription, String> {
-    if (law.struct_size as usize) < size_of::<Law>() {
-        return Err("`pilum_law` is truncated".to_owned());
-    }
+fn describe_law(law: &Law) -> Result<LawDescription, String> {
     if law.create.is_none() || law.integrate.is_none() || law.destroy.is_none() {
         return Err("`create`, `integrate` or `destroy` is null".to_owned());
     }
-    let parameters = table(law.parameter, law.n_parameters, "parameters")?
-        .into_iter()
-        .map(describe_parameter)
-        .collect::<Result<Vec<_>, _>>()?;
+    let parameters = table(
+        law.parameter,
+        law.n_parameters,
+        PARAMETER_SIZE_1_0,
+        "parameters",
+    )?
+    .iter()
+    .map(describe_parameter)
+    .collect::<Result<Vec<_>, _>>()?;
     unique(parameters.iter().map(|p| p.id.as_str()), "parameter")?;
     let mut formulations = Vec::new();
-    for (index, formulation) in
-        (0..).zip(table(law.formulation, law.n_formulations, "formulations")?)
-    {
+    let declared = table(
+        law.formulation,
+        law.n_formulations,
+        FORMULATION_SIZE_1_0,
+        "formulations",
+    )?;
+    for (index, formulation) in (0..).zip(&declared) {
         // Hypotheses that came later than this host are passed over.
         if let Some(hypothesis) = Hypothesis::from_code(formulation.hypothesis) {
             formulations.push(describe_formulation(formulation, hypothesis, index)?);
@@ -260,7 +307,7 @@ fn describe_law(law: &'static Law) -> Result<LawDescription, String> {
     })
 }
 
-fn describe_parameter(p: &'static Parameter) -> Result<ParameterDescription, String> {
+fn describe_parameter(p: &Parameter) -> Result<ParameterDescription, String> {
     let id = identifier(p.id, "a parameter")?;
     let mut choices = Vec::new();
     if !p.choices.is_null() {
@@ -308,7 +355,7 @@ fn describe_parameter(p: &'static Parameter) -> Result<ParameterDescription, Str
 }
 
 fn describe_formulation(
-    formulation: &'static Formulation,
+    formulation: &Formulation,
     hypothesis: Hypothesis,
     index: u32,
 ) -> Result<FormulationDescription, String> {
@@ -322,8 +369,8 @@ fn describe_formulation(
         (flux_id, formulation.flux, formulation.n_fluxes),
     ];
     for (expected, variables, n) in pair {
-        let found = table(variables, n, "gradients or fluxes")?;
-        let &[variable] = found.as_slice() else {
+        let found = table(variables, n, VARIABLE_SIZE_1_0, "gradients or fluxes")?;
+        let [variable] = found.as_slice() else {
             return Err(format!(
                 "{name}: {n} gradients or fluxes, this host uses one pair"
             ));
@@ -341,9 +388,10 @@ fn describe_formulation(
     for variable in table(
         formulation.state,
         formulation.n_states,
+        VARIABLE_SIZE_1_0,
         "internal variables",
     )? {
-        internal_variables.extend(describe_variable(variable)?);
+        internal_variables.extend(describe_variable(&variable)?);
     }
     unique(
         internal_variables.iter().map(|v| v.id.as_str()),
@@ -359,7 +407,7 @@ fn describe_formulation(
     })
 }
 
-fn describe_variable(v: &'static Variable) -> Result<Vec<InternalVariable>, String> {
+fn describe_variable(v: &Variable) -> Result<Vec<InternalVariable>, String> {
     let id = identifier(v.id, "an internal variable")?;
     if v.n_components == 0 || v.n_components > LONGEST_TABLE {
         return Err(format!(
@@ -405,7 +453,7 @@ unsafe impl Sync for OwnedInstance {}
 
 impl Drop for OwnedInstance {
     fn drop(&mut self) {
-        if let Some(destroy) = self.law.0.destroy {
+        if let Some(destroy) = self.law.known.destroy {
             // SAFETY: contract, "create": the pointer came from `create` and is not used again.
             unsafe { destroy(self.instance) };
         }
@@ -425,7 +473,7 @@ impl LawHandle {
         formulation: u32,
         parameters: &[f64],
     ) -> Result<OwnedInstance, CallFailure> {
-        let Some(create) = self.0.create else {
+        let Some(create) = self.known.create else {
             return Err((raw::PILUM_E_INTERNAL, "`create` is null".to_owned()));
         };
         let mut instance = null_mut();
@@ -433,7 +481,7 @@ impl LawHandle {
         // SAFETY: contract, "create": all pointers are valid for the call, counts are true.
         let status = unsafe {
             create(
-                self.0,
+                self.at,
                 &raw const HOST.0,
                 formulation,
                 parameters.as_ptr(),
@@ -566,13 +614,13 @@ pub(super) struct Call<'a> {
 impl OwnedInstance {
     /// Asks for initial internal variables. `None` if the law has no `init_state`.
     pub(super) fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
-        let init = self.law.0.init_state?;
+        let init = self.law.known.init_state?;
         Some(self.call(init, call))
     }
 
     /// Carries the points over the increment. Returns the most severe status and a message.
     pub(super) fn integrate(&self, call: Call<'_>) -> (Status, String) {
-        match self.law.0.integrate {
+        match self.law.known.integrate {
             Some(integrate) => self.call(integrate, call),
             None => (raw::PILUM_E_INTERNAL, "`integrate` is null".to_owned()),
         }
@@ -595,6 +643,8 @@ impl OwnedInstance {
             struct_size: size_of::<Batch>() as u32,
             request: call.request,
             n_points: n as u64,
+            // Always: messages count the points of the batch. Whoever knows the elements puts the
+            // place in front, from the number of the point that failed.
             first_point: 0,
             time: call.time,
             time_increment: call.time_increment,

@@ -9,8 +9,10 @@
 //!
 //! Newton's method with the law's tangent, restricted to f, comes first. Where that matrix is
 //! singular, the step is the least-squares solution of minimum norm. A line search keeps ‖r‖
-//! falling. Where this ends, fixed-point iterations with the elastic operator go on, accelerated
-//! after Anderson (type II); they need no tangent and reach contact, edges and apices.
+//! falling. Where it does not fall, the flux does not answer to what is left of r: on an edge, at
+//! an apex, over an open gap. Then a search along the elastic direction leaves that zone. Where
+//! this ends too, fixed-point iterations with the elastic operator go on, accelerated after
+//! Anderson (type II).
 
 use super::{N_MAX, Vector};
 use crate::plugin::{BatchFailure, End, Law, Operator, Start, Strided};
@@ -29,6 +31,9 @@ const FLAT: f64 = 1e-10;
 const MAX_NEWTON: usize = 40;
 const MAX_HALVINGS: usize = 10;
 const MAX_RELAXATIONS: usize = 160;
+/// Doublings and bisections on the way out of a zone where the flux does not answer.
+const MAX_DOUBLINGS: usize = 100;
+const MAX_BISECTIONS: usize = 60;
 /// Iterations spent on coming closer than [`RELATIVE_TOLERANCE`] of the largest flux.
 const MAX_POLISH: usize = 3;
 /// Newton is tried again after so many fixed-point iterations.
@@ -304,13 +309,17 @@ impl<'a> Search<'a> {
     fn assess(&mut self, step: &Step<'_>) {
         let sample = &mut self.trial;
         let (flux, gradient) = (&sample.point.flux[..self.n], &sample.point.gradient);
-        let reach = largest(&gradient[..self.n]).max(largest(&step.start.gradient[..self.n]));
+        let start_reach = largest(&step.start.gradient[..self.n]);
         let mut scale = largest(flux).max(largest(&step.start.flux[..self.n]));
         let mut springs = [0.0; N_MAX];
         for (k, &i) in self.free[..self.n_free].iter().enumerate() {
             springs[k] = self.stiffness[i] * (gradient[i] - self.origin[i]);
             scale = scale.max(f64::abs(springs[k])).max(step.goal.flux[i].abs());
         }
+        // A free component that runs away must not widen its own tolerance.
+        let likely = 10.0 * (start_reach + largest(&step.goal.gradient[..self.n]))
+            + 1e3 * scale / self.elastic_norm.max(f64::MIN_POSITIVE);
+        let reach = start_reach.max(largest(&gradient[..self.n]).min(likely));
         let mut verdict = Verdict::Tight;
         let mut worst = 0.0;
         let mut miss = None;
@@ -401,7 +410,7 @@ impl<'a> Search<'a> {
                 Verdict::Far => {}
             }
             let d = self.descent(&self.base.operator, &self.base.residual);
-            if !self.line_search(step, &d)? {
+            if !self.line_search(step, &d)? && !self.escape(step, &d)? {
                 break;
             }
         }
@@ -426,6 +435,70 @@ impl<'a> Search<'a> {
         Ok(false)
     }
 
+    /// Moves `base` along the elastic answer to what the step d leaves of the residual, until the
+    /// residual falls. `false`: it does not fall.
+    fn escape(&mut self, step: &Step<'_>, d: &Vector) -> Result<bool, Fatal> {
+        let left = self.left_over(d);
+        let direction = self.descent(&self.elastic, &left);
+        let longest = 8.0
+            * (largest(&step.start.gradient)
+                + largest(&self.base.point.gradient)
+                + largest(&direction));
+        let enough = 0.9 * self.base.norm;
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut fraction = 1.0;
+        for _ in 0..MAX_DOUBLINGS + MAX_BISECTIONS {
+            let Some(gradient) = self.moved(&direction, fraction) else {
+                return Ok(false);
+            };
+            let answers = if self.evaluate(step, gradient, self.tangent)? {
+                if self.trial.norm <= enough {
+                    swap(&mut self.base, &mut self.trial);
+                    return Ok(true);
+                }
+                let turned: f64 = (0..self.n_free)
+                    .map(|k| self.trial.residual[k] * left[k])
+                    .sum();
+                turned <= 0.0
+            } else {
+                true
+            };
+            if answers {
+                high = fraction;
+            } else {
+                low = fraction;
+            }
+            fraction = if high.is_finite() {
+                0.5 * (low + high)
+            } else {
+                2.0 * fraction
+            };
+            let resolved = high.is_finite() && high - low <= 1e-15 * high;
+            if resolved || fraction * largest(&direction) > longest {
+                return Ok(false);
+            }
+        }
+        Ok(false)
+    }
+
+    /// What a step d leaves of the residual of `base`, to first order; the whole of it where that
+    /// is next to nothing.
+    fn left_over(&self, d: &Vector) -> Vector {
+        let mut left = self.base.residual;
+        for (k, &i) in self.free[..self.n_free].iter().enumerate() {
+            let answer: f64 = self.free[..self.n_free]
+                .iter()
+                .map(|&j| self.base.operator[i * self.n + j] * d[j])
+                .sum();
+            left[k] += answer + self.stiffness[i] * d[i];
+        }
+        if norm(&left[..self.n_free]) > 1e-3 * self.base.norm {
+            left
+        } else {
+            self.base.residual
+        }
+    }
+
     /// The gradient of `base` moved by a part of d; `None` if rounding leaves it where it is.
     fn moved(&self, d: &Vector, fraction: f64) -> Option<Vector> {
         let mut gradient = self.base.point.gradient;
@@ -439,15 +512,14 @@ impl<'a> Search<'a> {
         moves.then_some(gradient)
     }
 
-    /// Fixed-point iterations with the elastic operator. Where the flux does not answer (an open
-    /// gap, an apex), steps double until it does.
+    /// Fixed-point iterations with the elastic operator.
     fn relax(&mut self, step: &Step<'_>, guess: Vector) -> Result<bool, Fatal> {
         if !self.evaluate(step, guess, self.relaxation)? {
             return Ok(false);
         }
         swap(&mut self.base, &mut self.trial);
         let mut history = History::default();
-        let mut stretch = 1.0;
+        let mut damping = 1.0;
         let mut polish = 0;
         for k in 1..=MAX_RELAXATIONS {
             match self.base.verdict {
@@ -457,35 +529,16 @@ impl<'a> Search<'a> {
                 Verdict::Far => {}
             }
             let f = self.descent(&self.base.operator, &self.base.residual);
-            let d = history.accelerated(&f, stretch);
-            let longest = 8.0 * (largest(&step.start.gradient) + largest(&guess) + largest(&f));
+            let d = history.accelerated(&f, damping);
             let Some(gradient) = self.moved(&d, 1.0) else {
                 break;
             };
-            if largest(&d) > longest {
-                break;
-            }
-            if !self.evaluate(step, gradient, self.relaxation)? {
-                history.forget();
-                stretch *= 0.5;
-                if stretch < 1e-3 {
-                    break;
-                }
-                continue;
-            }
-            let answer: f64 = (0..self.n_free)
-                .map(|k| (self.trial.residual[k] - self.base.residual[k]).abs())
-                .fold(0.0, f64::max);
-            if answer <= 1e-12 * self.base.norm {
-                history.forget();
-                stretch *= 2.0;
-                swap(&mut self.base, &mut self.trial);
-                continue;
-            }
-            if self.trial.norm > 2.0 * self.base.norm && stretch <= 1.0 {
+            if !self.evaluate(step, gradient, self.relaxation)?
+                || self.trial.norm > 2.0 * self.base.norm
+            {
                 if history.is_empty() {
-                    stretch *= 0.5;
-                    if stretch < 1e-3 {
+                    damping *= 0.5;
+                    if damping < 1e-3 {
                         break;
                     }
                 }
@@ -494,7 +547,7 @@ impl<'a> Search<'a> {
             }
             let f_new = self.descent(&self.trial.operator, &self.trial.residual);
             history.add(&d, &f, &f_new);
-            stretch = f64::min(1.0, 2.0 * stretch);
+            damping = f64::min(1.0, 2.0 * damping);
             swap(&mut self.base, &mut self.trial);
             if k % NEWTON_EVERY == 0 && self.base.verdict == Verdict::Far {
                 let gradient = self.base.point.gradient;
@@ -537,9 +590,9 @@ impl History {
     }
 
     /// f + … : the step that would cancel f if f were linear in what is remembered.
-    fn accelerated(&self, f: &Vector, stretch: f64) -> Vector {
+    fn accelerated(&self, f: &Vector, damping: f64) -> Vector {
         if self.n == 0 {
-            return f.map(|f| stretch * f);
+            return f.map(|f| damping * f);
         }
         let changes = SMatrix::<f64, N_MAX, MEMORY>::from_fn(|i, k| {
             if k < self.n { self.changes[k][i] } else { 0.0 }

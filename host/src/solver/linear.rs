@@ -34,7 +34,13 @@ impl LinearSolver {
         faer::set_global_parallelism(Par::Seq);
         let pattern = pattern.clone();
         let symbolic = SymbolicLu::try_new(symbolic(&pattern)).map_err(|_| Singular)?;
-        Ok(Self { pattern, symbolic, values: Vec::new(), factors: None, factorisations: 0 })
+        Ok(Self {
+            pattern,
+            symbolic,
+            values: Vec::new(),
+            factors: None,
+            factorisations: 0,
+        })
     }
 
     /// Factorises the matrix with these values.
@@ -95,7 +101,11 @@ impl LinearSolver {
         }
         let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let scale = largest(&row_sums) * largest(x) + largest(right);
-        let error = if scale > 0.0 { largest(&residual) / scale } else { 0.0 };
+        let error = if scale > 0.0 {
+            largest(&residual) / scale
+        } else {
+            0.0
+        };
         let finite = residual.iter().chain(x).all(|v| v.is_finite());
         (residual, if finite { error } else { f64::NAN })
     }
@@ -111,7 +121,10 @@ mod tests {
     use super::*;
 
     fn two_by_two() -> Pattern {
-        Pattern { column_start: vec![0, 2, 4], rows: vec![0, 1, 0, 1] }
+        Pattern {
+            column_start: vec![0, 2, 4],
+            rows: vec![0, 1, 0, 1],
+        }
     }
 
     #[test]
@@ -126,8 +139,8 @@ mod tests {
     #[test]
     fn refuses_a_singular_system() {
         let mut solver = LinearSolver::new(&two_by_two()).unwrap();
-        let refused = solver.factorise(&[1.0, 2.0, 2.0, 4.0]).is_err()
-            || solver.solve(&[1.0, 1.0]).is_err();
+        let refused =
+            solver.factorise(&[1.0, 2.0, 2.0, 4.0]).is_err() || solver.solve(&[1.0, 1.0]).is_err();
         assert!(refused);
     }
 }

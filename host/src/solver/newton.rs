@@ -38,7 +38,11 @@ impl Loads {
 
     /// Value of a prescribed displacement; exact at both ends.
     fn value(start: f64, end: f64, lambda: f64) -> f64 {
-        if lambda >= 1.0 { end } else { start + lambda * (end - start) }
+        if lambda >= 1.0 {
+            end
+        } else {
+            start + lambda * (end - start)
+        }
     }
 }
 
@@ -132,8 +136,17 @@ impl Newton<'_> {
         guess: Option<Vec<f64>>,
     ) -> Result<StepSuccess, StepFailure> {
         let mut iterations = Vec::new();
-        let outcome = self.iterate(loads, [lambda_start, lambda_end], time, guess, &mut iterations);
-        outcome.map_err(|failure| StepFailure { iterations, ..failure })
+        let outcome = self.iterate(
+            loads,
+            [lambda_start, lambda_end],
+            time,
+            guess,
+            &mut iterations,
+        );
+        outcome.map_err(|failure| StepFailure {
+            iterations,
+            ..failure
+        })
     }
 
     fn iterate(
@@ -148,8 +161,8 @@ impl Newton<'_> {
         let period = (time, lambda_end - lambda_start);
         let mut prescribed = vec![0.0; external.len()];
         for &(dof, start, end) in &loads.prescribed {
-            prescribed[dof] = Loads::value(start, end, lambda_end)
-                - Loads::value(start, end, lambda_start);
+            prescribed[dof] =
+                Loads::value(start, end, lambda_end) - Loads::value(start, end, lambda_start);
         }
         let mut increment = match guess {
             Some(mut guess) => {
@@ -161,7 +174,9 @@ impl Newton<'_> {
             }
             None => self.from_tangent(&external, &prescribed, period)?,
         };
-        let mut balance = self.evaluate(&increment, &external, period).map_err(failed_law)?;
+        let mut balance = self
+            .evaluate(&increment, &external, period)
+            .map_err(failed_law)?;
         iterations.push(Iteration {
             residual: balance.relative,
             correction: None,
@@ -171,7 +186,9 @@ impl Newton<'_> {
             let last = iterations[iterations.len() - 1];
             let tolerance = self.settings.force_tolerance;
             let small_correction = last.step_length >= 1.0
-                && last.correction.is_some_and(|c| c <= self.settings.displacement_tolerance);
+                && last
+                    .correction
+                    .is_some_and(|c| c <= self.settings.displacement_tolerance);
             if balance.relative <= EXACT * tolerance
                 || (balance.relative <= tolerance && small_correction)
             {
@@ -213,7 +230,9 @@ impl Newton<'_> {
         period: (f64, f64),
     ) -> Result<Vec<f64>, StepFailure> {
         let still = vec![0.0; external.len()];
-        let balance = self.evaluate(&still, external, period).map_err(failed_law)?;
+        let balance = self
+            .evaluate(&still, external, period)
+            .map_err(failed_law)?;
         let mut increment = self.correction(&balance.residual, Some(prescribed))?;
         for (value, prescribed) in increment.iter_mut().zip(prescribed) {
             *value += prescribed;
@@ -232,12 +251,15 @@ impl Newton<'_> {
         let mut values = Vec::new();
         let mut coupling = vec![0.0; residual.len()];
         let with_coupling = prescribed.map(|p| (p, coupling.as_mut_slice()));
-        self.system.assemble(self.groups, &mut values, with_coupling);
+        self.system
+            .assemble(self.groups, &mut values, with_coupling);
         self.costs.assembly += start.elapsed();
         let start = Instant::now();
         let right: Vec<f64> = residual.iter().zip(&coupling).map(|(r, c)| r - c).collect();
-        let solution =
-            self.solver.factorise(&values).and_then(|()| self.solver.solve(&right));
+        let solution = self
+            .solver
+            .factorise(&values)
+            .and_then(|()| self.solver.solve(&right));
         self.costs.equations += start.elapsed();
         self.costs.factorisations += 1;
         let solution = solution.map_err(|_| {
@@ -264,16 +286,26 @@ impl Newton<'_> {
     ) -> Result<(f64, Vec<f64>, Balance), StepFailure> {
         let mut best: Option<(f64, Vec<f64>, Balance)> = None;
         let mut first_failure = None;
-        let tries = if self.settings.line_search { STEP_LENGTHS.len() } else { 1 };
+        let tries = if self.settings.line_search {
+            STEP_LENGTHS.len()
+        } else {
+            1
+        };
         for &length in &STEP_LENGTHS[..tries] {
-            let moved: Vec<f64> =
-                increment.iter().zip(correction).map(|(u, d)| u + length * d).collect();
+            let moved: Vec<f64> = increment
+                .iter()
+                .zip(correction)
+                .map(|(u, d)| u + length * d)
+                .collect();
             match self.evaluate(&moved, external, period) {
                 Ok(balance) if balance.relative <= before.relative => {
                     return Ok((length, moved, balance));
                 }
                 Ok(balance) => {
-                    if best.as_ref().is_none_or(|(_, _, b)| balance.relative < b.relative) {
+                    if best
+                        .as_ref()
+                        .is_none_or(|(_, _, b)| balance.relative < b.relative)
+                    {
                         best = Some((length, moved, balance));
                     }
                 }
@@ -283,7 +315,9 @@ impl Newton<'_> {
         match (best, first_failure) {
             // The groups hold the state of the last fraction tried.
             (Some((length, moved, _)), _) => {
-                let balance = self.evaluate(&moved, external, period).map_err(failed_law)?;
+                let balance = self
+                    .evaluate(&moved, external, period)
+                    .map_err(failed_law)?;
                 Ok((length, moved, balance))
             }
             (None, Some(failure)) => Err(failed_law(failure)),
@@ -303,19 +337,34 @@ impl Newton<'_> {
         let mut internal = vec![0.0; increment.len()];
         let mut unreliable = None;
         for group in &mut *self.groups {
-            let success =
-                group.evaluate(increment, Operator::Consistent, time, time_increment)?;
-            group.kinematics.add_forces(&group.stress.trial, &mut internal);
-            unreliable = unreliable
-                .or(success.unreliable.map(|(_, why)| format!("group `{}`: {why}", group.name)));
+            let success = group.evaluate(increment, Operator::Consistent, time, time_increment)?;
+            group
+                .kinematics
+                .add_forces(&group.stress.trial, &mut internal);
+            unreliable = unreliable.or(success
+                .unreliable
+                .map(|(_, why)| format!("group `{}`: {why}", group.name)));
         }
         self.system.fold(&mut internal);
-        let residual: Vec<f64> =
-            self.system.free().iter().map(|&dof| external[dof] - internal[dof]).collect();
+        let residual: Vec<f64> = self
+            .system
+            .free()
+            .iter()
+            .map(|&dof| external[dof] - internal[dof])
+            .collect();
         let scale = norm(&internal).max(norm(external));
-        let relative = if scale > 0.0 { norm(&residual) / scale } else { 0.0 };
+        let relative = if scale > 0.0 {
+            norm(&residual) / scale
+        } else {
+            0.0
+        };
         self.costs.laws += start.elapsed();
-        Ok(Balance { internal, residual, relative, unreliable })
+        Ok(Balance {
+            internal,
+            residual,
+            relative,
+            unreliable,
+        })
     }
 }
 

@@ -1,7 +1,8 @@
 //! One update: elastic trial, plastic flow, loss of contact and its return.
 
+use crate::first_root::last_that;
 use crate::interface::{Constants, Interface, State};
-use crate::return_mapping::{Flow, Increment, Sample, last_that};
+use crate::return_mapping::{Flow, Increment, Sample};
 use abi::{Failure, InterfacePoint, InterfaceResponse, Tangent};
 
 type Matrix = [[f64; 2]; 2];
@@ -15,7 +16,7 @@ struct Contact {
     /// Relative displacement: contraction and slip.
     contraction: f64,
     slip: f64,
-    /// ∂slip/∂[`u_n`] and ∂slip/∂[`u_t`]: slip before the contact re-forms does not act.
+    /// ∂slip by ∂`[u_n]` and ∂`[u_t]`: slip before the contact re-forms does not act.
     slip_by_jump: [f64; 2],
 }
 
@@ -52,12 +53,14 @@ pub(crate) fn update(
 fn contact(constants: &Constants, point: &InterfacePoint<State>) -> Result<Contact, f64> {
     let [opening, slip] = point.jump_increment;
     let sigma = -point.traction[0];
-    let gap = if point.state.gap > 0.0 {
-        point.state.gap
-    } else if sigma < 0.0 {
-        // A tension carried in is released; contact is where it vanishes.
-        -sigma / constants.normal_stiffness
-    } else {
+    let gap = point.state.gap;
+    if gap <= 0.0 {
+        // A tension carried in enters the trial like any stress outside the surface; what is left
+        // of it at the end of the increment becomes a gap.
+        let left = -sigma / constants.normal_stiffness + opening;
+        if sigma < 0.0 && left >= 0.0 {
+            return Err(left);
+        }
         return Ok(Contact {
             sigma,
             tau: point.traction[1],
@@ -65,7 +68,7 @@ fn contact(constants: &Constants, point: &InterfacePoint<State>) -> Result<Conta
             slip,
             slip_by_jump: [0.0, 1.0],
         });
-    };
+    }
     if gap + opening >= 0.0 {
         return Err(gap + opening);
     }
@@ -190,7 +193,7 @@ fn lose_contact(
         }
     } else {
         // The contraction uses up the approach of the two faces and no more.
-        exhausted.unwrap_or(0.0)
+        exhausted.unwrap_or(lambda(1.0))
     };
     let contraction = increment.contraction(d_lambda);
     // Where contact was lost the faces would touch again.
@@ -209,7 +212,7 @@ fn lose_contact(
 #[inline]
 fn derivative(constants: &Constants, end: &Sample, sign: f64) -> Result<Matrix, Failure> {
     let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
-    // From |τ*| − K_t Δλ − μ (σ* − K_n c) = 0, with H = −dg/dΔλ.
+    // Eq. (B).
     let friction = end.mu_slope * end.sigma;
     let coupling = k_n * end.contraction_slope;
     let h = -end.residual_slope;
@@ -225,7 +228,7 @@ fn derivative(constants: &Constants, end: &Sample, sign: f64) -> Result<Matrix, 
     ])
 }
 
-/// Back to the signs of the contract: ∂t/∂[u] from ∂(`σ_n`, τ)/∂(σ*, τ*).
+/// Back to the signs of the contract: ∂t/∂⟦u⟧ from ∂(`σ_n`, τ)/∂(σ*, τ*).
 #[inline]
 fn response(
     constants: &Constants,

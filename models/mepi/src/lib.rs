@@ -3,6 +3,7 @@
 
 mod bounds;
 mod contact;
+mod first_root;
 mod hardening;
 mod interface;
 mod mepi;

@@ -15,7 +15,7 @@ abi::parameters! {
         /// Shear stiffness at a normal stress of 1 kPa.
         k_t: Parameter::new(c"k_t", c"kPa^(1-N)/m").above(0.0).usual(1e2, 1e9),
         /// Exponent of the normal stress in the stiffnesses.
-        n: Parameter::new(c"N", c"-").at_least(0.0).usual(0.0, 1.0),
+        n: Parameter::new(c"N", c"-").at_least(0.0).at_most(2.0).usual(0.0, 1.0),
         /// Friction coefficient at the end of the elastic range.
         mu_0: Parameter::new(c"μ_0", c"-").at_least(0.0).usual(0.0, 1.0),
         /// Friction coefficient at failure.

@@ -15,7 +15,7 @@ abi::parameters! {
         /// Shear stiffness at a normal stress of 1 kPa.
         k_t: Parameter::new(c"k_t", c"kPa^(1-N)/m").above(0.0).usual(1e2, 1e9),
         /// Exponent of the normal stress in the stiffnesses.
-        n: Parameter::new(c"N", c"-").at_least(0.0).usual(0.0, 1.0),
+        n: Parameter::new(c"N", c"-").at_least(0.0).at_most(2.0).usual(0.0, 1.0),
         /// Friction coefficient at the end of the elastic range.
         mu_0: Parameter::new(c"μ_0", c"-").at_least(0.0).usual(0.0, 1.0),
         /// Friction coefficient at failure.
@@ -38,8 +38,10 @@ abi::parameters! {
         a_0: Parameter::new(c"A_0", c"-").at_least(0.0).usual(1.0, 20.0),
         /// Plastic slip at the peak.
         u_tp: Parameter::new(c"u_tp", c"m").at_least(0.0).usual(1e-5, 1e-1),
-        /// How softening starts: from the friction reached at the peak, or at mu_p with a jump.
-        peak: Parameter::new(c"-", c"-").one_of(abi::choices!(c"continuous", c"published")).default(0.0),
+        /// How softening starts: from the friction reached at the peak, or at μ_p with a jump.
+        peak: Parameter::new(c"peak", c"-")
+            .one_of(abi::choices!(c"continuous", c"published"))
+            .default(0.0),
     }
 }
 

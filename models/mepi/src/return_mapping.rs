@@ -1,4 +1,4 @@
-//! Backward Euler: the scalar equation in Δλ and its first root.
+//! Backward Euler: the scalar equation in Δλ, Eq. (A), and its root.
 //!
 //! | symbol | here | |
 //! |---|---|---|
@@ -63,10 +63,8 @@ pub(crate) enum Flow {
 }
 
 /// After a relative step of this size Newton's next value is exact to round-off.
-const LAST_STEP: f64 = 1e-9;
+pub(crate) const LAST_STEP: f64 = 1e-9;
 const MAX_NEWTON: usize = 12;
-const MAX_BISECTIONS: usize = 250;
-const MAX_INTERVALS: usize = 2000;
 
 impl Increment<'_> {
     /// The first leg of the increment.
@@ -94,7 +92,7 @@ impl Increment<'_> {
         }
     }
 
-    /// Evaluates the scalar equation.
+    /// Evaluates Eq. (A).
     #[inline]
     pub(crate) fn sample(&self, leg: &Leg, d_lambda: f64) -> Sample {
         let Constants {
@@ -110,7 +108,7 @@ impl Increment<'_> {
         let travel = d_lambda - leg.origin;
         let contraction = leg.contraction + travel * beta.value;
         let contraction_slope = beta.value + travel * beta.slope;
-        // Eq. (6), (9).
+        // Eq. (6), and Eq. (A) with its derivative.
         let sigma = self.sigma - k_n * contraction;
         let residual = self.tau - k_t * d_lambda - mu.value * sigma;
         let residual_slope = k_n * mu.value * contraction_slope - k_t - mu.slope * sigma;
@@ -244,110 +242,9 @@ impl Increment<'_> {
         bounds.residual_slope < 0.0 && self.keeps_contact(bounds.contraction_high)
     }
 
-    /// Contact is kept for certain, wherever within the increment the faces come closest.
-    fn keeps_contact(&self, contraction: f64) -> bool {
+    /// A plastic contraction that leaves the faces in contact at the highest normal stress of the
+    /// increment; if it does not, contact is lost for certain.
+    pub(crate) fn keeps_contact(&self, contraction: f64) -> bool {
         self.highest >= self.constants.normal_stiffness * contraction
     }
-
-    /// Advances by intervals over each of which the outcome can be proved. `hint` is a root,
-    /// perhaps not the first.
-    #[cold]
-    fn march(&self, mut leg: Leg, limit: f64, hint: Option<f64>) -> Result<Flow, Failure> {
-        let mut peak = self.distance_to_peak().filter(|&p| p < limit);
-        let mut end = peak.unwrap_or(limit);
-        let mut from = self.sample(&leg, 0.0);
-        let mut width = hint.unwrap_or(end);
-        for _ in 0..MAX_INTERVALS {
-            if from.d_lambda >= end {
-                let Some(at_peak) = peak.take() else {
-                    return Ok(Flow::LosesContact { exhausted: None });
-                };
-                leg = self.second_leg(&from);
-                from = self.sample(&leg, at_peak);
-                if from.residual <= 0.0 {
-                    return Ok(Flow::StopsAtPeak(from));
-                }
-                end = limit;
-                width = end - from.d_lambda;
-            }
-            let next = from.d_lambda + width;
-            let to = self.sample(&leg, if next < end { next } else { end });
-            if to.d_lambda <= from.d_lambda {
-                break;
-            }
-            let bounds = self.bounds(&leg, &from, &to);
-            let falls = bounds.residual_slope < 0.0;
-            let in_contact = self.keeps_contact(bounds.contraction_high);
-            if falls && in_contact && to.residual <= 0.0 {
-                return Ok(Flow::Slides(self.root_between(&leg, from, to)));
-            }
-            let rootless = bounds.residual_low > 0.0
-                || bounds.sigma_high < 0.0
-                || (falls && to.residual > 0.0);
-            if rootless && !self.keeps_contact(to.contraction) {
-                let keeps = |x: f64| self.keeps_contact(self.sample(&leg, x).contraction);
-                let exhausted = last_that(keeps, from.d_lambda, to.d_lambda);
-                return Ok(Flow::LosesContact {
-                    exhausted: Some(exhausted),
-                });
-            }
-            if rootless && in_contact {
-                width = 4.0 * (to.d_lambda - from.d_lambda);
-                from = to;
-            } else {
-                width = 0.5 * (to.d_lambda - from.d_lambda);
-            }
-        }
-        Err(Failure::CutStep {
-            factor: 0.5,
-            reason: "the plastic slip cannot be told from a second solution close by",
-        })
-    }
-
-    /// The root of g between two samples where it changes sign and falls: Newton's method, kept
-    /// inside by bisection.
-    fn root_between(&self, leg: &Leg, from: Sample, to: Sample) -> Sample {
-        let (mut low, mut high) = (from.d_lambda, to.d_lambda);
-        let mut at = to;
-        for _ in 0..MAX_BISECTIONS {
-            if at.residual > 0.0 {
-                low = at.d_lambda;
-            } else {
-                high = at.d_lambda;
-            }
-            let newton = at.d_lambda - at.residual / at.residual_slope;
-            let step = (newton - at.d_lambda).abs();
-            let inside = newton > low && newton < high && step < 0.5 * (high - low);
-            let next = if inside {
-                newton
-            } else {
-                low + 0.5 * (high - low)
-            };
-            if next <= low || next >= high || step <= f64::EPSILON * at.d_lambda {
-                break;
-            }
-            at = self.sample(leg, next);
-            if inside && step <= LAST_STEP * next {
-                break;
-            }
-        }
-        at
-    }
-}
-
-/// The last number for which the condition, true at `low` and false at `high`, holds; to the last
-/// bit.
-pub(crate) fn last_that(holds: impl Fn(f64) -> bool, mut low: f64, mut high: f64) -> f64 {
-    for _ in 0..MAX_BISECTIONS {
-        let middle = low + 0.5 * (high - low);
-        if middle <= low || middle >= high {
-            break;
-        }
-        if holds(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
 }

@@ -1,13 +1,19 @@
-//! The mathematics of the laws, held against truth computed here from Eq. (6)-(17) by other means.
+//! The mathematics of the laws, held against truth computed from Eq. (6)-(17) by other means.
+#![expect(
+    clippy::float_cmp,
+    reason = "zeros and unchanged values are compared bit by bit"
+)]
 
 mod contact;
 mod extremes;
 mod paths;
 mod scalar_equation;
 mod tangent;
+mod truth;
 
 use crate::{Mepi, MepiSoftening, State, mepi, mepi_softening};
 use abi::{Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Tangent};
+use truth::Truth;
 
 /// Table IV with the reference pressure that makes it dilate.
 const TABLE_4: mepi::Parameters = mepi::Parameters {
@@ -97,7 +103,7 @@ struct Walker<'a, L> {
     state: State,
     /// Relative displacement so far: contraction, slip.
     u: [f64; 2],
-    /// Σ (σ_n d[u_n^p] + τ d[u_t^p]).
+    /// Σ (`σ_n` d`[u_n^p]` + τ d`[u_t^p]`).
     dissipation: f64,
 }
 
@@ -145,7 +151,7 @@ impl<'a, L: InterfaceLaw<State = State>> Walker<'a, L> {
         self.state = end.state;
     }
 
-    /// Slips against a normal spring: dσ_n = −stiffness · d[u_n]. 0 is constant normal stress.
+    /// Slips against a normal spring: `dσ_n` = −stiffness · d`[u_n]`. 0 is constant normal stress.
     fn slip(&mut self, stiffness: f64, du_t: f64) {
         // The contraction rate is below 1, and so is the opening per slip.
         let (mut low, mut high) = (-du_t.abs(), du_t.abs());
@@ -168,141 +174,6 @@ impl<'a, L: InterfaceLaw<State = State>> Walker<'a, L> {
         }
         panic!("no equilibrium at {:?} {:?}", self.traction, self.state);
     }
-}
-
-/// Eq. (10), (11), (16), (17) and their integrals, for a point with this initial normal stress.
-#[derive(Clone, Copy, Debug)]
-struct Truth {
-    p: mepi_softening::Parameters,
-    softens: bool,
-    sigma_ni: f64,
-}
-
-impl Truth {
-    fn softening(p: mepi_softening::Parameters, sigma_ni: f64) -> Self {
-        Self {
-            p,
-            softens: true,
-            sigma_ni,
-        }
-    }
-
-    fn hardening(p: mepi::Parameters, sigma_ni: f64) -> Self {
-        let p = mepi_softening::Parameters {
-            k_n: p.k_n,
-            k_t: p.k_t,
-            n: p.n,
-            mu_0: p.mu_0,
-            mu_p: p.mu_p,
-            mu_c0: p.mu_c0,
-            a: p.a,
-            c_0: p.c_0,
-            t: p.t,
-            p_0: p.p_0,
-            ..FONTAINEBLEAU
-        };
-        Self {
-            p,
-            softens: false,
-            sigma_ni,
-        }
-    }
-
-    fn k_n(&self) -> f64 {
-        self.p.k_n * self.sigma_ni.powf(self.p.n)
-    }
-
-    fn k_t(&self) -> f64 {
-        self.p.k_t * self.sigma_ni.powf(self.p.n)
-    }
-
-    fn mu(&self, xi: f64) -> f64 {
-        let p = &self.p;
-        let hardening =
-            |xi: f64| p.mu_0 + (p.mu_p - p.mu_0) * xi / (p.a * self.sigma_ni / p.p_0 * p.t + xi);
-        if self.softens && xi > p.u_tp {
-            let peak = if p.peak > 0.5 {
-                p.mu_p
-            } else {
-                hardening(p.u_tp)
-            };
-            p.mu_r + (peak - p.mu_r) / (p.a_0 / p.t * (xi - p.u_tp)).cosh()
-        } else {
-            hardening(xi)
-        }
-    }
-
-    fn mu_c(&self, xi: f64) -> f64 {
-        let (p, mu) = (&self.p, self.mu(xi));
-        if mu < p.mu_c0 {
-            p.mu_c0
-        } else {
-            let d = 1.0 - 1.0 / (p.c_0 / p.t * self.sigma_ni / p.p_0 * xi).cosh();
-            p.mu_c0 + (mu - p.mu_c0) * d
-        }
-    }
-
-    /// ∫ (μ_c − μ) dξ from 0.
-    fn plastic_contraction(&self, xi: f64) -> f64 {
-        let f = |xi: f64| self.mu_c(xi) - self.mu(xi);
-        // Integrated piece by piece between the kinks, in the variable that resolves small slips.
-        let scale = self.p.a * self.sigma_ni / self.p.p_0 * self.p.t;
-        let transformed = |y: f64| f(scale * y.exp_m1()) * scale * y.exp();
-        let end = (xi / scale).ln_1p();
-        let peak = (self.p.u_tp / scale).ln_1p();
-        let characteristic = (self.p.mu_c0 - self.p.mu_0) / (self.p.mu_p - self.p.mu_c0);
-        let mut kinks = vec![0.0, end];
-        if self.softens {
-            // Just beyond, where the published μ has jumped.
-            kinks.extend([peak * (1.0 - 1e-15), peak * (1.0 + 1e-15)]);
-        }
-        kinks.push(characteristic.max(0.0).ln_1p());
-        kinks.retain(|&k| k <= end);
-        kinks.sort_by(f64::total_cmp);
-        kinks
-            .windows(2)
-            .map(|w| gauss(transformed, w[0], w[1]))
-            .sum()
-    }
-
-    /// σ_n after plastic slip ξ against a normal spring in series with the interface's own.
-    fn sigma(&self, xi: f64, stiffness: f64) -> f64 {
-        let series = if stiffness.is_infinite() {
-            self.k_n()
-        } else {
-            self.k_n() * stiffness / (self.k_n() + stiffness)
-        };
-        self.sigma_ni - series * self.plastic_contraction(xi)
-    }
-
-    /// ξ, σ_n, τ at the slip u_t on a monotonic path.
-    fn at_slip(&self, u_t: f64, stiffness: f64) -> [f64; 3] {
-        let (mut low, mut high) = (0.0, u_t);
-        for _ in 0..80 {
-            let xi = 0.5 * (low + high);
-            let tau = self.mu(xi) * self.sigma(xi, stiffness);
-            if xi + tau / self.k_t() < u_t {
-                low = xi;
-            } else {
-                high = xi;
-            }
-        }
-        let sigma = self.sigma(low, stiffness);
-        [low, sigma, self.mu(low) * sigma]
-    }
-}
-
-/// Composite Gauss-Legendre rule with three points.
-fn gauss(f: impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
-    const N: usize = 400;
-    let h = (b - a) / N as f64;
-    let offset = 0.5 * h * 0.6_f64.sqrt();
-    (0..N)
-        .map(|i| {
-            let middle = a + (i as f64 + 0.5) * h;
-            h / 18.0 * (5.0 * (f(middle - offset) + f(middle + offset)) + 8.0 * f(middle))
-        })
-        .sum()
 }
 
 /// A linear congruential generator (Knuth's MMIX constants).

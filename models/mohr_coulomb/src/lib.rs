@@ -119,6 +119,7 @@ impl ContinuumLaw for MohrCoulomb {
         let lost = principal.stress - end.stress;
         let (shear, dilation) = self.elasticity.equivalent_strains(&lost);
         Ok(SolidResponse {
+            // Eq. (11).
             stress: principal.compose(&end.stress),
             state: State {
                 plastic_strain: point.state.plastic_strain + shear,

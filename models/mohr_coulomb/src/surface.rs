@@ -32,8 +32,8 @@ impl Slope {
         }
     }
 
-    /// Stress that a unit plastic multiplier takes away, over G: λ/G tr m + 2 m with
-    /// m = (w₁ a, w₂ a − w₃ b, −w₄ b).
+    /// Stress that flow along m = (w₁ a, w₂ a − w₃ b, −w₄ b) takes away, over G, Eq. (4):
+    /// r tr m + 2 m, where tr m = a − b = sin.
     fn relief(&self, ratio: f64, weight: [f64; 4]) -> Vector3<f64> {
         let [w1, w2, w3, w4] = weight;
         let (a, b) = (self.upper, self.lower);

@@ -131,6 +131,7 @@ impl Facet {
         let face = self.face(normal, shear);
         face.filter(|end| end.normal <= cut.normal)
             .unwrap_or(Returned {
+                // Eq. (7).
                 zone: Zone::Corner,
                 normal: cut.normal,
                 shear: cut.shear.copysign(shear),

@@ -174,6 +174,22 @@ fn a_tension_carried_in_is_released_as_a_gap() {
 }
 
 #[test]
+fn a_tension_carried_in_enters_the_trial_as_it_stands() {
+    let law = mepi(mepi::Parameters {
+        sigma_ni: 100.0,
+        ..TABLE_4
+    });
+    let truth = Truth::hardening(TABLE_4, 100.0);
+    let mut walker = Walker::new(&law, -5.0);
+    // Closing by 25 kPa of elastic stress leaves 20 kPa; the slip stays below mu_0 of that.
+    let (slip, closing) = (1.0 / truth.k_t(), 25.0 / truth.k_n());
+    walker.step([closing, slip]);
+    assert_relative_eq!(walker.sigma(), 20.0, max_relative = 1e-12);
+    assert_relative_eq!(walker.tau(), 1.0, max_relative = 1e-12);
+    assert_eq!(walker.state.gap, 0.0);
+}
+
+#[test]
 fn starts_only_from_compression_unless_the_initial_stress_is_given() {
     let law = mepi(TABLE_4);
     for traction in [0.0, 1.0] {

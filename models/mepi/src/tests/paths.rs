@@ -46,7 +46,7 @@ fn reaches_the_closed_form_in_one_increment_under_constant_normal_stress() {
     }
 }
 
-/// Errors of σ_n, τ and [u_n] against quadrature fall at first order, and extrapolation gains.
+/// Errors of `σ_n`, τ and `[u_n]` against quadrature fall at first order, and extrapolation gains.
 fn converges<L: InterfaceLaw<State = State>>(
     law: &L,
     truth: Truth,

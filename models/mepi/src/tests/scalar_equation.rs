@@ -5,7 +5,7 @@ use crate::hardening::sech_tanh;
 use crate::interface::{Common, Interface, Peak};
 use crate::return_mapping::{Flow, Increment, Sample};
 
-/// An interface with parameters over many decades, and σ_ni.
+/// An interface with parameters over many decades, and `σ_ni`.
 fn random_interface(random: &mut Random) -> (Interface, f64) {
     let mu_p = random.between(0.05, 1.5);
     let common = Common {

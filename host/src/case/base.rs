@@ -1,0 +1,116 @@
+//! Cases that differ from another by a few lines: `base = "path"`.
+//!
+//! The file's keys override those of its base: tables are merged key by key, entries of arrays
+//! that have a `name` (such as phases) are merged by name, everything else replaces.
+
+use super::CaseFile;
+use crate::error::{Error, Source};
+use serde::Deserialize;
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Longest chain of bases.
+const LONGEST_CHAIN: usize = 8;
+
+/// Reads a case file with what it is based on.
+pub(super) fn read(source: Source) -> Result<(Source, CaseFile), Error> {
+    let source = with_bases(source, LONGEST_CHAIN)?;
+    // Blank lines instead of the files before each one keep spans counting from the start.
+    let texts: Vec<String> = source
+        .files()
+        .map(|range| "\n".repeat(range.start) + &source.text()[range])
+        .collect();
+    let mut merged: Option<Spanned<DeTable<'_>>> = None;
+    for text in &texts {
+        let mut table = DeTable::parse(text).map_err(|error| at(&source, &error))?;
+        table.get_mut().remove("base");
+        match &mut merged {
+            None => merged = Some(table),
+            Some(merged) => merge(merged.get_mut(), table.into_inner()),
+        }
+    }
+    let merged = merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))?;
+    let file = CaseFile::deserialize(toml::Deserializer::from(merged))
+        .map_err(|error| at(&source, &error))?;
+    Ok((source, file))
+}
+
+fn at(source: &Source, error: &toml::de::Error) -> Error {
+    source
+        .error(error.span().unwrap_or(0..0), error.message().to_owned())
+        .into()
+}
+
+/// The file after its base, that after its own, and so on.
+fn with_bases(source: Source, chain: usize) -> Result<Source, Error> {
+    let table = DeTable::parse(source.text()).map_err(|error| at(&source, &error))?;
+    let Some((_, base)) = table
+        .get_ref()
+        .iter()
+        .find(|(key, _)| key.get_ref() == "base")
+    else {
+        return Ok(source);
+    };
+    let DeValue::String(path) = base.get_ref() else {
+        return Err(source
+            .error(base.span(), "`base` is the path of a case file")
+            .into());
+    };
+    if chain == 0 {
+        let message = format!("more than {LONGEST_CHAIN} files are based on each other");
+        return Err(source.error(base.span(), message).into());
+    }
+    let path = source
+        .path()
+        .parent()
+        .unwrap_or(Path::new("."))
+        .join(path.as_ref());
+    let read = Source::read(&path)
+        .map_err(|error| source.error(base.span(), format!("the base cannot be used: {error}")))?;
+    Ok(source.based_on(&with_bases(read, chain - 1)?))
+}
+
+/// Puts the entries of a table over those of another.
+fn merge<'i>(under: &mut DeTable<'i>, over: DeTable<'i>) {
+    for (key, value) in over {
+        match under.get_mut(key.get_ref().as_ref()) {
+            None => {
+                under.insert(key, value);
+            }
+            Some(below) => merge_value(below, value),
+        }
+    }
+}
+
+fn merge_value<'i>(below: &mut Spanned<DeValue<'i>>, value: Spanned<DeValue<'i>>) {
+    let span = value.span();
+    match (below.get_mut(), value.into_inner()) {
+        (DeValue::Table(below), DeValue::Table(value)) => merge(below, value),
+        (DeValue::Array(below), DeValue::Array(value))
+            if below
+                .iter()
+                .chain(value.iter())
+                .all(|entry| name(entry).is_some()) =>
+        {
+            for entry in value {
+                match below.iter_mut().find(|b| name(b) == name(&entry)) {
+                    Some(same) => merge_value(same, entry),
+                    None => below.push(entry),
+                }
+            }
+        }
+        (_, value) => *below = Spanned::new(span, value),
+    }
+}
+
+/// The `name` of an entry of an array of tables.
+fn name(entry: &Spanned<DeValue<'_>>) -> Option<String> {
+    match entry.get_ref() {
+        DeValue::Table(table) => match table.get("name")?.get_ref() {
+            DeValue::String(name) => Some(name.to_string()),
+            _ => None,
+        },
+        _ => None,
+    }
+}

@@ -1,0 +1,6 @@
+//! Tolerances and where they come from.
+
+/// A few hundred operations in double precision, relative to the largest number in play.
+pub const ROUND_OFF: f64 = 1e-12;
+/// Equilibrium: the solver's default force tolerance with a margin for its norm.
+pub const EQUILIBRIUM: f64 = 1e-8;
