@@ -5,7 +5,8 @@ mod base;
 
 use crate::error::{Error, Source};
 use crate::input::{Named, ParameterTable};
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer, de};
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -48,14 +49,24 @@ impl Case {
         )
     }
 
-    /// Folders with law libraries that the file names, relative to itself.
-    pub fn law_folders(&self) -> Vec<PathBuf> {
-        let here = self.source.path().parent().unwrap_or(Path::new("."));
-        self.file
-            .law_path
-            .iter()
-            .map(|folder| here.join(folder))
-            .collect()
+    /// Folders with law libraries, relative to the file that names them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there is no such folder.
+    pub fn law_folders(&self) -> Result<Vec<PathBuf>, Error> {
+        let folder = |written: &Spanned<PathBuf>| {
+            let file = self.source.path_at(&written.span());
+            let folder = file
+                .parent()
+                .unwrap_or(Path::new("."))
+                .join(written.get_ref());
+            if folder.is_dir() {
+                return Ok(folder);
+            }
+            let message = format!("`law_path`: there is no folder {}", folder.display());
+            Err(self.source.error(written.span(), message).into())
+        };
+        self.file.law_path.iter().map(folder).collect()
     }
 }
 
@@ -70,7 +81,7 @@ pub struct CaseFile {
     pub analysis: Analysis,
     /// Folders with law libraries, relative to the case file.
     #[serde(default)]
-    pub law_path: Vec<PathBuf>,
+    pub law_path: Vec<Spanned<PathBuf>>,
     /// The mesh.
     pub mesh: MeshInput,
     /// Laws with their parameters, by a name that groups refer to.
@@ -111,13 +122,12 @@ pub enum Analysis {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
-    /// Where columns and rows start.
-    #[serde(default)]
-    pub origin: [f64; 2],
+    /// Where columns and rows start; (0, 0) if left out.
+    pub origin: Option<Spanned<[f64; 2]>>,
     /// Columns, in the direction of x (r).
-    pub columns: Vec<Spanned<PartInput>>,
+    pub columns: Spanned<Vec<Spanned<PartInput>>>,
     /// Rows, in the direction of y (z).
-    pub rows: Vec<Spanned<PartInput>>,
+    pub rows: Spanned<Vec<Spanned<PartInput>>>,
     /// Which group an element belongs to; later regions override earlier ones.
     #[serde(rename = "region")]
     pub regions: Vec<RegionInput>,
@@ -171,7 +181,10 @@ pub struct LineInput {
 
 /// A position or an extent.
 #[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or an extent such as `[0.0, 1.0]`"
+)]
 pub enum Coordinate {
     /// A position.
     At(f64),
@@ -423,15 +436,42 @@ pub struct FigureInput {
 #[serde(deny_unknown_fields, default)]
 pub struct SolverInput {
     /// Largest residual force, relative to the largest of the forces in play (2-norms).
+    #[serde(deserialize_with = "tolerance")]
     pub force_tolerance: f64,
     /// Largest correction, relative to the displacement increment (2-norms).
+    #[serde(deserialize_with = "tolerance")]
     pub displacement_tolerance: f64,
     /// Iterations after which an increment is cut back.
+    #[serde(deserialize_with = "iterations")]
     pub max_iterations: usize,
     /// An increment is halved at most so many times.
+    #[serde(deserialize_with = "halvings")]
     pub max_halvings: u32,
     /// Whether to search along a correction that makes the residual grow.
     pub line_search: bool,
+}
+
+/// A tolerance: not below what double precision reaches, and not above the quantity itself.
+fn tolerance<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
+    within(f64::deserialize(input)?, 1e-14, 1.0)
+}
+
+fn iterations<'de, D: Deserializer<'de>>(input: D) -> Result<usize, D::Error> {
+    within(usize::deserialize(input)?, 1, 10_000)
+}
+
+/// A step halved more often than this hardly moves the load factor in double precision.
+fn halvings<'de, D: Deserializer<'de>>(input: D) -> Result<u32, D::Error> {
+    within(u32::deserialize(input)?, 0, 40)
+}
+
+fn within<T: PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {
+    if value >= least && value <= most {
+        return Ok(value);
+    }
+    Err(E::custom(format!(
+        "{value:?} is outside [{least:?}, {most:?}]"
+    )))
 }
 
 impl Default for SolverInput {

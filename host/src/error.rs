@@ -1,9 +1,10 @@
 //! What can go wrong, sorted by who has to act; the program's exit code follows.
 
-use miette::{Diagnostic, NamedSource, SourceSpan};
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode, SourceSpan};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::string::FromUtf8Error;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -24,10 +25,12 @@ impl Source {
     /// # Errors
     /// [`Error::Unreadable`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Unreadable {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = std::fs::read(path)
+            .and_then(|bytes| String::from_utf8(bytes).map_err(|error| not_utf_8(&error)))
+            .map_err(|source| Error::Unreadable {
+                path: path.to_owned(),
+                source,
+            })?;
         Ok(Self::new(path, text))
     }
 
@@ -88,6 +91,11 @@ impl Source {
         (&self.files[number].1, range.start, &self.text[range])
     }
 
+    /// The file a span lies in.
+    pub fn path_at(&self, span: &Range<usize>) -> &Path {
+        self.file(span.start).0
+    }
+
     /// File, line and column (from 1) of the start of a span.
     pub fn place(&self, span: &Range<usize>) -> String {
         let (path, start, text) = self.file(span.start);
@@ -107,7 +115,7 @@ impl Source {
         let span = span.start - start..span.end.saturating_sub(start).min(text.len());
         InputError {
             message: message.into(),
-            label: String::new(),
+            label: None,
             hint: None,
             span: span.into(),
             source_code: NamedSource::new(path.display().to_string(), text.to_owned())
@@ -116,18 +124,50 @@ impl Source {
     }
 }
 
+/// The place where a file ceases to be UTF-8, and what it could be instead.
+fn not_utf_8(error: &FromUtf8Error) -> std::io::Error {
+    let bytes = error.as_bytes();
+    let at = error.utf8_error().valid_up_to();
+    let line = bytes[..at].iter().filter(|&&byte| byte == b'\n').count() + 1;
+    let hint = match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => ": it looks like UTF-16, save it as UTF-8",
+        _ if bytes.contains(&0) => ": it looks like a binary file",
+        _ => ": save it as UTF-8",
+    };
+    std::io::Error::new(
+        std::io::ErrorKind::InvalidData,
+        format!(
+            "line {line}: the byte {:#04x} is not UTF-8 text{hint}",
+            bytes[at]
+        ),
+    )
+}
+
 /// An error in an input file, with its place.
-#[derive(Clone, Debug, Error, Diagnostic)]
+#[derive(Clone, Debug, Error)]
 #[error("{message}")]
 pub struct InputError {
     message: String,
-    label: String,
-    #[help]
+    label: Option<String>,
     hint: Option<String>,
-    #[label("{label}")]
     span: SourceSpan,
-    #[source_code]
     source_code: NamedSource<String>,
+}
+
+impl Diagnostic for InputError {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        let hint = self.hint.as_ref()?;
+        Some(Box::new(hint))
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(&self.source_code)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let label = LabeledSpan::new_with_span(self.label.clone(), self.span);
+        Some(Box::new(std::iter::once(label)))
+    }
 }
 
 impl InputError {
@@ -144,7 +184,7 @@ impl InputError {
     #[must_use]
     pub fn label(self, label: impl Into<String>) -> Self {
         Self {
-            label: label.into(),
+            label: Some(label.into()),
             ..self
         }
     }
@@ -174,7 +214,7 @@ pub enum Error {
     #[diagnostic(transparent)]
     Input(#[from] Box<InputError>),
     /// An input file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -182,7 +222,8 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Results cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}", path.display())]
+    #[diagnostic(help("name another place for the results on the command line"))]
     Unwritable {
         /// The file or folder.
         path: PathBuf,
@@ -230,13 +271,15 @@ impl Error {
         }
     }
 
-    /// The program's exit code: 1 bad input, 2 no equilibrium, 3 plugin trouble, 4 internal.
+    /// The program's exit code: 1 bad input (places that cannot be read or written included), 2 no equilibrium, 3 plugin trouble, 4 internal.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Input(_) | Self::Unreadable { .. } | Self::Usage(_) => 1,
+            Self::Input(_) | Self::Unreadable { .. } | Self::Unwritable { .. } | Self::Usage(_) => {
+                1
+            }
             Self::NoEquilibrium { .. } => 2,
             Self::Plugin { .. } => 3,
-            Self::Unwritable { .. } | Self::Internal(_) => 4,
+            Self::Internal(_) => 4,
         }
     }
 }
@@ -246,7 +289,9 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     candidates
         .into_iter()
         .map(|candidate| (edit_distance(name, candidate), candidate))
-        .filter(|(distance, candidate)| *distance <= 1 + candidate.len() / 3)
+        .filter(|(distance, candidate)| {
+            *distance <= 1 + candidate.len() / 3 && *distance < candidate.len().max(name.len())
+        })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
 }
@@ -290,6 +335,7 @@ mod tests {
         let names = ["young_modulus", "poisson_ratio"];
         assert_eq!(nearest("youngs_modulus", names), Some("young_modulus"));
         assert_eq!(nearest("cohesion", names), None);
+        assert_eq!(nearest("w", ["x", "y"]), None);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! What all input files share: reading TOML with the place of every error, and building laws from
 //! their parameters.
 
+mod wording;
+
 use crate::error::{Error, Source, suggestion};
 use crate::plugin::{Law, LawDescription, LoadedLaw, ParameterDescription, SearchPath};
 use abi::Hypothesis;
@@ -8,16 +10,55 @@ use indexmap::IndexMap;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 /// Reads a whole file. Unknown keys are errors if `T` says `deny_unknown_fields`.
 ///
 /// # Errors
 /// [`Error::Input`] at the place that does not fit.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, Error> {
-    toml::from_str(source.text()).map_err(|error| {
-        let span = error.span().unwrap_or(0..0);
-        source.error(span, error.message().to_owned()).into()
-    })
+    let table = DeTable::parse(source.text()).map_err(|error| toml_error(source, &error))?;
+    deserialize(source, table)
+}
+
+/// Reads a table whose spans count in the text of a source.
+///
+/// # Errors
+/// [`Error::Input`] at the place that does not fit, or at a number that is not finite.
+pub fn deserialize<T: DeserializeOwned>(
+    source: &Source,
+    table: Spanned<DeTable<'_>>,
+) -> Result<T, Error> {
+    for (key, value) in table.get_ref().iter() {
+        refuse_infinite(source, key.get_ref(), value)?;
+    }
+    T::deserialize(toml::Deserializer::from(table)).map_err(|error| toml_error(source, &error))
+}
+
+/// An error of the TOML reader, at its place.
+pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
+    wording::reword(source, error).into()
+}
+
+/// TOML has `nan` and `inf`; no quantity here has such a value.
+fn refuse_infinite(source: &Source, key: &str, value: &Spanned<DeValue<'_>>) -> Result<(), Error> {
+    match value.get_ref() {
+        DeValue::Float(float) => {
+            let text = float.as_str();
+            if matches!(text.trim_start_matches(['+', '-']), "nan" | "inf") {
+                let message = format!("`{key}`: {text} is no finite number");
+                return Err(source.error(value.span(), message).into());
+            }
+            Ok(())
+        }
+        DeValue::Array(entries) => entries
+            .iter()
+            .try_for_each(|entry| refuse_infinite(source, key, entry)),
+        DeValue::Table(table) => table
+            .iter()
+            .try_for_each(|(key, value)| refuse_infinite(source, key.get_ref(), value)),
+        _ => Ok(()),
+    }
 }
 
 /// Values by name, each with the place of name and value.
@@ -25,7 +66,7 @@ pub type Named<T> = IndexMap<Spanned<String>, Spanned<T>>;
 
 /// The value of a parameter as written in a file.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, or a text in quotes")]
 pub enum ParameterValue {
     /// A number.
     Number(f64),
@@ -99,8 +140,11 @@ pub fn build_law(
                 let number = number(source, declared, value)?;
                 if !declared.usual.contain(number) {
                     warnings.push(format!(
-                        "law `{}`: {} = {} {} is outside its usual range {}",
-                        description.id, declared.id, number, declared.unit, declared.usual
+                        "law `{}`: {} = {} is outside its usual range {}",
+                        description.id,
+                        declared.id,
+                        with_unit(number, declared),
+                        declared.usual
                     ));
                 }
                 number
@@ -232,7 +276,10 @@ fn number(
         ParameterValue::Label(label) => {
             return match choices.iter().position(|choice| choice == label) {
                 Some(index) => Ok(index as f64),
-                None if choices.is_empty() => Err(error(format!("`{id}` is a number")).into()),
+                None if choices.is_empty() => {
+                    let message = format!("`{id}`: found the text \"{label}\", expected a number");
+                    Err(error(message).into())
+                }
                 None => Err(error(format!("`{id}` has no choice `{label}`"))
                     .hint(suggestion(label, choices))
                     .into()),
@@ -247,13 +294,26 @@ fn number(
     if !number.is_finite() || !declared.bounds.contain(number) {
         let bounds = declared.bounds;
         return Err(error(format!(
-            "`{id}`: {number} {} is outside {bounds}",
-            declared.unit
+            "`{id}`: {} is outside {bounds}",
+            with_unit(number, declared)
         ))
         .label(declared.doc.clone())
         .into());
     }
     Ok(number)
+}
+
+/// A value with its unit, if it has one.
+fn with_unit(value: f64, declared: &ParameterDescription) -> String {
+    let number = if value == 0.0 || (1e-6..1e10).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    };
+    match declared.unit.as_str() {
+        "" | "-" => number,
+        unit => format!("{number} {unit}"),
+    }
 }
 
 /// Refuses angles that can only be meant in radians: none of them reaches π/2 degrees.

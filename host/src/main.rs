@@ -8,6 +8,7 @@
 use clap::{Parser, Subcommand};
 use host::case::Case;
 use host::error::{Error, Place};
+use host::plugin::SearchPath;
 use host::run::{Observer, run};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -32,6 +33,19 @@ enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
+    /// Lead one law at one integration point along a path.
+    Point {
+        /// A driver file.
+        driver: PathBuf,
+        /// File for the table; standard output if left out.
+        #[arg(long)]
+        csv: Option<PathBuf>,
+    },
+    /// List the laws found, or show all about one of them.
+    Laws {
+        /// Id of a law.
+        id: Option<String>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -45,6 +59,8 @@ fn main() -> ExitCode {
     };
     let outcome = match arguments.command {
         Command::Run { case, out } => run_case(&case, out),
+        Command::Point { driver, csv } => run_point(&driver, csv.as_deref()),
+        Command::Laws { id } => show_laws(id.as_deref()),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -66,6 +82,22 @@ fn run_case(path: &Path, out: Option<PathBuf>) -> Result<(), Error> {
         println!("results in {}", folder.display());
     }
     outcome
+}
+
+/// The table goes to standard output or a file, the report to the error stream.
+fn run_point(driver: &Path, csv: Option<&Path>) -> Result<(), Error> {
+    let report = host::point::run_file(driver, csv)?;
+    eprint!("{report}");
+    Ok(())
+}
+
+fn show_laws(id: Option<&str>) -> Result<(), Error> {
+    let search = SearchPath::new(&[]);
+    match id {
+        None => print!("{}", host::laws::list(&search)?),
+        Some(id) => print!("{}", host::laws::page(&search.law(id)?)),
+    }
+    Ok(())
 }
 
 /// A bar on a terminal, plain lines elsewhere; both on the error stream.

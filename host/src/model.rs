@@ -1,9 +1,12 @@
 //! From a case file to a model that can be run: groups with their elements and laws, loads and
 //! constraints by degree of freedom.
 
+mod constraints;
+
 use crate::assembly::Tie;
 use crate::case::{
-    Analysis, Axis, Case, CaseFile, Formulation, GroupInput, InPlane, Integration, PhaseInput,
+    Analysis, Axis, Case, CaseFile, Formulation, GroupInput, InPlane, Integration, LawInput,
+    PhaseInput,
 };
 use crate::element::{Axes, Joint6, Kinematics, Quad8, depth, gauss, line_shape};
 use crate::error::{Error, Source, suggestion};
@@ -40,7 +43,7 @@ impl Model {
     pub fn build(case: &Case) -> Result<Self, Error> {
         let Case { source, file } = case;
         let mesh = Mesh::build(source, file)?;
-        let search = SearchPath::new(&case.law_folders());
+        let search = SearchPath::new(&case.law_folders()?);
         let mut library = LawShelf {
             source,
             file,
@@ -54,6 +57,7 @@ impl Model {
         let mut swaps = vec![Vec::new(); file.phases.len()];
         for (number, (name, group)) in file.groups.iter().enumerate() {
             let mut current = &group.get_ref().law;
+            library.entry(current)?;
             for (phase, input) in file.phases.iter().enumerate() {
                 let swap = input
                     .laws
@@ -120,11 +124,13 @@ fn check_phases(source: &Source, file: &CaseFile, mesh: &Mesh) -> Result<(), Err
         return Err(source.error(0..0, "there is no [[phase]]").into());
     }
     let mut names: Vec<&str> = Vec::new();
-    for support in &file.supports {
-        mesh.line(source, &support.line)?;
-    }
     for phase in &file.phases {
         let name = phase.name.get_ref().as_str();
+        if name.trim().is_empty() {
+            return Err(source
+                .error(phase.name.span(), "a phase needs a name")
+                .into());
+        }
         if names.contains(&name) {
             let message = format!("two phases are called `{name}`");
             return Err(source.error(phase.name.span(), message).into());
@@ -151,30 +157,20 @@ fn check_phases(source: &Source, file: &CaseFile, mesh: &Mesh) -> Result<(), Err
                     .into());
             }
         }
-        check_values(source, mesh, phase)?;
+        check_pressures(source, mesh, phase)?;
     }
-    Ok(())
+    constraints::check(source, file, mesh)
 }
 
-fn check_values(source: &Source, mesh: &Mesh, phase: &PhaseInput) -> Result<(), Error> {
-    let finite = |line: &Spanned<String>, value: f64| -> Result<(), Error> {
-        if value.is_finite() {
-            return Ok(());
-        }
-        let message = format!("the value for line `{}` is {value}", line.get_ref());
-        Err(source.error(line.span(), message).into())
-    };
-    for input in &phase.displacement {
-        mesh.line(source, &input.line)?;
-        for value in [input.x, input.y].into_iter().flatten() {
-            finite(&input.line, value)?;
-        }
-    }
-    for input in &phase.free {
-        mesh.line(source, &input.line)?;
-    }
+fn check_pressures(source: &Source, mesh: &Mesh, phase: &PhaseInput) -> Result<(), Error> {
+    let mut lines: Vec<&str> = Vec::new();
     for input in &phase.pressure {
-        finite(&input.line, input.value)?;
+        let name = input.line.get_ref().as_str();
+        if lines.contains(&name) {
+            let message = format!("line `{name}` has two pressures in this phase");
+            return Err(source.error(input.line.span(), message).into());
+        }
+        lines.push(name);
         let line = mesh.line(source, &input.line)?;
         let shared = |edge: (usize, usize)| {
             let middle = mesh.edge(edge)[2];
@@ -185,10 +181,7 @@ fn check_values(source: &Source, mesh: &Mesh, phase: &PhaseInput) -> Result<(), 
                 > 1
         };
         if line.edges.is_empty() || line.edges.iter().any(|&edge| shared(edge)) {
-            let message = format!(
-                "a pressure needs a boundary, line `{}` is not",
-                input.line.get_ref()
-            );
+            let message = format!("a pressure needs a boundary, line `{name}` is not");
             return Err(source.error(input.line.span(), message).into());
         }
     }
@@ -203,7 +196,23 @@ struct LawShelf<'a> {
     laws: IndexMap<(String, &'static str), Arc<BuiltLaw>>,
 }
 
-impl LawShelf<'_> {
+impl<'a> LawShelf<'a> {
+    /// What the file says under a law's name.
+    fn entry(&self, name: &Spanned<String>) -> Result<&'a LawInput, Error> {
+        let laws = &self.file.laws;
+        let entry = laws.iter().find(|(key, _)| key.get_ref() == name.get_ref());
+        entry.map(|(_, entry)| entry.get_ref()).ok_or_else(|| {
+            let names: Vec<&str> = laws.keys().map(|k| k.get_ref().as_str()).collect();
+            self.source
+                .error(
+                    name.span(),
+                    format!("there is no law `{}` under [laws]", name.get_ref()),
+                )
+                .hint(suggestion(name.get_ref(), names))
+                .into()
+        })
+    }
+
     /// The law of this name, fit for a group.
     fn group_law(
         &mut self,
@@ -211,28 +220,7 @@ impl LawShelf<'_> {
         group: &GroupInput,
         name: &Spanned<String>,
     ) -> Result<GroupLaw, Error> {
-        let entry = self
-            .file
-            .laws
-            .iter()
-            .find(|(key, _)| key.get_ref() == name.get_ref());
-        let Some((_, entry)) = entry else {
-            let names: Vec<&str> = self
-                .file
-                .laws
-                .keys()
-                .map(|k| k.get_ref().as_str())
-                .collect();
-            return Err(self
-                .source
-                .error(
-                    name.span(),
-                    format!("there is no law `{}` under [laws]", name.get_ref()),
-                )
-                .hint(suggestion(name.get_ref(), names))
-                .into());
-        };
-        let entry = entry.get_ref();
+        let entry = self.entry(name)?;
         let plane = match self.file.analysis {
             Analysis::Axisymmetric => Hypothesis::Axisymmetric,
             Analysis::PlaneStrain => Hypothesis::PlaneStrain,

@@ -299,25 +299,23 @@ impl Driver {
             Stop::Shortfall(shortfall) => {
                 let Shortfall { reached, obstacle } = *shortfall;
                 let (gradient, flux) = words(self.law.hypothesis());
-                let mut message = format!("{place}: no equilibrium");
-                let mut hint = None;
-                if let Some(miss) = obstacle.miss {
+                let (why, hint) = if let Some(miss) = obstacle.miss {
                     let name = self.law.hypothesis().components()[miss.component];
-                    message += &describe(&miss, name, flux);
-                    hint = Some(format!(
+                    let hint = format!(
                         "a {flux} beyond strength has no equilibrium; control the {gradient} of \
                          `{name}` instead"
-                    ));
+                    );
+                    (describe(&miss, name, flux), Some(hint))
                 } else {
-                    message += &format!(": law `{id}` cannot follow the {gradient}s");
-                }
-                message += &format!("\n  reached: {reached:.6} of the increment");
-                if let Some(words) = obstacle.law {
-                    message += &format!("\n  law `{id}`: {words}");
-                }
-                for warning in warnings {
-                    message += &format!("\n  warning: {warning}");
-                }
+                    (format!("law `{id}` cannot follow the {gradient}s"), None)
+                };
+                let mut lines = vec![
+                    format!("{place}: no equilibrium: {why}"),
+                    format!("reached: {reached:.6} of the increment"),
+                ];
+                lines.extend(obstacle.law.map(|words| format!("law `{id}`: {words}")));
+                lines.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
+                let message = lines.join("\n  ");
                 Error::NoEquilibrium { message, hint }
             }
         }
@@ -326,7 +324,7 @@ impl Driver {
 
 fn describe(miss: &Miss, name: &str, flux: &str) -> String {
     format!(
-        "; {flux} `{name}` is {:.9e} kPa at best, {:.9e} kPa is asked for (residual {:.2e}, \
+        "{flux} `{name}` is {:.9e} kPa at best, {:.9e} kPa is asked for (residual {:.2e}, \
          tolerance {:.1e})",
         miss.flux, miss.goal, miss.residual, miss.tolerance
     )

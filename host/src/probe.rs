@@ -10,6 +10,9 @@ use toml::Spanned;
 /// Components of stress and strain by the name they have in quantities.
 const COMPONENTS: [&str; 4] = ["11", "22", "33", "12"];
 
+/// Columns of `history.csv` beside the probes.
+const RESERVED: [&str; 4] = ["phase", "increment", "time", "iterations"];
+
 /// All probes of a case, in the order of the file.
 #[derive(Debug)]
 pub struct Probes {
@@ -73,6 +76,10 @@ impl Probes {
     pub fn new(case: &Case, model: &Model) -> Result<Self, Error> {
         let mut probes: Vec<(String, Probe)> = Vec::new();
         for (name, input) in &case.file.probes {
+            if RESERVED.contains(&name.get_ref().as_str()) {
+                let message = format!("`{}` is a column of history.csv already", name.get_ref());
+                return Err(case.source.error(name.span(), message).into());
+            }
             let resolver = Resolver {
                 case,
                 model,
@@ -227,6 +234,9 @@ impl Resolver<'_> {
             || y.is_some()
         {
             return Err(self.wrong("`combine` stands alone (with `scale`)"));
+        }
+        if combine.is_empty() {
+            return Err(self.wrong("`combine` is empty"));
         }
         let names: Vec<&str> = earlier.iter().map(|(name, _)| name.as_str()).collect();
         let terms = combine.iter().map(|(name, factor)| {

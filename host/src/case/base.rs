@@ -5,7 +5,7 @@
 
 use super::CaseFile;
 use crate::error::{Error, Source};
-use serde::Deserialize;
+use crate::input::{deserialize, toml_error};
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -23,7 +23,7 @@ pub(super) fn read(source: Source) -> Result<(Source, CaseFile), Error> {
         .collect();
     let mut merged: Option<Spanned<DeTable<'_>>> = None;
     for text in &texts {
-        let mut table = DeTable::parse(text).map_err(|error| at(&source, &error))?;
+        let mut table = DeTable::parse(text).map_err(|error| toml_error(&source, &error))?;
         table.get_mut().remove("base");
         match &mut merged {
             None => merged = Some(table),
@@ -31,20 +31,13 @@ pub(super) fn read(source: Source) -> Result<(Source, CaseFile), Error> {
         }
     }
     let merged = merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))?;
-    let file = CaseFile::deserialize(toml::Deserializer::from(merged))
-        .map_err(|error| at(&source, &error))?;
+    let file = deserialize(&source, merged)?;
     Ok((source, file))
-}
-
-fn at(source: &Source, error: &toml::de::Error) -> Error {
-    source
-        .error(error.span().unwrap_or(0..0), error.message().to_owned())
-        .into()
 }
 
 /// The file after its base, that after its own, and so on.
 fn with_bases(source: Source, chain: usize) -> Result<Source, Error> {
-    let table = DeTable::parse(source.text()).map_err(|error| at(&source, &error))?;
+    let table = DeTable::parse(source.text()).map_err(|error| toml_error(&source, &error))?;
     let Some((_, base)) = table
         .get_ref()
         .iter()
@@ -66,8 +59,13 @@ fn with_bases(source: Source, chain: usize) -> Result<Source, Error> {
         .parent()
         .unwrap_or(Path::new("."))
         .join(path.as_ref());
-    let read = Source::read(&path)
-        .map_err(|error| source.error(base.span(), format!("the base cannot be used: {error}")))?;
+    let read = Source::read(&path).map_err(|error| {
+        let why = std::error::Error::source(&error).map_or(String::new(), |why| format!(": {why}"));
+        source.error(
+            base.span(),
+            format!("the base cannot be used: {error}{why}"),
+        )
+    })?;
     Ok(source.based_on(&with_bases(read, chain - 1)?))
 }
 

@@ -1,31 +1,26 @@
 //! Meshes of columns and rows: grid, regions, lines, and elements inserted along lines.
 
 use super::{EDGES, Joint, Line, Mesh, Quad};
-use crate::case::{CaseFile, Coordinate, Formulation, LineInput, PartInput, RegionInput};
+use crate::case::{Analysis, CaseFile, Coordinate, Formulation, LineInput, MeshInput};
+use crate::case::{PartInput, RegionInput};
 use crate::error::{Error, Source, suggestion};
 use std::collections::HashMap;
 use toml::Spanned;
 
 /// Most columns times rows.
 const MOST_ELEMENTS: usize = 4_000_000;
+/// Largest coordinate, m.
+const FARTHEST: f64 = 1e9;
 /// Two coordinates are the same within this fraction of the mesh's size.
 const SAME: f64 = 1e-9;
 
 pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
     let input = &file.mesh;
-    let x = grid(source, input.origin[0], &input.columns)?;
-    let y = grid(source, input.origin[1], &input.rows)?;
-    let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
-    if n_columns.saturating_mul(n_rows) > MOST_ELEMENTS {
-        return Err(Error::Usage(format!(
-            "{n_columns} columns × {n_rows} rows: at most {MOST_ELEMENTS} elements are possible"
-        )));
-    }
+    let (x, y) = grids(source, file)?;
     let groups = element_groups(source, file, &x, &y)?;
     let mut mesh = quads(&x, &y, &groups);
-    let tolerance = SAME * (x[n_columns] - x[0]).max(y[n_rows] - y[0]);
     for (name, line) in &input.lines {
-        let found = find_line(&mesh, line.get_ref(), tolerance).map_err(|why| {
+        let found = find_line(&mesh, [&x, &y], line.get_ref()).map_err(|why| {
             let message = format!("line `{}`: {why}", name.get_ref());
             source.error(line.span(), message)
         })?;
@@ -36,6 +31,10 @@ pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
         match (group.formulation, &group.line) {
             (Formulation::ZeroThickness, Some(line)) => {
                 mesh.line(source, line)?;
+                refuse_taken(&mesh, file, line.get_ref()).map_err(|why| {
+                    let message = format!("group `{}`: {why}", name.get_ref());
+                    source.error(line.span(), message)
+                })?;
                 split(&mut mesh, line.get_ref(), number).map_err(|why| {
                     let message = format!("group `{}`: {why}", name.get_ref());
                     source.error(line.span(), message)
@@ -59,23 +58,86 @@ pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
     Ok(mesh)
 }
 
-/// Coordinates of the grid lines.
-fn grid(source: &Source, origin: f64, parts: &[Spanned<PartInput>]) -> Result<Vec<f64>, Error> {
+/// Coordinates of the grid lines in x and y.
+fn grids(source: &Source, file: &CaseFile) -> Result<(Vec<f64>, Vec<f64>), Error> {
+    let MeshInput {
+        origin,
+        columns,
+        rows,
+        ..
+    } = &file.mesh;
+    let start = origin.as_ref().map_or([0.0; 2], |origin| *origin.get_ref());
+    let span = origin.as_ref().map_or(columns.span(), Spanned::span);
+    if start.iter().any(|at| at.abs() > FARTHEST) {
+        let message = format!("`origin` is {start:?}, expected at most {FARTHEST:e} m");
+        return Err(source.error(span, message).into());
+    }
+    if file.analysis == Analysis::Axisymmetric && start[0] < 0.0 {
+        let message = format!("the mesh starts at r = {}, across the axis", start[0]);
+        return Err(source
+            .error(span, message)
+            .hint("r is 0 on the axis and grows outward")
+            .into());
+    }
+    let x = grid(source, "columns", start[0], columns)?;
+    let y = grid(source, "rows", start[1], rows)?;
+    let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
+    if n_columns.saturating_mul(n_rows) > MOST_ELEMENTS {
+        let message = format!(
+            "{n_columns} columns × {n_rows} rows: at most {MOST_ELEMENTS} elements are possible"
+        );
+        return Err(source.error(columns.span(), message).into());
+    }
+    // Lines must be able to tell the two sides of an element apart.
+    let least = 4.0 * tolerance([&x, &y]);
+    for (grid, parts) in [(&x, columns), (&y, rows)] {
+        if let Some(pair) = grid.windows(2).find(|pair| pair[1] - pair[0] < least) {
+            let message = format!(
+                "elements between {:?} and {:?} are thinner than {least:.1e} m, {:.0e} of the mesh",
+                pair[0],
+                pair[1],
+                4.0 * SAME
+            );
+            return Err(source.error(parts.span(), message).into());
+        }
+    }
+    Ok((x, y))
+}
+
+/// Within this distance two coordinates are the same.
+fn tolerance(grids: [&[f64]; 2]) -> f64 {
+    let [width, height] = grids.map(|grid| grid[grid.len() - 1] - grid[0]);
+    SAME * width.max(height)
+}
+
+/// Coordinates of the grid lines in one direction.
+fn grid(
+    source: &Source,
+    name: &str,
+    origin: f64,
+    parts: &Spanned<Vec<Spanned<PartInput>>>,
+) -> Result<Vec<f64>, Error> {
     let mut at = vec![origin];
-    for part in parts {
+    for part in parts.get_ref() {
         let PartInput { n, to, ratio } = *part.get_ref();
         let error = |message: String| Err(source.error(part.span(), message).into());
         let start = at[at.len() - 1];
         if n == 0 || n > MOST_ELEMENTS {
             return error(format!("`n` is {n}, expected 1 to {MOST_ELEMENTS}"));
         }
+        if at.len() + n > MOST_ELEMENTS {
+            return error(format!("more than {MOST_ELEMENTS} {name} up to here"));
+        }
         if !ratio.is_finite() || ratio <= 0.0 {
             return error(format!("`ratio` is {ratio}, expected a positive number"));
         }
-        if !to.is_finite() || to <= start {
+        if to <= start {
             return error(format!(
                 "`to` is {to}, expected more than {start}, where the part starts"
             ));
+        }
+        if to > FARTHEST {
+            return error(format!("`to` is {to:e}, expected at most {FARTHEST:e} m"));
         }
         // Sizes first, first·ratio, first·ratio², … add up to the whole part.
         let sizes: Vec<f64> = (0..n).map(|i| ratio.powi(i as i32)).collect();
@@ -92,11 +154,9 @@ fn grid(source: &Source, origin: f64, parts: &[Spanned<PartInput>]) -> Result<Ve
         }
         at.push(to);
     }
-    if at.len() < 2 || !origin.is_finite() {
-        return Err(Error::Usage(format!(
-            "{}: the mesh needs columns and rows",
-            source.path().display()
-        )));
+    if at.len() < 2 {
+        let message = format!("`{name}` is empty, the mesh needs some");
+        return Err(source.error(parts.span(), message).into());
     }
     Ok(at)
 }
@@ -138,20 +198,27 @@ fn element_groups(
             let message = "a `zero_thickness` group is inserted along a line, it takes no region";
             return Err(source.error(name.span(), message).into());
         }
-        let columns = interval(source, x, in_x.as_ref())?;
-        let rows = interval(source, y, in_y.as_ref())?;
+        let columns = interval(source, name.get_ref(), x, in_x.as_ref())?;
+        let rows = interval(source, name.get_ref(), y, in_y.as_ref())?;
         for row in rows {
             group[row * n_columns..][columns.clone()].fill(number);
         }
     }
     if let Some(e) = group.iter().position(|&g| g == usize::MAX) {
         let (i, j) = (e % n_columns, e / n_columns);
-        return Err(Error::Usage(format!(
-            "{}: the element at ({:.6}, {:.6}) belongs to no region",
-            source.path().display(),
-            0.5 * (x[i] + x[i + 1]),
-            0.5 * (y[j] + y[j + 1])
-        )));
+        let regions = &file.mesh.regions;
+        let place = regions
+            .last()
+            .map_or(file.mesh.columns.span(), |region| region.group.span());
+        let message = format!(
+            "the element at ({:.6}, {:.6}) belongs to no region",
+            f64::midpoint(x[i], x[i + 1]),
+            f64::midpoint(y[j], y[j + 1])
+        );
+        return Err(source
+            .error(place, message)
+            .hint("a first [[mesh.region]] with only a `group` covers everything")
+            .into());
     }
     Ok(group)
 }
@@ -159,6 +226,7 @@ fn element_groups(
 /// Which columns (or rows) an extent covers. Its ends must be grid lines.
 fn interval(
     source: &Source,
+    group: &str,
     grid: &[f64],
     extent: Option<&Spanned<[f64; 2]>>,
 ) -> Result<std::ops::Range<usize>, Error> {
@@ -166,19 +234,11 @@ fn interval(
         return Ok(0..grid.len() - 1);
     };
     let tolerance = SAME * (grid[grid.len() - 1] - grid[0]);
-    let index = |at: f64| {
-        let nearest = (0..grid.len())
-            .min_by(|&a, &b| (grid[a] - at).abs().total_cmp(&(grid[b] - at).abs()))
-            .unwrap_or(0);
-        if (grid[nearest] - at).abs() <= tolerance {
-            Ok(nearest)
-        } else {
-            Err(source.error(
-                extent.span(),
-                format!("{at} is no grid line, the nearest is {}", grid[nearest]),
-            ))
-        }
+    let error = |why: String| {
+        let message = format!("region of group `{group}`: {why}");
+        source.error(extent.span(), message)
     };
+    let index = |at: f64| grid_line(grid, at, tolerance).map_err(error);
     let [from, to] = *extent.get_ref();
     let (from, to) = (index(from)?, index(to)?);
     if from >= to {
@@ -186,6 +246,21 @@ fn interval(
         return Err(source.error(extent.span(), message).into());
     }
     Ok(from..to)
+}
+
+/// Number of the grid line at a coordinate.
+fn grid_line(grid: &[f64], at: f64, tolerance: f64) -> Result<usize, String> {
+    let nearest = (0..grid.len())
+        .min_by(|&a, &b| (grid[a] - at).abs().total_cmp(&(grid[b] - at).abs()))
+        .unwrap_or(0);
+    if (grid[nearest] - at).abs() <= tolerance {
+        Ok(nearest)
+    } else {
+        Err(format!(
+            "{at} is no grid line, the nearest is {}",
+            grid[nearest]
+        ))
+    }
 }
 
 /// The quads of a grid. Nodes are numbered row by row, mid-sides included.
@@ -231,7 +306,8 @@ fn quads(x: &[f64], y: &[f64], groups: &[usize]) -> Mesh {
 }
 
 /// Edges (or the node) of the mesh on a line.
-fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, String> {
+fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, String> {
+    let tolerance = tolerance(grids);
     let on = |node: usize| {
         [line.x, line.y]
             .iter()
@@ -244,6 +320,14 @@ fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, Stri
                 }
             })
     };
+    for (coordinate, grid) in [line.x, line.y].into_iter().zip(grids) {
+        if let Some(Coordinate::Between([from, to])) = coordinate {
+            let from = grid_line(grid, from, tolerance)?;
+            if from >= grid_line(grid, to, tolerance)? {
+                return Err("its extent is empty, expected [smaller, larger]".to_owned());
+            }
+        }
+    }
     match (line.x, line.y) {
         (Some(Coordinate::At(_)), Some(Coordinate::At(_))) => {
             let nodes: Vec<usize> = (0..mesh.nodes.len()).filter(|&n| on(n)).collect();
@@ -255,7 +339,9 @@ fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, Stri
                 nodes,
             })
         }
-        (Some(Coordinate::At(_)), _) | (_, Some(Coordinate::At(_))) => {
+        (Some(Coordinate::At(at)), _) | (_, Some(Coordinate::At(at))) => {
+            let along_y = matches!(line.x, Some(Coordinate::At(_)));
+            grid_line(grids[usize::from(!along_y)], at, tolerance)?;
             let mut edges = Vec::new();
             for (q, quad) in mesh.quads.iter().enumerate() {
                 for (e, edge) in EDGES.iter().enumerate() {
@@ -273,6 +359,26 @@ fn find_line(mesh: &Mesh, line: &LineInput, tolerance: f64) -> Result<Line, Stri
             })
         }
         _ => Err("one coordinate must be a number, such as `x = 0.0`".to_owned()),
+    }
+}
+
+/// Refuses a line where no elements can be inserted: a point, or edges that another group has.
+fn refuse_taken(mesh: &Mesh, file: &CaseFile, name: &str) -> Result<(), String> {
+    let line = &mesh.lines[name];
+    if line.edges.is_empty() {
+        return Err("the line is a point".to_owned());
+    }
+    let middles: Vec<usize> = line.edges.iter().map(|&edge| mesh.edge(edge)[2]).collect();
+    let taken = mesh
+        .joints
+        .iter()
+        .find(|joint| middles.contains(&joint.minus[2]) || middles.contains(&joint.plus[2]));
+    match taken.and_then(|joint| file.groups.get_index(joint.group)) {
+        Some((other, _)) => Err(format!(
+            "the line has elements of group `{}` already",
+            other.get_ref()
+        )),
+        None => Ok(()),
     }
 }
 
@@ -369,6 +475,22 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
             for i in 0..8 {
                 if let Some(&new) = copy.get(&nodes[i]) {
                     mesh.quads[q].nodes[i] = new;
+                }
+            }
+        }
+    }
+    // So do the elements of a line that this one crosses.
+    for joint in &mut mesh.joints {
+        let at = joint
+            .minus
+            .iter()
+            .map(|&n| mesh.nodes[n][across])
+            .sum::<f64>()
+            / 3.0;
+        if at > position {
+            for node in joint.minus.iter_mut().chain(&mut joint.plus) {
+                if let Some(&new) = copy.get(node) {
+                    *node = new;
                 }
             }
         }

@@ -676,3 +676,87 @@ impl OwnedInstance {
         (status, read_message(&message))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A struct that is 16 bytes long in version 1.0.
+    #[repr(C)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct First {
+        struct_size: u32,
+        flags: u32,
+        value: u64,
+    }
+
+    /// The same two minors later.
+    #[repr(C)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Grown {
+        first: First,
+        added: u64,
+        last: u64,
+    }
+
+    fn first(struct_size: u32, value: u64) -> First {
+        First {
+            struct_size,
+            flags: 0,
+            value,
+        }
+    }
+
+    fn grown(struct_size: u32, value: u64) -> Grown {
+        Grown {
+            first: first(struct_size, value),
+            added: 1,
+            last: 2,
+        }
+    }
+
+    #[test]
+    fn an_earlier_table_is_read_as_far_as_it_goes() {
+        let entries = [first(16, 5), first(16, 6)];
+        let read = table(entries.as_ptr().cast::<Grown>(), 2, 16, "entries").unwrap();
+        let zeros = |first| Grown {
+            first,
+            added: 0,
+            last: 0,
+        };
+        assert_eq!(read, entries.map(zeros));
+    }
+
+    #[test]
+    fn a_later_table_is_walked_with_its_own_stride() {
+        let entries = [grown(32, 5), grown(32, 6)];
+        let read = table(entries.as_ptr().cast::<First>(), 2, 16, "entries").unwrap();
+        assert_eq!(read, entries.map(|entry| entry.first));
+    }
+
+    #[test]
+    fn a_table_shorter_than_version_1_0_is_refused() {
+        for stride in [0, 8, 15, 17] {
+            let entries = [first(stride, 5)];
+            let why = table(entries.as_ptr(), 1, 16, "entries").unwrap_err();
+            assert!(why.contains("expected at least 16"), "{why}");
+        }
+    }
+
+    #[test]
+    fn a_struct_is_read_as_far_as_it_says() {
+        let read = |said| {
+            let entry = grown(said, 5);
+            // SAFETY: 32 bytes are there, whatever less is said.
+            unsafe { known(&raw const entry, 16) }
+        };
+        assert_eq!(read(15), None);
+        assert_eq!(read(16).map(|s| (s.added, s.last)), Some((0, 0)));
+        assert_eq!(read(24).map(|s| (s.added, s.last)), Some((1, 0)));
+        assert_eq!(read(32).map(|s| (s.added, s.last)), Some((1, 2)));
+        let later = grown(32, 5);
+        // SAFETY: as above.
+        let read = unsafe { known((&raw const later).cast::<First>(), 16) };
+        assert_eq!(read, Some(later.first));
+    }
+}

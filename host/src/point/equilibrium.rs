@@ -329,10 +329,11 @@ impl<'a> Search<'a> {
             let own = own.max(f64::abs(springs[k]));
             let floor = ROUND_OFF * (scale + (self.elastic_norm + self.stiffness[i]) * reach);
             let close = RELATIVE_TOLERANCE * scale + floor;
-            // Negations, so that a residual that is not a number is far.
-            if !(r.abs() <= close) {
+            // Never true of a residual that is not a number.
+            let within = |bound: f64| r.abs() <= bound;
+            if !within(close) {
                 verdict = Verdict::Far;
-            } else if verdict == Verdict::Tight && !(r.abs() <= RELATIVE_TOLERANCE * own + floor) {
+            } else if verdict == Verdict::Tight && !within(RELATIVE_TOLERANCE * own + floor) {
                 verdict = Verdict::Close;
             }
             if r.abs() > worst {

@@ -283,7 +283,7 @@ fn initial_flux(
             .into());
     }
     let mut flux = [0.0; N_MAX];
-    for (name, value) in fits.iter().flat_map(|table| table.get_ref()) {
+    for (name, value) in fits.iter().flat_map(Spanned::get_ref) {
         flux[component(source, name, hypothesis)?] = finite(source, name.get_ref(), value)?;
     }
     Ok(flux)

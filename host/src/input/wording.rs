@@ -1,0 +1,139 @@
+//! Errors of the TOML reader and of serde in the words of this program.
+
+use crate::error::{InputError, Source, suggestion};
+use std::ops::Range;
+
+/// The error with its place, the key where one is concerned, and a hint where one is known.
+pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
+    let span = error.span().unwrap_or(0..0);
+    let message = error.message().trim();
+    // An error about a whole table underlines its first line at most.
+    let underlined = source.text().get(span.clone()).unwrap_or_default();
+    let first_line = underlined.find('\n');
+    let span = first_line.map_or(span.clone(), |length| span.start..span.start + length);
+    let at = |message: String| source.error(span.clone(), message);
+    let of_key = |message: String| match key_before(source.text(), span.start) {
+        Some(key) => at(format!("`{key}`: {message}")),
+        None => at(message),
+    };
+    if let Some((name, known)) = unknown(message, "unknown field ") {
+        return at(format!("unknown key `{name}`")).hint(suggestion(name, known));
+    }
+    if let Some((name, known)) = unknown(message, "unknown variant ") {
+        return of_key(format!("there is no `{name}`")).hint(suggestion(name, known));
+    }
+    if let Some(name) = message.strip_prefix("missing field ") {
+        return at(format!("missing key {name}"));
+    }
+    if let Some(name) = message.strip_prefix("duplicate field ") {
+        return at(format!("{name} is given twice"))
+            .hint("`r` is another name of `x`, and `z` of `y`");
+    }
+    if message == "duplicate key" {
+        return duplicate(source, span);
+    }
+    let found = ["invalid type: ", "invalid value: ", "invalid length "]
+        .iter()
+        .find_map(|start| message.strip_prefix(start))
+        .and_then(|rest| rest.split_once(", expected "));
+    match found {
+        Some((found, expected)) => of_key(format!(
+            "found {}, expected {}",
+            found_in_words(found),
+            expected_in_words(expected)
+        )),
+        None if message.starts_with("expected") || message.contains(" is outside [") => {
+            of_key(message.to_owned())
+        }
+        None => at(message.to_owned()),
+    }
+}
+
+/// Name and candidates of "… `name`, expected one of `a`, `b`".
+fn unknown<'a>(message: &'a str, start: &str) -> Option<(&'a str, Vec<&'a str>)> {
+    let quoted: Vec<&str> = message
+        .strip_prefix(start)?
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .collect();
+    let (name, known) = quoted.split_first()?;
+    Some((name, known.to_vec()))
+}
+
+/// A key that stands twice, or a list of tables one of which is written as a single table.
+fn duplicate(source: &Source, span: Range<usize>) -> InputError {
+    let text = source.text();
+    let name = text.get(span.clone()).unwrap_or_default().to_owned();
+    let is_list = text[..span.start.min(text.len())]
+        .lines()
+        .next_back()
+        .is_some_and(|l| l.starts_with("[["));
+    let error = source.error(span, format!("`{name}` stands here for the second time"));
+    if is_list {
+        error.hint("if there are several, each is written with double brackets, as here")
+    } else {
+        error
+    }
+}
+
+/// The key whose value starts here, unless the value is an entry of a list.
+fn key_before(text: &str, value: usize) -> Option<&str> {
+    let before = text.get(..value)?.trim_end().strip_suffix('=')?.trim_end();
+    let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    let start = before.rfind(|c| !is_part(c)).map_or(0, |i| i + 1);
+    (start < before.len()).then(|| &before[start..])
+}
+
+fn found_in_words(found: &str) -> String {
+    let value = found.split('`').nth(1);
+    match (found.split(' ').next(), value) {
+        (Some("floating" | "integer"), Some(number)) => format!("the number {number}"),
+        (Some("boolean"), Some(value)) => format!("`{value}`"),
+        (Some("map"), _) => "a table".to_owned(),
+        (Some("sequence"), _) => "a list".to_owned(),
+        (Some("string"), _) => format!("the text {}", found.trim_start_matches("string ")),
+        (Some(length), _) if length.parse::<usize>().is_ok() => format!("a list of {length}"),
+        _ => found.to_owned(),
+    }
+}
+
+fn expected_in_words(expected: &str) -> String {
+    match expected {
+        "usize" | "u32" | "u64" => "a whole number, not negative".to_owned(),
+        "f64" => "a number".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a string" => "a text in quotes".to_owned(),
+        "a sequence" => "a list in brackets".to_owned(),
+        "a map" => "a table".to_owned(),
+        _ if expected.starts_with("struct ") => "a table".to_owned(),
+        _ => match expected.strip_prefix("an array of length ") {
+            Some(length) => format!("a list of {length}"),
+            None => expected.to_owned(),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_the_key_of_a_value() {
+        let text = "a.first = 1\nlist = [ 2, { second=3 } ]";
+        let key = |value: char| text.find(value).and_then(|at| key_before(text, at));
+        assert_eq!(key('1'), Some("first"));
+        assert_eq!(key('2'), None);
+        assert_eq!(key('3'), Some("second"));
+    }
+
+    #[test]
+    fn reads_the_names_in_a_message() {
+        let message = "unknown field `a`, expected one of `b`, `c`";
+        assert_eq!(
+            unknown(message, "unknown field "),
+            Some(("a", vec!["b", "c"]))
+        );
+        assert_eq!(unknown(message, "unknown variant "), None);
+    }
+}

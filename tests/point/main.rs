@@ -1,0 +1,20 @@
+//! Single-point tests: each law, through its library and the point driver, against closed forms
+//! and quadratures that do not use the law's code; and the rules of the driver one by one.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests panic to fail"
+)]
+
+mod coulomb_joint;
+mod driver;
+mod elastic;
+mod input_errors;
+mod mepi;
+mod mepi_softening;
+mod mepi_truth;
+mod mohr_coulomb;
+mod oriented_mohr_coulomb;
+mod rules;
+mod singular;
