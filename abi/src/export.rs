@@ -735,6 +735,7 @@ impl<'a> Access<'a> {
         })
     }
 
+    #[inline]
     fn inputs_are_finite(&self, i: usize) -> bool {
         let finite =
             |view: &View, n| view.p.is_null() || (0..n).all(|c| self.get(view, i, c).is_finite());

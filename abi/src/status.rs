@@ -52,6 +52,7 @@ impl Outcome {
 
 /// The more severe of two codes: errors (most negative worst) before `CUT_STEP` before
 /// `OK_UNRELIABLE` before `OK`.
+#[inline]
 pub fn most_severe(a: raw::Status, b: raw::Status) -> raw::Status {
     if a < 0 || b < 0 { a.min(b) } else { a.max(b) }
 }

@@ -17,21 +17,36 @@ pub struct Case {
     pub source: Source,
     /// Contents.
     pub file: CaseFile,
+    /// Name of the variant, if the file stands for several cases.
+    pub variant: Option<String>,
 }
 
 impl Case {
-    /// Reads a case file, or `case.toml` in a folder.
+    /// Reads a case file, or `case.toml` in a folder: one case, or one for each `[[variant]]`.
     ///
     /// # Errors
     /// [`Error::Unreadable`], or [`Error::Input`] at the place that does not fit.
-    pub fn load(path: &Path) -> Result<Self, Error> {
+    pub fn load(path: &Path) -> Result<Vec<Self>, Error> {
         let path = if path.is_dir() {
             path.join("case.toml")
         } else {
             path.to_owned()
         };
-        let (source, file) = base::read(Source::read(&path)?)?;
-        Ok(Self { source, file })
+        let (source, files) = base::read(Source::read(&path)?)?;
+        let case = |(variant, file)| Self {
+            source: source.clone(),
+            file,
+            variant,
+        };
+        Ok(files.into_iter().map(case).collect())
+    }
+
+    /// Folder for the results if none is given: `results/<case>`, or `results/<case>/<variant>`.
+    pub fn default_folder(&self) -> PathBuf {
+        let folder = Path::new("results").join(self.name());
+        self.variant
+            .iter()
+            .fold(folder, |folder, variant| folder.join(variant))
     }
 
     /// Name of the case: its folder if the file is called `case.toml`, else the file's stem.
@@ -465,7 +480,7 @@ fn halvings<'de, D: Deserializer<'de>>(input: D) -> Result<u32, D::Error> {
     within(u32::deserialize(input)?, 0, 40)
 }
 
-fn within<T: PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {
+fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {
     if value >= least && value <= most {
         return Ok(value);
     }

@@ -113,13 +113,19 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
+    fn assert_close(a: [f64; 4], b: [f64; 4]) {
+        for (a, b) in a.iter().zip(b) {
+            assert_relative_eq!(*a, b, epsilon = 1e-14);
+        }
+    }
+
     #[test]
     fn facets_along_the_coordinates_carry_the_global_shear_stress() {
         let stress = [1.0, 2.0, 3.0, 4.0];
         let vertical = Axes::of_facet([0.0, -2.0]);
-        assert_eq!(vertical.stress_from_global(stress), [2.0, 1.0, 3.0, 4.0]);
+        assert_close(vertical.stress_from_global(stress), [2.0, 1.0, 3.0, 4.0]);
         let horizontal = Axes::of_facet([-1.0, 0.0]);
-        assert_eq!(horizontal.stress_from_global(stress), stress);
+        assert_close(horizontal.stress_from_global(stress), stress);
     }
 
     #[test]
@@ -141,9 +147,6 @@ mod tests {
     fn turning_a_stress_there_and_back_changes_nothing() {
         let axes = Axes::of_facet([0.6, 0.8]);
         let stress = [1.0, -2.0, 3.0, 4.0];
-        let back = axes.stress_to_global(axes.stress_from_global(stress));
-        for (a, b) in stress.iter().zip(back) {
-            assert_relative_eq!(*a, b, epsilon = 1e-14);
-        }
+        assert_close(axes.stress_to_global(axes.stress_from_global(stress)), stress);
     }
 }

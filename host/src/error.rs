@@ -128,7 +128,7 @@ impl Source {
 fn not_utf_8(error: &FromUtf8Error) -> std::io::Error {
     let bytes = error.as_bytes();
     let at = error.utf8_error().valid_up_to();
-    let line = bytes[..at].iter().filter(|&&byte| byte == b'\n').count() + 1;
+    let line = bytes[..at].split(|&byte| byte == b'\n').count();
     let hint = match bytes {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => ": it looks like UTF-16, save it as UTF-8",
         _ if bytes.contains(&0) => ": it looks like a binary file",

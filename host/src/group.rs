@@ -162,22 +162,18 @@ impl Group {
         self.law = law;
         let law = &self.law.built.law;
         let n_points = self.kinematics.n_points();
-        let internal = match kept {
-            Some(kept) => kept,
-            None => {
-                let stress = (self.stress.committed.as_slice(), self.flux_place());
-                let mut state = law
-                    .initial_state(n_points, stress)
-                    .map_err(|failure| self.locate(failure))?;
-                for &(number, value) in &self.law.initial {
-                    state
-                        .iter_mut()
-                        .skip(number)
-                        .step_by(law.n_states())
-                        .for_each(|v| *v = value);
-                }
-                state
+        let internal = if let Some(kept) = kept {
+            kept
+        } else {
+            let stress = (self.stress.committed.as_slice(), self.flux_place());
+            let mut state = law
+                .initial_state(n_points, stress)
+                .map_err(|failure| self.locate(&failure))?;
+            for &(number, value) in &self.law.initial {
+                let of_points = state.iter_mut().skip(number).step_by(law.n_states());
+                of_points.for_each(|v| *v = value);
             }
+            state
         };
         self.internal = Field::new(internal);
         let n = law.n_components();
@@ -186,7 +182,7 @@ impl Group {
         if self.tangents_are_constant {
             let one = self
                 .operator_of_first_point()
-                .map_err(|failure| self.locate(failure))?;
+                .map_err(|failure| self.locate(&failure))?;
             self.tangent = one.repeat(self.kinematics.points_per_element());
             return Ok(());
         }
@@ -194,12 +190,10 @@ impl Group {
         if self.uses_layer() {
             let mut operator = vec![0.0; n_points * n * n];
             self.run_law(Operator::Elastic, 0.0, 0.0, &mut operator)
-                .map_err(|failure| self.locate(failure))?;
-            let layer = self
-                .layer
-                .as_mut()
-                .ok_or_else(|| unreachable_failure(&self.name))?;
-            layer.start(&operator);
+                .map_err(|failure| self.locate(&failure))?;
+            if let Some(layer) = &mut self.layer {
+                layer.start(&operator);
+            }
             self.stress.trial.copy_from_slice(&self.stress.committed);
             self.internal
                 .trial
@@ -276,7 +270,7 @@ impl Group {
         };
         self.tangent = tangent;
         self.law_calls += self.kinematics.n_points() as u64;
-        result.map_err(|failure| self.locate(failure))
+        result.map_err(|failure| self.locate(&failure))
     }
 
     /// σ = σ₀ + D Δε.
@@ -363,7 +357,7 @@ impl Group {
         )
     }
 
-    fn locate(&self, failure: BatchFailure) -> PointFailure {
+    fn locate(&self, failure: &BatchFailure) -> PointFailure {
         let per_element = self.kinematics.points_per_element().max(1);
         let point = failure
             .point
@@ -382,7 +376,7 @@ impl Group {
                     .strip_prefix(&format!("point {}: ", failure.point))
                     .unwrap_or(&failure.message)
                     .to_owned(),
-                ..failure
+                ..failure.clone()
             },
         }
     }
@@ -472,22 +466,5 @@ impl Group {
                 Some((jump, pair(&self.stress.committed)))
             }
         }
-    }
-}
-
-fn unreachable_failure(group: &str) -> PointFailure {
-    PointFailure {
-        group: group.to_owned(),
-        law: String::new(),
-        law_id: String::new(),
-        element: 0,
-        point: 0,
-        position: [0.0; 2],
-        failure: BatchFailure {
-            point: 0,
-            outcome: abi::status::Outcome::Internal,
-            message: "a thin layer without a thickness".to_owned(),
-            factor: None,
-        },
     }
 }

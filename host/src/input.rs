@@ -29,7 +29,7 @@ pub fn deserialize<T: DeserializeOwned>(
     source: &Source,
     table: Spanned<DeTable<'_>>,
 ) -> Result<T, Error> {
-    for (key, value) in table.get_ref().iter() {
+    for (key, value) in table.get_ref() {
         refuse_infinite(source, key.get_ref(), value)?;
     }
     T::deserialize(toml::Deserializer::from(table)).map_err(|error| toml_error(source, &error))

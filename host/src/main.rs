@@ -7,7 +7,8 @@
 
 use clap::{Parser, Subcommand};
 use host::case::Case;
-use host::error::{Error, Place};
+use host::error::{Error, Place, suggestion};
+use host::output::Figures;
 use host::plugin::SearchPath;
 use host::run::{Observer, run};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -25,11 +26,14 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Run a case.
+    /// Run a case, or all variants of it.
     Run {
         /// A case file, or a folder with `case.toml`.
         case: PathBuf,
-        /// Folder for the results [default: results/<case name>].
+        /// Run only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
+        /// Folder for the results [default: results/<case name>[/<variant>]].
         #[arg(long)]
         out: Option<PathBuf>,
     },
@@ -58,7 +62,7 @@ fn main() -> ExitCode {
         }
     };
     let outcome = match arguments.command {
-        Command::Run { case, out } => run_case(&case, out),
+        Command::Run { case, variant, out } => run_cases(&case, variant.as_deref(), out.as_deref()),
         Command::Point { driver, csv } => run_point(&driver, csv.as_deref()),
         Command::Laws { id } => show_laws(id.as_deref()),
     };
@@ -72,14 +76,56 @@ fn main() -> ExitCode {
     }
 }
 
-fn run_case(path: &Path, out: Option<PathBuf>) -> Result<(), Error> {
-    let case = Case::load(path)?;
-    let folder = out.unwrap_or_else(|| Path::new("results").join(case.name()));
-    let mut progress = Progress::new();
-    let outcome = run(&case, &folder, &mut progress);
-    progress.finish();
-    if outcome.is_ok() {
-        println!("results in {}", folder.display());
+/// Runs a case, or all variants of one. A variant that fails does not stop the others; the last
+/// failure is the outcome.
+fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(), Error> {
+    let mut cases = Case::load(path)?;
+    if let Some(wanted) = variant {
+        let names: Vec<String> = cases
+            .iter()
+            .filter_map(|case| case.variant.clone())
+            .collect();
+        cases.retain(|case| case.variant.as_deref() == Some(wanted));
+        if cases.is_empty() {
+            let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
+            return Err(Error::Usage(format!(
+                "there is no variant `{wanted}`: {known}"
+            )));
+        }
+    }
+    let mut outcome = Ok(());
+    let mut drawn = Vec::new();
+    for case in &cases {
+        let folder = match (out, &case.variant) {
+            (None, _) => case.default_folder(),
+            (Some(out), Some(name)) if variant.is_none() => out.join(name),
+            (Some(out), _) => out.to_owned(),
+        };
+        if let Some(name) = &case.variant {
+            eprintln!("variant {name}");
+        }
+        let mut progress = Progress::new();
+        let run = run(case, &folder, &mut progress);
+        progress.finish();
+        match run {
+            Ok(figures) => {
+                println!("results in {}", folder.display());
+                drawn.extend(case.variant.clone().map(|variant| (variant, figures)));
+            }
+            // The last failure is reported by the caller, earlier ones here.
+            Err(error) => {
+                if let Err(earlier) = std::mem::replace(&mut outcome, Err(error)) {
+                    eprintln!("{:?}", miette::Report::new(earlier));
+                }
+            }
+        }
+    }
+    if drawn.len() > 1 {
+        let together = out.map_or_else(
+            || Path::new("results").join(cases[0].name()),
+            Path::to_owned,
+        );
+        Figures::draw_overlaid(&together, &drawn)?;
     }
     outcome
 }

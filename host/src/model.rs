@@ -41,7 +41,7 @@ impl Model {
     /// # Errors
     /// [`Error::Input`] at the place that does not fit; [`Error::Plugin`].
     pub fn build(case: &Case) -> Result<Self, Error> {
-        let Case { source, file } = case;
+        let Case { source, file, .. } = case;
         let mesh = Mesh::build(source, file)?;
         let search = SearchPath::new(&case.law_folders()?);
         let mut library = LawShelf {
@@ -242,16 +242,15 @@ impl<'a> LawShelf<'a> {
             }
         };
         let key = (name.get_ref().clone(), hypothesis.name());
-        let built = match self.laws.get(&key) {
-            Some(built) => Arc::clone(built),
-            None => {
-                let (source, parameters) = (self.source, &entry.parameters);
-                let built = build_law(source, &self.search, &entry.law, hypothesis, parameters)
-                    .map_err(|error| self.explain(error, group_name, group))?;
-                let built = Arc::new(built);
-                self.laws.insert(key, Arc::clone(&built));
-                built
-            }
+        let built = if let Some(built) = self.laws.get(&key) {
+            Arc::clone(built)
+        } else {
+            let (source, parameters) = (self.source, &entry.parameters);
+            let built = build_law(source, &self.search, &entry.law, hypothesis, parameters)
+                .map_err(|error| self.explain(error, group_name, group))?;
+            let built = Arc::new(built);
+            self.laws.insert(key, Arc::clone(&built));
+            built
         };
         let law = &built.law;
         if law.formulation().local_axes && group.formulation == Formulation::Solid {

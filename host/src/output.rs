@@ -6,7 +6,7 @@ mod figure;
 mod profile;
 mod summary;
 
-pub use figure::check_figures;
+pub use figure::{Figures, check_figures};
 pub use summary::PhaseRecord;
 
 use crate::case::{Case, OutputInput};
@@ -17,7 +17,6 @@ use crate::model::Model;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::Iteration;
 use fields::Fields;
-use figure::Figures;
 use profile::Profile;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -252,6 +251,11 @@ impl Results {
     /// Takes the record of a phase.
     pub fn phase(&mut self, record: PhaseRecord) {
         self.summary.phase(record);
+    }
+
+    /// The figures so far.
+    pub fn figures(&self) -> &Figures {
+        &self.figures
     }
 
     /// Writes the summary; the run's error, if there is one, goes into it.

@@ -6,7 +6,7 @@ use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::{Model, cannot_start, unit_pressure};
-use crate::output::{IncrementRecord, PhaseRecord, Results, check_figures};
+use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{LinearSolver, Loads, Newton, StepFailure, StepSuccess};
 use std::collections::BTreeMap;
@@ -37,7 +37,7 @@ const CUT: [f64; 2] = [0.1, 0.5];
 /// # Errors
 /// Bad input before anything is written; no equilibrium or plugin trouble after the last state
 /// of equilibrium has been written.
-pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<(), Error> {
+pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Figures, Error> {
     let started = Instant::now();
     let model = Model::build(case)?;
     let probes = Probes::new(case, &model)?;
@@ -51,7 +51,8 @@ pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<()
     let mut run = Run::new(case, model, probes);
     let outcome = run.phases(&mut results, observer);
     let finished = results.finish(&run.groups, started.elapsed(), outcome.as_ref().err());
-    outcome.and(finished)
+    outcome.and(finished)?;
+    Ok(results.figures().clone())
 }
 
 struct Run<'a> {
@@ -258,7 +259,7 @@ impl<'a> Run<'a> {
                             return Err(Error::plugin(format!("{place}: {defect}")));
                         }
                         if step < smallest {
-                            return Err(self.no_equilibrium(&place, lambda, n, &failure));
+                            return Err(Self::no_equilibrium(&place, lambda, n, &failure));
                         }
                     }
                 }
@@ -391,15 +392,18 @@ impl<'a> Run<'a> {
         }
         system.fold(&mut internal);
         loads.out_of_balance = vec![0.0; n_dofs];
-        let (mut rest, mut play) = (0.0, 0.0);
+        let (mut rest, mut against_end, mut play) = (0.0, 0.0, 0.0);
         for &dof in system.free() {
             let difference = internal[dof] - loads.force_start[dof];
             loads.out_of_balance[dof] = difference;
             rest += difference * difference;
+            against_end += (internal[dof] - loads.force_end[dof]).powi(2);
         }
         for (internal, external) in internal.iter().zip(&loads.force_start) {
             play += f64::max(internal * internal, external * external);
         }
+        // An initial stress that the loads of its own phase balance is in balance.
+        let rest = rest.min(against_end);
         if play > 0.0 {
             f64::sqrt(rest / play)
         } else {
@@ -407,7 +411,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn no_equilibrium(&self, place: &Place, lambda: f64, n: usize, failure: &StepFailure) -> Error {
+    fn no_equilibrium(place: &Place, lambda: f64, n: usize, failure: &StepFailure) -> Error {
         let reached = lambda * n as f64;
         Error::NoEquilibrium {
             message: format!(

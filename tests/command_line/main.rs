@@ -1,1 +1,11 @@
-//! Tests.
+//! The program as its users meet it, mistakes included: exit codes, messages, files.
+
+mod arguments;
+mod libraries;
+mod loading;
+mod mesh;
+mod names;
+mod parameters;
+mod program;
+mod results;
+mod syntax;

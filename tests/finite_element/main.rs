@@ -1,1 +1,16 @@
-//! Tests.
+//! Finite-element runs through the law libraries, against closed forms.
+
+mod cut_back;
+mod cylinder;
+mod footing;
+mod inclusion;
+mod newton;
+mod patch;
+mod patch_joint;
+mod patch_layer;
+mod patch_solid;
+mod phases;
+mod setup;
+mod sliding_block;
+mod thick_cylinder;
+mod thin_layer;

@@ -6,6 +6,7 @@
     clippy::panic,
     reason = "tests panic to fail"
 )]
+#![allow(clippy::doc_markdown, reason = "the headers hold formulas")]
 
 mod coulomb_joint;
 mod driver;

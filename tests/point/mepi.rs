@@ -204,9 +204,9 @@ fn slip_counts_in_both_directions() {
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
         if backwards(middle) > -1e-3 {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     assert_relative_eq!(run.last("plastic_slip"), low, max_relative = 1e-8);

@@ -148,8 +148,8 @@ fn oedometer_keeps_to_the_surface_after_yield() {
     let lambda = m * nu / (1.0 - nu);
     // Rates on the edge: both faces flow at the rate x, so ε_lat^e = −x a_ψ, ε_ax^e = ε_ax + 2x b_ψ,
     // and a_φ σ_lat = b_φ σ_ax.
-    let (a, b) = ((1.0 + sin_phi) / 2.0, (1.0 - sin_phi) / 2.0);
-    let (a_psi, b_psi) = ((1.0 + sin_psi) / 2.0, (1.0 - sin_psi) / 2.0);
+    let (a, b) = (0.5 * (1.0 + sin_phi), 0.5 * (1.0 - sin_phi));
+    let (a_psi, b_psi) = (0.5 * (1.0 + sin_psi), 0.5 * (1.0 - sin_psi));
     let axial = |x: f64| m * (1.0 + 2.0 * x * b_psi) - 2.0 * lambda * x * a_psi;
     let lateral = |x: f64| lambda * (1.0 + 2.0 * x * b_psi) - (lambda + m) * x * a_psi;
     let f = |x: f64| a * lateral(x) - b * axial(x);

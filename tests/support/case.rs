@@ -35,17 +35,28 @@ pub fn run_text(text: &str, folder: &Path) -> Result<Silent, Error> {
     let source = Source::new("case.toml", text);
     let file: CaseFile = parse(&source)?;
     let mut observer = Silent::default();
-    run(&Case { source, file }, folder, &mut observer)?;
+    let case = Case {
+        source,
+        file,
+        variant: None,
+    };
+    run(&case, folder, &mut observer)?;
     Ok(observer)
 }
 
-/// Runs a case file, with results in a folder.
+/// Runs a case file, with results in a folder; of a file with variants, in one folder for each.
 ///
 /// # Errors
-/// The run's.
+/// The first run's that fails.
 pub fn run_case(path: &Path, folder: &Path) -> Result<Silent, Error> {
     let mut observer = Silent::default();
-    run(&Case::load(path)?, folder, &mut observer)?;
+    for case in Case::load(path)? {
+        let folder = case
+            .variant
+            .iter()
+            .fold(folder.to_owned(), |folder, name| folder.join(name));
+        run(&case, &folder, &mut observer)?;
+    }
     Ok(observer)
 }
 

@@ -1,7 +1,8 @@
 //! Cases that differ from another by a few lines: `base = "path"`.
 //!
 //! The file's keys override those of its base: tables are merged key by key, entries of arrays
-//! that have a `name` (such as phases) are merged by name, everything else replaces.
+//! that have a `name` (such as phases) are merged by name, everything else replaces. Each entry of
+//! `[[variant]]` overrides the file in the same way, which then stands for as many cases.
 
 use super::CaseFile;
 use crate::error::{Error, Source};
@@ -13,8 +14,11 @@ use toml::de::{DeTable, DeValue};
 /// Longest chain of bases.
 const LONGEST_CHAIN: usize = 8;
 
+/// The contents of a file, by the name of the variant if there are any.
+type Variants = Vec<(Option<String>, CaseFile)>;
+
 /// Reads a case file with what it is based on.
-pub(super) fn read(source: Source) -> Result<(Source, CaseFile), Error> {
+pub(super) fn read(source: Source) -> Result<(Source, Variants), Error> {
     let source = with_bases(source, LONGEST_CHAIN)?;
     // Blank lines instead of the files before each one keep spans counting from the start.
     let texts: Vec<String> = source
@@ -30,9 +34,38 @@ pub(super) fn read(source: Source) -> Result<(Source, CaseFile), Error> {
             Some(merged) => merge(merged.get_mut(), table.into_inner()),
         }
     }
-    let merged = merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))?;
-    let file = deserialize(&source, merged)?;
-    Ok((source, file))
+    let mut merged = merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))?;
+    let Some(variants) = merged.get_mut().remove("variant") else {
+        let file = deserialize(&source, merged)?;
+        return Ok((source, vec![(None, file)]));
+    };
+    let span = variants.span();
+    let DeValue::Array(variants) = variants.into_inner() else {
+        return Err(source
+            .error(span, "variants are written as [[variant]]")
+            .into());
+    };
+    let mut files: Variants = Vec::new();
+    for variant in variants {
+        let (span, given) = (variant.span(), name(&variant));
+        let (Some(name), DeValue::Table(mut over)) = (given, variant.into_inner()) else {
+            return Err(source.error(span, "a [[variant]] needs a `name`").into());
+        };
+        let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+        if !name.starts_with(|c: char| c.is_ascii_alphanumeric()) || !name.chars().all(plain) {
+            let message = format!("`{name}` cannot be a folder's name: letters, digits, _ - .");
+            return Err(source.error(span, message).into());
+        }
+        if files.iter().any(|(other, _)| other.as_ref() == Some(&name)) {
+            let message = format!("two variants are called `{name}`");
+            return Err(source.error(span, message).into());
+        }
+        over.remove("name");
+        let mut table = merged.clone();
+        merge(table.get_mut(), over);
+        files.push((Some(name), deserialize(&source, table)?));
+    }
+    Ok((source, files))
 }
 
 /// The file after its base, that after its own, and so on.

@@ -91,11 +91,11 @@ fn grids(source: &Source, file: &CaseFile) -> Result<(Vec<f64>, Vec<f64>), Error
     // Lines must be able to tell the two sides of an element apart.
     let least = 4.0 * tolerance([&x, &y]);
     for (grid, parts) in [(&x, columns), (&y, rows)] {
-        if let Some(pair) = grid.windows(2).find(|pair| pair[1] - pair[0] < least) {
+        let mut sides = grid.iter().zip(&grid[1..]);
+        if let Some((from, to)) = sides.find(|(from, to)| *to - *from < least) {
             let message = format!(
-                "elements between {:?} and {:?} are thinner than {least:.1e} m, {:.0e} of the mesh",
-                pair[0],
-                pair[1],
+                "elements between {from:?} and {to:?} are thinner than {least:.1e} m, {:.0e} of \
+                 the mesh",
                 4.0 * SAME
             );
             return Err(source.error(parts.span(), message).into());
@@ -236,14 +236,15 @@ fn interval(
     let tolerance = SAME * (grid[grid.len() - 1] - grid[0]);
     let error = |why: String| {
         let message = format!("region of group `{group}`: {why}");
-        source.error(extent.span(), message)
+        Error::from(source.error(extent.span(), message))
     };
     let index = |at: f64| grid_line(grid, at, tolerance).map_err(error);
     let [from, to] = *extent.get_ref();
     let (from, to) = (index(from)?, index(to)?);
     if from >= to {
-        let message = "the extent is empty, expected [smaller, larger]";
-        return Err(source.error(extent.span(), message).into());
+        return Err(error(
+            "its extent is empty, expected [smaller, larger]".to_owned(),
+        ));
     }
     Ok(from..to)
 }
@@ -412,23 +413,7 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
     }
     // A node is doubled if the quads around it fall apart: ends on the boundary and inner nodes
     // do; an end inside the mesh does not.
-    let mut on_boundary = vec![true; mesh.nodes.len()];
-    let mut owners: HashMap<usize, usize> = HashMap::new();
-    for quad in &mesh.quads {
-        for edge in EDGES {
-            *owners.entry(quad.nodes[edge[2]]).or_default() += 1;
-        }
-    }
-    on_boundary.fill(false);
-    for quad in &mesh.quads {
-        for edge in EDGES {
-            if owners[&quad.nodes[edge[2]]] == 1 {
-                for i in edge {
-                    on_boundary[quad.nodes[i]] = true;
-                }
-            }
-        }
-    }
+    let on_boundary = boundary_nodes(mesh);
     let mut uses: HashMap<usize, usize> = HashMap::new();
     for &(minus, _) in &pairs {
         for node in mesh.edge(minus) {
@@ -497,6 +482,27 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
     }
     mesh.joints.extend(joints);
     Ok(())
+}
+
+/// Whether a node lies on an edge that only one quad has.
+fn boundary_nodes(mesh: &Mesh) -> Vec<bool> {
+    let mut owners: HashMap<usize, usize> = HashMap::new();
+    for quad in &mesh.quads {
+        for edge in EDGES {
+            *owners.entry(quad.nodes[edge[2]]).or_default() += 1;
+        }
+    }
+    let mut on_boundary = vec![false; mesh.nodes.len()];
+    for quad in &mesh.quads {
+        for edge in EDGES {
+            if owners[&quad.nodes[edge[2]]] == 1 {
+                for i in edge {
+                    on_boundary[quad.nodes[i]] = true;
+                }
+            }
+        }
+    }
+    on_boundary
 }
 
 /// Nodes of every line, after all splitting, in the order of the coordinates.

@@ -21,22 +21,22 @@ const COLOURS: [RGBColor; 6] = [
 
 /// A curve with its name.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Curve {
+struct Curve {
     /// Name, for the legend.
-    pub(super) name: String,
+    name: String,
     /// Points in order.
-    pub(super) points: Vec<(f64, f64)>,
+    points: Vec<(f64, f64)>,
 }
 
 /// Texts of a figure.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Labels {
+struct Labels {
     /// Above the figure.
-    pub(super) title: String,
+    title: String,
     /// Along the horizontal axis.
-    pub(super) x: String,
+    x: String,
     /// Along the vertical axis.
-    pub(super) y: String,
+    y: String,
 }
 
 /// Refuses figures whose probes or phase do not exist, or two with one name.
@@ -92,10 +92,10 @@ pub fn check_figures(case: &Case, probes: &Probes) -> Result<(), Error> {
 }
 
 /// The figures of a run, filled as it goes.
-#[derive(Debug)]
-pub(super) struct Figures {
+#[derive(Clone, Debug)]
+pub struct Figures {
     title: String,
-    figures: Vec<(FigureInput, Vec<Curve>)>,
+    drawn: Vec<(FigureInput, Vec<Curve>)>,
     names: Vec<String>,
 }
 
@@ -110,7 +110,7 @@ impl Figures {
         };
         Self {
             title: case.file.title.clone(),
-            figures: case
+            drawn: case
                 .file
                 .figures
                 .iter()
@@ -121,7 +121,7 @@ impl Figures {
     }
 
     pub(super) fn increment(&mut self, place: &Place, values: &[Option<f64>]) {
-        for (figure, curves) in &mut self.figures {
+        for (figure, curves) in &mut self.drawn {
             if figure
                 .phase
                 .as_ref()
@@ -142,29 +142,70 @@ impl Figures {
     }
 
     pub(super) fn draw(&self, folder: &Path) -> Result<(), Error> {
-        for (figure, curves) in &self.figures {
-            let path = folder.join(format!("{}.svg", figure.name.get_ref()));
-            let labels = Labels {
-                title: figure.title.clone().unwrap_or_else(|| self.title.clone()),
-                x: figure
-                    .x_label
-                    .clone()
-                    .unwrap_or_else(|| figure.x.get_ref().clone()),
-                y: figure.y_label.clone().unwrap_or_default(),
-            };
-            let text = svg(&labels, curves)
-                .map_err(|error| Error::Internal(format!("figure {}: {error}", path.display())))?;
-            std::fs::write(&path, text).map_err(|error| unwritable(&path, error))?;
+        for (figure, curves) in &self.drawn {
+            draw_file(folder, figure, &self.title, curves)?;
+        }
+        Ok(())
+    }
+
+    /// Draws the figures of several variants of a case over each other.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn draw_overlaid(folder: &Path, variants: &[(String, Self)]) -> Result<(), Error> {
+        let Some((_, first)) = variants.first() else {
+            return Ok(());
+        };
+        for (figure, _) in &first.drawn {
+            let mut curves = Vec::new();
+            for (variant, figures) in variants {
+                let same = figures
+                    .drawn
+                    .iter()
+                    .find(|(f, _)| f.name.get_ref() == figure.name.get_ref());
+                for curve in same
+                    .map(|(_, curves)| curves.as_slice())
+                    .unwrap_or_default()
+                {
+                    let name = if figure.y.len() == 1 {
+                        variant.clone()
+                    } else {
+                        format!("{variant}: {}", curve.name)
+                    };
+                    curves.push(Curve {
+                        name,
+                        points: curve.points.clone(),
+                    });
+                }
+            }
+            draw_file(folder, figure, &first.title, &curves)?;
         }
         Ok(())
     }
 }
 
-/// Draws curves into a text in SVG.
-///
-/// # Errors
-/// The drawing library's, in words.
-pub(super) fn svg(labels: &Labels, curves: &[Curve]) -> Result<String, String> {
+fn draw_file(
+    folder: &Path,
+    figure: &FigureInput,
+    title: &str,
+    curves: &[Curve],
+) -> Result<(), Error> {
+    let path = folder.join(format!("{}.svg", figure.name.get_ref()));
+    let labels = Labels {
+        title: figure.title.clone().unwrap_or_else(|| title.to_owned()),
+        x: figure
+            .x_label
+            .clone()
+            .unwrap_or_else(|| figure.x.get_ref().clone()),
+        y: figure.y_label.clone().unwrap_or_default(),
+    };
+    let text = svg(&labels, curves)
+        .map_err(|error| Error::Internal(format!("figure {}: {error}", path.display())))?;
+    std::fs::write(&path, text).map_err(|error| unwritable(&path, error))
+}
+
+/// Curves as a text in SVG.
+fn svg(labels: &Labels, curves: &[Curve]) -> Result<String, String> {
     let mut text = String::new();
     draw(&mut text, labels, curves).map_err(|error| error.to_string())?;
     Ok(text)

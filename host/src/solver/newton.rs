@@ -172,7 +172,7 @@ impl Newton<'_> {
                 self.system.follow(&mut guess);
                 guess
             }
-            None => self.from_tangent(&external, &prescribed, period)?,
+            None => self.predict(&external, &prescribed, period)?,
         };
         let mut balance = self
             .evaluate(&increment, &external, period)
@@ -223,7 +223,7 @@ impl Newton<'_> {
     }
 
     /// Displacement increments that the tangent at the start predicts.
-    fn from_tangent(
+    fn predict(
         &mut self,
         external: &[f64],
         prescribed: &[f64],

@@ -1,0 +1,69 @@
+//! `report.html`: the results of a run, or of several side by side, as one file that opens without
+//! a network.
+//!
+//! What needs no drawing is written as tables by the template; what does goes into the page as
+//! JSON, rounded to seven digits, and is drawn by the page's own script. The CSV files stay the
+//! primary result and are linked. A folder only has to have a `history.csv`; whatever else is
+//! missing or broken is left out, and the page says so.
+
+mod comparison;
+mod fields;
+mod log;
+mod page;
+mod profile;
+mod results;
+mod short;
+mod table;
+
+use crate::error::Error;
+use results::Run;
+use std::path::{Path, PathBuf};
+
+/// Name of a report's file.
+const FILE: &str = "report.html";
+
+/// Where the report of these folders is written if nothing else is asked for: into the folder
+/// itself, or beside the first of several.
+pub fn default_path(folders: &[PathBuf]) -> PathBuf {
+    match folders {
+        [folder] => folder.join(FILE),
+        [first, ..] => std::path::absolute(first)
+            .ok()
+            .and_then(|path| path.parent().map(Path::to_owned))
+            .unwrap_or_default()
+            .join(FILE),
+        [] => PathBuf::from(FILE),
+    }
+}
+
+/// Writes the report of a results folder, or the comparison of several, and returns the file's
+/// path. If `out` is a folder, the report goes into it.
+///
+/// # Errors
+/// [`Error::Usage`] without a folder; [`Error::Unreadable`] if one has no `history.csv`,
+/// [`Error::Input`] if that is not the history of a run; [`Error::Unwritable`].
+pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
+    if folders.is_empty() {
+        return Err(Error::Usage("name at least one results folder".to_owned()));
+    }
+    let mut runs = folders
+        .iter()
+        .map(|folder| Run::read(folder))
+        .collect::<Result<Vec<_>, _>>()?;
+    results::tell_apart(&mut runs);
+    let out = if out.is_dir() {
+        out.join(FILE)
+    } else {
+        out.to_owned()
+    };
+    let unwritable = |source| Error::Unwritable {
+        path: out.clone(),
+        source,
+    };
+    let absolute = std::path::absolute(&out).map_err(unwritable)?;
+    let parent = absolute.parent().unwrap_or(&absolute);
+    std::fs::create_dir_all(parent).map_err(unwritable)?;
+    let text = page::render(&runs, parent)?;
+    std::fs::write(&out, text).map_err(unwritable)?;
+    Ok(out)
+}

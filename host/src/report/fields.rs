@@ -1,0 +1,266 @@
+//! `fields.pvd` and its `*.vtu`: a reader of what this program writes, ASCII arrays, and no more.
+
+use super::short::{Short, thinned};
+use serde::Serialize;
+use std::path::Path;
+use std::str::FromStr;
+
+/// About so many numbers are shown; of more, some times are left out.
+const MOST_VALUES: usize = 600_000;
+
+/// Fields of a run on its mesh.
+#[derive(Debug, Serialize)]
+pub(super) struct Fields {
+    /// Coordinates of the nodes, x y x y …
+    nodes: Vec<Short>,
+    /// Nodes of every cell: eight of a quad, three of an edge.
+    cells: Vec<Vec<usize>>,
+    /// Number of every cell's group.
+    group: Vec<usize>,
+    /// Names of the groups.
+    pub(super) groups: Vec<String>,
+    /// Names of the fields.
+    pub(super) names: Vec<String>,
+    pub(super) times: Vec<Snapshot>,
+}
+
+/// The state at one time.
+#[derive(Debug, Serialize)]
+pub(super) struct Snapshot {
+    pub(super) time: Short,
+    /// What the page calls it.
+    pub(super) label: String,
+    /// x y x y …
+    displacement: Vec<Short>,
+    /// By field and cell.
+    values: Vec<Vec<Short>>,
+}
+
+/// One file.
+#[derive(Debug, Default)]
+struct Grid {
+    nodes: Vec<f64>,
+    cells: Vec<Vec<usize>>,
+    group: Vec<usize>,
+    displacement: Vec<f64>,
+    fields: Vec<(String, Vec<f64>)>,
+}
+
+impl Fields {
+    /// Reads the fields in a folder, as far as they can be read.
+    pub(super) fn read(folder: &Path, notes: &mut Vec<String>) -> Option<Self> {
+        let list = match std::fs::read_to_string(folder.join("fields.pvd")) {
+            Ok(list) => list,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
+            Err(error) => {
+                notes.push(format!("fields.pvd: {error}"));
+                return None;
+            }
+        };
+        let files: Vec<(f64, &str)> = list
+            .split("<DataSet ")
+            .skip(1)
+            .filter_map(|entry| {
+                let time = attribute(entry, "timestep")?.parse().ok()?;
+                Some((time, attribute(entry, "file")?))
+            })
+            .collect();
+        let mut fields: Option<Self> = None;
+        let mut shown = vec![true; files.len()];
+        for (number, (time, file)) in files.iter().enumerate() {
+            if !shown[number] {
+                continue;
+            }
+            let grid = std::fs::read_to_string(folder.join(file))
+                .map_err(|error| error.to_string())
+                .and_then(|text| Grid::parse(&text));
+            let grid = match grid {
+                Ok(grid) => grid,
+                Err(why) => {
+                    notes.push(format!("{file}: {why}; left out"));
+                    continue;
+                }
+            };
+            if fields.is_none() {
+                let size = grid.nodes.len() + grid.cells.len() * grid.fields.len();
+                let must = |i: usize| i == number;
+                let times = thinned(files.len(), MOST_VALUES / size.max(1), must);
+                shown = (0..files.len()).map(|i| times.contains(&i)).collect();
+                if times.len() < files.len() {
+                    notes.push(format!(
+                        "fields at {} of {} times are shown; the vtu files have all",
+                        times.len(),
+                        files.len()
+                    ));
+                }
+            }
+            let fields = fields.get_or_insert_with(|| Self::new(&grid));
+            match fields.snapshot(*time, &grid) {
+                Some(snapshot) => fields.times.push(snapshot),
+                None => notes.push(format!("{file}: another mesh or other fields; left out")),
+            }
+        }
+        fields.filter(|fields| !fields.times.is_empty())
+    }
+
+    fn new(grid: &Grid) -> Self {
+        Self {
+            nodes: grid.nodes.iter().copied().map(Short::from).collect(),
+            cells: grid.cells.clone(),
+            group: grid.group.clone(),
+            groups: Vec::new(),
+            names: grid.fields.iter().map(|(name, _)| name.clone()).collect(),
+            times: Vec::new(),
+        }
+    }
+
+    /// `None` if the grid is another one.
+    fn snapshot(&self, time: f64, grid: &Grid) -> Option<Snapshot> {
+        let short = |values: &Vec<f64>| values.iter().copied().map(Short::from).collect();
+        let names = grid.fields.iter().map(|(name, _)| name);
+        let same = self.nodes.len() == grid.nodes.len()
+            && self.cells == grid.cells
+            && self.names.iter().eq(names);
+        same.then(|| Snapshot {
+            time: time.into(),
+            label: String::new(),
+            displacement: short(&grid.displacement),
+            values: grid.fields.iter().map(|(_, values)| short(values)).collect(),
+        })
+    }
+
+    /// Names groups and times.
+    pub(super) fn label(&mut self, groups: &[String], label: impl Fn(f64) -> String) {
+        let n = self.group.iter().max().map_or(0, |last| last + 1);
+        self.groups = (0..n)
+            .map(|i| groups.get(i).cloned().unwrap_or(format!("group {}", i + 1)))
+            .collect();
+        for snapshot in &mut self.times {
+            snapshot.label = label(snapshot.time.0.unwrap_or_default());
+        }
+    }
+}
+
+impl Grid {
+    fn parse(text: &str) -> Result<Self, String> {
+        let part = |name: &str| {
+            let start = text.find(&format!("<{name}"))?;
+            let length = text[start..].find(&format!("</{name}>"))?;
+            Some(&text[start..start + length])
+        };
+        let part = |name: &str| part(name).ok_or(format!("it has no complete <{name}>"));
+        let planar = |values: Vec<f64>| -> Vec<f64> {
+            values.chunks_exact(3).flat_map(|v| [v[0], v[1]]).collect()
+        };
+        let (_, points) = arrays(part("Points")?).next().ok_or("it has no points")?;
+        let nodes = planar(numbers(points)?);
+        let cells = part("Cells")?;
+        let connectivity: Vec<usize> = numbers(named(cells, "connectivity")?)?;
+        let offsets: Vec<usize> = numbers(named(cells, "offsets")?)?;
+        let displacement = planar(numbers(named(part("PointData")?, "displacement")?)?);
+        let data = part("CellData")?;
+        let group: Vec<usize> = numbers(named(data, "group")?)?;
+        let mut fields = Vec::new();
+        for (name, values) in arrays(data) {
+            if name != "group" {
+                fields.push((name.to_owned(), numbers(values)?));
+            }
+        }
+        let mut start = 0;
+        let mut all = Vec::new();
+        for &end in &offsets {
+            let cell = connectivity.get(start..end).ok_or("its cells do not fit")?;
+            if !matches!(cell.len(), 3 | 8) || cell.iter().any(|&node| 2 * node >= nodes.len()) {
+                return Err("a cell is no quadratic quad or edge of the mesh".to_owned());
+            }
+            all.push(cell.to_vec());
+            start = end;
+        }
+        let n = all.len();
+        let fits = group.len() == n && fields.iter().all(|(_, values)| values.len() == n);
+        // A number that is far too large can only come from a broken file.
+        if !fits || displacement.len() != nodes.len() || group.iter().any(|&g| g > n) {
+            return Err("its arrays have different lengths".to_owned());
+        }
+        Ok(Self {
+            nodes,
+            cells: all,
+            group,
+            displacement,
+            fields,
+        })
+    }
+}
+
+/// The value of an attribute in a tag.
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    let tag = &tag[..tag.find('>').unwrap_or(tag.len())];
+    let (_, rest) = tag.split_once(&format!("{name}=\""))?;
+    rest.split_once('"').map(|(value, _)| value)
+}
+
+/// Names and contents of the arrays in a part of a file.
+fn arrays(part: &str) -> impl Iterator<Item = (&str, &str)> {
+    part.split("<DataArray ").skip(1).filter_map(|array| {
+        let (_, content) = array.split_once('>')?;
+        let (content, _) = content.split_once("</DataArray>")?;
+        Some((attribute(array, "Name").unwrap_or_default(), content))
+    })
+}
+
+fn named<'a>(part: &'a str, name: &str) -> Result<&'a str, String> {
+    arrays(part)
+        .find(|(found, _)| *found == name)
+        .map(|(_, content)| content)
+        .ok_or(format!("it has no array {name}"))
+}
+
+fn numbers<T: FromStr>(text: &str) -> Result<Vec<T>, String> {
+    text.split_ascii_whitespace()
+        .map(|word| {
+            word.parse()
+                .map_err(|_| format!("`{word}` is not a number that belongs there"))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "<VTKFile><UnstructuredGrid><Piece>\n\
+        <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">\
+        0e0 0e0 0e0 0e0 1e0 0e0 0e0 5e-1 0e0 </DataArray></Points>\n\
+        <Cells><DataArray Name=\"connectivity\">0 1 2 </DataArray>\
+        <DataArray Name=\"offsets\">3 </DataArray></Cells>\
+        <PointData Vectors=\"displacement\"><DataArray Name=\"displacement\">\
+        1 2 0 3 4 0 5 6 0</DataArray></PointData>\
+        <CellData><DataArray Name=\"group\">0 </DataArray>\
+        <DataArray Name=\"traction_n\">-7 </DataArray></CellData></Piece>";
+
+    #[test]
+    fn a_grid_is_read() {
+        let grid = Grid::parse(TEXT).unwrap();
+        assert_eq!(grid.nodes, [0.0, 0.0, 0.0, 1.0, 0.0, 0.5]);
+        assert_eq!(grid.cells, [[0, 1, 2]]);
+        assert_eq!(grid.displacement, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(grid.fields, [("traction_n".to_owned(), vec![-7.0])]);
+    }
+
+    #[test]
+    fn broken_grids_are_refused_with_the_reason() {
+        for (from, to, expected) in [
+            ("</CellData>", "", "no complete <CellData>"),
+            ("0 1 2 ", "0 1 9 ", "of the mesh"),
+            ("-7 ", "-7 8 ", "different lengths"),
+            ("3 </DataArray></Cells>", "4 </DataArray></Cells>", "do not fit"),
+            ("5e-1", "5e-", "`5e-` is not a number"),
+        ] {
+            let why = Grid::parse(&TEXT.replace(from, to)).unwrap_err();
+            assert!(why.contains(expected), "{why}");
+        }
+        for end in 0..TEXT.len() - 18 {
+            assert!(Grid::parse(&TEXT[..end]).is_err());
+        }
+    }
+}

@@ -1,0 +1,329 @@
+//! A results folder, read back.
+
+use super::fields::Fields;
+use super::log::Log;
+use super::profile::{COLUMNS, Profile};
+use super::short::{Short, thinned};
+use super::table::Table;
+use crate::error::Error;
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+/// Of a longer history some increments are left out.
+const MOST_ROWS: usize = 5_000;
+
+/// A run as its folder shows it.
+#[derive(Debug)]
+pub(super) struct Run {
+    /// What the page calls it.
+    pub(super) name: String,
+    /// The folder.
+    pub(super) folder: PathBuf,
+    /// `summary.json`, null if there is none.
+    pub(super) summary: Value,
+    pub(super) history: History,
+    pub(super) profile: Option<Profile>,
+    pub(super) fields: Option<Fields>,
+    pub(super) log: Log,
+    /// What is missing or broken.
+    pub(super) notes: Vec<String>,
+}
+
+/// How a run ended.
+#[derive(Debug, PartialEq)]
+pub(super) enum Ending {
+    Done,
+    /// With the status and the reason.
+    Failed(String, String),
+    /// With what shows it.
+    Unfinished(&'static str),
+}
+
+/// `history.csv`.
+#[derive(Debug, Serialize)]
+pub(super) struct History {
+    /// Names of the phases, in order.
+    phases: Vec<String>,
+    /// Number of the phase, by row.
+    phase: Vec<usize>,
+    increment: Vec<usize>,
+    /// Names of the columns of numbers: the time, the probes, the iterations.
+    pub(super) names: Vec<String>,
+    /// By column and row.
+    values: Vec<Vec<Short>>,
+    /// Last row of every phase.
+    #[serde(skip)]
+    pub(super) ends: Vec<PhaseEnd>,
+    /// Times of the increments.
+    #[serde(skip)]
+    times: HashMap<(String, usize), f64>,
+}
+
+/// The last increment of a phase.
+#[derive(Debug)]
+pub(super) struct PhaseEnd {
+    pub(super) phase: String,
+    pub(super) increment: usize,
+    /// By column.
+    pub(super) values: Vec<Option<f64>>,
+}
+
+impl History {
+    fn read(path: &Path, notes: &mut Vec<String>) -> Result<Self, Error> {
+        let needed = ["phase", "increment", "time"];
+        let table = Table::read(path, &needed, notes)?;
+        let [phase, increment, time] = needed.map(|name| table.position(name).unwrap_or_default());
+        let columns: Vec<usize> = (0..table.columns().len())
+            .filter(|column| ![phase, increment].contains(column))
+            .collect();
+        let mut ends: Vec<PhaseEnd> = Vec::new();
+        let mut phases: Vec<usize> = Vec::new();
+        let mut times = HashMap::new();
+        for row in 0..table.n_rows() {
+            let name = table.text(row, phase);
+            let end = PhaseEnd {
+                phase: name.to_owned(),
+                increment: table.count(row, increment).unwrap_or_default(),
+                values: columns.iter().map(|&c| table.number(row, c)).collect(),
+            };
+            if let Some(time) = table.number(row, time) {
+                times.insert((name.to_owned(), end.increment), time);
+            }
+            match ends.last_mut() {
+                Some(last) if last.phase == name => *last = end,
+                _ => ends.push(end),
+            }
+            phases.push(ends.len() - 1);
+        }
+        let ends_phase = |row: usize| phases.get(row + 1) != Some(&phases[row]);
+        let shown = thinned(table.n_rows(), MOST_ROWS, ends_phase);
+        if shown.len() < table.n_rows() {
+            notes.push(format!(
+                "the curves show {} of {} increments; history.csv has all",
+                shown.len(),
+                table.n_rows()
+            ));
+        }
+        if table.n_rows() == 0 {
+            notes.push("history.csv has no increment: none reached equilibrium".to_owned());
+        }
+        let column = |&column: &usize| {
+            let values = shown.iter().map(|&row| Short(table.number(row, column)));
+            values.collect()
+        };
+        Ok(Self {
+            phase: shown.iter().map(|&row| phases[row]).collect(),
+            increment: shown
+                .iter()
+                .map(|&row| table.count(row, increment).unwrap_or_default())
+                .collect(),
+            names: columns
+                .iter()
+                .map(|&c| table.columns()[c].clone())
+                .collect(),
+            values: columns.iter().map(column).collect(),
+            phases: ends.iter().map(|end| end.phase.clone()).collect(),
+            ends,
+            times,
+        })
+    }
+
+    /// Names of the probes.
+    pub(super) fn probes(&self) -> impl Iterator<Item = &str> {
+        let names = self.names.iter().map(String::as_str);
+        names.filter(|name| !["time", "iterations"].contains(name))
+    }
+
+    /// The last value of a column.
+    pub(super) fn last(&self, name: &str) -> Option<f64> {
+        let column = self.names.iter().position(|n| n == name)?;
+        self.ends.last()?.values[column]
+    }
+
+    /// Phase and increment at a time.
+    fn label(&self, time: f64) -> String {
+        let found = self.times.iter().find(|(_, t)| (*t - time).abs() < 1e-9);
+        match found {
+            Some(((phase, increment), _)) => format!("{phase}, increment {increment}"),
+            None => format!("time {time}"),
+        }
+    }
+}
+
+impl Run {
+    /// Reads a folder.
+    ///
+    /// # Errors
+    /// As [`super::write`].
+    pub(super) fn read(folder: &Path) -> Result<Self, Error> {
+        let mut notes = Vec::new();
+        let history = History::read(&folder.join("history.csv"), &mut notes)?;
+        let summary = summary(folder, &mut notes);
+        let profile_path = folder.join("profile.csv");
+        let profile = profile_path
+            .is_file()
+            .then(|| Table::read(&profile_path, &COLUMNS, &mut notes));
+        let profile = match profile {
+            None => None,
+            Some(Ok(table)) => Profile::new(&table, &history.times, &mut notes),
+            Some(Err(error)) => {
+                notes.push(format!("profile.csv: {error}; left out"));
+                None
+            }
+        };
+        let mut fields = Fields::read(folder, &mut notes);
+        if let Some(fields) = &mut fields {
+            let groups: Vec<String> = list(&summary["groups"])
+                .map(|group| text(&group["name"]).to_owned())
+                .collect();
+            fields.label(&groups, |time| history.label(time));
+        }
+        let log = Log::read(&folder.join("log.jsonl"), &mut notes);
+        let name = std::path::absolute(folder)
+            .ok()
+            .and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+            .unwrap_or_else(|| folder.display().to_string());
+        Ok(Self {
+            name,
+            folder: folder.to_owned(),
+            summary,
+            history,
+            profile,
+            fields,
+            log,
+            notes,
+        })
+    }
+
+    /// How it ended.
+    pub(super) fn ending(&self) -> Ending {
+        if self.summary.is_null() {
+            return Ending::Unfinished(
+                "there is no summary.json, so the run was stopped from outside or has not ended yet",
+            );
+        }
+        if !self.log.ended && !self.log.attempts.is_empty() {
+            return Ending::Unfinished(
+                "log.jsonl has no end, so the run was stopped from outside or has not ended yet; \
+                 summary.json may be of an earlier run",
+            );
+        }
+        match text(&self.summary["status"]) {
+            "done" => Ending::Done,
+            "running" => Ending::Unfinished("the run was stopped from outside or has not ended yet"),
+            status => Ending::Failed(
+                status.to_owned(),
+                text(&self.summary["error"]).to_owned(),
+            ),
+        }
+    }
+
+    /// Its title.
+    pub(super) fn title(&self) -> &str {
+        match text(&self.summary["title"]) {
+            "" => &self.name,
+            title => title,
+        }
+    }
+
+    /// Warnings of the run and of its laws, each once.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let of_run = list(&self.summary["warnings"]);
+        let of_laws = entries(&self.summary["laws"]).flat_map(|(_, law)| list(&law["warnings"]));
+        let mut warnings: Vec<String> = Vec::new();
+        let mut add = |warning: &str| {
+            if !warning.is_empty() && !warnings.iter().any(|w| w == warning) {
+                warnings.push(warning.to_owned());
+            }
+        };
+        of_run.chain(of_laws).for_each(|warning| add(text(warning)));
+        if !self.summary["warnings"].is_array() {
+            for phase in list(&self.summary["phases"]) {
+                let out_of_balance = phase["out_of_balance"].as_f64().unwrap_or_default();
+                if out_of_balance > 1e-6 {
+                    add(&format!(
+                        "phase `{}` starts out of balance: {:.2} % of the forces in play",
+                        text(&phase["name"]),
+                        100.0 * out_of_balance
+                    ));
+                }
+            }
+        }
+        self.log.unreliable.iter().for_each(|warning| add(warning));
+        warnings
+    }
+
+    /// Units of probes, of the quantities of profiles and fields, of internal variables.
+    pub(super) fn units(&self) -> BTreeMap<&str, &str> {
+        let mut units: BTreeMap<&str, &str> = BTreeMap::new();
+        let profile = self.profile.iter().flat_map(|profile| &profile.columns);
+        let fields = self.fields.iter().flat_map(|fields| &fields.names);
+        for name in profile.chain(fields) {
+            let unit = match name.split_once('_') {
+                Some(("stress" | "traction", _)) => "kPa",
+                Some(("jump", _)) => "m",
+                _ => continue,
+            };
+            units.insert(name, unit);
+        }
+        units.insert("displacement", "m");
+        for (_, law) in entries(&self.summary["laws"]) {
+            for variable in list(&law["internal_variables"]) {
+                units.insert(text(&variable["id"]), text(&variable["unit"]));
+            }
+        }
+        for (probe, unit) in entries(&self.summary["probe_units"]) {
+            units.insert(probe, text(unit));
+        }
+        units.retain(|_, unit| !unit.is_empty());
+        units
+    }
+}
+
+/// Lengthens the names of runs whose folders are called alike by the folders they lie in.
+pub(super) fn tell_apart(runs: &mut [Run]) {
+    for longer in 2..8 {
+        let alike: Vec<bool> = runs
+            .iter()
+            .map(|run| runs.iter().filter(|other| other.name == run.name).count() > 1)
+            .collect();
+        for (run, _) in runs.iter_mut().zip(alike).filter(|(_, alike)| *alike) {
+            let path = std::path::absolute(&run.folder).unwrap_or_default();
+            let parts: Vec<_> = path.iter().map(std::ffi::OsStr::to_string_lossy).collect();
+            run.name = parts[parts.len().saturating_sub(longer)..].join("/");
+        }
+    }
+}
+
+fn summary(folder: &Path, notes: &mut Vec<String>) -> Value {
+    let text = match std::fs::read_to_string(folder.join("summary.json")) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Value::Null,
+        Err(error) => {
+            notes.push(format!("summary.json: {error}"));
+            return Value::Null;
+        }
+    };
+    serde_json::from_str(&text).unwrap_or_else(|error| {
+        notes.push(format!("summary.json: {error}"));
+        Value::Null
+    })
+}
+
+/// A text, empty if there is none.
+pub(super) fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+/// Entries of an array, none if it is no array.
+pub(super) fn list(value: &Value) -> impl Iterator<Item = &Value> {
+    value.as_array().into_iter().flatten()
+}
+
+/// Entries of an object, none if it is no object.
+pub(super) fn entries(value: &Value) -> impl Iterator<Item = (&str, &Value)> {
+    let entries = value.as_object().into_iter().flatten();
+    entries.map(|(key, value)| (key.as_str(), value))
+}

@@ -1,0 +1,83 @@
+//! Numbers as the page shows them.
+
+use serde::{Serialize, Serializer};
+
+/// A number in the page's JSON: seven digits; null if it is missing or not finite.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Short(pub(super) Option<f64>);
+
+impl From<f64> for Short {
+    fn from(value: f64) -> Self {
+        Self(Some(value))
+    }
+}
+
+impl Serialize for Short {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Some(value) = self.0.filter(|value| value.is_finite()) else {
+            return serializer.serialize_none();
+        };
+        let value = rounded(value, 7);
+        if value.fract() == 0.0 && value.abs() < 1e9 {
+            serializer.serialize_i64(value as i64)
+        } else {
+            serializer.serialize_f64(value)
+        }
+    }
+}
+
+/// A number with so many digits.
+fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+}
+
+/// A number in a table: six digits.
+pub(super) fn display(value: f64) -> String {
+    let value = rounded(value, 6);
+    if value == 0.0 || (1e-4..1e7).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+/// Which of `n` entries to show if at most about `most` can be: evenly spaced, the last included,
+/// and those that must be.
+pub(super) fn thinned(n: usize, most: usize, must: impl Fn(usize) -> bool) -> Vec<usize> {
+    let stride = n.div_ceil(most.max(1)).max(1);
+    (0..n)
+        .filter(|&i| (n - 1 - i) % stride == 0 || must(i))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_never_nan() {
+        let json = |value: f64| serde_json::to_string(&Short::from(value)).unwrap();
+        assert_eq!(json(1.0 / 3.0), "0.3333333");
+        assert_eq!(json(-100.0), "-100");
+        assert_eq!(json(-0.0), "0");
+        assert_eq!(json(1.234_567_89e-12), "1.234568e-12");
+        assert_eq!(json(f64::NAN), "null");
+        assert_eq!(json(f64::NEG_INFINITY), "null");
+        assert_eq!(serde_json::to_string(&Short(None)).unwrap(), "null");
+    }
+
+    #[test]
+    fn tables_have_six_digits() {
+        assert_eq!(display(8.967_888_247), "8.96789");
+        assert_eq!(display(210e6), "2.1e8");
+        assert_eq!(display(-2.03e-11), "-2.03e-11");
+        assert_eq!(display(0.0), "0");
+    }
+
+    #[test]
+    fn thinning_keeps_the_last_and_what_it_must() {
+        assert_eq!(thinned(3, 10, |_| false), [0, 1, 2]);
+        assert_eq!(thinned(10, 3, |i| i == 0), [0, 1, 5, 9]);
+        assert!(thinned(0, 3, |_| true).is_empty());
+    }
+}

@@ -1,0 +1,287 @@
+//! Grids, regions and lines that do not fit together.
+
+use crate::program::{BAD_INPUT, DONE, Edit, JOINT, Place, edited, refuses};
+
+const COLUMNS: &str = "columns = [
+  { n = 1, to = 1.0 },
+  { n = 1, to = 1.01 },
+  { n = 1, to = 2.0 },
+]";
+
+#[test]
+fn refuses_impossible_grids() {
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "a thousand million columns",
+                &[("{ n = 1, to = 2.0 }", "^{ n = 1000000000, to = 2.0 }")],
+                &["`n` is 1000000000, expected 1 to 4000000"],
+            ),
+            (
+                "too many elements",
+                &[
+                    ("columns = [", "columns = ^["),
+                    ("n = 1, to = 2.0", "n = 3000000, to = 2.0"),
+                ],
+                &["3000002 columns × 2 rows", "at most 4000000 elements"],
+            ),
+            (
+                "no columns",
+                &[(COLUMNS, "columns = ^[]")],
+                &["`columns` is empty"],
+            ),
+            (
+                "zero columns",
+                &[("{ n = 1, to = 2.0 }", "^{ n = 0, to = 2.0 }")],
+                &["`n` is 0"],
+            ),
+            (
+                "backwards",
+                &[("{ n = 1, to = 2.0 }", "^{ n = 1, to = 0.5 }")],
+                &["`to` is 0.5, expected more than 1.01"],
+            ),
+            (
+                "negative ratio",
+                &[("{ n = 1, to = 2.0 }", "^{ n = 1, to = 2.0, ratio = -1.0 }")],
+                &["`ratio` is -1, expected a positive number"],
+            ),
+            (
+                "a ratio that leaves nothing",
+                &[("{ n = 1, to = 2.0 }", "^{ n = 9, to = 2.0, ratio = 1e99 }")],
+                &["leaves parts of no size"],
+            ),
+            (
+                "beyond the moon",
+                &[("{ n = 1, to = 2.0 }", "^{ n = 1, to = 1e300 }")],
+                &["`to` is 1e300, expected at most 1e9 m"],
+            ),
+            (
+                "a column of no width",
+                &[
+                    ("columns = [", "columns = ^["),
+                    ("to = 1.01", "to = 1.0000000001"),
+                ],
+                &["between 1.0 and 1.0000000001 are thinner"],
+            ),
+            (
+                "across the axis",
+                &[
+                    ("\"plane_strain\"", "\"axisymmetric\""),
+                    ("columns", "origin = ^[-1.0, 0.0]\ncolumns"),
+                ],
+                &["the mesh starts at r = -1, across the axis"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn refuses_regions_off_the_grid() {
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "an end between grid lines",
+                &[("x = [1.0, 1.01]", "x = ^[1.0, 1.02]")],
+                &["region of group `layer`: 1.02 is no grid line, the nearest is 1.01"],
+            ),
+            (
+                "ends the wrong way round",
+                &[("x = [1.0, 1.01]", "x = ^[1.01, 1.0]")],
+                &["region of group `layer`: its extent is empty, expected [smaller, larger]"],
+            ),
+            (
+                "an element without a region",
+                &[
+                    ("group = \"soil\"", "group = \"soil\"\nx = [0.0, 1.0]"),
+                    ("group = \"layer\"", "group = ^\"layer\""),
+                ],
+                &["the element at (1.505000, 0.250000) belongs to no region"],
+            ),
+            (
+                "a group without elements",
+                &[
+                    ("group = \"layer\"\nx = [1.0, 1.01]", "group = \"soil\""),
+                    ("[groups.layer]", "[groups.^layer]"),
+                ],
+                &["no element belongs to group `layer`"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn refuses_lines_that_match_nothing_or_only_in_part() {
+    const LEFT: &str = "left = { x = 0.0 }";
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "between grid lines",
+                &[(LEFT, "left = ^{ x = 0.3 }")],
+                &["line `left`: 0.3 is no grid line, the nearest is 0"],
+            ),
+            (
+                "an end between grid lines",
+                &[(LEFT, "left = ^{ x = 0.0, y = [0.0, 0.7] }")],
+                &["line `left`: 0.7 is no grid line, the nearest is 0.5"],
+            ),
+            (
+                "an end outside",
+                &[(LEFT, "left = ^{ x = 0.0, y = [0.0, 9.0] }")],
+                &["line `left`: 9 is no grid line, the nearest is 1"],
+            ),
+            (
+                "ends the wrong way round",
+                &[(LEFT, "left = ^{ x = 0.0, y = [1.0, 0.0] }")],
+                &["line `left`: its extent is empty, expected [smaller, larger]"],
+            ),
+            (
+                "no position",
+                &[(LEFT, "left = ^{ y = [0.0, 1.0] }")],
+                &["line `left`: one coordinate must be a number"],
+            ),
+            (
+                "nothing",
+                &[(LEFT, "left = ^{}")],
+                &["line `left`: one coordinate"],
+            ),
+            (
+                "a point without a node",
+                &[(LEFT, "left = ^{ x = 0.3, y = 0.2 }")],
+                &["line `left`: there is no node at this point"],
+            ),
+        ],
+    );
+}
+
+/// Edits of the case whose joint lies along the middle.
+fn refuses_joints(mistakes: &[(&'static str, &[Edit], &'static [&'static str])]) {
+    for (what, edits, says) in mistakes {
+        let edits: Vec<Edit> = JOINT.iter().chain(*edits).copied().collect();
+        let edits: &'static [Edit] = edits.leak();
+        refuses(BAD_INPUT, &[(what, edits, says)]);
+    }
+}
+
+#[test]
+fn refuses_joints_where_none_can_be() {
+    const LINE: &str = "line = \"middle\"\n";
+    const ANOTHER: &str = "[groups.more]\nformulation = \"zero_thickness\"\nline = ^\"half\"\n\
+        law = \"joint\"\n\n[[supports]]";
+    refuses_joints(&[
+        (
+            "no line",
+            &[(LINE, ""), ("[groups.layer]", "[groups.^layer]")],
+            &["group `layer` needs a `line`"],
+        ),
+        (
+            "an unknown line",
+            &[(LINE, "line = ^\"midle\"\n")],
+            &["there is no line `midle`", "did you mean `middle`?"],
+        ),
+        (
+            "the boundary",
+            &[(LINE, "line = ^\"top\"\n")],
+            &["group `layer`: the line lies on the boundary"],
+        ),
+        (
+            "a point",
+            &[(LINE, "line = ^\"corner\"\n")],
+            &["group `layer`: the line is a point"],
+        ),
+        (
+            "where another group is",
+            &[
+                (
+                    "[mesh.lines]",
+                    "[mesh.lines]\nhalf = { y = 0.5, x = [0.0, 1.0] }",
+                ),
+                ("[[supports]]", ANOTHER),
+            ],
+            &["group `more`: the line has elements of group `layer` already"],
+        ),
+        (
+            "a region",
+            &[(
+                "group = \"soil\"",
+                "group = \"soil\"\n[[mesh.region]]\ngroup = ^\"layer\"",
+            )],
+            &["`zero_thickness` group is inserted along a line"],
+        ),
+        (
+            "a direction",
+            &[(LINE, "line = \"middle\"\nnormal = ^\"x\"\n")],
+            &["`normal` does not go with the formulation `zero_thickness`"],
+        ),
+        (
+            "points of a layer",
+            &[(LINE, "line = \"middle\"\nintegration = ^\"mean\"\n")],
+            &["`integration` does not go with the formulation `zero_thickness`"],
+        ),
+    ]);
+}
+
+#[test]
+fn refuses_keys_of_other_formulations() {
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "line of a solid",
+                &[("\"solid\"\n", "\"solid\"\nline = ^\"top\"\n")],
+                &["`line` only belongs to the formulation `zero_thickness`"],
+            ),
+            (
+                "points of a joint in a solid",
+                &[("\"solid\"\n", "\"solid\"\nintegration = ^\"nodes\"\n")],
+                &["`integration` does not go with the formulation `solid`"],
+            ),
+            (
+                "a layer as thick as long",
+                &[
+                    ("to = 1.01", "to = 1.5"),
+                    ("x = [1.0, 1.01]", "x = [1.0, 1.5]"),
+                    ("[groups.layer]", "[groups.^layer]"),
+                ],
+                &["which way is across the layer?", "say `normal"],
+            ),
+        ],
+    );
+}
+
+/// The joint of the case and one across it, in one group or the other first: the same answer.
+#[test]
+fn joints_may_cross() {
+    let settlement = |first: &str, second: &str| {
+        let lines = [
+            "\"zero_thickness\"\nline = \"middle\"\n",
+            "formulation = \"zero_thickness\"\nline = \"upright\"\nlaw = \"joint\"\n",
+        ];
+        let text = edited(JOINT)
+            .replace("[mesh.lines]", "[mesh.lines]\nupright = { x = 1.0 }")
+            .replace(
+                lines[0],
+                &format!("\"zero_thickness\"\nline = \"{first}\"\n"),
+            )
+            .replace(
+                "[[supports]]",
+                &format!(
+                    "[groups.more]\n{}\n[[supports]]",
+                    lines[1].replace("upright", second)
+                ),
+            )
+            .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
+            .replace("\"traction_t\"", "\"stress_12\"");
+        let place = Place::new();
+        let outcome = place.run_case(text);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        tests::case::column(&place.path("out/history.csv"), "settlement")
+    };
+    let one = settlement("middle", "upright");
+    let other = settlement("upright", "middle");
+    for (one, other) in one.iter().zip(&other) {
+        approx::assert_relative_eq!(one, other, max_relative = 1e-6);
+    }
+}

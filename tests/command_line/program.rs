@@ -1,0 +1,255 @@
+//! Running the program in a folder of its own, and tables of mistakes in a small case.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Exit codes, `host::error::Error::exit_code`.
+pub(crate) const DONE: i32 = 0;
+pub(crate) const BAD_INPUT: i32 = 1;
+pub(crate) const NO_EQUILIBRIUM: i32 = 2;
+pub(crate) const PLUGIN_TROUBLE: i32 = 3;
+
+/// A case that runs. The mistakes are edits of it.
+pub(crate) const CASE: &str = r#"title = "A block beside a layer"
+analysis = "plane_strain"
+
+[mesh]
+columns = [
+  { n = 1, to = 1.0 },
+  { n = 1, to = 1.01 },
+  { n = 1, to = 2.0 },
+]
+rows = [{ n = 2, to = 1.0 }]
+
+[[mesh.region]]
+group = "soil"
+
+[[mesh.region]]
+group = "layer"
+x = [1.0, 1.01]
+
+[mesh.lines]
+left = { x = 0.0 }
+right = { x = 2.0 }
+bottom = { y = 0.0 }
+top = { y = 1.0 }
+middle = { y = 0.5 }
+corner = { x = 0.0, y = 0.5 }
+
+[laws.soil]
+law = "elastic"
+parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }
+
+[laws.joint]
+law = "coulomb_joint"
+[laws.joint.parameters]
+normal_stiffness = 1e6
+shear_stiffness = 4e5
+cohesion = 10.0
+friction_angle = 30.0
+dilatancy_angle = 5.0
+
+[groups.soil]
+formulation = "solid"
+law = "soil"
+
+[groups.layer]
+formulation = "thin_layer"
+law = "joint"
+
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+
+[[phase]]
+name = "weight"
+increments = 2
+pressure = [{ line = "top", value = 10.0 }]
+
+[[phase]]
+name = "push"
+increments = 2
+displacement = [{ line = "top", x = 1e-5 }]
+
+[probes]
+settlement = { line = "top", quantity = "displacement_y", scale = -1000.0 }
+tau = { group = "layer", quantity = "traction_t" }
+half = { combine = { tau = 0.5 } }
+
+[solver]
+max_iterations = 20
+
+[output]
+profile = "phases"
+"#;
+
+/// Edits that put the joint along the middle, without thickness, in place of the layer.
+pub(crate) const JOINT: &[Edit] = &[
+    ("[[mesh.region]]\ngroup = \"layer\"\nx = [1.0, 1.01]\n", ""),
+    (
+        "formulation = \"thin_layer\"\n",
+        "formulation = \"zero_thickness\"\nline = \"middle\"\n",
+    ),
+];
+
+/// A text that occurs in the case, and what stands there instead.
+pub(crate) type Edit = (&'static str, &'static str);
+
+/// The case after some edits.
+///
+/// # Panics
+/// If a text to be replaced does not occur.
+pub(crate) fn edited(edits: &[Edit]) -> String {
+    edits.iter().fold(CASE.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "the case does not contain {from:?}");
+        text.replacen(from, to, 1)
+    })
+}
+
+/// What became of a run of the program.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+impl Outcome {
+    /// Whether the message contains a text, however its lines are broken and framed.
+    pub(crate) fn says(&self, text: &str) -> bool {
+        squeezed(&self.stderr).contains(&squeezed(text))
+    }
+}
+
+fn squeezed(text: &str) -> String {
+    text.chars()
+        .filter(|c| !c.is_whitespace() && *c != '│')
+        .collect()
+}
+
+/// A folder to run the program in.
+#[derive(Debug)]
+pub(crate) struct Place {
+    folder: TempDir,
+}
+
+impl Place {
+    pub(crate) fn new() -> Self {
+        Self {
+            folder: TempDir::new().unwrap(),
+        }
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, contents: impl AsRef<[u8]>) {
+        let path = self.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, contents).unwrap();
+    }
+
+    /// Runs the program with this folder as its working directory.
+    pub(crate) fn run(&self, arguments: &[&str]) -> Outcome {
+        let deps = std::env::current_exe()
+            .unwrap()
+            .parent()
+            .unwrap()
+            .to_owned();
+        let output = Command::new(program(&deps))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .env("PILUM_LAW_PATH", deps)
+            .env("NO_COLOR", "1")
+            .env_remove("RUST_BACKTRACE")
+            .output()
+            .unwrap();
+        Outcome {
+            code: output.status.code(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    /// Runs a case given as the bytes of its file; results go to `out`.
+    pub(crate) fn run_case(&self, text: impl AsRef<[u8]>) -> Outcome {
+        self.write("case.toml", text);
+        self.run(&["run", "case.toml", "--out", "out"])
+    }
+
+    /// Names of what lies in the folder, sorted.
+    pub(crate) fn contents(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.folder.path()).unwrap();
+        let name = |entry: std::fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+        let mut names: Vec<String> = entries.map(|entry| name(entry.unwrap())).collect();
+        names.sort();
+        names
+    }
+}
+
+/// The program beside the folder of the test executables.
+fn program(deps: &Path) -> PathBuf {
+    let name = format!("pilum{}", std::env::consts::EXE_SUFFIX);
+    let path = deps.parent().unwrap().join(name);
+    assert!(
+        path.is_file(),
+        "{} is missing: `cargo test --workspace` builds it, or `cargo build -p host` (with the \
+         same profile)",
+        path.display()
+    );
+    path
+}
+
+/// A mistake: what it is, the edits that make it, what the message says. A `^` in an edit marks
+/// the place that the message has to name, and is not part of the file.
+pub(crate) type Mistake = (&'static str, &'static [Edit], &'static [&'static str]);
+
+/// Makes each mistake. All must end with this code and a message at the place that says what it
+/// has to, without leaving anything behind.
+pub(crate) fn refuses(code: i32, mistakes: &[Mistake]) {
+    let mut complaints = Vec::new();
+    for (what, edits, says) in mistakes {
+        let place = Place::new();
+        let text = edited(edits);
+        let outcome = place.run_case(text.replacen('^', "", 1));
+        let mut wrong = Vec::new();
+        if outcome.code != Some(code) {
+            wrong.push(format!("exit code {:?}, expected {code}", outcome.code));
+        }
+        if let Some(at) = text.find('^').map(|at| position(&text, at))
+            && !outcome.says(&format!("case.toml:{at}"))
+        {
+            wrong.push(format!("the place is not case.toml:{at}"));
+        }
+        let missing = says.iter().filter(|text| !outcome.says(text));
+        wrong.extend(missing.map(|text| format!("it does not say: {text}")));
+        if !outcome.stdout.is_empty() {
+            wrong.push("something on standard output".to_owned());
+        }
+        if place.contents() != ["case.toml"] {
+            wrong.push(format!("left behind: {:?}", place.contents()));
+        }
+        if !wrong.is_empty() {
+            let wrong = wrong.join("\n  ");
+            complaints.push(format!("{what}:\n  {wrong}\n{}", outcome.stderr));
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+/// Line and column, from 1.
+fn position(text: &str, at: usize) -> String {
+    let before = &text[..at];
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+    format!("{line}:{column}")
+}
+
+#[test]
+fn the_case_itself_runs() {
+    let outcome = Place::new().run_case(CASE);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}

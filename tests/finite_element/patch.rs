@@ -1,0 +1,267 @@
+//! Patch tests: the displacement of every boundary node is prescribed from a field whose stress
+//! is constant in every group; all integration points must then have that stress.
+
+use crate::setup::{Results, assert_close, grid, run};
+use std::fmt::Write;
+
+/// Stresses of a linear system of equations solved to a backward error of 1e-10 at worst, and
+/// usually far better; strains of thin elements lose t/L of the digits of displacements.
+pub(crate) const PATCH: f64 = 1e-10;
+
+/// Direction of the normal of a layer or a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Normal {
+    /// Layers are vertical.
+    X,
+    /// Layers are horizontal.
+    Y,
+}
+
+impl Normal {
+    /// Both.
+    pub(crate) const BOTH: [Self; 2] = [Self::X, Self::Y];
+
+    /// From (along the layer, across it) to (x, y), or back.
+    pub(crate) fn turn(self, [along, across]: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::X => [across, along],
+            Self::Y => [along, across],
+        }
+    }
+
+    /// From components along, across, out of plane, shear of a layer to 11 22 33 12.
+    pub(crate) fn turn_stress(self, [along, across, out, shear]: [f64; 4]) -> [f64; 4] {
+        let [s_11, s_22] = self.turn([along, across]);
+        [s_11, s_22, out, shear]
+    }
+}
+
+/// A zero-thickness group along a line.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointLine {
+    /// Its normal.
+    pub(crate) normal: Normal,
+    /// Coordinate in the direction of the normal.
+    pub(crate) at: f64,
+    /// Extent along it.
+    pub(crate) extent: [f64; 2],
+}
+
+/// Stress (or traction and jump) that all points of a group must have.
+#[derive(Clone, Debug)]
+pub(crate) struct Expected {
+    group: String,
+    values: Vec<(&'static str, f64)>,
+    /// What stresses and tractions are compared with, and jumps.
+    scales: [f64; 2],
+    tolerance: f64,
+}
+
+impl Expected {
+    /// Stress 11 22 33 12 of a solid.
+    pub(crate) fn stress(group: &str, stress: [f64; 4]) -> Self {
+        let names = ["stress_11", "stress_22", "stress_33", "stress_12"];
+        Self {
+            group: group.to_owned(),
+            values: names.into_iter().zip(stress).collect(),
+            scales: [largest(&stress), 0.0],
+            tolerance: PATCH,
+        }
+    }
+
+    /// Traction and jump, normal and tangential.
+    pub(crate) fn interface(group: &str, traction: [f64; 2], jump: [f64; 2]) -> Self {
+        let names = ["traction_n", "traction_t", "jump_n", "jump_t"];
+        let values = [traction[0], traction[1], jump[0], jump[1]];
+        Self {
+            group: group.to_owned(),
+            values: names.into_iter().zip(values).collect(),
+            scales: [largest(&traction), largest(&jump)],
+            tolerance: PATCH,
+        }
+    }
+
+    /// Sets what stresses and jumps are compared with where they are zero.
+    pub(crate) fn scaled(self, scales: [f64; 2]) -> Self {
+        Self { scales, ..self }
+    }
+
+    /// Sets another tolerance.
+    pub(crate) fn within(self, tolerance: f64) -> Self {
+        Self { tolerance, ..self }
+    }
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, v| m.max(v.abs()))
+}
+
+/// A patch.
+pub(crate) struct Patch<'a> {
+    /// `plane_strain` or `axisymmetric`.
+    pub(crate) analysis: &'a str,
+    /// Grid lines.
+    pub(crate) x: &'a [f64],
+    /// Grid lines.
+    pub(crate) y: &'a [f64],
+    /// `[[mesh.region]]` entries.
+    pub(crate) regions: &'a str,
+    /// Lines under `[laws]`.
+    pub(crate) laws: &'a str,
+    /// Lines under `[groups]`.
+    pub(crate) groups: &'a str,
+    /// The line `joint`, if there is one.
+    pub(crate) joint: Option<JointLine>,
+    /// Displacement at (x, y); true on the joint's far side.
+    pub(crate) field: &'a dyn Fn([f64; 2], bool) -> [f64; 2],
+}
+
+impl Patch<'_> {
+    /// Runs the patch and compares every point.
+    #[track_caller]
+    pub(crate) fn assert(&self, what: &str, expected: &[Expected]) {
+        let finished = run(&self.text(expected));
+        for Expected {
+            group,
+            values,
+            scales,
+            tolerance,
+        } in expected
+        {
+            for (name, value) in values {
+                let scale = scales[usize::from(name.starts_with("jump"))];
+                for reduce in ["min", "max"] {
+                    let found = finished.last(&format!("{group}_{name}_{reduce}"));
+                    let label = format!("{what}: {reduce} of {name} in {group}");
+                    assert_close(&label, found, *value, *tolerance, scale);
+                }
+            }
+        }
+        assert_eq!(finished.observer.cut_backs, 0, "{what}: cut-backs");
+    }
+
+    fn text(&self, expected: &[Expected]) -> String {
+        let Self {
+            analysis,
+            x,
+            y,
+            regions,
+            laws,
+            groups,
+            ..
+        } = self;
+        let (columns, rows) = (grid(&x[1..]), grid(&y[1..]));
+        let (lines, displacements) = self.boundary();
+        let mut probes = String::new();
+        for Expected { group, values, .. } in expected {
+            for (name, _) in values {
+                for reduce in ["min", "max"] {
+                    writeln!(
+                        probes,
+                        "{group}_{name}_{reduce} = {{ group = \"{group}\", \
+                         quantity = \"{name}\", reduce = \"{reduce}\" }}"
+                    )
+                    .unwrap();
+                }
+            }
+        }
+        format!(
+            "analysis = \"{analysis}\"\n\
+             [mesh]\norigin = [{:?}, {:?}]\ncolumns = {columns}\nrows = {rows}\n{regions}\n\
+             [mesh.lines]\n{lines}\n[laws]\n{laws}\n[groups]\n{groups}\n\
+             [[phase]]\nname = \"strain\"\nincrements = 1\ndisplacement = [\n{displacements}]\n\
+             [probes]\n{probes}",
+            x[0], y[0]
+        )
+    }
+
+    /// Lines for the boundary nodes, and their displacements.
+    fn boundary(&self) -> (String, String) {
+        let mut lines = String::new();
+        let mut displacements = String::new();
+        if let Some(JointLine {
+            normal,
+            at,
+            extent: [from, to],
+        }) = self.joint
+        {
+            let [along, across] = match normal {
+                Normal::X => ["y", "x"],
+                Normal::Y => ["x", "y"],
+            };
+            writeln!(
+                lines,
+                "joint = {{ {across} = {at:?}, {along} = [{from:?}, {to:?}] }}"
+            )
+            .unwrap();
+        }
+        let mut add = |name: String, line: String, [u_x, u_y]: [f64; 2]| {
+            writeln!(lines, "{name} = {line}").unwrap();
+            writeln!(
+                displacements,
+                "  {{ line = \"{name}\", x = {u_x:e}, y = {u_y:e} }},"
+            )
+            .unwrap();
+        };
+        let (fine_x, fine_y) = (with_middles(self.x), with_middles(self.y));
+        let boundary: Vec<[f64; 2]> = (0..fine_x.len())
+            .flat_map(|i| (0..fine_y.len()).map(move |j| (i, j)))
+            .filter(|&(i, j)| i == 0 || j == 0 || i == fine_x.len() - 1 || j == fine_y.len() - 1)
+            .map(|(i, j)| [fine_x[i], fine_y[j]])
+            .collect();
+        // A double node takes the displacement of the element edge that it belongs to; the
+        // other nodes of these edges are overridden by what follows.
+        let is_double = |p: [f64; 2]| {
+            self.joint.is_some_and(
+                |JointLine {
+                     normal,
+                     at,
+                     extent: [from, to],
+                 }| {
+                    let [along, across] = normal.turn(p);
+                    same(across, at) && along > from - 1e-9 && along < to + 1e-9
+                },
+            )
+        };
+        for (number, &p) in boundary.iter().enumerate().filter(|(_, p)| is_double(**p)) {
+            let normal = self.joint.unwrap().normal;
+            let [along, across] = normal.turn(p);
+            let ends = match normal {
+                Normal::X => self.x,
+                Normal::Y => self.y,
+            };
+            let i = ends.iter().position(|&end| same(end, across)).unwrap();
+            for (side, neighbour) in [("near", ends[i - 1]), ("far", ends[i + 1])] {
+                let (low, high) = (neighbour.min(across), neighbour.max(across));
+                let line = match normal {
+                    Normal::X => format!("{{ x = [{low:?}, {high:?}], y = {along:?} }}"),
+                    Normal::Y => format!("{{ x = {along:?}, y = [{low:?}, {high:?}] }}"),
+                };
+                add(
+                    format!("{side}_{number}"),
+                    line,
+                    (self.field)(p, side == "far"),
+                );
+            }
+        }
+        for (number, &p) in boundary.iter().enumerate().filter(|(_, p)| !is_double(**p)) {
+            let far = self
+                .joint
+                .is_some_and(|joint| joint.normal.turn(p)[1] > joint.at);
+            let line = format!("{{ x = {:?}, y = {:?} }}", p[0], p[1]);
+            add(format!("node_{number}"), line, (self.field)(p, far));
+        }
+        (lines, displacements)
+    }
+}
+
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-9
+}
+
+fn with_middles(ends: &[f64]) -> Vec<f64> {
+    let pairs = ends
+        .windows(2)
+        .flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
+    pairs.chain([ends[ends.len() - 1]]).collect()
+}
