@@ -24,6 +24,16 @@ pub struct Pattern {
     pub rows: Vec<usize>,
 }
 
+/// Moves forces at tied degrees of freedom to those they follow.
+pub fn fold(ties: &[Tie], force: &mut [f64]) {
+    for tie in ties {
+        let tied = std::mem::take(&mut force[tie.dof]);
+        for (master, weight) in tie.masters {
+            force[master] += weight * tied;
+        }
+    }
+}
+
 /// Unknowns and pattern of one phase.
 #[derive(Debug)]
 pub struct System {
@@ -117,12 +127,7 @@ impl System {
 
     /// Moves forces at tied degrees of freedom to those they follow.
     pub fn fold(&self, force: &mut [f64]) {
-        for tie in &self.ties {
-            let tied = std::mem::take(&mut force[tie.dof]);
-            for (master, weight) in tie.masters {
-                force[master] += weight * tied;
-            }
-        }
+        fold(&self.ties, force);
     }
 
     /// The tangent matrix from the groups' tangents. If increments of prescribed displacements

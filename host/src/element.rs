@@ -147,6 +147,9 @@ mod tests {
     fn turning_a_stress_there_and_back_changes_nothing() {
         let axes = Axes::of_facet([0.6, 0.8]);
         let stress = [1.0, -2.0, 3.0, 4.0];
-        assert_close(axes.stress_to_global(axes.stress_from_global(stress)), stress);
+        assert_close(
+            axes.stress_to_global(axes.stress_from_global(stress)),
+            stress,
+        );
     }
 }

@@ -148,7 +148,8 @@ impl Group {
     }
 
     /// Swaps the law. The stress stays; internal variables stay if the law is the same one (with
-    /// other parameters), else the new law starts from the current stress.
+    /// other parameters), else the new law starts from the current stress and jumps are counted
+    /// from here. Initial values that the case file gives hold in both cases.
     ///
     /// # Errors
     /// The law cannot start from the stress.
@@ -162,20 +163,22 @@ impl Group {
         self.law = law;
         let law = &self.law.built.law;
         let n_points = self.kinematics.n_points();
-        let internal = if let Some(kept) = kept {
+        let starts_anew = kept.is_none();
+        let mut internal = if let Some(kept) = kept {
             kept
         } else {
             let stress = (self.stress.committed.as_slice(), self.flux_place());
-            let mut state = law
-                .initial_state(n_points, stress)
-                .map_err(|failure| self.locate(&failure))?;
-            for &(number, value) in &self.law.initial {
-                let of_points = state.iter_mut().skip(number).step_by(law.n_states());
-                of_points.for_each(|v| *v = value);
-            }
-            state
+            law.initial_state(n_points, stress)
+                .map_err(|failure| self.locate(&failure))?
         };
+        for &(number, value) in &self.law.initial {
+            let of_points = internal.iter_mut().skip(number).step_by(law.n_states());
+            of_points.for_each(|v| *v = value);
+        }
         self.internal = Field::new(internal);
+        if starts_anew && self.formulation == Formulation::ZeroThickness {
+            self.strain.committed.fill(0.0);
+        }
         let n = law.n_components();
         let element_n = self.kinematics.n_components();
         self.tangents_are_constant = law.formulation().linear && !self.uses_layer();
@@ -192,7 +195,7 @@ impl Group {
             self.run_law(Operator::Elastic, 0.0, 0.0, &mut operator)
                 .map_err(|failure| self.locate(&failure))?;
             if let Some(layer) = &mut self.layer {
-                layer.start(&operator);
+                layer.start(&operator, starts_anew);
             }
             self.stress.trial.copy_from_slice(&self.stress.committed);
             self.internal

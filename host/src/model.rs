@@ -6,7 +6,7 @@ mod constraints;
 use crate::assembly::Tie;
 use crate::case::{
     Analysis, Axis, Case, CaseFile, Formulation, GroupInput, InPlane, Integration, LawInput,
-    PhaseInput,
+    PhaseInput, StressInput,
 };
 use crate::element::{Axes, Joint6, Kinematics, Quad8, depth, gauss, line_shape};
 use crate::error::{Error, Source, suggestion};
@@ -87,6 +87,7 @@ impl Model {
             };
             groups.push(builder.build(law, &mut ties)?);
         }
+        constraints::check(source, file, &mesh, &ties)?;
         Ok(Self {
             mesh,
             groups,
@@ -159,7 +160,7 @@ fn check_phases(source: &Source, file: &CaseFile, mesh: &Mesh) -> Result<(), Err
         }
         check_pressures(source, mesh, phase)?;
     }
-    constraints::check(source, file, mesh)
+    Ok(())
 }
 
 fn check_pressures(source: &Source, mesh: &Mesh, phase: &PhaseInput) -> Result<(), Error> {
@@ -505,9 +506,6 @@ impl GroupBuilder<'_> {
                 return misplaced(integration.span(), "this `integration`");
             }
         }
-        if self.group.initial_stress.is_some() && *formulation == Formulation::ZeroThickness {
-            return misplaced(self.name.span(), "`initial_stress`");
-        }
         Ok(())
     }
 
@@ -604,18 +602,46 @@ impl GroupBuilder<'_> {
         }
     }
 
-    /// Initial stress of all points, in axes of the elements.
+    /// Initial stress of all points, in axes of the elements. A zero-thickness element without
+    /// one of its own starts with that of the ground on its two sides, projected on its facet.
     fn initial_stress(&self, kinematics: &dyn Kinematics) -> Vec<f64> {
-        let n = kinematics.n_components();
-        let mut stress = vec![0.0; n * kinematics.n_points()];
-        if let Some(s) = self.group.initial_stress {
-            for (point, stress) in stress.chunks_exact_mut(4).enumerate() {
-                let axes = kinematics.axes(point / kinematics.points_per_element());
-                stress.copy_from_slice(&axes.stress_from_global([s.s11, s.s22, s.s33, s.s12]));
+        let mut stress = Vec::with_capacity(kinematics.n_components() * kinematics.n_points());
+        for point in 0..kinematics.n_points() {
+            let element = point / kinematics.points_per_element();
+            let axes = kinematics.axes(element);
+            if kinematics.n_components() == 4 {
+                stress.extend(axes.stress_from_global(components(self.group.initial_stress)));
+            } else {
+                let global = match self.group.initial_stress {
+                    Some(_) => components(self.group.initial_stress),
+                    None => self.stress_beside(kinematics.nodes(element)),
+                };
+                let [_, normal, _, shear] = axes.stress_from_global(global);
+                stress.extend([normal, shear]);
             }
         }
         stress
     }
+
+    /// Mean of the initial stresses on the two sides of a zero-thickness element.
+    fn stress_beside(&self, nodes: &[usize]) -> [f64; 4] {
+        // Mid-side nodes belong to one quad each.
+        let beside = [nodes[2], nodes[5]].map(|middle| {
+            let quad = self
+                .mesh
+                .quads
+                .iter()
+                .find(|quad| quad.nodes.contains(&middle));
+            let group = quad.and_then(|quad| self.file.groups.get_index(quad.group));
+            components(group.and_then(|(_, group)| group.get_ref().initial_stress))
+        });
+        std::array::from_fn(|c| f64::midpoint(beside[0][c], beside[1][c]))
+    }
+}
+
+/// Components 11 22 33 12; zero if there is no stress.
+fn components(stress: Option<StressInput>) -> [f64; 4] {
+    stress.map_or([0.0; 4], |s| [s.s11, s.s22, s.s33, s.s12])
 }
 
 /// Ties the two mid-thickness nodes of a quad to the corners on either side.

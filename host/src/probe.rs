@@ -1,5 +1,6 @@
 //! Probes: numbers that a case asks for after every increment.
 
+use crate::assembly::{Tie, fold};
 use crate::case::{Case, ProbeInput, Reduce};
 use crate::error::{Error, Source, suggestion};
 use crate::group::Group;
@@ -61,6 +62,8 @@ enum PointQuantity {
 pub struct Snapshot<'a> {
     /// Groups with their committed state.
     pub groups: &'a [Group],
+    /// Degrees of freedom that follow others.
+    pub ties: &'a [Tie],
     /// Displacements by degree of freedom.
     pub displacement: &'a [f64],
     /// Internal less external forces by degree of freedom: reactions where displacements are
@@ -147,7 +150,10 @@ impl Probe {
                 let forces = match group {
                     None => snapshot.reaction,
                     Some(group) => {
-                        of_group = snapshot.groups[*group].forces(snapshot.displacement.len());
+                        let mut forces =
+                            snapshot.groups[*group].forces(snapshot.displacement.len());
+                        fold(snapshot.ties, &mut forces);
+                        of_group = forces;
                         &of_group
                     }
                 };

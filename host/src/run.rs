@@ -71,6 +71,8 @@ struct Run<'a> {
     force: Vec<f64>,
     /// Pseudo-time: one unit for every phase.
     time: f64,
+    /// Largest of the forces (2-norms) at the start of any phase so far.
+    largest_force: f64,
 }
 
 /// What is left of a model once mesh and groups are taken out.
@@ -100,6 +102,7 @@ impl<'a> Run<'a> {
             pressure: BTreeMap::new(),
             force: vec![0.0; n_dofs],
             time: 0.0,
+            largest_force: 0.0,
         };
         for support in &case.file.supports {
             for dof in run.dofs(support.line.get_ref(), &support.fixed) {
@@ -243,6 +246,7 @@ impl<'a> Run<'a> {
                             step = (REGROWTH * step).min(1.0 / n as f64);
                         }
                         self.accept(&success, loads, end);
+                        system.follow(&mut self.displacement);
                         last = Some((length, success.increment));
                         done.reaction = Some(self.reaction(&success.internal));
                         lambda = end;
@@ -267,6 +271,7 @@ impl<'a> Run<'a> {
             let reaction = done.reaction.take().unwrap_or_default();
             let snapshot = Snapshot {
                 groups: &self.groups,
+                ties: &self.model.ties,
                 displacement: &self.displacement,
                 reaction: &reaction,
             };
@@ -294,13 +299,14 @@ impl<'a> Run<'a> {
             let ratio = (to - from) / length;
             increment.iter().map(|u| ratio * u).collect()
         });
-        let mut newton = Newton {
+        let settings = &self.case.file.solver;
+        let mut newton = Newton::new(
             system,
             solver,
-            groups: &mut self.groups,
-            settings: &self.case.file.solver,
-            costs: &mut record.costs,
-        };
+            &mut self.groups,
+            settings,
+            &mut record.costs,
+        );
         newton.step(loads, from, to, self.time + from, guess)
     }
 
@@ -376,13 +382,14 @@ impl<'a> Run<'a> {
                 .map(|(&dof, &end)| (dof, self.displacement[dof], end))
                 .collect(),
             out_of_balance: Vec::new(),
+            scale: 0.0,
         }
     }
 
     /// Internal less external forces at the start of a phase where nothing holds them (after a
     /// swap of laws, a support given up, an initial stress). Returns their size relative to the
     /// forces in play.
-    fn out_of_balance(&self, system: &System, loads: &mut Loads) -> f64 {
+    fn out_of_balance(&mut self, system: &System, loads: &mut Loads) -> f64 {
         let n_dofs = self.displacement.len();
         let mut internal = vec![0.0; n_dofs];
         for group in &self.groups {
@@ -402,10 +409,13 @@ impl<'a> Run<'a> {
         for (internal, external) in internal.iter().zip(&loads.force_start) {
             play += f64::max(internal * internal, external * external);
         }
+        // Where nothing is left of earlier forces, what remains of them is round-off.
+        self.largest_force = self.largest_force.max(f64::sqrt(play));
+        loads.scale = self.largest_force;
         // An initial stress that the loads of its own phase balance is in balance.
         let rest = rest.min(against_end);
         if play > 0.0 {
-            f64::sqrt(rest / play)
+            f64::sqrt(rest) / self.largest_force
         } else {
             0.0
         }

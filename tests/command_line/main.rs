@@ -1,6 +1,7 @@
 //! The program as its users meet it, mistakes included: exit codes, messages, files.
 
 mod arguments;
+mod bases;
 mod libraries;
 mod loading;
 mod mesh;

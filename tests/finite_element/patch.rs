@@ -1,5 +1,5 @@
-//! Patch tests: the displacement of every boundary node is prescribed from a field whose stress
-//! is constant in every group; all integration points must then have that stress.
+//! Patch tests: boundary displacements are those of a field whose stress is constant in every
+//! group; all integration points must then have that stress.
 
 use crate::setup::{Results, assert_close, grid, run};
 use std::fmt::Write;
@@ -34,17 +34,6 @@ impl Normal {
         let [s_11, s_22] = self.turn([along, across]);
         [s_11, s_22, out, shear]
     }
-}
-
-/// A zero-thickness group along a line.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct JointLine {
-    /// Its normal.
-    pub(crate) normal: Normal,
-    /// Coordinate in the direction of the normal.
-    pub(crate) at: f64,
-    /// Extent along it.
-    pub(crate) extent: [f64; 2],
 }
 
 /// Stress (or traction and jump) that all points of a group must have.
@@ -110,10 +99,10 @@ pub(crate) struct Patch<'a> {
     pub(crate) laws: &'a str,
     /// Lines under `[groups]`.
     pub(crate) groups: &'a str,
-    /// The line `joint`, if there is one.
-    pub(crate) joint: Option<JointLine>,
-    /// Displacement at (x, y); true on the joint's far side.
-    pub(crate) field: &'a dyn Fn([f64; 2], bool) -> [f64; 2],
+    /// Lines under `[mesh.lines]`.
+    pub(crate) lines: &'a str,
+    /// `[[phase]]` entries.
+    pub(crate) phases: &'a str,
 }
 
 impl Patch<'_> {
@@ -141,127 +130,58 @@ impl Patch<'_> {
     }
 
     fn text(&self, expected: &[Expected]) -> String {
-        let Self {
-            analysis,
-            x,
-            y,
-            regions,
-            laws,
-            groups,
-            ..
-        } = self;
+        let Self { analysis, x, y, regions, laws, groups, lines, phases } = self;
         let (columns, rows) = (grid(&x[1..]), grid(&y[1..]));
-        let (lines, displacements) = self.boundary();
         let mut probes = String::new();
         for Expected { group, values, .. } in expected {
             for (name, _) in values {
                 for reduce in ["min", "max"] {
-                    writeln!(
+                    let _ = writeln!(
                         probes,
                         "{group}_{name}_{reduce} = {{ group = \"{group}\", \
                          quantity = \"{name}\", reduce = \"{reduce}\" }}"
-                    )
-                    .unwrap();
+                    );
                 }
             }
         }
         format!(
             "analysis = \"{analysis}\"\n\
              [mesh]\norigin = [{:?}, {:?}]\ncolumns = {columns}\nrows = {rows}\n{regions}\n\
-             [mesh.lines]\n{lines}\n[laws]\n{laws}\n[groups]\n{groups}\n\
-             [[phase]]\nname = \"strain\"\nincrements = 1\ndisplacement = [\n{displacements}]\n\
+             [mesh.lines]\n{lines}\n[laws]\n{laws}\n[groups]\n{groups}\n{phases}\n\
              [probes]\n{probes}",
             x[0], y[0]
         )
     }
+}
 
-    /// Lines for the boundary nodes, and their displacements.
-    fn boundary(&self) -> (String, String) {
-        let mut lines = String::new();
-        let mut displacements = String::new();
-        if let Some(JointLine {
-            normal,
-            at,
-            extent: [from, to],
-        }) = self.joint
-        {
-            let [along, across] = match normal {
-                Normal::X => ["y", "x"],
-                Normal::Y => ["x", "y"],
-            };
-            writeln!(
-                lines,
-                "joint = {{ {across} = {at:?}, {along} = [{from:?}, {to:?}] }}"
-            )
-            .unwrap();
-        }
-        let mut add = |name: String, line: String, [u_x, u_y]: [f64; 2]| {
-            writeln!(lines, "{name} = {line}").unwrap();
-            writeln!(
-                displacements,
-                "  {{ line = \"{name}\", x = {u_x:e}, y = {u_y:e} }},"
-            )
-            .unwrap();
-        };
-        let (fine_x, fine_y) = (with_middles(self.x), with_middles(self.y));
-        let boundary: Vec<[f64; 2]> = (0..fine_x.len())
-            .flat_map(|i| (0..fine_y.len()).map(move |j| (i, j)))
-            .filter(|&(i, j)| i == 0 || j == 0 || i == fine_x.len() - 1 || j == fine_y.len() - 1)
-            .map(|(i, j)| [fine_x[i], fine_y[j]])
-            .collect();
-        // A double node takes the displacement of the element edge that it belongs to; the
-        // other nodes of these edges are overridden by what follows.
-        let is_double = |p: [f64; 2]| {
-            self.joint.is_some_and(
-                |JointLine {
-                     normal,
-                     at,
-                     extent: [from, to],
-                 }| {
-                    let [along, across] = normal.turn(p);
-                    same(across, at) && along > from - 1e-9 && along < to + 1e-9
-                },
-            )
-        };
-        for (number, &p) in boundary.iter().enumerate().filter(|(_, p)| is_double(**p)) {
-            let normal = self.joint.unwrap().normal;
-            let [along, across] = normal.turn(p);
-            let ends = match normal {
-                Normal::X => self.x,
-                Normal::Y => self.y,
-            };
-            let i = ends.iter().position(|&end| same(end, across)).unwrap();
-            for (side, neighbour) in [("near", ends[i - 1]), ("far", ends[i + 1])] {
-                let (low, high) = (neighbour.min(across), neighbour.max(across));
-                let line = match normal {
-                    Normal::X => format!("{{ x = [{low:?}, {high:?}], y = {along:?} }}"),
-                    Normal::Y => format!("{{ x = {along:?}, y = [{low:?}, {high:?}] }}"),
-                };
-                add(
-                    format!("{side}_{number}"),
-                    line,
-                    (self.field)(p, side == "far"),
+/// Lines for all nodes on the boundary of a grid, and a phase that gives them the displacements
+/// of a field.
+pub(crate) fn boundary_nodes(
+    x: &[f64],
+    y: &[f64],
+    field: &dyn Fn([f64; 2]) -> [f64; 2],
+) -> (String, String) {
+    let (fine_x, fine_y) = (with_middles(x), with_middles(y));
+    let (mut lines, mut displacements) = (String::new(), String::new());
+    let last = [fine_x.len() - 1, fine_y.len() - 1];
+    for (i, &x) in fine_x.iter().enumerate() {
+        for (j, &y) in fine_y.iter().enumerate() {
+            if i == 0 || j == 0 || i == last[0] || j == last[1] {
+                let [u_x, u_y] = field([x, y]);
+                let _ = writeln!(lines, "node_{i}_{j} = {{ x = {x:?}, y = {y:?} }}");
+                let _ = writeln!(
+                    displacements,
+                    "  {{ line = \"node_{i}_{j}\", x = {u_x:e}, y = {u_y:e} }},"
                 );
             }
         }
-        for (number, &p) in boundary.iter().enumerate().filter(|(_, p)| !is_double(**p)) {
-            let far = self
-                .joint
-                .is_some_and(|joint| joint.normal.turn(p)[1] > joint.at);
-            let line = format!("{{ x = {:?}, y = {:?} }}", p[0], p[1]);
-            add(format!("node_{number}"), line, (self.field)(p, far));
-        }
-        (lines, displacements)
     }
-}
-
-fn same(a: f64, b: f64) -> bool {
-    (a - b).abs() < 1e-9
+    let phase =
+        format!("[[phase]]\nname = \"strain\"\nincrements = 1\ndisplacement = [\n{displacements}]\n");
+    (lines, phase)
 }
 
 fn with_middles(ends: &[f64]) -> Vec<f64> {
-    let pairs = ends
-        .windows(2)
-        .flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
+    let pairs = ends.windows(2).flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
     pairs.chain([ends[ends.len() - 1]]).collect()
 }

@@ -56,7 +56,7 @@ fn plane_strain_under_a_linear_displacement() {
         lambda * (e_11 + e_22),
         shear * gamma,
     ];
-    let field = |[x, y]: [f64; 2], _| [a[0][0] * x + a[0][1] * y, a[1][0] * x + a[1][1] * y];
+    let field = |[x, y]: [f64; 2]| [a[0][0] * x + a[0][1] * y, a[1][0] * x + a[1][1] * y];
     for law in laws() {
         for integration in ["full", "reduced"] {
             let patch = Patch {

@@ -48,10 +48,12 @@ impl Layer {
         }
     }
 
-    /// Takes the elastic operators of a law that starts now; jumps are counted from here.
-    pub(super) fn start(&mut self, operators: &[f64]) {
-        self.jump.committed.fill(0.0);
-        self.jump.trial.fill(0.0);
+    /// Takes the elastic operators of a law that starts now, anew or with other parameters.
+    pub(super) fn start(&mut self, operators: &[f64], anew: bool) {
+        if anew {
+            self.jump.committed.fill(0.0);
+        }
+        self.jump.trial.copy_from_slice(&self.jump.committed);
         for (stiffness, operator) in self.stiffness.iter_mut().zip(operators.chunks_exact(4)) {
             *stiffness = [operator[0], operator[3]];
         }

@@ -1,5 +1,6 @@
 //! Whether supports and prescribed displacements fit together, phase by phase.
 
+use crate::assembly::Tie;
 use crate::case::{Analysis, Axis, CaseFile, DisplacementInput, FreeInput, PhaseInput};
 use crate::error::{Error, Source};
 use crate::mesh::Mesh;
@@ -11,7 +12,12 @@ use toml::Spanned;
 ///
 /// # Errors
 /// [`Error::Input`] at the line or the phase.
-pub(super) fn check(source: &Source, file: &CaseFile, mesh: &Mesh) -> Result<(), Error> {
+pub(super) fn check(
+    source: &Source,
+    file: &CaseFile,
+    mesh: &Mesh,
+    ties: &[Tie],
+) -> Result<(), Error> {
     let mut constraints = Constraints {
         source,
         mesh,
@@ -38,6 +44,7 @@ pub(super) fn check(source: &Source, file: &CaseFile, mesh: &Mesh) -> Result<(),
             constraints.prescribe(displacement, &mut values)?;
         }
         constraints.refuse_loose(phase)?;
+        constraints.refuse_tied(phase, ties, &values)?;
     }
     Ok(())
 }
@@ -134,6 +141,41 @@ impl<'a> Constraints<'a> {
                     return Err(refuse(message).into());
                 }
                 self.held.entry(dof).or_insert(Holder::Prescribed);
+            }
+        }
+        Ok(())
+    }
+
+    /// A mid-thickness node of a layer with mean strain follows the two faces: it can be held only
+    /// where they are, and with them.
+    fn refuse_tied(
+        &self,
+        phase: &PhaseInput,
+        ties: &[Tie],
+        values: &HashMap<usize, (f64, &str)>,
+    ) -> Result<(), Error> {
+        let value = |dof: usize| values.get(&dof).map_or(0.0, |(value, _)| *value);
+        for tie in ties.iter().filter(|tie| self.held.contains_key(&tie.dof)) {
+            let masters = tie.masters;
+            let mean: f64 = masters
+                .iter()
+                .map(|&(dof, weight)| weight * value(dof))
+                .sum();
+            let wished = value(tie.dof);
+            let fits = masters.iter().all(|(dof, _)| self.held.contains_key(dof))
+                && (mean - wished).abs() <= 1e-12 * mean.abs().max(wished.abs());
+            if !fits {
+                let [x, y] = self.mesh.nodes[tie.dof / 2];
+                let message = format!(
+                    "phase `{}`: the node at ({x}, {y}) in the middle of a layer with \
+                     `integration = \"mean\"` follows the layer's faces and cannot be held alone",
+                    phase.name.get_ref()
+                );
+                return Err(self
+                    .source
+                    .error(phase.name.span(), message)
+                    .hint("hold the nodes on both faces too, or leave this one free")
+                    .into());
             }
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
-use crate::case::Case;
+use crate::case::{Analysis, Case, FigureInput, GroupInput, ProbeInput, Reduce};
 use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::input::BuiltLaw;
@@ -10,6 +10,7 @@ use crate::probe::Probes;
 use crate::solver::Costs;
 use serde_json::{Map, Value, json};
 use std::time::Duration;
+use toml::Spanned;
 
 /// A phase, for the record.
 #[derive(Clone, Debug)]
@@ -86,6 +87,12 @@ impl Summary {
             "case_sha256".to_owned(),
             json!(hexadecimal_sha256(case.source.text().as_bytes())),
         );
+        head.insert("case_files".to_owned(), case_files(case));
+        head.insert("analysis".to_owned(), json!(analysis(case)));
+        head.insert("groups".to_owned(), groups(case, model));
+        head.insert("solver".to_owned(), solver(case));
+        head.insert("figures".to_owned(), figures(case));
+        head.insert("probe_units".to_owned(), probe_units(case, model));
         head.insert("laws".to_owned(), laws.into());
         head.insert(
             "mesh".to_owned(),
@@ -191,6 +198,149 @@ impl Summary {
     }
 }
 
+/// The case file after those it is based on.
+fn case_files(case: &Case) -> Value {
+    let source = &case.source;
+    let files = source.files().map(|range| {
+        let text = &source.text()[range.clone()];
+        json!({ "path": source.path_at(&range).display().to_string(), "text": text })
+    });
+    files.collect()
+}
+
+fn analysis(case: &Case) -> &'static str {
+    match case.file.analysis {
+        Analysis::Axisymmetric => "axisymmetric",
+        Analysis::PlaneStrain => "plane_strain",
+    }
+}
+
+/// Groups in the order of the file, which is that of the numbers in the fields.
+fn groups(case: &Case, model: &Model) -> Value {
+    let groups = case.file.groups.iter().zip(&model.groups);
+    let describe = |((name, input), group): (_, &Group)| {
+        let (name, input): (&Spanned<String>, &Spanned<GroupInput>) = (name, input);
+        let swaps: Map<String, Value> = case
+            .file
+            .phases
+            .iter()
+            .filter_map(|phase| {
+                let (_, law) = phase.laws.iter().find(|(key, _)| *key == name)?;
+                Some((phase.name.get_ref().clone(), json!(law.get_ref())))
+            })
+            .collect();
+        json!({
+            "name": name.get_ref(),
+            "formulation": input.get_ref().formulation.name(),
+            "elements": group.kinematics.n_elements(),
+            "points_per_element": group.kinematics.points_per_element(),
+            "law": input.get_ref().law.get_ref(),
+            "laws_from_phase": swaps,
+        })
+    };
+    groups.map(describe).collect()
+}
+
+fn solver(case: &Case) -> Value {
+    let solver = &case.file.solver;
+    json!({
+        "force_tolerance": solver.force_tolerance,
+        "displacement_tolerance": solver.displacement_tolerance,
+        "max_iterations": solver.max_iterations,
+        "max_halvings": solver.max_halvings,
+        "line_search": solver.line_search,
+    })
+}
+
+fn figures(case: &Case) -> Value {
+    let figure = |figure: &FigureInput| {
+        let y: Vec<&String> = figure.y.iter().map(Spanned::get_ref).collect();
+        json!({
+            "name": figure.name.get_ref(),
+            "title": figure.title,
+            "x": figure.x.get_ref(),
+            "x_label": figure.x_label,
+            "y": y,
+            "y_label": figure.y_label,
+            "phase": figure.phase.as_ref().map(Spanned::get_ref),
+        })
+    };
+    case.file.figures.iter().map(figure).collect()
+}
+
+/// Units of the probes, where factors leave no doubt.
+fn probe_units(case: &Case, model: &Model) -> Value {
+    let mut units: Map<String, Value> = Map::new();
+    for (name, input) in &case.file.probes {
+        let input = input.get_ref();
+        let unit = match &input.combine {
+            None => measured_unit(case, model, input),
+            Some(terms) => {
+                let of = |name: &Spanned<String>| units.get(name.get_ref())?.as_str();
+                let first = terms.keys().next().and_then(of);
+                let alike = terms
+                    .iter()
+                    .all(|(name, factor)| of(name) == first && is(factor.get_ref().abs(), 1.0));
+                first.filter(|_| alike).map(str::to_owned)
+            }
+        };
+        let unit = unit.and_then(|unit| scaled_unit(unit, input.scale.abs()));
+        units.insert(name.get_ref().clone(), json!(unit));
+    }
+    units.into()
+}
+
+fn measured_unit(case: &Case, model: &Model, input: &ProbeInput) -> Option<String> {
+    let quantity = input.quantity.as_ref()?.get_ref().as_str();
+    let kind = quantity.split('_').next().unwrap_or_default();
+    let of_points = input.line.is_none();
+    if of_points && input.reduce == Some(Reduce::Sum) {
+        return None;
+    }
+    let mut variables = model
+        .laws
+        .values()
+        .flat_map(|built| &built.law.formulation().internal_variables);
+    let variable = variables.find(|variable| of_points && variable.id == quantity);
+    let unit = match (kind, variable) {
+        (_, Some(variable)) => &variable.unit,
+        ("stress" | "traction", None) => "kPa",
+        ("strain", None) => "-",
+        ("jump" | "displacement", None) => "m",
+        ("reaction" | "force", None) => match case.file.analysis {
+            Analysis::Axisymmetric => "kN",
+            Analysis::PlaneStrain => "kN/m",
+        },
+        _ => return None,
+    };
+    Some(unit.to_owned())
+}
+
+/// The unit of a quantity times a factor.
+fn scaled_unit(unit: String, factor: f64) -> Option<String> {
+    if is(factor, 1.0) {
+        return Some(unit);
+    }
+    let scaled = [
+        ("m", 1e3, "mm"),
+        ("m", 1e2, "cm"),
+        ("kPa", 1e-3, "MPa"),
+        ("kPa", 1e3, "Pa"),
+        ("kN", 1e-3, "MN"),
+        ("kN", 1e3, "N"),
+        ("-", 1e2, "%"),
+    ];
+    scaled
+        .iter()
+        .find(|(of, by, _)| *of == unit && is(factor, *by))
+        .map(|(_, _, scaled)| (*scaled).to_owned())
+}
+
+/// Equal but for rounding.
+fn is(value: f64, expected: f64) -> bool {
+    (value - expected).abs() <= 1e-12 * expected
+}
+
 fn law(built: &BuiltLaw) -> Value {
     let description = built.law.description();
     let library = built.law.library();
@@ -208,12 +358,45 @@ fn law(built: &BuiltLaw) -> Value {
             )
         })
         .collect();
+    let described: Vec<Value> = description
+        .parameters
+        .iter()
+        .zip(&built.parameters)
+        .map(|(declared, used)| {
+            json!({
+                "id": declared.id,
+                "symbol": declared.symbol,
+                "unit": declared.unit,
+                "value": if used.value.is_nan() { Value::Null } else { json!(used.value) },
+                "choice": declared.choices.get(used.value as usize),
+                "by_default": used.by_default,
+                "bounds": if declared.choices.is_empty() {
+                    declared.bounds.to_string()
+                } else {
+                    declared.choices.join(", ")
+                },
+                "doc": declared.doc,
+            })
+        })
+        .collect();
+    let variables: Vec<Value> = built
+        .law
+        .formulation()
+        .internal_variables
+        .iter()
+        .map(|v| json!({ "id": v.id, "symbol": v.symbol, "unit": v.unit, "doc": v.doc }))
+        .collect();
     json!({
         "law": description.id,
+        "name": description.name,
+        "doc": description.doc,
+        "references": description.references,
         "version": description.version,
         "library": library.path().display().to_string(),
         "sha256": library.sha256(),
         "parameters": parameters,
+        "described_parameters": described,
+        "internal_variables": variables,
         "warnings": built.warnings,
     })
 }

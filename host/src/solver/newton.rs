@@ -13,6 +13,8 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 const EXACT: f64 = 1e-3;
+/// Round-off of K u, relative to the largest entry of K and the norm of u.
+const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 /// Loads over a phase, as functions of the load factor λ from 0 to 1.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +27,9 @@ pub struct Loads {
     pub prescribed: Vec<(usize, f64, f64)>,
     /// Forces out of balance at the start, carried to equilibrium in proportion to λ.
     pub out_of_balance: Vec<f64>,
+    /// Largest of the forces (2-norms) at the start of the phase: where all forces vanish in its
+    /// course, the residual is still measured against something.
+    pub scale: f64,
 }
 
 impl Loads {
@@ -102,15 +107,17 @@ pub struct StepFailure {
 #[derive(Debug)]
 pub struct Newton<'a> {
     /// Unknowns.
-    pub system: &'a System,
+    system: &'a System,
     /// Equations.
-    pub solver: &'a mut LinearSolver,
+    solver: &'a mut LinearSolver,
     /// Elements and their state.
-    pub groups: &'a mut [Group],
+    groups: &'a mut [Group],
     /// Settings.
-    pub settings: &'a SolverInput,
+    settings: &'a SolverInput,
     /// Costs so far.
-    pub costs: &'a mut Costs,
+    costs: &'a mut Costs,
+    scale: f64,
+    largest_stiffness: f64,
 }
 
 /// Internal forces, residual by equation, and the residual's norm relative to the forces in play.
@@ -118,10 +125,31 @@ struct Balance {
     internal: Vec<f64>,
     residual: Vec<f64>,
     relative: f64,
+    /// The residual is no more than round-off of K u.
+    at_round_off: bool,
     unreliable: Option<String>,
 }
 
-impl Newton<'_> {
+impl<'a> Newton<'a> {
+    /// Iterations on these elements and equations.
+    pub fn new(
+        system: &'a System,
+        solver: &'a mut LinearSolver,
+        groups: &'a mut [Group],
+        settings: &'a SolverInput,
+        costs: &'a mut Costs,
+    ) -> Self {
+        Self {
+            system,
+            solver,
+            groups,
+            settings,
+            costs,
+            scale: 0.0,
+            largest_stiffness: 0.0,
+        }
+    }
+
     /// Seeks equilibrium at the end of a step, starting from a guess of the displacement
     /// increments or, without one, from the tangent at the start.
     ///
@@ -135,6 +163,7 @@ impl Newton<'_> {
         time: f64,
         guess: Option<Vec<f64>>,
     ) -> Result<StepSuccess, StepFailure> {
+        self.scale = loads.scale;
         let mut iterations = Vec::new();
         let outcome = self.iterate(
             loads,
@@ -189,9 +218,8 @@ impl Newton<'_> {
                 && last
                     .correction
                     .is_some_and(|c| c <= self.settings.displacement_tolerance);
-            if balance.relative <= EXACT * tolerance
-                || (balance.relative <= tolerance && small_correction)
-            {
+            let small_residual = balance.relative <= tolerance || balance.at_round_off;
+            if balance.relative <= EXACT * tolerance || (small_residual && small_correction) {
                 return Ok(StepSuccess {
                     increment,
                     internal: balance.internal,
@@ -253,6 +281,10 @@ impl Newton<'_> {
         let with_coupling = prescribed.map(|p| (p, coupling.as_mut_slice()));
         self.system
             .assemble(self.groups, &mut values, with_coupling);
+        let largest = values
+            .iter()
+            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        self.largest_stiffness = largest;
         self.costs.assembly += start.elapsed();
         let start = Instant::now();
         let right: Vec<f64> = residual.iter().zip(&coupling).map(|(r, c)| r - c).collect();
@@ -352,17 +384,16 @@ impl Newton<'_> {
             .iter()
             .map(|&dof| external[dof] - internal[dof])
             .collect();
-        let scale = norm(&internal).max(norm(external));
-        let relative = if scale > 0.0 {
-            norm(&residual) / scale
-        } else {
-            0.0
-        };
+        let scale = norm(&internal).max(norm(external)).max(self.scale);
+        let size = norm(&residual);
+        let relative = if scale > 0.0 { size / scale } else { 0.0 };
+        let at_round_off = size <= ROUND_OFF * self.largest_stiffness * norm(increment);
         self.costs.laws += start.elapsed();
         Ok(Balance {
             internal,
             residual,
             relative,
+            at_round_off,
             unreliable,
         })
     }

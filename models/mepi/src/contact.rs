@@ -35,7 +35,7 @@ pub(crate) fn update(
     }
     let constants = law.constants(state.sigma_ni);
     let mut end = match contact(&constants, point) {
-        Ok(contact) => close_or_slide(&constants, state, &contact)?,
+        Ok(contact) => close_or_slide(&constants, state, &contact, tangent)?,
         Err(gap) => open(State { gap, ..state }),
     };
     if tangent == Tangent::Elastic {
@@ -98,6 +98,7 @@ fn close_or_slide(
     constants: &Constants,
     state: State,
     contact: &Contact,
+    tangent: Tangent,
 ) -> Result<InterfaceResponse<State>, Failure> {
     let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
     let hardening = &constants.hardening;
@@ -136,7 +137,11 @@ fn close_or_slide(
                 contact,
                 [sigma, sign * end.mu * sigma],
                 slid(state, end.d_lambda, end.contraction),
-                derivative(constants, &end, sign)?,
+                if tangent == Tangent::Consistent {
+                    derivative(constants, &end, sign)?
+                } else {
+                    elastic
+                },
             ))
         }
         Flow::StopsAtPeak(end) => {

@@ -1,0 +1,176 @@
+//! Runs side by side: settings and final values.
+
+use super::results::{Run, entries, list, text};
+use super::short::display;
+use serde::Serialize;
+use serde_json::Value;
+
+/// A setting of every run.
+#[derive(Debug, Serialize)]
+pub(super) struct Setting {
+    section: String,
+    name: String,
+    /// By run; empty where there is no such setting.
+    values: Vec<String>,
+    pub(super) differs: bool,
+}
+
+/// Final values of a probe.
+#[derive(Debug, Serialize)]
+pub(super) struct FinalValue {
+    name: String,
+    unit: String,
+    /// By run: value, and difference from the first.
+    values: Vec<(String, String)>,
+}
+
+/// Settings of all runs, in the order in which they first appear.
+pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
+    let all: Vec<_> = runs.iter().map(|run| settings_of(&run.summary)).collect();
+    let mut settings: Vec<Setting> = Vec::new();
+    for (number, of_run) in all.into_iter().enumerate() {
+        let mut after = None;
+        for (section, name, value) in of_run {
+            let found = settings
+                .iter()
+                .position(|s| s.section == section && s.name == name);
+            let at = found.unwrap_or_else(|| {
+                // Behind its neighbour or at the end of its section.
+                let end = settings.iter().rposition(|s| s.section == section);
+                let at = after.max(end).map_or(settings.len(), |i: usize| i + 1);
+                settings.insert(
+                    at,
+                    Setting {
+                        section,
+                        name,
+                        values: vec![String::new(); runs.len()],
+                        differs: false,
+                    },
+                );
+                at
+            });
+            settings[at].values[number] = value;
+            after = Some(at);
+        }
+    }
+    for setting in &mut settings {
+        setting.differs = setting.values.windows(2).any(|pair| pair[0] != pair[1]);
+    }
+    settings
+}
+
+/// Section, name and value of the settings of a run.
+fn settings_of(summary: &Value) -> Vec<(String, String, String)> {
+    let mut settings = Vec::new();
+    let mut add = |section: &str, name: &str, value: &Value, unit: &str| {
+        let value = match value {
+            Value::Null => return,
+            Value::String(text) => text.clone(),
+            Value::Number(number) => number.as_f64().map(display).unwrap_or_default(),
+            other => other.to_string(),
+        };
+        let separator = if unit.is_empty() || unit == "-" { "" } else { " " };
+        let unit = if unit == "-" { "" } else { unit };
+        let value = format!("{value}{separator}{unit}");
+        settings.push((section.to_owned(), name.to_owned(), value));
+    };
+    add("program", "version", &summary["program"], "");
+    add("model", "analysis", &summary["analysis"], "");
+    add("model", "nodes", &summary["mesh"]["nodes"], "");
+    add("model", "elements", &summary["mesh"]["elements"], "");
+    for group in list(&summary["groups"]) {
+        let section = format!("group {}", text(&group["name"]));
+        for key in ["formulation", "elements", "points_per_element", "law"] {
+            add(&section, &key.replace('_', " "), &group[key], "");
+        }
+        for (phase, law) in entries(&group["laws_from_phase"]) {
+            add(&section, &format!("law from phase {phase}"), law, "");
+        }
+    }
+    for (name, law) in entries(&summary["laws"]) {
+        let section = format!("law {name}");
+        add(&section, "law", &law["law"], "");
+        add(&section, "version", &law["version"], "");
+        for (id, value) in entries(&law["parameters"]) {
+            let described = list(&law["described_parameters"]).find(|p| text(&p["id"]) == id);
+            let unit = described.map_or("", |p| text(&p["unit"]));
+            match described.map(|p| &p["choice"]) {
+                Some(Value::String(choice)) => add(&section, id, &Value::from(choice.as_str()), ""),
+                _ => add(&section, id, value, unit),
+            }
+        }
+        let digest = text(&law["sha256"]);
+        let short = digest.get(..12).unwrap_or(digest);
+        add(&section, "library, SHA-256", &Value::from(short), "");
+    }
+    for phase in list(&summary["phases"]) {
+        let section = format!("phase {}", text(&phase["name"]));
+        add(&section, "equations", &phase["equations"], "");
+        add(&section, "increments done", &phase["increments"], "");
+    }
+    for (name, value) in entries(&summary["solver"]) {
+        add("solver", &name.replace('_', " "), value, "");
+    }
+    settings
+}
+
+/// Final values of all probes of all runs.
+pub(super) fn final_values(runs: &[Run]) -> Vec<FinalValue> {
+    let mut names: Vec<&str> = Vec::new();
+    for name in runs.iter().flat_map(|run| run.history.probes()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let first = |name: &str| runs.first().and_then(|run| run.history.last(name));
+    let values = |name: &str| {
+        let of_run = |(number, run): (usize, &Run)| {
+            let value = run.history.last(name);
+            let difference = match (number, first(name), value) {
+                (1.., Some(first), Some(value)) => difference(first, value),
+                _ => String::new(),
+            };
+            (value.map(display).unwrap_or_default(), difference)
+        };
+        runs.iter().enumerate().map(of_run).collect()
+    };
+    let unit = |name: &str| runs.iter().find_map(|run| run.units().get(name).copied());
+    let final_value = |name: &str| FinalValue {
+        name: name.to_owned(),
+        unit: unit(name).unwrap_or_default().to_owned(),
+        values: values(name),
+    };
+    names.into_iter().map(final_value).collect()
+}
+
+/// By how much a value differs from the first, in per cent of it.
+fn difference(first: f64, value: f64) -> String {
+    if (value - first).abs() <= 1e-12 * first.abs() {
+        return "±0".to_owned();
+    }
+    if first == 0.0 {
+        return format!("{:+.3e}", value - first);
+    }
+    let percent = 100.0 * (value - first) / first.abs();
+    match percent.abs() {
+        1000.0.. => format!("×{:.3e}", value / first),
+        10.0..1000.0 => format!("{percent:+.1} %"),
+        0.01..10.0 => format!("{percent:+.2} %"),
+        _ => format!("{percent:+.1e} %"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_in_per_cent_of_the_first() {
+        assert_eq!(difference(100.0, 101.5), "+1.50 %");
+        assert_eq!(difference(-2.0, -1.0), "+50.0 %");
+        assert_eq!(difference(3.0, 3.0), "±0");
+        assert_eq!(difference(0.0, 1.0), "+1.000e0");
+        assert_eq!(difference(1e-13, 1.0), "×1.000e13");
+        assert_eq!(difference(1.0, 1.000_001), "+1.0e-4 %");
+    }
+}

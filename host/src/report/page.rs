@@ -1,0 +1,332 @@
+//! The page: tables by the template, everything that is drawn as JSON for the script.
+
+use super::comparison::{final_values, settings};
+use super::fields::Fields;
+use super::log::Log;
+use super::profile::Profile;
+use super::results::{Ending, History, Run, entries, list, text};
+use super::short::display;
+use crate::error::Error;
+use minijinja::{Environment, Value as Template, context};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const TEMPLATE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("style.css");
+/// The parts of the script, one after the other in one scope.
+const SCRIPT: [&str; 7] = [
+    include_str!("script/basics.js"),
+    include_str!("script/chart.js"),
+    include_str!("script/curves.js"),
+    include_str!("script/profiles.js"),
+    include_str!("script/contours.js"),
+    include_str!("script/convergence.js"),
+    include_str!("script/selftest.js"),
+];
+const UPLOT: &str = include_str!("vendor/uPlot.iife.min.js");
+const UPLOT_STYLE: &str = include_str!("vendor/uPlot.min.css");
+const UPLOT_LICENCE: &str = include_str!("vendor/LICENSE-uPlot");
+/// More cut-backs than this are only in the log.
+const MOST_CUT_BACKS: usize = 100;
+/// Files of a run that the page links to.
+const FILES: [(&str, &str); 5] = [
+    ("history.csv", "every increment, every probe"),
+    ("profile.csv", "values along interfaces"),
+    ("fields.pvd", "fields, for programs that read VTK files"),
+    ("log.jsonl", "every iteration and cut-back"),
+    ("summary.json", "versions, settings, costs, final values"),
+];
+
+/// What the script draws of a run.
+#[derive(Serialize)]
+struct Drawn<'a> {
+    name: &'a str,
+    axisymmetric: bool,
+    history: &'a History,
+    figures: &'a Value,
+    profile: Option<&'a Profile>,
+    fields: Option<&'a Fields>,
+    log: &'a Log,
+    force_tolerance: Option<f64>,
+    units: BTreeMap<&'a str, &'a str>,
+}
+
+/// The text of the page, for a file in `folder`.
+pub(super) fn render(runs: &[Run], folder: &Path) -> Result<String, Error> {
+    let internal = |why: String| Error::Internal(format!("report: {why}"));
+    let drawn: Vec<Drawn<'_>> = runs.iter().map(drawn).collect();
+    let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
+    let mut environment = Environment::new();
+    environment
+        .add_template("report.html", TEMPLATE)
+        .and_then(|()| environment.get_template("report.html"))
+        .and_then(|template| template.render(page(runs, folder, &data)))
+        .map_err(|error| internal(format!("{error:#}")))
+}
+
+fn page(runs: &[Run], folder: &Path, data: &str) -> Template {
+    let is_comparison = runs.len() > 1;
+    let title = if is_comparison {
+        let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+        format!("Comparison: {}", names.join(", "))
+    } else {
+        runs.first().map_or("", Run::title).to_owned()
+    };
+    let settings = settings(runs);
+    context! {
+        title,
+        is_comparison,
+        runs => runs.iter().map(|run| run_context(run, folder)).collect::<Vec<_>>(),
+        final_values => if is_comparison { final_values(runs) } else { Vec::new() },
+        n_differing => settings.iter().filter(|setting| setting.differs).count(),
+        settings,
+        has_profiles => runs.iter().any(|run| run.profile.is_some()),
+        has_fields => runs.iter().any(|run| run.fields.is_some()),
+        version => env!("CARGO_PKG_VERSION"),
+        style => format!("{UPLOT_STYLE}\n{STYLE}"),
+        licence => UPLOT_LICENCE,
+        uplot => without_first_comment(UPLOT),
+        script => SCRIPT.concat(),
+        // Nothing in the data can end the script element.
+        data => data.replace('<', "\\u003c"),
+    }
+}
+
+fn drawn(run: &Run) -> Drawn<'_> {
+    Drawn {
+        name: &run.name,
+        axisymmetric: text(&run.summary["analysis"]) == "axisymmetric",
+        history: &run.history,
+        figures: &run.summary["figures"],
+        profile: run.profile.as_ref(),
+        fields: run.fields.as_ref(),
+        log: &run.log,
+        force_tolerance: run.summary["solver"]["force_tolerance"].as_f64(),
+        units: run.units(),
+    }
+}
+
+fn run_context(run: &Run, folder: &Path) -> Template {
+    let summary = &run.summary;
+    let (status, failed, reason) = match run.ending() {
+        Ending::Done => ("done".to_owned(), false, String::new()),
+        Ending::Failed(status, reason) => (status, true, reason),
+        Ending::Unfinished(why) => ("unfinished".to_owned(), true, why.to_owned()),
+    };
+    let last = run.history.ends.last().map(|end| {
+        format!("phase {}, increment {}", end.phase, end.increment)
+    });
+    let files: Vec<(&str, &str, String)> = FILES
+        .iter()
+        .filter(|(file, _)| run.folder.join(file).is_file())
+        .filter_map(|(file, what)| Some((*file, *what, link(folder, &run.folder.join(file))?)))
+        .collect();
+    context! {
+        name => run.name,
+        title => run.title(),
+        status, failed, reason, last, files,
+        program => text(&summary["program"]),
+        facts => facts(summary),
+        notes => run.notes,
+        warnings => run.warnings(),
+        ends => ends(run),
+        groups => list(&summary["groups"]).map(group).collect::<Vec<_>>(),
+        laws => entries(&summary["laws"]).map(law).collect::<Vec<_>>(),
+        solver => named_values(&summary["solver"]),
+        phases => list(&summary["phases"]).map(phase).collect::<Vec<_>>(),
+        seconds => summary["seconds"]["total"].as_f64().map(display),
+        seconds_output => summary["seconds"]["output"].as_f64().map(display),
+        law_calls => named_values(&summary["law_calls_by_group"]),
+        cut_backs => cut_backs(&run.log),
+        n_cut_backs => run.log.cut_backs.len(),
+        case_files => list(&summary["case_files"])
+            .map(|file| (text(&file["path"]), text(&file["text"])))
+            .collect::<Vec<_>>(),
+    }
+}
+
+/// What the head of the page says of a run.
+fn facts(summary: &Value) -> Vec<String> {
+    let mut facts = Vec::new();
+    match text(&summary["analysis"]) {
+        "" => (),
+        analysis => facts.push(analysis.replace('_', " ")),
+    }
+    let count = |value: &Value, what: &str| value.as_u64().map(|n| format!("{n} {what}"));
+    facts.extend(count(&summary["mesh"]["nodes"], "nodes"));
+    facts.extend(count(&summary["mesh"]["elements"], "elements"));
+    let seconds = summary["seconds"]["total"].as_f64();
+    facts.extend(seconds.map(|seconds| format!("{seconds:.2} s")));
+    match text(&summary["program"]) {
+        "" => (),
+        program => facts.push(program.to_owned()),
+    }
+    facts
+}
+
+/// Names of the phases and, by probe, name, unit and values at their ends.
+fn ends(run: &Run) -> Template {
+    let units = run.units();
+    let history = &run.history;
+    let columns = history.names.iter().enumerate();
+    let probes: Vec<_> = columns
+        .filter(|(_, name)| history.probes().any(|probe| probe == *name))
+        .map(|(column, name)| {
+            let values: Vec<String> = history
+                .ends
+                .iter()
+                .map(|end| end.values[column].map(display).unwrap_or_default())
+                .collect();
+            (name, units.get(name.as_str()), values)
+        })
+        .collect();
+    let phases: Vec<String> = history
+        .ends
+        .iter()
+        .map(|end| format!("{}, {}", end.phase, end.increment))
+        .collect();
+    context! { phases, probes }
+}
+
+fn group(group: &Value) -> Template {
+    let swaps: Vec<String> = entries(&group["laws_from_phase"])
+        .map(|(phase, law)| format!("{} from phase {phase}", text(law)))
+        .collect();
+    context! {
+        name => text(&group["name"]),
+        formulation => text(&group["formulation"]).replace('_', " "),
+        elements => group["elements"].as_u64(),
+        points => group["points_per_element"].as_u64(),
+        law => text(&group["law"]),
+        swaps => swaps.join(", "),
+    }
+}
+
+fn law((name, law): (&str, &Value)) -> Template {
+    let number = |value: &Value| value.as_f64().map(display).unwrap_or_default();
+    let described = list(&law["described_parameters"]).map(|p| {
+        context! {
+            id => text(&p["id"]),
+            symbol => text(&p["symbol"]),
+            unit => text(&p["unit"]),
+            value => p["choice"].as_str().map_or_else(|| number(&p["value"]), str::to_owned),
+            by_default => p["by_default"].as_bool(),
+            bounds => text(&p["bounds"]),
+            doc => text(&p["doc"]),
+        }
+    });
+    let mut parameters: Vec<Template> = described.collect();
+    if parameters.is_empty() {
+        let plain = |(id, value)| context! { id, value => number(value) };
+        parameters = entries(&law["parameters"]).map(plain).collect();
+    }
+    let variables = list(&law["internal_variables"]).map(|v| {
+        context! {
+            id => text(&v["id"]),
+            symbol => text(&v["symbol"]),
+            unit => text(&v["unit"]),
+            doc => text(&v["doc"]),
+        }
+    });
+    context! {
+        name,
+        parameters,
+        variables => variables.collect::<Vec<_>>(),
+        id => text(&law["law"]),
+        called => text(&law["name"]),
+        doc => text(&law["doc"]),
+        references => text(&law["references"]),
+        version => text(&law["version"]),
+        sha256 => text(&law["sha256"]),
+    }
+}
+
+/// Names and values of an object.
+fn named_values(object: &Value) -> Vec<(String, String)> {
+    let value = |value: &Value| match value {
+        Value::Number(number) => number.as_f64().map(display).unwrap_or_default(),
+        Value::Bool(true) => "yes".to_owned(),
+        Value::Bool(false) => "no".to_owned(),
+        other => text(other).to_owned(),
+    };
+    entries(object)
+        .map(|(name, v)| (name.replace('_', " "), value(v)))
+        .collect()
+}
+
+fn phase(phase: &Value) -> Template {
+    let count = |key: &str| phase[key].as_u64();
+    let seconds = |key: &str| phase["seconds"][key].as_f64().map(|s| format!("{s:.3}"));
+    context! {
+        name => text(&phase["name"]),
+        equations => count("equations"),
+        increments => count("increments"),
+        iterations => count("iterations"),
+        cut_backs => count("cut_backs"),
+        unreliable => count("unreliable_steps"),
+        factorisations => count("factorisations"),
+        laws => seconds("laws_and_forces"),
+        assembly => seconds("assembly"),
+        solution => seconds("equations"),
+    }
+}
+
+fn cut_backs(log: &Log) -> Vec<Template> {
+    let number = |value: Option<f64>| value.map(display);
+    log.cut_backs
+        .iter()
+        .take(MOST_CUT_BACKS)
+        .map(|c| {
+            context! {
+                phase => c.phase,
+                increment => c.increment,
+                load_factor => number(c.load_factor.0),
+                next_step => number(c.next_step.0),
+                reason => c.reason,
+            }
+        })
+        .collect()
+}
+
+/// The vendored script without the comment that names its address.
+fn without_first_comment(script: &str) -> &str {
+    script.split_once("*/").map_or(script, |(_, rest)| rest)
+}
+
+/// A file seen from a folder, as an address. `None` if they have nothing in common.
+fn link(from: &Path, to: &Path) -> Option<String> {
+    let (from, to) = (from.canonicalize().ok()?, to.canonicalize().ok()?);
+    let common = from
+        .iter()
+        .zip(to.iter())
+        .take_while(|(a, b)| a == b)
+        .count();
+    if common == 0 {
+        return None;
+    }
+    let up = from.iter().skip(common).map(|_| "..");
+    let path: PathBuf = up
+        .map(AsRef::as_ref)
+        .chain(to.iter().skip(common))
+        .collect();
+    let parts: Vec<String> = path
+        .iter()
+        .map(|part| escaped(&part.to_string_lossy()))
+        .collect();
+    Some(parts.join("/"))
+}
+
+/// A name as a part of an address.
+fn escaped(name: &str) -> String {
+    let mut text = String::new();
+    for byte in name.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte) {
+            text.push(char::from(byte));
+        } else {
+            text.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    text
+}

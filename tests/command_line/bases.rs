@@ -1,0 +1,104 @@
+//! Cases based on others: messages point into the file that holds the mistake.
+
+use crate::program::{BAD_INPUT, CASE, DONE, Place};
+
+/// Runs a case file that is based on another; the message is about `at`.
+fn refused(case: &str, base: &str, at: &str, says: &str) {
+    let place = Place::new();
+    place.write("base.toml", base);
+    let outcome = place.run_case(case);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    for text in [at, says] {
+        assert!(
+            outcome.says(text),
+            "it does not say {text:?}:\n{}",
+            outcome.stderr
+        );
+    }
+    assert_eq!(place.contents(), ["base.toml", "case.toml"]);
+}
+
+const BASED: &str = "base = \"base.toml\"\n";
+
+#[test]
+fn finds_mistakes_in_the_base() {
+    let line = |text: &str| {
+        CASE.lines()
+            .position(|line| line.starts_with(text))
+            .unwrap()
+            + 1
+    };
+    for (edit, at, says) in [
+        (
+            ["rows =", "rwos ="],
+            format!("{}:1", line("rows")),
+            "did you mean `rows`?",
+        ),
+        (
+            ["to = 2.0", "to = nan"],
+            format!("{}:17", line("  { n = 1, to = 2.0")),
+            "`to`: nan",
+        ),
+        (
+            ["\"push\"", "\"push"],
+            format!("{}:13", line("name = \"push\"")),
+            "invalid basic string",
+        ),
+        (
+            ["law = \"joint\"", "law = \"jiont\""],
+            format!("{}:7", line("law = \"joint\"")),
+            "`jiont`",
+        ),
+    ] {
+        let base = CASE.replacen(edit[0], edit[1], 1);
+        refused(BASED, &base, &format!("base.toml:{at}"), says);
+    }
+}
+
+#[test]
+fn finds_mistakes_in_what_overrides_the_base() {
+    let case = format!("{BASED}[groups.soil]\nlaw = \"siol\"\n");
+    refused(&case, CASE, "case.toml:3:7", "did you mean `soil`?");
+    let case = format!("{BASED}[solver]\nmax_halvings = -1\n");
+    refused(
+        &case,
+        CASE,
+        "case.toml:3:16",
+        "`max_halvings`: found the number -1",
+    );
+}
+
+#[test]
+fn refuses_bases_that_are_none() {
+    refused(
+        "base = \"bose.toml\"\n",
+        CASE,
+        "case.toml:1:8",
+        "cannot read bose.toml: ",
+    );
+    refused(
+        "base = 1\n",
+        CASE,
+        "case.toml:1:8",
+        "`base` is the path of a case file",
+    );
+    refused(
+        "base = \"case.toml\"\n",
+        CASE,
+        "case.toml:1:8",
+        "are based on each other",
+    );
+}
+
+/// A folder of laws is found from the file that names it.
+#[test]
+fn folders_of_laws_are_relative_to_the_file_that_names_them() {
+    let place = Place::new();
+    place.write("elsewhere/laws/README", "");
+    place.write(
+        "elsewhere/base.toml",
+        format!("law_path = [\"laws\"]\n{CASE}"),
+    );
+    let outcome = place.run_case("base = \"elsewhere/base.toml\"\n");
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}
