@@ -1,7 +1,7 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
-mod base;
+pub(crate) mod base;
 
 use crate::error::{Error, Source};
 use crate::input::{Named, ParameterTable};
@@ -426,7 +426,7 @@ pub enum Reduce {
     Sum,
 }
 
-/// Curves of probes over another probe.
+/// Curves of probes over another probe, or of a stress over the integration points of a cut.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FigureInput {
@@ -434,16 +434,38 @@ pub struct FigureInput {
     pub name: Spanned<String>,
     /// Title; the case's if left out.
     pub title: Option<String>,
-    /// Probe along the horizontal axis.
+    /// Probe (of a cut: quantity of a point) along the horizontal axis.
     pub x: Spanned<String>,
     /// Text of the horizontal axis.
     pub x_label: Option<String>,
-    /// Probes along the vertical axis.
+    /// Probes (quantities) along the vertical axis.
     pub y: Vec<Spanned<String>>,
     /// Text of the vertical axis.
     pub y_label: Option<String>,
     /// Only this phase; all if left out.
     pub phase: Option<Spanned<String>>,
+    /// A cut: the integration points in it instead of probes.
+    pub points: Option<CutInput>,
+}
+
+/// Integration points inside extents (ends excluded), at chosen increments.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CutInput {
+    /// Of this group; of all if left out.
+    pub group: Option<Spanned<String>>,
+    /// Extent in x (r).
+    #[serde(alias = "r")]
+    pub x: Option<[f64; 2]>,
+    /// Extent in y (z).
+    #[serde(alias = "z")]
+    pub y: Option<[f64; 2]>,
+    /// After these increments of the phase, a curve for each; after the last one if left out.
+    #[serde(default)]
+    pub increments: Vec<usize>,
+    /// Factor of what stands along the vertical axis.
+    #[serde(default = "one")]
+    pub scale: f64,
 }
 
 /// Solver settings.
@@ -507,6 +529,8 @@ impl Default for SolverInput {
 pub struct OutputInput {
     /// When the profile along interfaces is written.
     pub profile: When,
+    /// When all integration points are written.
+    pub points: When,
     /// When fields for a viewer are written.
     pub fields: When,
 }

@@ -19,5 +19,6 @@ pub mod output;
 pub mod plugin;
 pub mod point;
 pub mod probe;
+pub mod report;
 pub mod run;
 pub mod solver;

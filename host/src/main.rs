@@ -10,7 +10,7 @@ use host::case::Case;
 use host::error::{Error, Place, suggestion};
 use host::output::Figures;
 use host::plugin::SearchPath;
-use host::run::{Observer, run};
+use host::run::{Observer, check, run};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -61,11 +61,14 @@ fn main() -> ExitCode {
             return ExitCode::from(u8::from(error.use_stderr()));
         }
     };
-    let outcome = match arguments.command {
-        Command::Run { case, variant, out } => run_cases(&case, variant.as_deref(), out.as_deref()),
-        Command::Point { driver, csv } => run_point(&driver, csv.as_deref()),
-        Command::Laws { id } => show_laws(id.as_deref()),
-    };
+    let run = || execute(arguments.command);
+    // A panic has printed itself; it is a defect of the program, not of the input.
+    let outcome =
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or_else(|_| {
+            Err(Error::Internal(
+                "the program panicked; please report it".to_owned(),
+            ))
+        });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -73,6 +76,14 @@ fn main() -> ExitCode {
             eprintln!("{:?}", miette::Report::new(error));
             ExitCode::from(code)
         }
+    }
+}
+
+fn execute(command: Command) -> Result<(), Error> {
+    match command {
+        Command::Run { case, variant, out } => run_cases(&case, variant.as_deref(), out.as_deref()),
+        Command::Point { driver, csv } => run_point(&driver, csv.as_deref()),
+        Command::Laws { id } => show_laws(id.as_deref()),
     }
 }
 
@@ -92,6 +103,10 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
                 "there is no variant `{wanted}`: {known}"
             )));
         }
+    }
+    // All variants are checked before the first one runs.
+    if cases.len() > 1 {
+        cases.iter().try_for_each(check)?;
     }
     let mut outcome = Ok(());
     let mut drawn = Vec::new();

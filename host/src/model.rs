@@ -106,7 +106,7 @@ pub fn cannot_start(source: &Source, file: &CaseFile, failure: &PointFailure) ->
         .find(|(key, _)| key.get_ref() == &failure.law);
     let its_own_reason = matches!(
         failure.failure.outcome,
-        Outcome::Domain | Outcome::Parameter | Outcome::Numeric | Outcome::CutStep
+        Outcome::Domain | Outcome::Parameter
     );
     match entry {
         Some((_, law)) if its_own_reason => {
@@ -115,6 +115,10 @@ pub fn cannot_start(source: &Source, file: &CaseFile, failure: &PointFailure) ->
                 .error(span, format!("cannot start: {failure}"))
                 .into()
         }
+        _ if failure.failure.outcome == Outcome::CutStep => Error::NoEquilibrium {
+            message: format!("cannot start: {failure}"),
+            hint: Some("a law must accept a zero increment when its phase begins".to_owned()),
+        },
         _ => Error::plugin(format!("cannot start: {failure}")),
     }
 }

@@ -1,12 +1,14 @@
-//! Results in a folder: `history.csv`, `profile.csv`, `fields.pvd` with `*.vtu`, `summary.json`,
-//! `log.jsonl`. Rows are flushed as increments converge, so whatever was reported is on disk.
+//! Results in a folder: `history.csv`, `profile.csv`, `points.csv`, `fields.pvd` with `*.vtu`,
+//! `summary.json`, `log.jsonl`. Rows are flushed as increments converge, so whatever was reported
+//! is on disk.
 
 mod fields;
 mod figure;
+mod points;
 mod profile;
 mod summary;
 
-pub use figure::{Figures, check_figures};
+pub use figure::{Figures, check_figures, check_table_figures};
 pub use summary::PhaseRecord;
 
 use crate::case::{Case, OutputInput};
@@ -17,6 +19,7 @@ use crate::model::Model;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::Iteration;
 use fields::Fields;
+use points::Points;
 use profile::Profile;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -52,6 +55,7 @@ pub struct Results {
     settings: OutputInput,
     history: Table,
     profile: Option<Profile>,
+    points: Option<Points>,
     fields: Option<Fields>,
     log: LogFile,
     summary: Summary,
@@ -105,6 +109,22 @@ fn unwritable(path: &Path, source: std::io::Error) -> Error {
     }
 }
 
+/// Ids of the internal variables of all laws that these groups ever carry, each once.
+fn internal_variables(model: &Model, of: impl Fn(&Group) -> bool) -> Vec<String> {
+    let first = model.groups.iter().map(|group| (group, &group.law));
+    let swapped = model.swaps.iter().flatten();
+    let swapped = swapped.map(|(group, law)| (&model.groups[*group], law));
+    let mut ids: Vec<String> = Vec::new();
+    for (_, law) in first.chain(swapped).filter(|(group, _)| of(group)) {
+        for variable in &law.built.law.formulation().internal_variables {
+            if !ids.contains(&variable.id) {
+                ids.push(variable.id.clone());
+            }
+        }
+    }
+    ids
+}
+
 #[derive(Debug)]
 struct LogFile {
     path: PathBuf,
@@ -138,13 +158,18 @@ impl Results {
         Ok(Self {
             history: Table::create(folder.join("history.csv"), columns)?,
             profile: Profile::create(folder, settings.profile, model)?,
+            points: Points::create(folder, settings.points, model)?,
             fields: Fields::create(folder, settings.fields, model),
             log: LogFile {
                 file: create(&log_path)?,
                 path: log_path,
             },
             summary: Summary::new(case, model, probes),
-            figures: Figures::new(case, probes),
+            figures: Figures::new(
+                &case.file.title,
+                &case.file.figures,
+                probes.names().map(str::to_owned).collect(),
+            ),
             folder: folder.to_owned(),
             settings,
             seconds: Duration::ZERO,
@@ -229,6 +254,11 @@ impl Results {
         {
             profile.write(place, snapshot.groups)?;
         }
+        if self.settings.points.includes(place.increment, of)
+            && let Some(points) = &mut self.points
+        {
+            points.write(place, snapshot.groups)?;
+        }
         if self.settings.fields.includes(place.increment, of)
             && let Some(fields) = &mut self.fields
         {
@@ -244,6 +274,7 @@ impl Results {
         }
         self.summary.last_increment(place, &record.probes);
         self.figures.increment(place, &record.probes);
+        self.figures.cuts(place, of, snapshot.groups);
         self.seconds += start.elapsed();
         Ok(())
     }

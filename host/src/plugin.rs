@@ -31,11 +31,10 @@ impl Library {
     /// Opens a library: hash, handshake, description, in this order.
     ///
     /// # Errors
-    /// [`Error::Plugin`] with the path and what is wrong; [`Error::Unreadable`].
+    /// [`Error::Plugin`] with the path and what is wrong.
     pub fn open(path: &Path) -> Result<Arc<Self>, Error> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Unreadable {
-            path: path.to_owned(),
-            source,
+        let bytes = std::fs::read(path).map_err(|why| {
+            Error::plugin(format!("library {} cannot be read: {why}", path.display()))
         })?;
         let sha256 = hexadecimal_sha256(&bytes);
         let open = library::open(path)

@@ -5,13 +5,15 @@
 //! path. An increment lasts one unit of time.
 
 mod equilibrium;
+mod figure;
 mod file;
 mod table;
 
 pub use file::Driver;
 pub use table::{Row, Table};
 
-use crate::error::Error;
+use crate::error::{Error, suggestion};
+use crate::output::Figures;
 use abi::status::Outcome;
 use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
 use file::{Control, Segment, words};
@@ -35,6 +37,8 @@ const OUTSIDE: f64 = 1e-9;
 /// What came out of a driver file.
 #[derive(Clone, Debug)]
 pub struct PointReport {
+    /// Name of the variant, if the file stands for several drivers.
+    pub variant: Option<String>,
     /// Law.
     pub law: String,
     /// Version of the law.
@@ -61,6 +65,9 @@ pub struct PointReport {
 
 impl fmt::Display for PointReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(variant) = &self.variant {
+            write!(f, "variant {variant}: ")?;
+        }
         writeln!(
             f,
             "law `{}` {} of {}, {}",
@@ -87,31 +94,101 @@ impl fmt::Display for PointReport {
     }
 }
 
-/// Runs a driver file. Rows go to `csv`, or to the standard output.
+/// Runs a driver file without variants. Rows go to `csv`, or to the standard output.
+///
+/// # Errors
+/// As [`run_file_variants`].
+pub fn run_file(path: &Path, csv: Option<&Path>) -> Result<PointReport, Error> {
+    let mut last = None;
+    run_file_variants(path, None, csv, |report| last = Some(report.clone()))?;
+    last.ok_or_else(|| Error::Internal("a driver file without drivers".to_owned()))
+}
+
+/// Runs a driver file: all its variants one after the other, or one of them. Rows go to `csv`, or
+/// to the standard output; of several variants to `csv` with `_<variant>` before its ending.
+/// Figures stand beside `csv`, each with the curves of all variants.
 ///
 /// # Errors
 /// Bad input and plugin trouble, before anything is written; [`Error::Unwritable`];
-/// [`Error::NoEquilibrium`] after the rows found until then have been written.
-pub fn run_file(path: &Path, csv: Option<&Path>) -> Result<PointReport, Error> {
-    let driver = Driver::read(path)?;
-    driver.start()?;
-    let Some(csv) = csv else {
-        return driver.write_csv(io::stdout().lock(), Path::new("the standard output"));
-    };
-    let same = path.canonicalize().ok().zip(csv.canonicalize().ok());
-    if same.is_some_and(|(driver, csv)| driver == csv) {
-        return Err(Error::Usage(format!(
-            "--csv {} would overwrite the driver file",
-            csv.display()
-        )));
+/// [`Error::NoEquilibrium`] after the rows and curves found until then have been written.
+pub fn run_file_variants(
+    path: &Path,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+    mut report: impl FnMut(&PointReport),
+) -> Result<(), Error> {
+    let mut drivers = Driver::read(path)?;
+    let names: Vec<String> = drivers.iter().filter_map(|d| d.variant.clone()).collect();
+    if let Some(wanted) = variant {
+        drivers.retain(|driver| driver.variant.as_deref() == Some(wanted));
+        if drivers.is_empty() {
+            let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
+            let message = format!("there is no variant `{wanted}`: {known}");
+            return Err(Error::Usage(message));
+        }
     }
-    let file = File::create(csv).map_err(|source| Error::Unwritable {
-        path: csv.to_owned(),
-        source,
-    })?;
-    let mut report = driver.write_csv(file, csv)?;
-    report.csv = Some(csv.to_owned());
-    Ok(report)
+    for driver in &drivers {
+        driver.start()?;
+    }
+    let alone = drivers.len() == 1;
+    let Some(csv) = csv else {
+        let [driver] = drivers.as_slice() else {
+            return Err(Error::Usage(format!(
+                "{} has variants: give --csv FILE for all of them, or --variant NAME for one of {}",
+                path.display(),
+                names.join(", ")
+            )));
+        };
+        report(&driver.write_csv(io::stdout().lock(), Path::new("the standard output"))?);
+        return Ok(());
+    };
+    let target = |driver: &Driver| match &driver.variant {
+        Some(variant) if !alone => with_suffix(csv, variant),
+        _ => csv.to_owned(),
+    };
+    for driver in &drivers {
+        let csv = target(driver);
+        let same = path.canonicalize().ok().zip(csv.canonicalize().ok());
+        if same.is_some_and(|(driver, csv)| driver == csv) {
+            return Err(Error::Usage(format!(
+                "--csv {} would overwrite the driver file",
+                csv.display()
+            )));
+        }
+    }
+    let mut drawn = Vec::new();
+    let outcome = drivers.iter().try_for_each(|driver| {
+        let csv = target(driver);
+        let file = File::create(&csv).map_err(|source| Error::Unwritable {
+            path: csv.clone(),
+            source,
+        })?;
+        let mut figures = driver.empty_figures();
+        let result = driver.follow(file, &csv, &mut figures);
+        drawn.push((driver.variant.clone().unwrap_or_default(), figures));
+        let mut done = result?;
+        done.csv = Some(csv);
+        report(&done);
+        Ok(())
+    });
+    let folder = csv.parent().unwrap_or(Path::new(""));
+    let figures = match drawn.as_slice() {
+        [(_, figures)] if alone => figures.draw(folder),
+        several => Figures::draw_overlaid(folder, several),
+    };
+    outcome.and(figures)
+}
+
+/// `a/b.csv` to `a/b_<variant>.csv`.
+fn with_suffix(csv: &Path, variant: &str) -> PathBuf {
+    let mut name = csv.file_stem().unwrap_or_default().to_owned();
+    name.push("_");
+    name.push(variant);
+    if let Some(ending) = csv.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    csv.with_file_name(name)
 }
 
 /// A goal that was not reached.
@@ -141,12 +218,24 @@ impl Driver {
     /// # Errors
     /// As [`Driver::run`]; the rows found until then have been written.
     pub fn write_csv(&self, out: impl Write, name: &Path) -> Result<PointReport, Error> {
+        self.follow(out, name, &mut self.empty_figures())
+    }
+
+    fn follow(
+        &self,
+        out: impl Write,
+        name: &Path,
+        figures: &mut Figures,
+    ) -> Result<PointReport, Error> {
         let unwritable = |source| Error::Unwritable {
             path: name.to_owned(),
             source,
         };
         let mut table = Table::new(out, self);
-        let result = self.run(|row| table.write(row).map_err(unwritable));
+        let result = self.run(|row| {
+            self.draw_row(figures, row);
+            table.write(row).map_err(unwritable)
+        });
         if !matches!(result, Err(Error::Unwritable { .. })) {
             table.flush().map_err(unwritable)?;
         }
@@ -225,6 +314,7 @@ impl Driver {
         } = &walk.point;
         let values = gradient[..n].iter().chain(&flux[..n]).chain(internal);
         Ok(PointReport {
+            variant: self.variant.clone(),
             law: self.law.description().id.clone(),
             version: self.law.description().version.clone(),
             library: self.law.library().path().to_owned(),
@@ -282,6 +372,8 @@ impl Driver {
     /// The error that a stop stands for.
     fn explain(&self, stop: Stop, place: &str, warnings: &[String]) -> Error {
         let id = &self.law.description().id;
+        let variant = self.variant.iter().map(|name| format!("variant {name}, "));
+        let place = &(variant.collect::<String>() + place);
         match stop {
             Stop::Fatal(failure) => {
                 let what = match failure.outcome {

@@ -32,6 +32,16 @@ const EASY: usize = 8;
 /// Smallest and largest reduction of a step at a cut-back.
 const CUT: [f64; 2] = [0.1, 0.5];
 
+/// Checks everything about a case that can be checked without running it.
+///
+/// # Errors
+/// [`Error::Input`] or [`Error::Plugin`].
+pub fn check(case: &Case) -> Result<(), Error> {
+    let model = Model::build(case)?;
+    let probes = Probes::new(case, &model)?;
+    check_figures(case, &probes)
+}
+
 /// Runs a case and writes its results into `folder`.
 ///
 /// # Errors

@@ -101,22 +101,3 @@ fn a_pressure_beyond_the_limit_ends_in_no_equilibrium() {
     let last = summary["probes"]["outer"].as_f64().unwrap();
     assert_close("summary and history", last, outer[4], 1e-15, 1.0);
 }
-
-#[test]
-fn a_structure_that_can_move_freely_has_no_equilibrium() {
-    // Nothing holds the footing's ground vertically.
-    let text = text(Footing { n: 2, ..FRICTION })
-        .replace("fixed = [\"x\", \"y\"]", "fixed = [\"x\"]")
-        .replace(
-            "displacement = [{ line = \"strip\", y = -0.5 }]",
-            "pressure = [{ line = \"strip\", value = 1.0 }]",
-        );
-    let failed = fail(&text);
-    assert!(
-        matches!(failed.error, Error::NoEquilibrium { .. }),
-        "{}",
-        failed.error
-    );
-    assert_eq!(failed.summary()["status"], "no equilibrium");
-    assert!(table(&failed.folder().join("history.csv")).is_empty());
-}

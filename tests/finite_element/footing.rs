@@ -208,8 +208,8 @@ fn ground_of_20_degrees_with_half_the_dilatancy() {
     let n = 8;
     let last = |dilatancy_angle| {
         push(Footing {
-            n,
             dilatancy_angle,
+            n,
             ..FRICTION
         })
         .last("pressure")

@@ -1,4 +1,10 @@
 //! Finite-element runs through the law libraries, against closed forms.
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "part of the tests"
+)]
 
 mod cut_back;
 mod cylinder;

@@ -11,19 +11,25 @@
 //!   └────┴───────┴──┘        └────┴───────┴──┘
 //! ```
 //!
-//! Boundary    displacements of all boundary nodes. Through joint: a laminate as in
-//!             `patch_layer`, with jumps σ_n/K_n, τ/K_t. Ending joint: stress along it only, so
-//!             that nothing opens or slides
+//! Boundary    the normal displacement of all four sides, their sum over the laminate with the
+//!             jump σ_n/K_n; for shear, a second phase that moves one side along the joint while
+//!             nothing moves across it; an ending joint is stressed along its line only, so that
+//!             nothing opens or slides
 //! Law         elastic ground; coulomb_joint and mepi in their elastic range
 //! Asserts     stresses, tractions and jumps of all points, PATCH
 
-use crate::patch::{Expected, JointLine, Normal, Patch};
+use crate::patch::{Expected, Normal, Patch};
 use crate::setup::{Lame, elastic};
+use std::fmt::Write;
 
 const INTEGRATION: [&str; 3] = ["nodes", "full", "reduced"];
 const K_N: f64 = 3.0e5;
 const K_T: f64 = 1.7e5;
+/// Grid lines across the joint, and where it is.
+const ACROSS: [f64; 5] = [0.0, 0.9, AT, 1.2, 2.5];
 const AT: f64 = 1.0;
+/// Grid lines along the joint.
+const ALONG: [f64; 4] = [0.0, 0.7, 0.8, 3.0];
 
 fn joint_laws() -> [String; 2] {
     [
@@ -40,18 +46,90 @@ fn joint_laws() -> [String; 2] {
     ]
 }
 
-fn group(integration: &str) -> String {
-    format!(
-        "joint = {{ formulation = \"zero_thickness\", line = \"joint\", \
-         integration = \"{integration}\", law = \"joint\" }}\n"
-    )
+/// Young's modulus and Poisson's ratio on the near and the far side.
+type Grounds = [(f64, f64); 2];
+
+/// A patch of two grounds with a joint.
+struct JointPatch<'a> {
+    analysis: &'a str,
+    normal: Normal,
+    grounds: Grounds,
+    law: &'a str,
+    integration: &'a str,
+    /// Extent of the joint.
+    extent: [f64; 2],
 }
 
-fn through(analysis: &str, normal: Normal, law: &str, integration: &str, shear_stress: f64) {
+impl JointPatch<'_> {
+    /// Displacements of the sides: (along the joint at its far end, across it at the far side),
+    /// and, in a second phase, of the far side along the joint.
+    #[track_caller]
+    fn assert(&self, [along, across]: [f64; 2], sliding: Option<f64>, expected: &[Expected]) {
+        let Self {
+            analysis,
+            normal,
+            grounds,
+            law,
+            integration,
+            extent: [from, to],
+        } = *self;
+        let (x, y, [s, n]): (&[f64], &[f64], _) = match normal {
+            Normal::X => (&ACROSS, &ALONG, ["y", "x"]),
+            Normal::Y => (&ALONG, &ACROSS, ["x", "y"]),
+        };
+        let lines = format!(
+            "joint = {{ {n} = {AT:?}, {s} = [{from:?}, {to:?}] }}\n\
+             near = {{ {n} = 0.0 }}\nfar = {{ {n} = 2.5 }}\n\
+             start = {{ {s} = 0.0 }}\nend = {{ {s} = 3.0 }}\n"
+        );
+        let mut phases = format!(
+            "[[phase]]\nname = \"strain\"\nincrements = 1\ndisplacement = [\n\
+             {{ line = \"near\", {n} = 0.0 }}, {{ line = \"far\", {n} = {across:e} }},\n\
+             {{ line = \"start\", {s} = 0.0 }}, {{ line = \"end\", {s} = {along:e} }},\n]\n"
+        );
+        if let Some(sliding) = sliding {
+            // In pure shear the ends carry shear stress: hold them across the joint where they
+            // are. They carry no normal stress: let them go along it.
+            let _ = write!(
+                phases,
+                "[[phase]]\nname = \"slide\"\nincrements = 1\nreset_displacements = true\n\
+                 free = [{{ line = \"start\", components = [\"{s}\"] }}, \
+                 {{ line = \"end\", components = [\"{s}\"] }}]\ndisplacement = [\n\
+                 {{ line = \"start\", {n} = 0.0 }}, {{ line = \"end\", {n} = 0.0 }},\n\
+                 {{ line = \"near\", {s} = 0.0, {n} = 0.0 }},\n\
+                 {{ line = \"far\", {s} = {sliding:e}, {n} = 0.0 }},\n]\n"
+            );
+        }
+        let patch = Patch {
+            analysis,
+            x,
+            y,
+            regions: &format!(
+                "[[mesh.region]]\ngroup = \"ground_1\"\n\
+                 [[mesh.region]]\ngroup = \"ground_2\"\n{n} = [{AT:?}, 2.5]\n"
+            ),
+            laws: &format!(
+                "{}{}{law}",
+                elastic("ground_1", grounds[0].0, grounds[0].1),
+                elastic("ground_2", grounds[1].0, grounds[1].1)
+            ),
+            groups: &format!(
+                "ground_1 = {{ formulation = \"solid\", law = \"ground_1\" }}\n\
+                 ground_2 = {{ formulation = \"solid\", law = \"ground_2\" }}\n\
+                 joint = {{ formulation = \"zero_thickness\", line = \"joint\", \
+                 integration = \"{integration}\", law = \"joint\" }}\n"
+            ),
+            lines: &lines,
+            phases: &phases,
+        };
+        let what = format!("{analysis}, normal {normal:?}, {integration}, {from} to {to}");
+        patch.assert(&what, expected);
+    }
+}
+
+fn pressed(analysis: &str, normal: Normal, law: &str, integration: &str) {
     let grounds = [(20e3, 0.3), (35e3, 0.15)];
-    let traction = [-90.0, shear_stress];
-    let jump = [traction[0] / K_N, traction[1] / K_T];
-    let along = 0.4e-3;
+    let (s, along) = (-90.0, 0.4e-3);
     let out = if analysis == "axisymmetric" {
         along
     } else {
@@ -59,78 +137,79 @@ fn through(analysis: &str, normal: Normal, law: &str, integration: &str, shear_s
     };
     let [one, two] = grounds.map(|(young, poisson)| {
         let Lame {
-            lambda,
-            shear,
-            oedometric,
+            lambda, oedometric, ..
         } = Lame::new(young, poisson);
-        let across = (traction[0] - lambda * (along + out)) / oedometric;
+        let across = (s - lambda * (along + out)) / oedometric;
         let stress = [
             oedometric * along + lambda * (across + out),
-            traction[0],
+            s,
             oedometric * out + lambda * (across + along),
-            traction[1],
+            0.0,
         ];
-        (normal.turn_stress(stress), [across, traction[1] / shear])
+        (normal.turn_stress(stress), across)
     });
-    let field = |p: [f64; 2], far: bool| {
-        let [s, n] = normal.turn(p);
-        let (below, above) = (n.min(AT), (n - AT).max(0.0));
-        let u = [
-            along * s + one.1[1] * below + two.1[1] * above + f64::from(far) * jump[1],
-            one.1[0] * below + two.1[0] * above + f64::from(far) * jump[0],
-        ];
-        normal.turn(u)
-    };
-    let across_lines = [0.0, 0.9, AT, 1.2, 2.5];
-    let along_lines = [0.0, 0.7, 0.8, 3.0];
-    let (x, y): (&[f64], &[f64]) = match normal {
-        Normal::X => (&across_lines, &along_lines),
-        Normal::Y => (&along_lines, &across_lines),
-    };
-    let key = if normal == Normal::X { "x" } else { "y" };
-    let patch = Patch {
+    let far = one.1 * AT + s / K_N + two.1 * (2.5 - AT);
+    JointPatch {
         analysis,
-        x,
-        y,
-        regions: &format!(
-            "[[mesh.region]]\ngroup = \"ground_1\"\n\
-             [[mesh.region]]\ngroup = \"ground_2\"\n{key} = [{AT:?}, 2.5]\n"
-        ),
-        laws: &format!(
-            "{}{}{law}",
-            elastic("ground_1", grounds[0].0, grounds[0].1),
-            elastic("ground_2", grounds[1].0, grounds[1].1)
-        ),
-        groups: &format!(
-            "ground_1 = {{ formulation = \"solid\", law = \"ground_1\" }}\n\
-             ground_2 = {{ formulation = \"solid\", law = \"ground_2\" }}\n{}",
-            group(integration)
-        ),
-        joint: Some(JointLine {
-            normal,
-            at: AT,
-            extent: [0.0, 3.0],
-        }),
-        field: &field,
-    };
-    patch.assert(
-        &format!("{analysis}, normal {normal:?}, {integration}"),
+        normal,
+        grounds,
+        law,
+        integration,
+        extent: [0.0, 3.0],
+    }
+    .assert(
+        [3.0 * along, far],
+        None,
         &[
             Expected::stress("ground_1", one.0),
             Expected::stress("ground_2", two.0),
-            Expected::interface("joint", traction, jump),
+            Expected::interface("joint", [s, 0.0], [s / K_N, 0.0]),
         ],
     );
 }
 
 #[test]
-fn joint_from_boundary_to_boundary() {
+fn joint_under_normal_stress() {
     for law in joint_laws() {
         for integration in INTEGRATION {
             for normal in Normal::BOTH {
-                through("plane_strain", normal, &law, integration, 25.0);
+                pressed("plane_strain", normal, &law, integration);
             }
-            through("axisymmetric", Normal::Y, &law, integration, 0.0);
+            pressed("axisymmetric", Normal::Y, &law, integration);
+        }
+    }
+}
+
+#[test]
+fn joint_under_normal_and_shear_stress() {
+    // Without Poisson's ratio M = E, G = E/2, and nothing presses on the ends.
+    let grounds = [(20e3, 0.0), (35e3, 0.0)];
+    let (s, t) = (-90.0, 25.0);
+    let over = |joint: f64, one: f64, two: f64| 1.0 / joint + AT / one + (2.5 - AT) / two;
+    let far = s * over(K_N, grounds[0].0, grounds[1].0);
+    let sliding = t * over(K_T, 0.5 * grounds[0].0, 0.5 * grounds[1].0);
+    for law in joint_laws() {
+        for integration in INTEGRATION {
+            for normal in Normal::BOTH {
+                let stress = normal.turn_stress([0.0, s, 0.0, t]);
+                JointPatch {
+                    analysis: "plane_strain",
+                    normal,
+                    grounds,
+                    law: &law,
+                    integration,
+                    extent: [0.0, 3.0],
+                }
+                .assert(
+                    [0.0, far],
+                    Some(sliding),
+                    &[
+                        Expected::stress("ground_1", stress),
+                        Expected::stress("ground_2", stress),
+                        Expected::interface("joint", [s, t], [s / K_N, t / K_T]),
+                    ],
+                );
+            }
         }
     }
 }
@@ -138,53 +217,30 @@ fn joint_from_boundary_to_boundary() {
 /// A joint that ends inside the ground, in ground that is stressed along it only.
 fn ending(analysis: &str, normal: Normal, extent: [f64; 2], law: &str, integration: &str) {
     let (young, poisson) = (20e3, 0.3);
-    let stress_along = -70.0;
-    let along = stress_along / young;
-    let Lame {
-        lambda,
-        shear,
-        oedometric,
-    } = Lame::new(young, poisson);
-    // Strains (along, across, out of plane) without stress across; around the axis strains in
-    // the radial direction and out of plane are the same.
-    let (strains, out_stress) = if analysis == "axisymmetric" {
-        ([along, -poisson * along, -poisson * along], 0.0)
+    let s: f64 = -70.0;
+    // Strains (along, across); the same across as out of plane around the axis.
+    let ([along, across], out_stress) = if analysis == "axisymmetric" {
+        ([s / young, -poisson * s / young], 0.0)
     } else {
-        let e = stress_along * (1.0 - poisson * poisson) / young;
-        let across = -lambda / oedometric * e;
-        ([e, across, 0.0], poisson * stress_along)
+        let along = s * (1.0 - poisson * poisson) / young;
+        ([along, -poisson / (1.0 - poisson) * along], poisson * s)
     };
-    // The strains above are those of this stress.
-    let volume: f64 = strains.iter().sum();
-    assert!((lambda * volume + 2.0 * shear * strains[1]).abs() < 1e-10);
-    let stress = normal.turn_stress([stress_along, 0.0, out_stress, 0.0]);
-    let lines = [0.0, 0.9, AT, 1.2, 2.5];
-    let patch = Patch {
+    let stress = normal.turn_stress([s, 0.0, out_stress, 0.0]);
+    JointPatch {
         analysis,
-        x: &lines,
-        y: &lines,
-        regions: "[[mesh.region]]\ngroup = \"ground\"",
-        laws: &format!("{}{law}", elastic("ground", young, poisson)),
-        groups: &format!(
-            "ground = {{ formulation = \"solid\", law = \"ground\" }}\n{}",
-            group(integration)
-        ),
-        joint: Some(JointLine {
-            normal,
-            at: AT,
-            extent,
-        }),
-        field: &|p, _| {
-            let [s, n] = normal.turn(p);
-            normal.turn([strains[0] * s, strains[1] * n])
-        },
-    };
-    patch.assert(
-        &format!("{analysis}, normal {normal:?}, {integration}, extent {extent:?}"),
+        normal,
+        grounds: [(young, poisson); 2],
+        law,
+        integration,
+        extent,
+    }
+    .assert(
+        [3.0 * along, 2.5 * across],
+        None,
         &[
-            Expected::stress("ground", stress),
-            Expected::interface("joint", [0.0; 2], [0.0; 2])
-                .scaled([stress_along.abs(), stress_along.abs() / K_T]),
+            Expected::stress("ground_1", stress),
+            Expected::stress("ground_2", stress),
+            Expected::interface("joint", [0.0; 2], [0.0; 2]).scaled([s.abs(), s.abs() / K_T]),
         ],
     );
 }
@@ -193,7 +249,7 @@ fn ending(analysis: &str, normal: Normal, extent: [f64; 2], law: &str, integrati
 fn joint_that_ends_inside_the_ground() {
     let [law, _] = joint_laws();
     for integration in INTEGRATION {
-        for extent in [[AT, 2.5], [0.0, 1.2], [0.9, 1.2]] {
+        for extent in [[0.8, 3.0], [0.0, 0.8], [0.7, 0.8]] {
             for normal in Normal::BOTH {
                 ending("plane_strain", normal, extent, &law, integration);
             }

@@ -20,7 +20,7 @@
 //! Law         elastic, oriented_mohr_coulomb, coulomb_joint, mepi, all in their elastic range
 //! Asserts     stresses of all points, tractions and jumps of the layer, PATCH
 
-use crate::patch::{Expected, Normal, PATCH, Patch};
+use crate::patch::{Expected, Normal, PATCH, Patch, boundary_nodes};
 use crate::setup::{Lame, elastic};
 
 const INTEGRATION: [&str; 3] = ["full", "reduced", "mean"];
@@ -168,7 +168,7 @@ fn laminate(analysis: &str, normal: Normal, law: &LayerLaw, integration: &str, s
             [along, out],
         ),
     ];
-    let field = |p: [f64; 2], _: bool| {
+    let field = |p: [f64; 2]| {
         let [s, n] = normal.turn(p);
         let mut u = [along * s, 0.0];
         for (i, (_, [across, gamma])) in layers.iter().enumerate() {
@@ -199,6 +199,7 @@ fn laminate(analysis: &str, normal: Normal, law: &LayerLaw, integration: &str, s
         Normal::X => (&ACROSS, &ALONG),
         Normal::Y => (&ALONG, &ACROSS),
     };
+    let (lines, phases) = boundary_nodes(x, y, &field);
     let patch = Patch {
         analysis,
         x,
@@ -206,8 +207,8 @@ fn laminate(analysis: &str, normal: Normal, law: &LayerLaw, integration: &str, s
         regions: &regions,
         laws: &laws,
         groups: &groups,
-        joint: None,
-        field: &field,
+        lines: &lines,
+        phases: &phases,
     };
     let (layer_stress, [across, gamma]) = layers[1];
     // A law for interfaces sees t (ε_n + κ (ε_m + ε_θ)), equations (4), (18), (19); the jump of
@@ -280,8 +281,10 @@ fn homogeneous(analysis: &str, normal: Normal, interface: bool, integration: &st
         normal_stress(hoop),
         ground.shear * (a[0][1] + a[1][0]),
     ];
+    // With one point across a vertical layer, ∫ N r is exact but for t/(6 r) = 0.3 % of the moment
+    // of the vertical stress over the layer's end.
     let tolerance = if axisymmetric && normal == Normal::X && integration == "mean" {
-        1e-3
+        2e-4
     } else {
         PATCH
     };
@@ -293,6 +296,8 @@ fn homogeneous(analysis: &str, normal: Normal, interface: bool, integration: &st
         Normal::X => (&across, &along),
         Normal::Y => (&along, &across),
     };
+    let field = |[x, y]: [f64; 2]| [a[0][0] * x + a[0][1] * y, a[1][0] * x + a[1][1] * y];
+    let (lines, phases) = boundary_nodes(x, y, &field);
     for [from, to] in [
         [along[1], along[3]],
         [along[0], along[2]],
@@ -316,8 +321,8 @@ fn homogeneous(analysis: &str, normal: Normal, interface: bool, integration: &st
                  layer = {{ formulation = \"thin_layer\", normal = \"{axis}\", \
                  integration = \"{integration}\", law = \"layer\" }}\n"
             ),
-            joint: None,
-            field: &|[x, y], _| [a[0][0] * x + a[0][1] * y, a[1][0] * x + a[1][1] * y],
+            lines: &lines,
+            phases: &phases,
         };
         let what = format!(
             "{analysis}, normal {normal:?}, {integration}, interface law {interface}, \

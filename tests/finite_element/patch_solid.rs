@@ -17,7 +17,7 @@
 //! Law         elastic; mohr_coulomb and the cohesion far from its reach
 //! Asserts     stress of every integration point, PATCH
 
-use crate::patch::{Expected, Patch};
+use crate::patch::{Expected, Patch, boundary_nodes};
 use crate::setup::{Lame, elastic};
 
 const YOUNG: f64 = 20e3;
@@ -57,17 +57,19 @@ fn plane_strain_under_a_linear_displacement() {
         shear * gamma,
     ];
     let field = |[x, y]: [f64; 2]| [a[0][0] * x + a[0][1] * y, a[1][0] * x + a[1][1] * y];
+    let x = [0.0, 1.0, 1.05, 4.0];
+    let (lines, phases) = boundary_nodes(&x, &Y, &field);
     for law in laws() {
         for integration in ["full", "reduced"] {
             let patch = Patch {
                 analysis: "plane_strain",
-                x: &[0.0, 1.0, 1.05, 4.0],
+                x: &x,
                 y: &Y,
                 regions: REGION,
                 laws: &law,
                 groups: &solid(integration),
-                joint: None,
-                field: &field,
+                lines: &lines,
+                phases: &phases,
             };
             patch.assert(integration, &[Expected::stress("ground", stress)]);
         }
@@ -87,6 +89,7 @@ fn axisymmetric_under_a_linear_displacement() {
     for law in laws() {
         for integration in ["full", "reduced"] {
             for r in [[0.0, 1.0, 1.05, 4.0], [0.5, 1.0, 1.05, 4.0]] {
+                let (lines, phases) = boundary_nodes(&r, &Y, &|[r, z]| [a * r, b * z]);
                 let patch = Patch {
                     analysis: "axisymmetric",
                     x: &r,
@@ -94,8 +97,8 @@ fn axisymmetric_under_a_linear_displacement() {
                     regions: REGION,
                     laws: &law,
                     groups: &solid(integration),
-                    joint: None,
-                    field: &|[r, z], _| [a * r, b * z],
+                    lines: &lines,
+                    phases: &phases,
                 };
                 let what = format!("{integration}, r from {}", r[0]);
                 patch.assert(&what, &[Expected::stress("ground", stress)]);

@@ -1,12 +1,12 @@
-//! Cases that differ from another by a few lines: `base = "path"`.
+//! Input files that differ from another by a few lines: `base = "path"`.
 //!
 //! The file's keys override those of its base: tables are merged key by key, entries of arrays
 //! that have a `name` (such as phases) are merged by name, everything else replaces. Each entry of
-//! `[[variant]]` overrides the file in the same way, which then stands for as many cases.
+//! `[[variant]]` overrides the file in the same way, which then stands for as many files.
 
-use super::CaseFile;
 use crate::error::{Error, Source};
 use crate::input::{deserialize, toml_error};
+use serde::de::DeserializeOwned;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -15,10 +15,10 @@ use toml::de::{DeTable, DeValue};
 const LONGEST_CHAIN: usize = 8;
 
 /// The contents of a file, by the name of the variant if there are any.
-type Variants = Vec<(Option<String>, CaseFile)>;
+pub(crate) type Variants<T> = Vec<(Option<String>, T)>;
 
-/// Reads a case file with what it is based on.
-pub(super) fn read(source: Source) -> Result<(Source, Variants), Error> {
+/// Reads a file with what it is based on.
+pub(crate) fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Variants<T>), Error> {
     let source = with_bases(source, LONGEST_CHAIN)?;
     // Blank lines instead of the files before each one keep spans counting from the start.
     let texts: Vec<String> = source
@@ -45,7 +45,7 @@ pub(super) fn read(source: Source) -> Result<(Source, Variants), Error> {
             .error(span, "variants are written as [[variant]]")
             .into());
     };
-    let mut files: Variants = Vec::new();
+    let mut files: Variants<T> = Vec::new();
     for variant in variants {
         let (span, given) = (variant.span(), name(&variant));
         let (Some(name), DeValue::Table(mut over)) = (given, variant.into_inner()) else {

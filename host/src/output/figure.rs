@@ -1,22 +1,27 @@
-//! Curves of probes as SVG.
+//! Curves of probes, or of stresses along a cut, as SVG.
 
 use super::unwritable;
-use crate::case::{Case, FigureInput};
-use crate::error::{Error, Place, suggestion};
+use crate::case::{Case, CutInput, FigureInput};
+use crate::error::{Error, Place, Source, suggestion};
+use crate::group::Group;
 use crate::probe::Probes;
 use plotters::prelude::*;
 use std::path::Path;
 
 /// Size of a figure in points.
 const SIZE: (u32, u32) = (640, 420);
-/// Colours that stay apart for most eyes and in grey (Okabe & Ito).
-const COLOURS: [RGBColor; 6] = [
+/// Colours that stay apart for most eyes and in grey (Okabe & Ito), then some more.
+const COLOURS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),
+    RGBColor(0, 0, 0),
+    RGBColor(150, 150, 150),
+    RGBColor(106, 61, 154),
+    RGBColor(128, 128, 0),
 ];
 
 /// A curve with its name.
@@ -39,6 +44,17 @@ struct Labels {
     y: String,
 }
 
+/// What can be drawn along a cut; `k_0` is the ratio of radial to vertical stress.
+const CUT_QUANTITIES: [&str; 7] = [
+    "x",
+    "y",
+    "stress_11",
+    "stress_22",
+    "stress_33",
+    "stress_12",
+    "k_0",
+];
+
 /// Refuses figures whose probes or phase do not exist, or two with one name.
 ///
 /// # Errors
@@ -52,29 +68,28 @@ pub fn check_figures(case: &Case, probes: &Probes) -> Result<(), Error> {
         .iter()
         .map(|phase| phase.name.get_ref().as_str())
         .collect();
-    let mut seen: Vec<&str> = Vec::new();
+    check_names(source, &case.file.figures)?;
     for figure in &case.file.figures {
-        let name = figure.name.get_ref().as_str();
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        if name.is_empty() || !name.chars().all(plain) {
-            let message = format!("`{name}` cannot be a file's name: letters, digits, _ and -");
-            return Err(source.error(figure.name.span(), message).into());
+        match figure.points {
+            None => check_columns(source, figure, "probe", &names)?,
+            Some(_) => check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?,
         }
-        if seen.contains(&name) {
-            let message = format!("two figures are called `{name}`");
-            return Err(source.error(figure.name.span(), message).into());
-        }
-        seen.push(name);
-        for probe in figure.y.iter().chain([&figure.x]) {
-            if !names.contains(&probe.get_ref().as_str()) {
-                return Err(source
-                    .error(
-                        probe.span(),
-                        format!("there is no probe `{}`", probe.get_ref()),
-                    )
-                    .hint(suggestion(probe.get_ref(), names))
-                    .into());
-            }
+        if let Some(group) = figure.points.as_ref().and_then(|cut| cut.group.as_ref())
+            && !case.file.groups.contains_key(group.get_ref().as_str())
+        {
+            let groups: Vec<&str> = case
+                .file
+                .groups
+                .keys()
+                .map(|k| k.get_ref().as_str())
+                .collect();
+            return Err(source
+                .error(
+                    group.span(),
+                    format!("there is no group `{}`", group.get_ref()),
+                )
+                .hint(suggestion(group.get_ref(), groups))
+                .into());
         }
         if let Some(phase) = &figure.phase
             && !phases.contains(&phase.get_ref().as_str())
@@ -91,6 +106,66 @@ pub fn check_figures(case: &Case, probes: &Probes) -> Result<(), Error> {
     Ok(())
 }
 
+/// Refuses figures of a table whose columns do not exist, or two with one name.
+///
+/// # Errors
+/// [`Error::Input`] at the name.
+pub fn check_table_figures(
+    source: &Source,
+    figures: &[FigureInput],
+    columns: &[&str],
+) -> Result<(), Error> {
+    check_names(source, figures)?;
+    for figure in figures {
+        check_columns(source, figure, "column", columns)?;
+        if let Some(phase) = &figure.phase {
+            let message = "a driver has no phases";
+            return Err(source.error(phase.span(), message).into());
+        }
+        if figure.points.is_some() {
+            let message = "a driver has one point, there is no cut through it";
+            return Err(source.error(figure.name.span(), message).into());
+        }
+    }
+    Ok(())
+}
+
+fn check_names(source: &Source, figures: &[FigureInput]) -> Result<(), Error> {
+    let mut seen: Vec<&str> = Vec::new();
+    for figure in figures {
+        let name = figure.name.get_ref().as_str();
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || !name.chars().all(plain) {
+            let message = format!("`{name}` cannot be a file's name: letters, digits, _ and -");
+            return Err(source.error(figure.name.span(), message).into());
+        }
+        if seen.contains(&name) {
+            let message = format!("two figures are called `{name}`");
+            return Err(source.error(figure.name.span(), message).into());
+        }
+        seen.push(name);
+    }
+    Ok(())
+}
+
+fn check_columns(
+    source: &Source,
+    figure: &FigureInput,
+    kind: &str,
+    known: &[&str],
+) -> Result<(), Error> {
+    for wanted in figure.y.iter().chain([&figure.x]) {
+        if !known.contains(&wanted.get_ref().as_str()) {
+            let message = format!("there is no {kind} `{}`", wanted.get_ref());
+            return Err(source
+                .error(wanted.span(), message)
+                .hint(suggestion(wanted.get_ref(), known.to_vec()))
+                .into());
+        }
+    }
+    Ok(())
+}
+
 /// The figures of a run, filled as it goes.
 #[derive(Clone, Debug)]
 pub struct Figures {
@@ -100,8 +175,12 @@ pub struct Figures {
 }
 
 impl Figures {
-    pub(super) fn new(case: &Case, probes: &Probes) -> Self {
+    /// Figures whose curves are still empty. Values come in the order of `names`.
+    pub(crate) fn new(title: &str, figures: &[FigureInput], names: Vec<String>) -> Self {
         let curves = |figure: &FigureInput| {
+            if figure.points.is_some() {
+                return Vec::new();
+            }
             let named = |y: &toml::Spanned<String>| Curve {
                 name: y.get_ref().clone(),
                 points: Vec::new(),
@@ -109,24 +188,22 @@ impl Figures {
             figure.y.iter().map(named).collect()
         };
         Self {
-            title: case.file.title.clone(),
-            drawn: case
-                .file
-                .figures
-                .iter()
-                .map(|f| (f.clone(), curves(f)))
-                .collect(),
-            names: probes.names().map(str::to_owned).collect(),
+            title: title.to_owned(),
+            drawn: figures.iter().map(|f| (f.clone(), curves(f))).collect(),
+            names,
         }
     }
 
     pub(super) fn increment(&mut self, place: &Place, values: &[Option<f64>]) {
+        self.add(values, |figure| {
+            figure.points.is_none() && drawn_in(figure, &place.phase)
+        });
+    }
+
+    /// Takes a row of values for the figures that want it.
+    pub(crate) fn add(&mut self, values: &[Option<f64>], wanted: impl Fn(&FigureInput) -> bool) {
         for (figure, curves) in &mut self.drawn {
-            if figure
-                .phase
-                .as_ref()
-                .is_some_and(|phase| phase.get_ref() != &place.phase)
-            {
+            if !wanted(figure) {
                 continue;
             }
             let value = |name: &str| {
@@ -141,7 +218,28 @@ impl Figures {
         }
     }
 
-    pub(super) fn draw(&self, folder: &Path) -> Result<(), Error> {
+    /// Takes the cuts that are asked for after this increment, one of `of`.
+    pub(super) fn cuts(&mut self, place: &Place, of: usize, groups: &[Group]) {
+        let Place { phase, increment } = place;
+        for (figure, curves) in &mut self.drawn {
+            let Some(cut) = figure.points.as_ref().filter(|_| drawn_in(figure, phase)) else {
+                continue;
+            };
+            let last = cut.increments.is_empty() && *increment == of;
+            if !(last || cut.increments.contains(increment)) {
+                continue;
+            }
+            for y in &figure.y {
+                let y = y.get_ref();
+                curves.push(Curve {
+                    name: format!("{y}, {phase} {increment}"),
+                    points: cut_points(cut, [figure.x.get_ref(), y], groups),
+                });
+            }
+        }
+    }
+
+    pub(crate) fn draw(&self, folder: &Path) -> Result<(), Error> {
         for (figure, curves) in &self.drawn {
             draw_file(folder, figure, &self.title, curves)?;
         }
@@ -163,11 +261,11 @@ impl Figures {
                     .drawn
                     .iter()
                     .find(|(f, _)| f.name.get_ref() == figure.name.get_ref());
-                for curve in same
+                let same = same
                     .map(|(_, curves)| curves.as_slice())
-                    .unwrap_or_default()
-                {
-                    let name = if figure.y.len() == 1 {
+                    .unwrap_or_default();
+                for curve in same {
+                    let name = if same.len() == 1 {
                         variant.clone()
                     } else {
                         format!("{variant}: {}", curve.name)
@@ -182,6 +280,44 @@ impl Figures {
         }
         Ok(())
     }
+}
+
+fn drawn_in(figure: &FigureInput, phase: &str) -> bool {
+    figure.phase.as_ref().is_none_or(|p| p.get_ref() == phase)
+}
+
+/// Two quantities at the points of a cut, by increasing first one.
+fn cut_points(cut: &CutInput, quantities: [&str; 2], groups: &[Group]) -> Vec<(f64, f64)> {
+    let inside = |extent: Option<[f64; 2]>, c| extent.is_none_or(|[from, to]| from < c && c < to);
+    let wanted = |group: &&Group| {
+        cut.group
+            .as_ref()
+            .is_none_or(|g| g.get_ref() == &group.name)
+    };
+    let mut points = Vec::new();
+    for group in groups.iter().filter(wanted) {
+        for point in 0..group.kinematics.n_points() {
+            let [x, y] = group.kinematics.position(point);
+            let Some(stress) = group.global_stress(point) else {
+                break;
+            };
+            let value = |quantity| match quantity {
+                "x" => x,
+                "y" => y,
+                "stress_11" => stress[0],
+                "stress_22" => stress[1],
+                "stress_33" => stress[2],
+                "stress_12" => stress[3],
+                _ => stress[0] / stress[1],
+            };
+            let pair = quantities.map(value);
+            if inside(cut.x, x) && inside(cut.y, y) && pair.iter().all(|v| v.is_finite()) {
+                points.push((pair[0], cut.scale * pair[1]));
+            }
+        }
+    }
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points
 }
 
 fn draw_file(
@@ -221,6 +357,7 @@ fn draw(
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let x = range(points().map(|p| p.0), 0.0);
     let y = range(points().map(|p| p.1), 0.05);
+    let legend = emptiest_corner(points(), &x, &y);
     let mut chart = ChartBuilder::on(&area)
         .caption(&labels.title, ("sans-serif", 15))
         .margin(12)
@@ -249,10 +386,33 @@ fn draw(
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
             .label_font(("sans-serif", 12))
-            .position(SeriesLabelPosition::LowerRight)
+            .position(legend)
             .draw()?;
     }
     area.present()
+}
+
+/// The corner that has the fewest points, for the legend.
+fn emptiest_corner<'a>(
+    points: impl Iterator<Item = &'a (f64, f64)>,
+    x: &std::ops::Range<f64>,
+    y: &std::ops::Range<f64>,
+) -> SeriesLabelPosition {
+    // Lower right, upper right, lower left, upper left: the first of the emptiest.
+    let mut counts = [0; 4];
+    let part = |v: f64, range: &std::ops::Range<f64>| (v - range.start) / (range.end - range.start);
+    for &(u, v) in points {
+        let (u, v) = (part(u, x), part(v, y));
+        if !(0.3..0.7).contains(&u) && !(0.45..0.55).contains(&v) {
+            counts[usize::from(v > 0.5) + 2 * usize::from(u < 0.5)] += 1;
+        }
+    }
+    match (0..4).min_by_key(|&corner| counts[corner]) {
+        Some(1) => SeriesLabelPosition::UpperRight,
+        Some(2) => SeriesLabelPosition::LowerLeft,
+        Some(3) => SeriesLabelPosition::UpperLeft,
+        _ => SeriesLabelPosition::LowerRight,
+    }
 }
 
 /// The range of some values, widened by a fraction of it; never empty.

@@ -1,6 +1,6 @@
 //! Values along interfaces.
 
-use super::{Table, number};
+use super::{Table, internal_variables, number};
 use crate::case::When;
 use crate::error::{Error, Place};
 use crate::group::Group;
@@ -22,20 +22,7 @@ impl Profile {
         if when == When::Never || !model.groups.iter().any(is_interface) {
             return Ok(None);
         }
-        let mut variables: Vec<String> = Vec::new();
-        let swapped = model
-            .swaps
-            .iter()
-            .flatten()
-            .map(|(group, law)| (&model.groups[*group], law));
-        let first = model.groups.iter().map(|group| (group, &group.law));
-        for (group, law) in first.chain(swapped) {
-            for variable in &law.built.law.formulation().internal_variables {
-                if is_interface(group) && !variables.contains(&variable.id) {
-                    variables.push(variable.id.clone());
-                }
-            }
-        }
+        let variables = internal_variables(model, is_interface);
         let columns = [
             "phase",
             "increment",

@@ -252,6 +252,7 @@ fn solver(case: &Case) -> Value {
     })
 }
 
+/// Figures of probes; those of cuts have nothing in `history.csv`.
 fn figures(case: &Case) -> Value {
     let figure = |figure: &FigureInput| {
         let y: Vec<&String> = figure.y.iter().map(Spanned::get_ref).collect();
@@ -265,7 +266,8 @@ fn figures(case: &Case) -> Value {
             "phase": figure.phase.as_ref().map(Spanned::get_ref),
         })
     };
-    case.file.figures.iter().map(figure).collect()
+    let of_probes = case.file.figures.iter().filter(|f| f.points.is_none());
+    of_probes.map(figure).collect()
 }
 
 /// Units of the probes, where factors leave no doubt.

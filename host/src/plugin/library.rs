@@ -77,9 +77,12 @@ pub(super) fn open(path: &Path) -> Result<OpenLibrary, String> {
         .unwrap_or_else(std::sync::PoisonError::into_inner);
 
     // SAFETY: running the library's initialisers is what loading means; the user named it.
-    let library: &'static libloading::Library = Box::leak(Box::new(
-        unsafe { load(path) }.map_err(|error| format!("it cannot be loaded: {error}"))?,
-    ));
+    let library: &'static libloading::Library =
+        Box::leak(Box::new(unsafe { load(path) }.map_err(|error| {
+            let why =
+                std::error::Error::source(&error).map_or(String::new(), |why| format!(": {why}"));
+            format!("it cannot be loaded: {error}{why}")
+        })?));
     // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
     let magic = unsafe { library.get::<*const MagicBlock>(b"pilum_magic\0") }
         .map_err(|_| "it has no symbol `pilum_magic`: this is no Pilum law library".to_owned())?;

@@ -94,10 +94,16 @@ impl SearchPath {
             .collect();
         Err(Error::Plugin {
             message: format!("no library with law `{id}` in {}", folders.join(", ")),
-            hint: Some(format!(
-                "{}; more folders: `law_path` in the file, or PILUM_LAW_PATH",
-                suggestion(id, ids)
-            )),
+            hint: Some(if ids.is_empty() {
+                "no law library is there at all; in the repository, `cargo build --release` builds \
+                 the laws"
+                    .to_owned()
+            } else {
+                format!(
+                    "{}; more folders: `law_path` in the file, or PILUM_LAW_PATH",
+                    suggestion(id, ids)
+                )
+            }),
         })
     }
 

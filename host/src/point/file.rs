@@ -1,6 +1,7 @@
 //! The driver file: reading it, and checking everything that can be checked before the first call.
 
 use super::{N_MAX, Vector};
+use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
 use crate::input::{self, Named, ParameterTable};
 use crate::plugin::{Law, SearchPath, Strided};
@@ -20,13 +21,17 @@ const MAX_INCREMENTS: usize = 100_000_000;
 struct File {
     law: Spanned<String>,
     #[serde(default)]
-    law_path: Vec<PathBuf>,
+    title: String,
+    #[serde(default)]
+    law_path: Vec<Spanned<PathBuf>>,
     hypothesis: Spanned<String>,
     #[serde(default)]
     parameters: ParameterTable,
     initial: Option<Spanned<Initial>>,
     #[serde(default)]
     segment: Vec<SegmentTable>,
+    #[serde(default, rename = "figure")]
+    figures: Vec<FigureInput>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -93,26 +98,42 @@ pub struct Driver {
     pub(super) flux: Vector,
     pub(super) internal: Vec<f64>,
     pub(super) segments: Vec<Segment>,
+    pub(super) variant: Option<String>,
+    pub(super) title: String,
+    pub(super) figures: Vec<FigureInput>,
     source: Source,
     place_of_initial: Range<usize>,
 }
 
 impl Driver {
-    /// Reads a driver file and builds its law.
+    /// Reads a driver file and builds its law: one driver, or one for each `[[variant]]`.
     ///
     /// # Errors
     /// [`Error::Unreadable`], and those of [`Driver::from_source`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        Self::from_source(&Source::read(path)?)
+    pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
+        Self::variants(Source::read(path)?)
     }
 
-    /// Takes the text of a driver file and builds its law.
+    /// Takes the text of a driver file without variants and builds its law.
     ///
     /// # Errors
     /// [`Error::Input`] at the place that does not fit; [`Error::Plugin`] if the law is not found
-    /// or its library is defective.
+    /// or its library is defective; [`Error::Usage`] if the file has variants.
     pub fn from_source(source: &Source) -> Result<Self, Error> {
-        let file: File = input::parse(source)?;
+        let mut drivers = Self::variants(source.clone())?;
+        match (drivers.pop(), drivers.is_empty()) {
+            (Some(driver), true) => Ok(driver),
+            _ => Err(Error::Usage("the driver has several variants".to_owned())),
+        }
+    }
+
+    fn variants(source: Source) -> Result<Vec<Self>, Error> {
+        let (source, files) = base::read(source)?;
+        let driver = |(variant, file)| Self::build(&source, variant, file);
+        files.into_iter().map(driver).collect()
+    }
+
+    fn build(source: &Source, variant: Option<String>, file: File) -> Result<Self, Error> {
         let hypothesis = hypothesis(source, &file.hypothesis)?;
         let segments = segments(source, &file, hypothesis)?;
         let place_of_initial = file
@@ -123,8 +144,13 @@ impl Driver {
         let initial = file.initial.as_ref().map_or(&none, Spanned::get_ref);
         let flux = initial_flux(source, initial, hypothesis)?;
 
-        let folder = source.path().parent().unwrap_or(Path::new(""));
-        let folders: Vec<PathBuf> = file.law_path.iter().map(|p| folder.join(p)).collect();
+        let folder = |written: &Spanned<PathBuf>| {
+            let file = source.path_at(&written.span());
+            file.parent()
+                .unwrap_or(Path::new(""))
+                .join(written.get_ref())
+        };
+        let folders: Vec<PathBuf> = file.law_path.iter().map(folder).collect();
         let search = SearchPath::new(&folders);
         let built = input::build_law(source, &search, &file.law, hypothesis, &file.parameters)?;
         let mut driver = Self {
@@ -133,10 +159,14 @@ impl Driver {
             flux,
             internal: Vec::new(),
             segments,
+            variant,
+            title: file.title,
+            figures: file.figures,
             source: source.clone(),
             place_of_initial,
         };
         driver.internal = driver.initial_internal(&initial.internal)?;
+        driver.check_figures(source)?;
         Ok(driver)
     }
 

@@ -69,7 +69,11 @@ fn settings_of(summary: &Value) -> Vec<(String, String, String)> {
             Value::Number(number) => number.as_f64().map(display).unwrap_or_default(),
             other => other.to_string(),
         };
-        let separator = if unit.is_empty() || unit == "-" { "" } else { " " };
+        let separator = if unit.is_empty() || unit == "-" {
+            ""
+        } else {
+            " "
+        };
         let unit = if unit == "-" { "" } else { unit };
         let value = format!("{value}{separator}{unit}");
         settings.push((section.to_owned(), name.to_owned(), value));

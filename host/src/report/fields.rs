@@ -19,7 +19,7 @@ pub(super) struct Fields {
     group: Vec<usize>,
     /// Names of the groups.
     pub(super) groups: Vec<String>,
-    /// Names of the fields.
+    /// Names of the fields, of whatever time.
     pub(super) names: Vec<String>,
     pub(super) times: Vec<Snapshot>,
 }
@@ -32,7 +32,7 @@ pub(super) struct Snapshot {
     pub(super) label: String,
     /// x y x y …
     displacement: Vec<Short>,
-    /// By field and cell.
+    /// By field and cell; empty if there is no such field at this time (a law was swapped).
     values: Vec<Vec<Short>>,
 }
 
@@ -97,7 +97,7 @@ impl Fields {
             let fields = fields.get_or_insert_with(|| Self::new(&grid));
             match fields.snapshot(*time, &grid) {
                 Some(snapshot) => fields.times.push(snapshot),
-                None => notes.push(format!("{file}: another mesh or other fields; left out")),
+                None => notes.push(format!("{file}: another mesh; left out")),
             }
         }
         fields.filter(|fields| !fields.times.is_empty())
@@ -109,23 +109,34 @@ impl Fields {
             cells: grid.cells.clone(),
             group: grid.group.clone(),
             groups: Vec::new(),
-            names: grid.fields.iter().map(|(name, _)| name.clone()).collect(),
+            names: Vec::new(),
             times: Vec::new(),
         }
     }
 
-    /// `None` if the grid is another one.
-    fn snapshot(&self, time: f64, grid: &Grid) -> Option<Snapshot> {
-        let short = |values: &Vec<f64>| values.iter().copied().map(Short::from).collect();
-        let names = grid.fields.iter().map(|(name, _)| name);
-        let same = self.nodes.len() == grid.nodes.len()
-            && self.cells == grid.cells
-            && self.names.iter().eq(names);
-        same.then(|| Snapshot {
+    /// `None` if the mesh is another one.
+    fn snapshot(&mut self, time: f64, grid: &Grid) -> Option<Snapshot> {
+        if self.nodes.len() != grid.nodes.len() || self.cells != grid.cells {
+            return None;
+        }
+        for (name, _) in &grid.fields {
+            if !self.names.contains(name) {
+                self.names.push(name.clone());
+                self.times
+                    .iter_mut()
+                    .for_each(|t| t.values.push(Vec::new()));
+            }
+        }
+        let short = |values: &[f64]| values.iter().copied().map(Short::from).collect();
+        let values = self.names.iter().map(|name| {
+            let found = grid.fields.iter().find(|(other, _)| other == name);
+            found.map(|(_, values)| short(values)).unwrap_or_default()
+        });
+        Some(Snapshot {
             time: time.into(),
             label: String::new(),
             displacement: short(&grid.displacement),
-            values: grid.fields.iter().map(|(_, values)| short(values)).collect(),
+            values: values.collect(),
         })
     }
 
@@ -253,7 +264,11 @@ mod tests {
             ("</CellData>", "", "no complete <CellData>"),
             ("0 1 2 ", "0 1 9 ", "of the mesh"),
             ("-7 ", "-7 8 ", "different lengths"),
-            ("3 </DataArray></Cells>", "4 </DataArray></Cells>", "do not fit"),
+            (
+                "3 </DataArray></Cells>",
+                "4 </DataArray></Cells>",
+                "do not fit",
+            ),
             ("5e-1", "5e-", "`5e-` is not a number"),
         ] {
             let why = Grid::parse(&TEXT.replace(from, to)).unwrap_err();

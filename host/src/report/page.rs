@@ -7,10 +7,12 @@ use super::profile::Profile;
 use super::results::{Ending, History, Run, entries, list, text};
 use super::short::display;
 use crate::error::Error;
+use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -30,10 +32,13 @@ const UPLOT_STYLE: &str = include_str!("vendor/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("vendor/LICENSE-uPlot");
 /// More cut-backs than this are only in the log.
 const MOST_CUT_BACKS: usize = 100;
+/// Larger pictures are not copied into the page, in bytes.
+const LARGEST_PICTURE: usize = 200_000;
 /// Files of a run that the page links to.
-const FILES: [(&str, &str); 5] = [
+const FILES: [(&str, &str); 6] = [
     ("history.csv", "every increment, every probe"),
     ("profile.csv", "values along interfaces"),
+    ("points.csv", "values at integration points"),
     ("fields.pvd", "fields, for programs that read VTK files"),
     ("log.jsonl", "every iteration and cut-back"),
     ("summary.json", "versions, settings, costs, final values"),
@@ -79,9 +84,9 @@ fn page(runs: &[Run], folder: &Path, data: &str) -> Template {
         title,
         is_comparison,
         runs => runs.iter().map(|run| run_context(run, folder)).collect::<Vec<_>>(),
-        final_values => if is_comparison { final_values(runs) } else { Vec::new() },
+        final_values => Template::from(Serde(final_values(runs))),
         n_differing => settings.iter().filter(|setting| setting.differs).count(),
-        settings,
+        settings => Template::from(Serde(settings)),
         has_profiles => runs.iter().any(|run| run.profile.is_some()),
         has_fields => runs.iter().any(|run| run.fields.is_some()),
         version => env!("CARGO_PKG_VERSION"),
@@ -115,34 +120,37 @@ fn run_context(run: &Run, folder: &Path) -> Template {
         Ending::Failed(status, reason) => (status, true, reason),
         Ending::Unfinished(why) => ("unfinished".to_owned(), true, why.to_owned()),
     };
-    let last = run.history.ends.last().map(|end| {
-        format!("phase {}, increment {}", end.phase, end.increment)
-    });
+    let last = run
+        .history
+        .ends
+        .last()
+        .map(|end| format!("phase {}, increment {}", end.phase, end.increment));
     let files: Vec<(&str, &str, String)> = FILES
         .iter()
         .filter(|(file, _)| run.folder.join(file).is_file())
         .filter_map(|(file, what)| Some((*file, *what, link(folder, &run.folder.join(file))?)))
         .collect();
     context! {
-        name => run.name,
+        name => run.name.as_str(),
         title => run.title(),
         status, failed, reason, last, files,
         program => text(&summary["program"]),
         facts => facts(summary),
-        notes => run.notes,
+        notes => run.notes.clone(),
         warnings => run.warnings(),
         ends => ends(run),
+        pictures => pictures(run),
         groups => list(&summary["groups"]).map(group).collect::<Vec<_>>(),
         laws => entries(&summary["laws"]).map(law).collect::<Vec<_>>(),
         solver => named_values(&summary["solver"]),
         phases => list(&summary["phases"]).map(phase).collect::<Vec<_>>(),
-        seconds => summary["seconds"]["total"].as_f64().map(display),
-        seconds_output => summary["seconds"]["output"].as_f64().map(display),
+        seconds => seconds(&summary["seconds"]["total"]),
+        seconds_output => seconds(&summary["seconds"]["output"]),
         law_calls => named_values(&summary["law_calls_by_group"]),
         cut_backs => cut_backs(&run.log),
         n_cut_backs => run.log.cut_backs.len(),
         case_files => list(&summary["case_files"])
-            .map(|file| (text(&file["path"]), text(&file["text"])))
+            .map(|file| (text(&file["path"]).to_owned(), text(&file["text"]).to_owned()))
             .collect::<Vec<_>>(),
     }
 }
@@ -157,13 +165,38 @@ fn facts(summary: &Value) -> Vec<String> {
     let count = |value: &Value, what: &str| value.as_u64().map(|n| format!("{n} {what}"));
     facts.extend(count(&summary["mesh"]["nodes"], "nodes"));
     facts.extend(count(&summary["mesh"]["elements"], "elements"));
-    let seconds = summary["seconds"]["total"].as_f64();
-    facts.extend(seconds.map(|seconds| format!("{seconds:.2} s")));
+    facts.extend(seconds(&summary["seconds"]["total"]).map(|seconds| format!("{seconds} s")));
     match text(&summary["program"]) {
         "" => (),
         program => facts.push(program.to_owned()),
     }
     facts
+}
+
+/// Pictures in the folder that the page does not draw itself, such as figures of cuts: names and
+/// data addresses.
+fn pictures(run: &Run) -> Vec<(String, String)> {
+    let drawn: Vec<&str> = list(&run.summary["figures"])
+        .map(|figure| text(&figure["name"]))
+        .collect();
+    let Ok(entries) = std::fs::read_dir(&run.folder) else {
+        return Vec::new();
+    };
+    let mut pictures: Vec<(String, String)> = entries
+        .flatten()
+        .filter_map(|entry| {
+            let path = entry.path();
+            let name = path.file_stem()?.to_str()?.to_owned();
+            if path.extension()? != "svg" || drawn.contains(&name.as_str()) {
+                return None;
+            }
+            let picture = std::fs::read(&path).ok()?;
+            let small = picture.len() <= LARGEST_PICTURE;
+            small.then(|| (name, format!("data:image/svg+xml,{}", escaped(&picture))))
+        })
+        .collect();
+    pictures.sort();
+    pictures
 }
 
 /// Names of the phases and, by probe, name, unit and values at their ends.
@@ -179,13 +212,17 @@ fn ends(run: &Run) -> Template {
                 .iter()
                 .map(|end| end.values[column].map(display).unwrap_or_default())
                 .collect();
-            (name, units.get(name.as_str()), values)
+            (
+                name.clone(),
+                units.get(name.as_str()).map(ToString::to_string),
+                values,
+            )
         })
         .collect();
     let phases: Vec<String> = history
         .ends
         .iter()
-        .map(|end| format!("{}, {}", end.phase, end.increment))
+        .map(|end| format!("{}, increment {}", end.phase, end.increment))
         .collect();
     context! { phases, probes }
 }
@@ -258,7 +295,6 @@ fn named_values(object: &Value) -> Vec<(String, String)> {
 
 fn phase(phase: &Value) -> Template {
     let count = |key: &str| phase[key].as_u64();
-    let seconds = |key: &str| phase["seconds"][key].as_f64().map(|s| format!("{s:.3}"));
     context! {
         name => text(&phase["name"]),
         equations => count("equations"),
@@ -267,10 +303,14 @@ fn phase(phase: &Value) -> Template {
         cut_backs => count("cut_backs"),
         unreliable => count("unreliable_steps"),
         factorisations => count("factorisations"),
-        laws => seconds("laws_and_forces"),
-        assembly => seconds("assembly"),
-        solution => seconds("equations"),
+        laws => seconds(&phase["seconds"]["laws_and_forces"]),
+        assembly => seconds(&phase["seconds"]["assembly"]),
+        solution => seconds(&phase["seconds"]["equations"]),
     }
+}
+
+fn seconds(value: &Value) -> Option<String> {
+    value.as_f64().map(|seconds| format!("{seconds:.3}"))
 }
 
 fn cut_backs(log: &Log) -> Vec<Template> {
@@ -280,11 +320,11 @@ fn cut_backs(log: &Log) -> Vec<Template> {
         .take(MOST_CUT_BACKS)
         .map(|c| {
             context! {
-                phase => c.phase,
+                phase => c.phase.as_str(),
                 increment => c.increment,
                 load_factor => number(c.load_factor.0),
                 next_step => number(c.next_step.0),
-                reason => c.reason,
+                reason => c.reason.as_str(),
             }
         })
         .collect()
@@ -313,20 +353,19 @@ fn link(from: &Path, to: &Path) -> Option<String> {
         .collect();
     let parts: Vec<String> = path
         .iter()
-        .map(|part| escaped(&part.to_string_lossy()))
+        .map(|part| escaped(part.to_string_lossy().as_bytes()))
         .collect();
     Some(parts.join("/"))
 }
 
-/// A name as a part of an address.
-fn escaped(name: &str) -> String {
-    let mut text = String::new();
-    for byte in name.bytes() {
+/// Bytes as a part of an address.
+fn escaped(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, &byte| {
         if byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte) {
             text.push(char::from(byte));
         } else {
-            text.push_str(&format!("%{byte:02X}"));
+            let _ = write!(text, "%{byte:02X}");
         }
-    }
-    text
+        text
+    })
 }

@@ -204,12 +204,7 @@ fn interfaces(points: &[Point]) -> (Vec<Interface>, Vec<usize>) {
 
 /// Points of a group by position along the interface, each station's across it. If stations have
 /// different numbers of points, every point is a station of its own.
-fn stations(
-    points: &[Point],
-    members: &[usize],
-    across: usize,
-    length: f64,
-) -> Vec<Vec<usize>> {
+fn stations(points: &[Point], members: &[usize], across: usize, length: f64) -> Vec<Vec<usize>> {
     let mut sorted = members.to_vec();
     sorted.sort_by(|&a, &b| {
         let (a, b) = (&points[a], &points[b]);

@@ -212,11 +212,10 @@ impl Run {
         }
         match text(&self.summary["status"]) {
             "done" => Ending::Done,
-            "running" => Ending::Unfinished("the run was stopped from outside or has not ended yet"),
-            status => Ending::Failed(
-                status.to_owned(),
-                text(&self.summary["error"]).to_owned(),
-            ),
+            "running" => {
+                Ending::Unfinished("the run was stopped from outside or has not ended yet")
+            }
+            status => Ending::Failed(status.to_owned(), text(&self.summary["error"]).to_owned()),
         }
     }
 

@@ -1,0 +1,72 @@
+//! Stresses at all integration points.
+
+use super::{Table, internal_variables, number};
+use crate::case::When;
+use crate::error::{Error, Place};
+use crate::group::Group;
+use crate::model::Model;
+use std::path::Path;
+
+/// `points.csv`: one row per integration point of every group that has a stress.
+#[derive(Debug)]
+pub(super) struct Points {
+    table: Table,
+    /// Internal variables of all laws of these groups, each once.
+    variables: Vec<String>,
+}
+
+impl Points {
+    /// `None` if it is not asked for.
+    pub(super) fn create(folder: &Path, when: When, model: &Model) -> Result<Option<Self>, Error> {
+        if when == When::Never {
+            return Ok(None);
+        }
+        let variables = internal_variables(model, |group| group.global_stress(0).is_some());
+        let columns = [
+            "phase",
+            "increment",
+            "group",
+            "element",
+            "point",
+            "x",
+            "y",
+            "stress_11",
+            "stress_22",
+            "stress_33",
+            "stress_12",
+        ];
+        let columns = columns
+            .into_iter()
+            .chain(variables.iter().map(String::as_str));
+        let table = Table::create(folder.join("points.csv"), columns)?;
+        Ok(Some(Self { table, variables }))
+    }
+
+    pub(super) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
+        for group in groups {
+            let per_element = group.kinematics.points_per_element();
+            for point in 0..group.kinematics.n_points() {
+                let Some(stress) = group.global_stress(point) else {
+                    break;
+                };
+                let mut row = vec![
+                    place.phase.clone(),
+                    place.increment.to_string(),
+                    group.name.clone(),
+                    (point / per_element + 1).to_string(),
+                    (point % per_element + 1).to_string(),
+                ];
+                row.extend(group.kinematics.position(point).map(number));
+                row.extend(stress.map(number));
+                row.extend(self.variables.iter().map(|id| {
+                    group
+                        .internal_variable(point, id)
+                        .map(number)
+                        .unwrap_or_default()
+                }));
+                self.table.row(&row)?;
+            }
+        }
+        self.table.flush()
+    }
+}

@@ -1,0 +1,71 @@
+// --- with ?selftest the page tries itself out and writes the outcome at its end ----------------
+
+/** Whether something is drawn on a canvas. */
+function isDrawn(canvas) {
+  const copy = make('canvas', { width: canvas.width, height: canvas.height }).getContext('2d', { willReadFrequently: true });
+  copy.drawImage(canvas, 0, 0);
+  const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data;
+  const seen = new Set();
+  for (let i = 0; i < pixels.length; i += 4) if (pixels[i + 3]) seen.add((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2]);
+  return seen.size > 8;
+}
+
+function isSvg(text) {
+  const parsed = new DOMParser().parseFromString(text, 'image/svg+xml');
+  return !parsed.querySelector('parsererror') && parsed.querySelectorAll('path, polygon').length > 3;
+}
+
+async function selftest() {
+  const outcome = {};
+  // Charts are laid out after the event that changes them.
+  const settled = () => new Promise(resolve => setTimeout(resolve, 20));
+  const input = (node, value) => {
+    node.value = value;
+    node.dispatchEvent(new Event('input'));
+    return settled();
+  };
+  await settled();
+  outcome.canvases = [...document.querySelectorAll('canvas')].map(isDrawn);
+  outcome.figures = (chosen.figures || []).map(chart => ({ svg: isSvg(chart.svg('<title> & "figure"')), hover: chart.hoverAt(0, 3) }));
+  const pick = document.querySelector('#chooser select');
+  const before = chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
+  pick.value = pick.options[0].value;
+  pick.dispatchEvent(new Event('change'));
+  outcome.chooser_changes = before !== chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
+  await settled();
+  const { profile, contour, residuals } = chosen;
+  if (profile) {
+    const drawn = () => profile.body.dataset.drawn;
+    await input(profile.steer.input, 0);
+    const first = [profile.title.textContent, drawn()];
+    await input(profile.steer.input, profile.steer.input.max);
+    const last = [profile.title.textContent, drawn()];
+    profile.spread();
+    await settled();
+    outcome.profile = { first, last, overlaid: drawn(), svg: isSvg(profile.chart.svg('profile')), hover: profile.chart.hoverAt(0, 2) };
+  }
+  if (contour) {
+    const states = [];
+    await input(contour.time.input, 0);
+    states.push(contour.host.dataset.drawn);
+    await input(contour.time.input, contour.time.input.max);
+    states.push(contour.host.dataset.drawn);
+    contour.field('0');
+    states.push(contour.host.dataset.drawn);
+    await input(contour.scaleInput, 0);
+    states.push(contour.host.dataset.drawn);
+    outcome.contour = { states, svg: isSvg(contour.pictureOf()), hover: contour.hoverMiddle(), drawn: isDrawn(contour.canvas) };
+  }
+  if (residuals) outcome.residuals = { svg: isSvg(residuals.chart.svg('')), hover: residuals.chart.hoverAt(0, 0) };
+  outcome.png_bytes = (await png(chosen.chart.svg('chosen'))).size;
+  redrawAll();
+  await settled();
+  return outcome;
+}
+
+if (new URLSearchParams(location.search).has('selftest')) {
+  selftest().catch(error => ({ failed: String(error && error.stack || error) })).then(outcome => {
+    outcome.errors = errors;
+    document.body.append(make('pre', { id: 'selftest' }, JSON.stringify(outcome)));
+  });
+}
