@@ -45,6 +45,15 @@ enum Command {
         #[arg(long)]
         csv: Option<PathBuf>,
     },
+    /// Write the report of a run, or the comparison of several.
+    Report {
+        /// Results folders.
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+        /// The report's file [default: report.html in the folder, or beside the folders].
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
     /// List the laws found, or show all about one of them.
     Laws {
         /// Id of a law.
@@ -83,6 +92,7 @@ fn execute(command: Command) -> Result<(), Error> {
     match command {
         Command::Run { case, variant, out } => run_cases(&case, variant.as_deref(), out.as_deref()),
         Command::Point { driver, csv } => run_point(&driver, csv.as_deref()),
+        Command::Report { folders, out } => write_report(&folders, out),
         Command::Laws { id } => show_laws(id.as_deref()),
     }
 }
@@ -149,6 +159,13 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
 fn run_point(driver: &Path, csv: Option<&Path>) -> Result<(), Error> {
     let report = host::point::run_file(driver, csv)?;
     eprint!("{report}");
+    Ok(())
+}
+
+fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
+    let out = out.unwrap_or_else(|| host::report::default_path(folders));
+    let written = host::report::write(folders, &out)?;
+    println!("report in {}", written.display());
     Ok(())
 }
 

@@ -439,7 +439,7 @@ impl<'a> Run<'a> {
                 failure.reason
             ),
             hint: Some(
-                "results up to the last state of equilibrium are written; \
+                "results up to the last whole increment in equilibrium are written; \
                  log.jsonl lists the iterations"
                     .to_owned(),
             ),

@@ -383,6 +383,32 @@ fn refuse_taken(mesh: &Mesh, file: &CaseFile, name: &str) -> Result<(), String> 
     }
 }
 
+/// Refuses a line that ends on an earlier one, or on which an earlier one ends: which quads stay
+/// joined there would depend on the order. Lines may cross. `uses`: in how many edges of the new
+/// line its nodes are.
+fn refuse_meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Result<(), String> {
+    let key = |node: usize| mesh.nodes[node].map(f64::to_bits);
+    let mut earlier: HashMap<(usize, [u64; 2]), usize> = HashMap::new();
+    for joint in &mesh.joints {
+        for &node in &joint.minus {
+            *earlier.entry((joint.group, key(node))).or_default() += 1;
+        }
+    }
+    // Mid-side nodes are in one edge too, but no line meets another there.
+    for (&node, &count) in uses {
+        for ((_, at), &others) in &earlier {
+            if *at == key(node) && (count == 1 || others == 1) {
+                let [x, y] = mesh.nodes[node];
+                return Err(format!(
+                    "the line meets the line of another `zero_thickness` group at ({x}, {y}) and one \
+                     of them ends there: such lines may cross, but not end on each other"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Doubles the nodes of a line and inserts zero-thickness elements between its two sides. Where
 /// the line ends inside the mesh its last node stays single, so the two sides stay joined there.
 fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
@@ -420,6 +446,7 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
             *uses.entry(node).or_default() += 1;
         }
     }
+    refuse_meeting(mesh, &uses)?;
     let mut copy: HashMap<usize, usize> = HashMap::new();
     let mut joints = Vec::new();
     for &(minus, _) in &pairs {
@@ -509,7 +536,17 @@ fn boundary_nodes(mesh: &Mesh) -> Vec<bool> {
 fn collect_line_nodes(mesh: &mut Mesh) {
     let mut lines = std::mem::take(&mut mesh.lines);
     for line in lines.values_mut() {
-        if !line.edges.is_empty() {
+        if line.edges.is_empty() {
+            // A point: all nodes there, both of a double one.
+            if let Some(at) = line
+                .nodes
+                .first()
+                .map(|&node| mesh.nodes[node].map(f64::to_bits))
+            {
+                let here = |&node: &usize| mesh.nodes[node].map(f64::to_bits) == at;
+                line.nodes = (0..mesh.nodes.len()).filter(here).collect();
+            }
+        } else {
             line.nodes = line
                 .edges
                 .iter()

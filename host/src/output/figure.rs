@@ -352,13 +352,18 @@ fn draw(
     labels: &Labels,
     curves: &[Curve],
 ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
-    let area = SVGBackend::with_string(text, SIZE).into_drawing_area();
-    area.fill(&WHITE)?;
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let x = range(points().map(|p| p.0), 0.0);
     let y = range(points().map(|p| p.1), 0.05);
-    let legend = emptiest_corner(points(), &x, &y);
-    let mut chart = ChartBuilder::on(&area)
+    let longest = curves.iter().map(|curve| curve.name.chars().count()).max();
+    let legend = [42 + 7 * longest.unwrap_or(0), 16 + 17 * curves.len()];
+    let corner = empty_corner(curves, &x, &y, legend);
+    let beside = curves.len() > 1 && corner.is_none();
+    let width = SIZE.0 + if beside { legend[0] as u32 } else { 0 };
+    let area = SVGBackend::with_string(text, (width, SIZE.1)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let (left, right) = area.split_horizontally(SIZE.0);
+    let mut chart = ChartBuilder::on(&left)
         .caption(&labels.title, ("sans-serif", 15))
         .margin(12)
         .x_label_area_size(38)
@@ -373,45 +378,72 @@ fn draw(
         .axis_desc_style(("sans-serif", 14))
         .label_style(("sans-serif", 12))
         .draw()?;
-    for (curve, colour) in curves.iter().zip(COLOURS.into_iter().cycle()) {
+    let colours = COLOURS.into_iter().cycle();
+    for (number, (curve, colour)) in (0..).zip(curves.iter().zip(colours)) {
         let style = colour.stroke_width(2);
         chart
             .draw_series(LineSeries::new(curve.points.iter().copied(), style))?
             .label(&curve.name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+        if beside {
+            let y = 40 + 17 * number;
+            right.draw(&PathElement::new([(0, y), (18, y)], style))?;
+            right.draw(&Text::new(
+                curve.name.as_str(),
+                (24, y - 6),
+                ("sans-serif", 12),
+            ))?;
+        }
     }
-    if curves.len() > 1 {
+    if let Some(corner) = corner.filter(|_| curves.len() > 1) {
         chart
             .configure_series_labels()
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
             .label_font(("sans-serif", 12))
-            .position(legend)
+            .position(corner)
             .draw()?;
     }
     area.present()
 }
 
-/// The corner that has the fewest points, for the legend.
-fn emptiest_corner<'a>(
-    points: impl Iterator<Item = &'a (f64, f64)>,
+/// A corner where a legend of this size, in points, covers no curve.
+fn empty_corner(
+    curves: &[Curve],
     x: &std::ops::Range<f64>,
     y: &std::ops::Range<f64>,
-) -> SeriesLabelPosition {
-    // Lower right, upper right, lower left, upper left: the first of the emptiest.
-    let mut counts = [0; 4];
+    legend: [usize; 2],
+) -> Option<SeriesLabelPosition> {
+    // Parts of the plot, which is what labels and margins leave of the figure.
+    let width = (legend[0] + 10) as f64 / f64::from(SIZE.0 - 82);
+    let height = (legend[1] + 10) as f64 / f64::from(SIZE.1 - 84);
     let part = |v: f64, range: &std::ops::Range<f64>| (v - range.start) / (range.end - range.start);
-    for &(u, v) in points {
-        let (u, v) = (part(u, x), part(v, y));
-        if !(0.3..0.7).contains(&u) && !(0.45..0.55).contains(&v) {
-            counts[usize::from(v > 0.5) + 2 * usize::from(u < 0.5)] += 1;
-        }
-    }
-    match (0..4).min_by_key(|&corner| counts[corner]) {
-        Some(1) => SeriesLabelPosition::UpperRight,
-        Some(2) => SeriesLabelPosition::LowerLeft,
-        Some(3) => SeriesLabelPosition::UpperLeft,
-        _ => SeriesLabelPosition::LowerRight,
+    let covered = |right: bool, upper: bool| {
+        let inside = |u: f64, v: f64| {
+            let (u, v) = (part(u, x), part(v, y));
+            let (u, v) = (
+                if right { 1.0 - u } else { u },
+                if upper { 1.0 - v } else { v },
+            );
+            u < width && v < height
+        };
+        curves.iter().flat_map(|c| c.points.windows(2)).any(|ends| {
+            let [(u0, v0), (u1, v1)] = [ends[0], ends[1]];
+            (0..=20)
+                .map(|k| f64::from(k) / 20.0)
+                .any(|s| inside(u0 + s * (u1 - u0), v0 + s * (v1 - v0)))
+        })
+    };
+    if !covered(true, false) {
+        Some(SeriesLabelPosition::LowerRight)
+    } else if !covered(true, true) {
+        Some(SeriesLabelPosition::UpperRight)
+    } else if !covered(false, true) {
+        Some(SeriesLabelPosition::UpperLeft)
+    } else if !covered(false, false) {
+        Some(SeriesLabelPosition::LowerLeft)
+    } else {
+        None
     }
 }
 

@@ -82,6 +82,7 @@ impl Summary {
             json!(format!("pilum {}", env!("CARGO_PKG_VERSION"))),
         );
         head.insert("case".to_owned(), json!(case.name()));
+        head.insert("variant".to_owned(), json!(case.variant));
         head.insert("title".to_owned(), json!(case.file.title));
         head.insert(
             "case_sha256".to_owned(),

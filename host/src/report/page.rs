@@ -158,6 +158,10 @@ fn run_context(run: &Run, folder: &Path) -> Template {
 /// What the head of the page says of a run.
 fn facts(summary: &Value) -> Vec<String> {
     let mut facts = Vec::new();
+    match text(&summary["variant"]) {
+        "" => (),
+        variant => facts.push(format!("variant {variant}")),
+    }
     match text(&summary["analysis"]) {
         "" => (),
         analysis => facts.push(analysis.replace('_', " ")),

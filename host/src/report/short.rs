@@ -46,7 +46,7 @@ pub(super) fn display(value: f64) -> String {
 pub(super) fn thinned(n: usize, most: usize, must: impl Fn(usize) -> bool) -> Vec<usize> {
     let stride = n.div_ceil(most.max(1)).max(1);
     (0..n)
-        .filter(|&i| (n - 1 - i) % stride == 0 || must(i))
+        .filter(|&i| (n - 1 - i).is_multiple_of(stride) || must(i))
         .collect()
 }
 

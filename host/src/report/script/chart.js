@@ -153,7 +153,8 @@ function makeChart(host, height, name) {
       hooks: { setCursor: [hover] },
     }, columns(), plot);
     u.over.append(tip, dot);
-    legend.replaceChildren(...(spec.series.length > 1 || spec.keepLegend ? spec.series.filter(s => !s.unnamed).map(key) : []));
+    if (spec.series[0] === NOTHING) legend.replaceChildren(make('span', { class: 'small' }, 'no values'));
+    else legend.replaceChildren(...(spec.series.length > 1 || spec.keepLegend ? spec.series.filter(s => !s.unnamed).map(key) : []));
   };
 
   const key = s => {
@@ -173,7 +174,7 @@ function makeChart(host, height, name) {
 
   const chart = {
     set(next) {
-      spec = next;
+      spec = next.series.length ? next : { ...next, series: [NOTHING] };
       // The same curves with other values keep their zoom.
       const now = JSON.stringify([spec.x, spec.y, spec.series.map(s => [s.name, s.colour, s.dash, s.unnamed])]);
       if (u && now === names && spec.x.range && spec.y.range) {
@@ -191,14 +192,21 @@ function makeChart(host, height, name) {
     get canvas() {
       return u.ctx.canvas;
     },
-    hoverAt(s, i) {
-      u.setCursor({ left: u.valToPos(spec.series[s].x[i], 'x'), top: u.valToPos(spec.series[s].y[i], 'y') });
+    /** What is shown where the last point of the first curve is pointed at. */
+    hoverLast() {
+      const { x, y } = spec.series[0];
+      if (!x.length) return '';
+      const i = x.findLastIndex((value, k) => value != null && y[k] != null);
+      u.setCursor({ left: u.valToPos(x[i], 'x'), top: u.valToPos(y[i], 'y') });
       return tip.hidden ? '' : tip.textContent;
     },
   };
   redraws.push(() => build());
   return chart;
 }
+
+/** In place of curves where there are none. */
+const NOTHING = { name: '', unnamed: true, silent: true, colour: 0, x: [], y: [] };
 
 /** A few letters that change with what is drawn. */
 function digest(series) {

@@ -135,6 +135,8 @@ part(() => {
     for (let n = 0; n < points; n++) at[n] = view.to(position(mesh, n, factor));
     const colours = Array.from({ length: 257 }, (_, i) => mapped(map(), i / 256));
     const fine = Math.sqrt(fields.cells.length) * 3 < view.k * mesh.size;
+    pen.within(view.width - BAR, view.height);
+    const edges = [];
     fields.cells.forEach((cell, c) => {
       if (state.hidden.has(fields.groups[fields.group[c]])) return;
       const value = shownValues[c];
@@ -142,17 +144,19 @@ part(() => {
       const fill = t == null ? ink.blank : colours[Math.round(256 * Math.min(1, Math.max(0, t)))];
       const outline = mesh.outlines[c].map(n => at[n]);
       if (cell.length === 8) pen.polygon(outline, fill, state.lines && fine ? ink.mesh : fill, state.lines && fine ? 0.5 : 0.7);
-      else pen.line(outline, fill, 5);
+      else edges.push([outline, fill]);
     });
     for (const edge of mesh.borders) {
       if (edge.groups.every(g => state.hidden.has(fields.groups[g]))) continue;
       pen.line(edge.nodes.map(n => at[n]), ink.edge, 1);
     }
+    for (const [outline, fill] of edges) pen.line(outline, fill, 5);
     if (state.outline) {
       for (const edge of mesh.borders) {
         if (edge.groups.length === 1) pen.line(edge.nodes.map(n => view.to(position(mesh, n, 0))), ink.soft, 1, [4, 3]);
       }
     }
+    pen.everywhere();
     // The colour bar.
     const high = Math.min(320, view.height - 90);
     const left = view.width - BAR + 8;
@@ -180,6 +184,15 @@ part(() => {
   };
 
   const onCanvas = context => ({
+    within(width, height) {
+      context.save();
+      context.beginPath();
+      context.rect(0, 0, width, height);
+      context.clip();
+    },
+    everywhere() {
+      context.restore();
+    },
     trace(points) {
       context.beginPath();
       points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
@@ -216,6 +229,8 @@ part(() => {
   const inSvg = out => {
     const list = points => points.map(([x, y]) => `${x.toFixed(2)},${y.toFixed(2)}`).join(' ');
     return {
+      within: (width, height) => out.push(`<clipPath id="mesh"><rect width="${width}" height="${height}"/></clipPath><g clip-path="url(#mesh)">`),
+      everywhere: () => out.push('</g>'),
       polygon: (points, fill, stroke, width) => out.push(`<polygon points="${list(points)}" fill="${fill}" stroke="${stroke}" stroke-width="${width}"/>`),
       line: (points, stroke, width, dash) => out.push(`<polyline points="${list(points)}" fill="none" stroke="${stroke}" stroke-width="${width}"${dash ? ` stroke-dasharray="${dash.join(' ')}"` : ''}/>`),
       box: (x, y, width, height, fill) => out.push(`<rect x="${x.toFixed(1)}" y="${y.toFixed(1)}" width="${width}" height="${height.toFixed(2)}" fill="${fill}"/>`),
@@ -261,12 +276,17 @@ part(() => {
     });
     if (state.hover != null) {
       const outline = mesh.outlines[state.hover].map(n => view.to(position(mesh, n, SCALES[state.scale])));
-      onCanvas(context).line([...outline, outline[0]], '#ff3b6b', 2);
+      const pen = onCanvas(context);
+      pen.within(view.width - BAR, view.height);
+      pen.line(mesh.fields.cells[state.hover].length === 8 ? [...outline, outline[0]] : outline, '#ff3b6b', 2);
+      pen.everywhere();
     }
     host.dataset.drawn = `${state.field} ${state.time} ${SCALES[state.scale]} ${bounds.map(b => b.toPrecision(6)).join(' ')}`;
   };
   let wanted = false;
   const soon = () => {
+    // Further events can come before the drawing.
+    if (view) view = look(meshOf(state.run), view.width, view.height);
     if (wanted) return;
     wanted = true;
     requestAnimationFrame(() => {

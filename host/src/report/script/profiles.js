@@ -49,7 +49,9 @@ part(() => {
     const row = run.history.increment.findIndex((n, i) => n === step.increment && run.history.phases[run.history.phase[i]] === step.phase);
     if (!values || row < 0 || values[row] == null) return '';
     const unit = unitOf(driver);
-    return `${driver} = ${shown(values[row])}${unit && unit !== '-' ? ' ' + unit : ''}`;
+    // Rounding errors of zero are shown as zero.
+    const value = Math.abs(values[row]) < 1e-9 * largestOf(values) ? 0 : values[row];
+    return `${driver} = ${shown(value)}${unit && unit !== '-' ? ' ' + unit : ''}`;
   };
   const describe = step => [`${step.phase}, increment ${step.increment}`, driven(step)].filter(Boolean).join(' · ');
 

@@ -26,7 +26,7 @@ async function selftest() {
   };
   await settled();
   outcome.canvases = [...document.querySelectorAll('canvas')].map(isDrawn);
-  outcome.figures = (chosen.figures || []).map(chart => ({ svg: isSvg(chart.svg('<title> & "figure"')), hover: chart.hoverAt(0, 3) }));
+  outcome.figures = (chosen.figures || []).map(chart => ({ svg: isSvg(chart.svg('<title> & "figure"')), hover: chart.hoverLast() }));
   const pick = document.querySelector('#chooser select');
   const before = chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
   pick.value = pick.options[0].value;
@@ -42,7 +42,7 @@ async function selftest() {
     const last = [profile.title.textContent, drawn()];
     profile.spread();
     await settled();
-    outcome.profile = { first, last, overlaid: drawn(), svg: isSvg(profile.chart.svg('profile')), hover: profile.chart.hoverAt(0, 2) };
+    outcome.profile = { first, last, overlaid: drawn(), svg: isSvg(profile.chart.svg('profile')), hover: profile.chart.hoverLast() };
   }
   if (contour) {
     const states = [];
@@ -56,7 +56,7 @@ async function selftest() {
     states.push(contour.host.dataset.drawn);
     outcome.contour = { states, svg: isSvg(contour.pictureOf()), hover: contour.hoverMiddle(), drawn: isDrawn(contour.canvas) };
   }
-  if (residuals) outcome.residuals = { svg: isSvg(residuals.chart.svg('')), hover: residuals.chart.hoverAt(0, 0) };
+  if (residuals) outcome.residuals = { svg: isSvg(residuals.chart.svg('')), hover: residuals.chart.hoverLast() };
   outcome.png_bytes = (await png(chosen.chart.svg('chosen'))).size;
   redrawAll();
   await settled();

@@ -1,0 +1,154 @@
+//! The page in a real browser: headless Chromium opens it with `?selftest`, the page tries itself
+//! out and writes the outcome at its end, and the browser prints the document.
+//!
+//! Where there is no Chromium the tests say so and do nothing; with `CI` set they fail.
+
+use crate::folders::folders;
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const NAMES: [&str; 4] = [
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+];
+/// It takes a few seconds.
+const PATIENCE: Duration = Duration::from_mins(2);
+
+fn chromium() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path)
+        .flat_map(|folder| NAMES.map(|name| folder.join(name)))
+        .find(|program| program.is_file())
+}
+
+/// What the page says of itself; `None` without a browser.
+fn selftest(page: &Path) -> Option<Value> {
+    let Some(program) = chromium() else {
+        assert!(
+            std::env::var_os("CI").is_none(),
+            "no Chromium on the path, and CI is set"
+        );
+        // Past the test harness, which keeps what passing tests print to itself.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED: no Chromium on the path, the page is not tried in a browser"
+        );
+        return None;
+    };
+    let place = tempfile::tempdir().unwrap();
+    let (document, messages) = (place.path().join("document"), place.path().join("messages"));
+    let mut profile = OsStr::new("--user-data-dir=").to_owned();
+    profile.push(place.path().join("profile"));
+    let page = page.display().to_string();
+    let address = format!("file://{}?selftest", page.replace(' ', "%20"));
+    let mut browser = Command::new(program)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"])
+        .args(["--enable-logging=stderr", "--virtual-time-budget=20000"])
+        .args([profile.as_os_str(), OsStr::new(&address)])
+        .stdout(Stdio::from(std::fs::File::create(&document).unwrap()))
+        .stderr(Stdio::from(std::fs::File::create(&messages).unwrap()))
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while browser.try_wait().unwrap().is_none() {
+        if start.elapsed() > PATIENCE {
+            let _ = browser.kill();
+            panic!("the browser does not end");
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let messages = String::from_utf8_lossy(&std::fs::read(messages).unwrap()).into_owned();
+    let console: Vec<&str> = messages
+        .lines()
+        .filter(|line| line.contains("CONSOLE"))
+        .collect();
+    assert!(console.is_empty(), "{console:#?}");
+    let document = String::from_utf8_lossy(&std::fs::read(document).unwrap()).into_owned();
+    let (_, outcome) = document
+        .split_once("<pre id=\"selftest\">")
+        .unwrap_or_else(|| panic!("the page did not try itself out\n{messages}"));
+    let (outcome, _) = outcome.split_once("</pre>").unwrap();
+    let outcome = outcome
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&amp;", "&");
+    let outcome: Value = serde_json::from_str(&outcome).unwrap();
+    assert_eq!(outcome["errors"], serde_json::json!([]), "{outcome:#}");
+    assert_eq!(outcome["failed"], Value::Null, "{outcome:#}");
+    for drawn in outcome["canvases"].as_array().unwrap() {
+        assert_eq!(drawn, true, "{outcome:#}");
+    }
+    assert_eq!(outcome["chooser_changes"], true);
+    assert!(outcome["png_bytes"].as_u64().unwrap() > 2000);
+    Some(outcome)
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap()
+}
+
+#[test]
+fn a_report_works() {
+    let Some(outcome) = selftest(&folders().layer.join("report.html")) else {
+        return;
+    };
+    // Two figures, the chooser, three profiles, the contours, the residuals.
+    assert_eq!(outcome["canvases"].as_array().unwrap().len(), 8);
+    for figure in outcome["figures"].as_array().unwrap() {
+        assert_eq!(figure["svg"], true);
+    }
+    let hover = text(&outcome["figures"][0]["hover"]);
+    assert!(hover.contains("displacement (mm): 6"), "{hover}");
+    assert!(hover.contains("shear <b>, increment 4"), "{hover}");
+
+    let profile = &outcome["profile"];
+    assert_eq!(text(&profile["first"][0]), "press, increment 1 · w = 0 mm");
+    assert_eq!(
+        text(&profile["last"][0]),
+        "shear <b>, increment 4 · w = 6 mm"
+    );
+    assert_ne!(profile["first"][1], profile["last"][1]);
+    // One curve becomes four: those of the phase.
+    assert!(text(&profile["last"][1]).starts_with("1:"));
+    assert!(text(&profile["overlaid"]).starts_with("4:"));
+    assert_eq!(profile["svg"], true);
+
+    let contour = &outcome["contour"];
+    let states: Vec<&str> = contour["states"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(text)
+        .collect();
+    assert!(
+        states.windows(2).all(|pair| pair[0] != pair[1]),
+        "{states:?}"
+    );
+    assert_eq!(contour["drawn"], true);
+    assert_eq!(contour["svg"], true);
+    assert!(text(&contour["hover"]).starts_with("soil, element 1\nstress_11: "));
+    assert!(text(&outcome["residuals"]["hover"]).contains("iteration"));
+}
+
+#[test]
+fn a_run_without_equilibrium_has_a_report_that_works() {
+    selftest(&folders().overloaded.join("report.html"));
+}
+
+#[test]
+fn a_comparison_works() {
+    let Some(outcome) = selftest(&folders().comparison) else {
+        return;
+    };
+    let hover = text(&outcome["figures"][0]["hover"]);
+    assert!(hover.starts_with("layer & more: force\n"), "{hover}");
+    // At the end two of the runs have a profile, at the start all three.
+    assert!(text(&outcome["profile"]["first"][1]).starts_with("3:"));
+    assert!(text(&outcome["profile"]["last"][1]).starts_with("2:"));
+}
