@@ -33,7 +33,7 @@ enum Command {
         /// Run only this variant of it.
         #[arg(long)]
         variant: Option<String>,
-        /// Folder for the results [default: results/<case name>[/<variant>]].
+        /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
         #[arg(long)]
         out: Option<PathBuf>,
     },

@@ -39,7 +39,7 @@ fn every_stress_is_admissible() {
     for phase in ["confinement", "loading"] {
         for point in run.points(phase).iter().filter(|p| p.group == "sand") {
             let [s_11, s_22, s_33, s_12] = point.stress;
-            let (centre, radius) = ((s_11 + s_22) / 2.0, ((s_11 - s_22) / 2.0).hypot(s_12));
+            let (centre, radius) = (f64::midpoint(s_11, s_22), ((s_11 - s_22) / 2.0).hypot(s_12));
             let mut s = [centre + radius, centre - radius, s_33];
             s.sort_by(f64::total_cmp);
             // f = ((1 + sin φ) s₁ − (1 − sin φ) s₃)/2 ≤ 0, relative to the largest stress.

@@ -9,36 +9,36 @@ use tempfile::TempDir;
 use tests::case::{Silent, table};
 
 /// A run that has ended.
-pub struct Run {
+pub(crate) struct Run {
     history: Vec<BTreeMap<String, String>>,
     points: Vec<BTreeMap<String, String>>,
     /// `summary.json`.
-    pub summary: serde_json::Value,
+    pub(crate) summary: serde_json::Value,
     /// How it ended.
-    pub outcome: Result<Silent, Error>,
+    pub(crate) outcome: Result<Silent, Error>,
 }
 
 /// An integration point with its stress, tension positive.
-pub struct Point {
-    pub group: String,
-    pub x: f64,
-    pub y: f64,
+pub(crate) struct Point {
+    pub(crate) group: String,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
     /// Components 11, 22, 33, 12.
-    pub stress: [f64; 4],
+    pub(crate) stress: [f64; 4],
 }
 
 type Shelf = HashMap<(String, String), Arc<OnceLock<Arc<Run>>>>;
 static RUNS: LazyLock<Mutex<Shelf>> = LazyLock::new(Mutex::default);
 
 /// Runs a variant, however it ends.
-pub fn run(case: &str, variant: &str) -> Arc<Run> {
+pub(crate) fn run(case: &str, variant: &str) -> Arc<Run> {
     let key = (case.to_owned(), variant.to_owned());
     let place = Arc::clone(RUNS.lock().unwrap().entry(key).or_default());
     Arc::clone(place.get_or_init(|| Arc::new(Run::new(case, variant))))
 }
 
 /// Runs a variant that must reach its end.
-pub fn finished(case: &str, variant: &str) -> Arc<Run> {
+pub(crate) fn finished(case: &str, variant: &str) -> Arc<Run> {
     let run = run(case, variant);
     if let Err(error) = &run.outcome {
         panic!("{case}, {variant}: {error}");
@@ -64,25 +64,29 @@ impl Run {
         let points = file("points.csv");
         Self {
             history: table(&file("history.csv")),
-            points: points.exists().then(|| table(&points)).unwrap_or_default(),
+            points: if points.exists() {
+                table(&points)
+            } else {
+                Vec::new()
+            },
             summary: serde_json::from_str(&summary).unwrap(),
             outcome,
         }
     }
 
     /// Values of a probe in a phase, increment by increment.
-    pub fn probe(&self, phase: &str, name: &str) -> Vec<f64> {
+    pub(crate) fn probe(&self, phase: &str, name: &str) -> Vec<f64> {
         let rows = self.history.iter().filter(|row| row["phase"] == phase);
         rows.map(|row| row[name].parse().unwrap()).collect()
     }
 
     /// A probe at the end of a phase.
-    pub fn end(&self, phase: &str, name: &str) -> f64 {
+    pub(crate) fn end(&self, phase: &str, name: &str) -> f64 {
         *self.probe(phase, name).last().unwrap()
     }
 
     /// All integration points at the end of a phase, from `points.csv`.
-    pub fn points(&self, phase: &str) -> Vec<Point> {
+    pub(crate) fn points(&self, phase: &str) -> Vec<Point> {
         let rows = self.points.iter().filter(|row| row["phase"] == phase);
         rows.map(|row| {
             let number = |column: &str| row[column].parse::<f64>().unwrap();
@@ -98,6 +102,6 @@ impl Run {
 }
 
 /// |a/b − 1| ≤ tolerance.
-pub fn assert_close(a: f64, b: f64, tolerance: f64, what: &str) {
+pub(crate) fn assert_close(a: f64, b: f64, tolerance: f64, what: &str) {
     assert!((a / b - 1.0).abs() <= tolerance, "{what}: {a} against {b}");
 }
