@@ -27,11 +27,9 @@ const FILE: &str = "report.html";
 pub fn default_path(folders: &[PathBuf]) -> PathBuf {
     match folders {
         [folder] => folder.join(FILE),
-        [first, ..] => std::path::absolute(first)
-            .ok()
-            .and_then(|path| path.parent().map(Path::to_owned))
-            .unwrap_or_default()
-            .join(FILE),
+        // `.` and `..` have no parent by name.
+        [first, ..] if first.file_name().is_none() => first.join("..").join(FILE),
+        [first, ..] => first.parent().unwrap_or(first).join(FILE),
         [] => PathBuf::from(FILE),
     }
 }
