@@ -394,16 +394,19 @@ fn refuse_meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Result<(), Strin
             *earlier.entry((joint.group, key(node))).or_default() += 1;
         }
     }
-    // Mid-side nodes are in one edge too, but no line meets another there.
-    for (&node, &count) in uses {
-        for ((_, at), &others) in &earlier {
-            if *at == key(node) && (count == 1 || others == 1) {
-                let [x, y] = mesh.nodes[node];
-                return Err(format!(
-                    "the line meets the line of another `zero_thickness` group at ({x}, {y}) and one \
-                     of them ends there: such lines may cross, but not end on each other"
-                ));
-            }
+    // A node that the earlier line has doubled counts once. Mid-side nodes are in one edge too,
+    // but no line meets another there.
+    let mut new: HashMap<[u64; 2], usize> = HashMap::new();
+    for (&node, count) in uses {
+        *new.entry(key(node)).or_default() += count;
+    }
+    for ((_, at), &others) in &earlier {
+        if new.get(at).is_some_and(|&count| count == 1 || others == 1) {
+            let [x, y] = at.map(f64::from_bits);
+            return Err(format!(
+                "the line meets the line of another `zero_thickness` group at ({x}, {y}) and one \
+                 of them ends there: such lines may cross, but not end on each other"
+            ));
         }
     }
     Ok(())
