@@ -5,6 +5,7 @@
 //! or tied: a combination of others, as the mid-thickness nodes of a thin layer with mean strain.
 
 use crate::group::Group;
+use std::ops::Range;
 
 /// A degree of freedom that follows others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,9 +20,41 @@ pub struct Tie {
 #[derive(Clone, Debug, Default)]
 pub struct Pattern {
     /// Start of every column, and the end.
-    pub column_start: Vec<usize>,
+    pub column_start: Vec<u32>,
     /// Row numbers.
-    pub rows: Vec<usize>,
+    pub rows: Vec<u32>,
+}
+
+impl Pattern {
+    /// Number of rows and columns.
+    pub fn n(&self) -> usize {
+        self.column_start.len() - 1
+    }
+
+    /// Where the entries of a column stand.
+    pub fn places(&self, column: usize) -> Range<usize> {
+        self.column_start[column] as usize..self.column_start[column + 1] as usize
+    }
+
+    /// Rows of a column.
+    pub fn column(&self, column: usize) -> &[u32] {
+        &self.rows[self.places(column)]
+    }
+
+    /// For every entry the place of the one across the diagonal, in a symmetric pattern.
+    pub fn transposed_places(&self) -> Vec<u32> {
+        // Columns are visited in ascending order, so entry after entry of a row is met.
+        let mut next = self.column_start.clone();
+        let mut across = vec![0; self.rows.len()];
+        for column in 0..self.n() {
+            for at in self.places(column) {
+                let next = &mut next[self.rows[at] as usize];
+                across[at] = *next;
+                *next += 1;
+            }
+        }
+        across
+    }
 }
 
 /// Moves forces at tied degrees of freedom to those they follow.
@@ -34,7 +67,7 @@ pub fn fold(ties: &[Tie], force: &mut [f64]) {
     }
 }
 
-/// Unknowns and pattern of one phase.
+/// Unknowns and pattern of one phase, of all groups or of some.
 #[derive(Debug)]
 pub struct System {
     /// Equation of every degree of freedom; `None` if it is prescribed, tied or unused.
@@ -42,8 +75,12 @@ pub struct System {
     /// Degree of freedom of every equation.
     free: Vec<usize>,
     ties: Vec<Tie>,
-    /// Of every group, its elements.
+    /// Of every group, its elements; none of a group that does not take part.
     elements: Vec<Vec<ElementMap>>,
+    /// Degrees of freedom of a domain that stands beside the groups as one dense element.
+    boundary: Vec<usize>,
+    /// Positions in the matrix of every pair of them, column-major.
+    boundary_slots: Vec<u32>,
     /// Pattern of the matrix.
     pub pattern: Pattern,
 }
@@ -60,9 +97,17 @@ struct ElementMap {
 }
 
 impl System {
-    /// Numbers the unknowns: all used degrees of freedom that are neither prescribed nor tied.
-    pub fn new(n_nodes: usize, groups: &[Group], prescribed: &[bool], ties: &[Tie]) -> Self {
-        let n_dofs = 2 * n_nodes;
+    /// Numbers the unknowns of the groups that take part: all degrees of freedom they use that
+    /// are neither prescribed nor tied. A `domain` of other groups that touches them is one dense
+    /// element on the unknowns it shares with them.
+    pub fn new(
+        groups: &[Group],
+        takes_part: impl Fn(&Group) -> bool,
+        prescribed: &[bool],
+        ties: &[Tie],
+        domain: Option<&System>,
+    ) -> Self {
+        let n_dofs = prescribed.len();
         let mut tie_of = vec![None; n_dofs];
         for (i, tie) in ties.iter().enumerate() {
             tie_of[tie.dof] = Some(i);
@@ -70,8 +115,12 @@ impl System {
         let mut elements: Vec<Vec<ElementMap>> = groups
             .iter()
             .map(|group| {
-                let numbers = 0..group.kinematics.n_elements();
-                numbers
+                let n = if takes_part(group) {
+                    group.kinematics.n_elements()
+                } else {
+                    0
+                };
+                (0..n)
                     .map(|e| ElementMap::new(group.kinematics.nodes(e), &tie_of, ties))
                     .collect()
             })
@@ -90,16 +139,48 @@ impl System {
                 free.push(dof);
             }
         }
-        let pattern = Pattern::new(free.len(), &equation, &elements);
+        let is_shared = |dof: &usize| domain.is_some_and(|domain| domain.equation[*dof].is_some());
+        let boundary: Vec<usize> = free.iter().copied().filter(is_shared).collect();
+        let of_elements = elements.iter().flatten().map(|map| map.dofs.as_slice());
+        let all = of_elements.chain([boundary.as_slice()]);
+        let pattern = Pattern::new(free.len(), &equation, all);
         for map in elements.iter_mut().flatten() {
-            map.find_slots(&equation, &pattern);
+            map.slots = find_slots(&map.dofs, &equation, &pattern);
         }
+        // Row-major of the transposed: the same places, column-major.
+        let boundary_slots =
+            transposed(&find_slots(&boundary, &equation, &pattern), boundary.len());
         Self {
             equation,
             free,
             ties: ties.to_vec(),
             elements,
+            boundary,
+            boundary_slots,
             pattern,
+        }
+    }
+
+    /// Whether a group takes part.
+    pub fn includes(&self, group: usize) -> bool {
+        !self.elements[group].is_empty()
+    }
+
+    /// Equation of a degree of freedom.
+    pub fn equation(&self, dof: usize) -> Option<usize> {
+        self.equation[dof]
+    }
+
+    /// Degrees of freedom that the groups share with the domain beside them.
+    pub fn boundary(&self) -> &[usize] {
+        &self.boundary
+    }
+
+    /// Adds the stiffness of the domain beside the groups (column-major, by
+    /// [`Self::boundary`]) to the matrix.
+    pub fn add_domain(&self, stiffness: &[f64], values: &mut [f64]) {
+        for (slot, value) in self.boundary_slots.iter().zip(stiffness) {
+            values[*slot as usize] += value;
         }
     }
 
@@ -130,50 +211,67 @@ impl System {
         fold(&self.ties, force);
     }
 
-    /// The tangent matrix from the groups' tangents. If increments of prescribed displacements
-    /// are given, adds the forces they cause at constant tangent to `coupling`, by equation.
-    pub fn assemble(
-        &self,
-        groups: &[Group],
-        values: &mut Vec<f64>,
-        mut prescribed: Option<(&[f64], &mut [f64])>,
-    ) {
+    /// The tangent matrix from the groups' tangents.
+    pub fn assemble(&self, groups: &[Group], values: &mut Vec<f64>) {
         values.clear();
         values.resize(self.pattern.rows.len(), 0.0);
-        let mut own = Vec::new();
-        let mut tied = Vec::new();
+        let mut matrix = ElementMatrix::default();
         for (group, maps) in groups.iter().zip(&self.elements) {
             for (e, map) in maps.iter().enumerate() {
-                let n_own = 2 * group.kinematics.nodes(e).len();
-                own.resize(n_own * n_own, 0.0);
-                group
-                    .kinematics
-                    .stiffness(e, group.element_tangents(e), &mut own);
-                let n = map.dofs.len();
-                let matrix = match &map.transform {
-                    None => &own,
-                    Some(transform) => {
-                        congruent(&own, transform, n_own, n, &mut tied);
-                        &tied
-                    }
-                };
-                for (slot, value) in map.slots.iter().zip(matrix) {
+                for (slot, value) in map.slots.iter().zip(matrix.of(group, e, map)) {
                     if *slot != u32::MAX {
                         values[*slot as usize] += value;
                     }
                 }
-                if let Some((increment, coupling)) = &mut prescribed {
-                    for i in 0..n {
-                        let Some(row) = self.equation[map.dofs[i]] else {
-                            continue;
-                        };
-                        for j in 0..n {
-                            if self.equation[map.dofs[j]].is_none() {
-                                coupling[row] += matrix[i * n + j] * increment[map.dofs[j]];
-                            }
+            }
+        }
+    }
+
+    /// Adds the forces that increments of prescribed displacements cause at constant tangent to
+    /// `forces`, by equation.
+    pub fn prescribed_forces(&self, groups: &[Group], increment: &[f64], forces: &mut [f64]) {
+        let mut matrix = ElementMatrix::default();
+        for (group, maps) in groups.iter().zip(&self.elements) {
+            for (e, map) in maps.iter().enumerate() {
+                let moves =
+                    |dof: &usize| self.equation[*dof].is_none() && increment[*dof].abs() > 0.0;
+                if !map.dofs.iter().any(moves) {
+                    continue;
+                }
+                let n = map.dofs.len();
+                let matrix = matrix.of(group, e, map);
+                for (i, row) in map.dofs.iter().map(|&dof| self.equation[dof]).enumerate() {
+                    let Some(row) = row else { continue };
+                    for (j, dof) in map.dofs.iter().enumerate() {
+                        if self.equation[*dof].is_none() {
+                            forces[row] += matrix[i * n + j] * increment[*dof];
                         }
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Room for the matrix of one element.
+#[derive(Default)]
+struct ElementMatrix {
+    own: Vec<f64>,
+    tied: Vec<f64>,
+}
+
+impl ElementMatrix {
+    /// An element's tangent matrix by the degrees of freedom of its map, row-major.
+    fn of(&mut self, group: &Group, element: usize, map: &ElementMap) -> &[f64] {
+        let n_own = 2 * group.kinematics.nodes(element).len();
+        self.own.resize(n_own * n_own, 0.0);
+        let tangents = group.element_tangents(element);
+        group.kinematics.stiffness(element, tangents, &mut self.own);
+        match &map.transform {
+            None => &self.own,
+            Some(transform) => {
+                congruent(&self.own, transform, n_own, map.dofs.len(), &mut self.tied);
+                &self.tied
             }
         }
     }
@@ -233,33 +331,46 @@ impl ElementMap {
             slots: Vec::new(),
         }
     }
+}
 
-    fn find_slots(&mut self, equation: &[Option<usize>], pattern: &Pattern) {
-        let n = self.dofs.len();
-        self.slots = vec![u32::MAX; n * n];
-        for (j, &column) in self.dofs.iter().enumerate() {
-            let Some(column) = equation[column] else {
-                continue;
-            };
-            let start = pattern.column_start[column];
-            let rows = &pattern.rows[start..pattern.column_start[column + 1]];
-            for (i, &row) in self.dofs.iter().enumerate() {
-                if let Some(at) = equation[row].and_then(|row| rows.binary_search(&row).ok()) {
-                    self.slots[i * n + j] = (start + at) as u32;
-                }
+/// Positions in the matrix of every pair of degrees of freedom, row-major.
+fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> Vec<u32> {
+    let n = dofs.len();
+    let mut slots = vec![u32::MAX; n * n];
+    for (j, &column) in dofs.iter().enumerate() {
+        let Some(column) = equation[column] else {
+            continue;
+        };
+        let start = pattern.column_start[column];
+        let rows = pattern.column(column);
+        for (i, &row) in dofs.iter().enumerate() {
+            let row = equation[row].map(|row| row as u32);
+            if let Some(at) = row.and_then(|row| rows.binary_search(&row).ok()) {
+                slots[i * n + j] = start + at as u32;
             }
         }
     }
+    slots
+}
+
+/// An n × n matrix with rows and columns exchanged.
+fn transposed(matrix: &[u32], n: usize) -> Vec<u32> {
+    (0..n * n).map(|at| matrix[at % n * n + at / n]).collect()
 }
 
 impl Pattern {
-    fn new(n: usize, equation: &[Option<usize>], elements: &[Vec<ElementMap>]) -> Self {
+    fn new<'a>(
+        n: usize,
+        equation: &[Option<usize>],
+        elements: impl Iterator<Item = &'a [usize]>,
+    ) -> Self {
         // Elements of every column, then their rows, sorted and each once.
-        let mut columns: Vec<Vec<usize>> = vec![Vec::new(); n];
-        for map in elements.iter().flatten() {
-            let equations: Vec<usize> = map.dofs.iter().filter_map(|&dof| equation[dof]).collect();
+        let mut columns: Vec<Vec<u32>> = vec![Vec::new(); n];
+        for dofs in elements {
+            let equations = dofs.iter().filter_map(|&dof| equation[dof]);
+            let equations: Vec<u32> = equations.map(|equation| equation as u32).collect();
             for &column in &equations {
-                columns[column].extend_from_slice(&equations);
+                columns[column as usize].extend_from_slice(&equations);
             }
         }
         let mut pattern = Self {
@@ -270,7 +381,7 @@ impl Pattern {
             rows.sort_unstable();
             rows.dedup();
             pattern.rows.append(&mut rows);
-            pattern.column_start.push(pattern.rows.len());
+            pattern.column_start.push(pattern.rows.len() as u32);
         }
         pattern
     }

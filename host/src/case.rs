@@ -486,6 +486,32 @@ pub struct SolverInput {
     pub max_halvings: u32,
     /// Whether to search along a correction that makes the residual grow.
     pub line_search: bool,
+    /// What becomes of linear groups.
+    pub equations: Equations,
+}
+
+/// How the equations of a phase are set up.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Equations {
+    /// Condensed where that is expected to be faster.
+    #[default]
+    Auto,
+    /// Linear groups are factorised once a phase and condensed onto what they share with the others.
+    Condensed,
+    /// All groups are assembled and factorised at every iteration.
+    Sparse,
+}
+
+impl Equations {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Condensed => "condensed",
+            Self::Sparse => "sparse",
+        }
+    }
 }
 
 /// A tolerance: not below what double precision reaches, and not above the quantity itself.
@@ -519,6 +545,7 @@ impl Default for SolverInput {
             max_iterations: 25,
             max_halvings: 10,
             line_search: true,
+            equations: Equations::Auto,
         }
     }
 }

@@ -205,6 +205,16 @@ impl Group {
         Ok(())
     }
 
+    /// Whether stresses follow strains by one constant matrix.
+    pub fn is_linear(&self) -> bool {
+        self.tangents_are_constant
+    }
+
+    /// Whether the law's tangents are symmetric.
+    pub fn is_symmetric(&self) -> bool {
+        self.law.built.law.formulation().symmetric
+    }
+
     /// A thin layer whose law is an interface law.
     fn uses_layer(&self) -> bool {
         self.layer.is_some() && self.law.built.law.n_components() == 2

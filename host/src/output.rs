@@ -42,8 +42,6 @@ pub struct IncrementRecord {
     pub probes: Vec<Option<f64>>,
     /// Iterations, failed attempts included.
     pub iterations: usize,
-    /// Reactions at its end, while they are needed.
-    pub reaction: Option<Vec<f64>>,
     /// A law called a result inaccurate.
     pub warning: Option<String>,
 }

@@ -1,14 +1,17 @@
 //! Running a case: phases, increments, cut-back and regrowth, results.
 
-use crate::assembly::System;
-use crate::case::{Axis, Case, CaseFile, PhaseInput};
+use crate::assembly::{System, fold};
+use crate::case::{Axis, Case, CaseFile, Equations, PhaseInput};
 use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
+use crate::plugin::Operator;
 use crate::probe::{Probes, Snapshot};
-use crate::solver::{LinearSolver, Loads, Newton, StepFailure, StepSuccess};
+use crate::solver::{
+    LinearDomain, LinearSolver, Loads, Newton, Singular, StepFailure, StepSuccess,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
@@ -31,6 +34,8 @@ const REGROWTH: f64 = 2.0;
 const EASY: usize = 8;
 /// Smallest and largest reduction of a step at a cut-back.
 const CUT: [f64; 2] = [0.1, 0.5];
+/// Residuals below this are round-off, whatever tolerance is asked for.
+const ROUND_OFF: f64 = 1e-12;
 
 /// Checks everything about a case that can be checked without running it.
 ///
@@ -83,6 +88,29 @@ struct Run<'a> {
     time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     largest_force: f64,
+}
+
+/// The equations of one phase.
+#[derive(Debug)]
+struct PhaseEquations {
+    /// Unknowns of the groups that iterate.
+    system: System,
+    /// The groups that do not.
+    domain: Option<LinearDomain>,
+    solver: LinearSolver,
+    /// Forces out of balance at the start, relative to the forces in play.
+    out_of_balance: f64,
+    n_unknowns: usize,
+    /// Displacements at the start of the phase.
+    at_start: Vec<f64>,
+    /// Displacements when the domain's groups were last brought up to date.
+    at_last: Vec<f64>,
+}
+
+impl PhaseEquations {
+    fn n(&self) -> usize {
+        self.n_unknowns
+    }
 }
 
 /// What is left of a model once mesh and groups are taken out.
@@ -167,20 +195,16 @@ impl<'a> Run<'a> {
         let is_prescribed: Vec<bool> = (0..self.displacement.len())
             .map(|dof| self.prescribed.contains_key(&dof))
             .collect();
-        let system = System::new(
-            self.mesh.nodes.len(),
-            &self.groups,
-            &is_prescribed,
-            &self.model.ties,
-        );
-        system.fold(&mut loads.force_start);
-        system.fold(&mut loads.force_end);
-        let imbalance = self.out_of_balance(&system, &mut loads);
-        let mut solver = LinearSolver::new(&system.pattern).map_err(|_| Error::NoEquilibrium {
-            message: format!("phase `{name}`: the equations are singular"),
-            hint: Some("a part of the model is not supported".to_owned()),
-        })?;
-        let mut record = PhaseRecord::new(name, system.n_equations(), imbalance);
+        fold(&self.model.ties, &mut loads.force_start);
+        fold(&self.model.ties, &mut loads.force_end);
+        let mut equations = self
+            .equations(&is_prescribed, &mut loads)
+            .map_err(|Singular| Error::NoEquilibrium {
+                message: format!("phase `{name}`: the equations are singular"),
+                hint: Some("a part of the model is not supported".to_owned()),
+            })?;
+        let imbalance = equations.out_of_balance;
+        let mut record = PhaseRecord::new(name, equations.n(), imbalance);
         if imbalance > 1e-6 {
             observer.warning(&format!(
                 "phase `{name}` starts out of balance: {:.2} % of the forces in play, carried to \
@@ -191,28 +215,23 @@ impl<'a> Run<'a> {
         let outcome = self.increments(
             phase,
             &loads,
-            &system,
-            &mut solver,
+            &mut equations,
             &mut record,
             results,
             observer,
         );
-        record.factorisations = solver.factorisations;
+        record.factorisations =
+            equations.solver.factorisations + u64::from(equations.domain.is_some());
         self.time += 1.0;
         results.phase(record);
         outcome
     }
 
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "the parts of one phase, each used once"
-    )]
     fn increments(
         &mut self,
         phase: &PhaseInput,
         loads: &Loads,
-        system: &System,
-        solver: &mut LinearSolver,
+        equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
         results: &mut Results,
         observer: &mut dyn Observer,
@@ -242,8 +261,7 @@ impl<'a> Run<'a> {
                     lambda + step
                 };
                 let length = end - lambda;
-                let attempt =
-                    self.attempt(loads, [lambda, end], last.as_ref(), system, solver, record);
+                let attempt = self.attempt(loads, [lambda, end], last.as_ref(), equations, record);
                 match attempt {
                     Ok(success) => {
                         results.iterations(&place, end, &success.iterations)?;
@@ -255,10 +273,8 @@ impl<'a> Run<'a> {
                         if success.iterations.len() <= EASY {
                             step = (REGROWTH * step).min(1.0 / n as f64);
                         }
-                        self.accept(&success, loads, end);
-                        system.follow(&mut self.displacement);
+                        self.accept(&success, loads, equations, end);
                         last = Some((length, success.increment));
-                        done.reaction = Some(self.reaction(&success.internal));
                         lambda = end;
                     }
                     Err(failure) => {
@@ -273,12 +289,14 @@ impl<'a> Run<'a> {
                             return Err(Error::plugin(format!("{place}: {defect}")));
                         }
                         if step < smallest {
-                            return Err(Self::no_equilibrium(&place, lambda, n, &failure));
+                            return Err(Self::no_equilibrium(&place, lambda, n, &failure.reason));
                         }
                     }
                 }
             }
-            let reaction = done.reaction.take().unwrap_or_default();
+            let reaction = self
+                .whole(equations, loads, lambda, record)
+                .map_err(|why| Self::no_equilibrium(&place, lambda, n, &why))?;
             let snapshot = Snapshot {
                 groups: &self.groups,
                 ties: &self.model.ties,
@@ -301,8 +319,7 @@ impl<'a> Run<'a> {
         loads: &Loads,
         [from, to]: [f64; 2],
         last: Option<&(f64, Vec<f64>)>,
-        system: &System,
-        solver: &mut LinearSolver,
+        equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
     ) -> Result<StepSuccess, StepFailure> {
         let guess = last.map(|(length, increment)| {
@@ -311,8 +328,9 @@ impl<'a> Run<'a> {
         });
         let settings = &self.case.file.solver;
         let mut newton = Newton::new(
-            system,
-            solver,
+            &equations.system,
+            equations.domain.as_ref(),
+            &mut equations.solver,
             &mut self.groups,
             settings,
             &mut record.costs,
@@ -320,9 +338,21 @@ impl<'a> Run<'a> {
         newton.step(loads, from, to, self.time + from, guess)
     }
 
-    fn accept(&mut self, success: &StepSuccess, loads: &Loads, lambda: f64) {
-        for group in &mut self.groups {
-            group.commit();
+    /// Takes over a step: the groups that took part in it, and the displacements they know.
+    fn accept(
+        &mut self,
+        success: &StepSuccess,
+        loads: &Loads,
+        equations: &mut PhaseEquations,
+        lambda: f64,
+    ) {
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            if equations.system.includes(number) {
+                group.commit();
+            }
+        }
+        if let Some(domain) = &mut equations.domain {
+            domain.follow(&success.increment);
         }
         for (u, increment) in self.displacement.iter_mut().zip(&success.increment) {
             *u += increment;
@@ -339,13 +369,72 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Internal less external forces.
-    fn reaction(&self, internal: &[f64]) -> Vec<f64> {
-        internal
-            .iter()
-            .zip(&self.force)
-            .map(|(internal, external)| internal - external)
-            .collect()
+    /// Completes the state at load factor λ: what a linear domain left out of the iterations, and
+    /// the reactions (internal less external forces, by degree of freedom).
+    ///
+    /// # Errors
+    /// Why the domain is not in equilibrium.
+    fn whole(
+        &mut self,
+        equations: &mut PhaseEquations,
+        loads: &Loads,
+        lambda: f64,
+        record: &mut PhaseRecord,
+    ) -> Result<Vec<f64>, String> {
+        let started = Instant::now();
+        if let Some(domain) = &equations.domain {
+            let mut since_start = vec![0.0; self.displacement.len()];
+            domain.expand(lambda, &mut since_start);
+            for &dof in domain.unknowns() {
+                self.displacement[dof] = equations.at_start[dof] + since_start[dof];
+            }
+            equations.system.follow(&mut self.displacement);
+            let whole = self.displacement.iter().zip(&equations.at_last);
+            let increment: Vec<f64> = whole.map(|(u, last)| u - last).collect();
+            for (number, group) in self.groups.iter_mut().enumerate() {
+                if !equations.system.includes(number) {
+                    group
+                        .evaluate(&increment, Operator::None, self.time, 0.0)
+                        .map_err(|failure| failure.to_string())?;
+                    group.commit();
+                }
+            }
+            equations.at_last.copy_from_slice(&self.displacement);
+        } else {
+            equations.system.follow(&mut self.displacement);
+        }
+        let mut reaction = vec![0.0; self.displacement.len()];
+        for group in &self.groups {
+            group
+                .kinematics
+                .add_forces(&group.stress.committed, &mut reaction);
+        }
+        fold(&self.model.ties, &mut reaction);
+        let mut play = 0.0;
+        for (force, external) in reaction.iter_mut().zip(&self.force) {
+            play += f64::max(*force * *force, external * external);
+            *force -= external;
+        }
+        if let Some(domain) = &equations.domain {
+            // Of what the phase carries to equilibrium in its course, this much is left.
+            let rest = 1.0 - lambda;
+            let of_unknown = |&dof: &usize| reaction[dof] - rest * loads.out_of_balance[dof];
+            let residual: f64 = domain
+                .unknowns()
+                .iter()
+                .map(of_unknown)
+                .map(|r| r * r)
+                .sum();
+            let relative = f64::sqrt(residual) / f64::sqrt(play).max(loads.scale);
+            if relative > self.file().solver.force_tolerance.max(ROUND_OFF) {
+                return Err(format!(
+                    "the condensed equations of the linear groups lose accuracy: residual \
+                     {relative:.1e}; try `equations = \"sparse\"`"
+                ));
+            }
+        }
+        record.costs.laws += started.elapsed();
+        Ok(reaction)
     }
 
     /// Loads of a phase; takes over its changes of constraints.
@@ -396,10 +485,56 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// The equations of a phase, and what is out of balance at its start.
+    fn equations(
+        &mut self,
+        is_prescribed: &[bool],
+        loads: &mut Loads,
+    ) -> Result<PhaseEquations, Singular> {
+        let (groups, ties) = (&self.groups, &self.model.ties);
+        let wanted = self.file().solver.equations;
+        let condensed = if wanted == Equations::Sparse {
+            None
+        } else {
+            // Groups that are held by the others alone cannot be condensed.
+            let always = wanted == Equations::Condensed;
+            LinearDomain::new(groups, is_prescribed, ties, always).unwrap_or(None)
+        };
+        let (system, mut domain) = match condensed {
+            Some((domain, system)) => (system, Some(domain)),
+            None => (
+                System::new(groups, |_| true, is_prescribed, ties, None),
+                None,
+            ),
+        };
+        let all_symmetric = groups
+            .iter()
+            .all(|group| group.is_linear() && group.is_symmetric());
+        let symmetric = domain.is_none() && all_symmetric;
+        let solver = LinearSolver::new(&system.pattern, symmetric)?;
+        let mut unknowns = system.free().to_vec();
+        unknowns.extend(domain.iter().flat_map(|domain| domain.unknowns()));
+        unknowns.sort_unstable();
+        unknowns.dedup();
+        let out_of_balance = self.out_of_balance(&unknowns, loads);
+        if let Some(domain) = &mut domain {
+            domain.start(&self.groups, loads);
+        }
+        Ok(PhaseEquations {
+            system,
+            domain,
+            solver,
+            out_of_balance,
+            n_unknowns: unknowns.len(),
+            at_start: self.displacement.clone(),
+            at_last: self.displacement.clone(),
+        })
+    }
+
     /// Internal less external forces at the start of a phase where nothing holds them (after a
     /// swap of laws, a support given up, an initial stress). Returns their size relative to the
     /// forces in play.
-    fn out_of_balance(&mut self, system: &System, loads: &mut Loads) -> f64 {
+    fn out_of_balance(&mut self, unknowns: &[usize], loads: &mut Loads) -> f64 {
         let n_dofs = self.displacement.len();
         let mut internal = vec![0.0; n_dofs];
         for group in &self.groups {
@@ -407,10 +542,10 @@ impl<'a> Run<'a> {
                 .kinematics
                 .add_forces(&group.stress.committed, &mut internal);
         }
-        system.fold(&mut internal);
+        fold(&self.model.ties, &mut internal);
         loads.out_of_balance = vec![0.0; n_dofs];
         let (mut rest, mut against_end, mut play) = (0.0, 0.0, 0.0);
-        for &dof in system.free() {
+        for &dof in unknowns {
             let difference = internal[dof] - loads.force_start[dof];
             loads.out_of_balance[dof] = difference;
             rest += difference * difference;
@@ -431,12 +566,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn no_equilibrium(place: &Place, lambda: f64, n: usize, failure: &StepFailure) -> Error {
+    fn no_equilibrium(place: &Place, lambda: f64, n: usize, reason: &str) -> Error {
         let reached = lambda * n as f64;
         Error::NoEquilibrium {
             message: format!(
-                "{place}: no equilibrium beyond {reached:.4} of {n} increments\n  last attempt: {}",
-                failure.reason
+                "{place}: no equilibrium beyond {reached:.4} of {n} increments\n  last attempt: {reason}"
             ),
             hint: Some(
                 "results up to the last whole increment in equilibrium are written; \

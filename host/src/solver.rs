@@ -1,7 +1,11 @@
-//! Finding equilibrium: Newton iterations within a step, and the sparse equations they solve.
+//! Finding equilibrium: Newton iterations within a step, the sparse equations they solve, and the
+//! linear part of a model that takes no part in them.
 
 mod linear;
+mod linear_domain;
+mod multifrontal;
 mod newton;
 
 pub use linear::{LinearSolver, Singular};
+pub use linear_domain::LinearDomain;
 pub use newton::{Costs, Iteration, Loads, Newton, StepFailure, StepSuccess};

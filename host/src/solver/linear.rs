@@ -1,5 +1,6 @@
-//! Sparse linear equations, solved by `faer`. All that is known of that crate is here.
+//! Sparse linear equations: which factorisation, and the check of every solution.
 
+use super::multifrontal::{Kind, Multifrontal};
 use crate::assembly::Pattern;
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
@@ -9,15 +10,27 @@ use faer::{ColMut, Par};
 /// Largest backward error of an accepted solution.
 const BACKWARD_ERROR: f64 = 1e-10;
 
-/// Sparse LU with row pivoting; the analysis of the pattern is done once.
+/// Sparse equations of one pattern. A multifrontal factorisation does the work; where its
+/// restricted row exchanges lose accuracy, `faer`'s LU with full row exchanges takes over.
 #[derive(Debug)]
 pub struct LinearSolver {
     pattern: Pattern,
-    symbolic: SymbolicLu<usize>,
+    multifrontal: Multifrontal,
     values: Vec<f64>,
-    factors: Option<Lu<usize, f64>>,
+    /// The last matrix has been factorised by the multifrontal method.
+    factorised: bool,
+    row_exchanges: Option<RowExchanges>,
     /// Numerical factorisations so far.
     pub factorisations: u64,
+    /// How many of them needed full row exchanges.
+    pub fallbacks: u64,
+}
+
+/// The other method.
+#[derive(Debug)]
+struct RowExchanges {
+    symbolic: SymbolicLu<u32>,
+    factors: Option<Lu<u32, f64>>,
 }
 
 /// The matrix is singular, or so close to it that a solution would be noise.
@@ -25,21 +38,24 @@ pub struct LinearSolver {
 pub struct Singular;
 
 impl LinearSolver {
-    /// Analyses a pattern.
+    /// Analyses a pattern. Matrices that are `symmetric` have to be positive definite.
     ///
     /// # Errors
     /// [`Singular`] if the pattern alone makes the matrix singular, or memory runs out.
-    pub fn new(pattern: &Pattern) -> Result<Self, Singular> {
-        // faer's sparse factorisations are slower with threads than without.
-        faer::set_global_parallelism(Par::Seq);
-        let pattern = pattern.clone();
-        let symbolic = SymbolicLu::try_new(symbolic(&pattern)).map_err(|_| Singular)?;
+    pub fn new(pattern: &Pattern, symmetric: bool) -> Result<Self, Singular> {
+        let kind = if symmetric {
+            Kind::Symmetric
+        } else {
+            Kind::Unsymmetric
+        };
         Ok(Self {
-            pattern,
-            symbolic,
+            multifrontal: Multifrontal::new(pattern, kind, &vec![false; pattern.n()])?,
+            pattern: pattern.clone(),
             values: Vec::new(),
-            factors: None,
+            factorised: false,
+            row_exchanges: None,
             factorisations: 0,
+            fallbacks: 0,
         })
     }
 
@@ -50,42 +66,82 @@ impl LinearSolver {
     pub fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
         self.values.clear();
         self.values.extend_from_slice(values);
-        self.factors = None;
-        if self.pattern.rows.is_empty() {
-            return Ok(());
+        if let Some(other) = &mut self.row_exchanges {
+            other.factors = None;
         }
-        let matrix = SparseColMatRef::new(symbolic(&self.pattern), &self.values);
-        let factors =
-            Lu::try_new_with_symbolic(self.symbolic.clone(), matrix).map_err(|_| Singular)?;
         self.factorisations += 1;
-        self.factors = Some(factors);
+        self.factorised = self.multifrontal.factorise(values).is_ok();
+        if self.factorised {
+            Ok(())
+        } else {
+            self.fall_back()
+        }
+    }
+
+    /// Factorises with full row exchanges.
+    fn fall_back(&mut self) -> Result<(), Singular> {
+        // faer's sparse factorisations are slower with threads than without.
+        faer::set_global_parallelism(Par::Seq);
+        self.factorised = false;
+        self.fallbacks += 1;
+        let other = match &mut self.row_exchanges {
+            Some(other) => other,
+            none => none.insert(RowExchanges {
+                symbolic: SymbolicLu::try_new(symbolic(&self.pattern)).map_err(|_| Singular)?,
+                factors: None,
+            }),
+        };
+        let matrix = SparseColMatRef::new(symbolic(&self.pattern), &self.values);
+        let factors = Lu::try_new_with_symbolic(other.symbolic.clone(), matrix);
+        other.factors = Some(factors.map_err(|_| Singular)?);
         Ok(())
     }
 
-    /// Solves for one right-hand side, refines the solution once or twice if that helps, and
-    /// checks its backward error.
+    /// Solves for one right-hand side, refines the solution where that helps, and checks its
+    /// backward error.
     ///
     /// # Errors
-    /// [`Singular`] if no factors are at hand or the solution is not one.
-    pub fn solve(&self, right: &[f64]) -> Result<Vec<f64>, Singular> {
-        let mut x = right.to_vec();
-        if self.pattern.rows.is_empty() {
-            return Ok(x);
+    /// [`Singular`] if the matrix was never factorised or the solution is not one.
+    pub fn solve(&mut self, right: &[f64]) -> Result<Vec<f64>, Singular> {
+        if self.factorised {
+            if let Ok(x) = self.refined(right) {
+                return Ok(x);
+            }
+            self.fall_back()?;
         }
-        let factors = self.factors.as_ref().ok_or(Singular)?;
-        factors.solve_in_place(ColMut::from_slice_mut(&mut x));
+        self.refined(right)
+    }
+
+    fn refined(&self, right: &[f64]) -> Result<Vec<f64>, Singular> {
+        let mut x = self.solve_once(right)?;
         for _ in 0..3 {
-            let (mut residual, error) = self.residual(right, &x);
+            let (residual, error) = self.residual(right, &x);
             if !error.is_finite() {
                 return Err(Singular);
             }
             if error <= BACKWARD_ERROR {
                 return Ok(x);
             }
-            factors.solve_in_place(ColMut::from_slice_mut(&mut residual));
-            x.iter_mut().zip(&residual).for_each(|(x, r)| *x += r);
+            let correction = self.solve_once(&residual)?;
+            x.iter_mut().zip(&correction).for_each(|(x, r)| *x += r);
         }
         Err(Singular)
+    }
+
+    fn solve_once(&self, right: &[f64]) -> Result<Vec<f64>, Singular> {
+        if self.factorised {
+            let (y, kept) = self.multifrontal.forward(right);
+            return Ok(self.multifrontal.backward(&y, &kept));
+        }
+        let other = self
+            .row_exchanges
+            .as_ref()
+            .and_then(|other| other.factors.as_ref());
+        let mut x = right.to_vec();
+        other
+            .ok_or(Singular)?
+            .solve_in_place(ColMut::from_slice_mut(&mut x));
+        Ok(x)
     }
 
     /// b − A x, and the backward error ‖b − A x‖ / (‖A‖‖x‖ + ‖b‖) in maximum norms.
@@ -93,8 +149,8 @@ impl LinearSolver {
         let mut residual = right.to_vec();
         let mut row_sums = vec![0.0; right.len()];
         for column in 0..right.len() {
-            for at in self.pattern.column_start[column]..self.pattern.column_start[column + 1] {
-                let row = self.pattern.rows[at];
+            for at in self.pattern.places(column) {
+                let row = self.pattern.rows[at] as usize;
                 residual[row] -= self.values[at] * x[column];
                 row_sums[row] += self.values[at].abs();
             }
@@ -111,8 +167,9 @@ impl LinearSolver {
     }
 }
 
-fn symbolic(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, usize> {
-    let n = pattern.column_start.len() - 1;
+/// The pattern in faer's terms.
+fn symbolic(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, u32> {
+    let n = pattern.n();
     SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_start, None, &pattern.rows)
 }
 
@@ -129,7 +186,7 @@ mod tests {
 
     #[test]
     fn solves_an_unsymmetric_system() {
-        let mut solver = LinearSolver::new(&two_by_two()).unwrap();
+        let mut solver = LinearSolver::new(&two_by_two(), false).unwrap();
         // Columns (4, 1), (2, 3).
         solver.factorise(&[4.0, 1.0, 2.0, 3.0]).unwrap();
         let x = solver.solve(&[8.0, 7.0]).unwrap();
@@ -137,8 +194,35 @@ mod tests {
     }
 
     #[test]
+    fn falls_back_to_full_row_exchanges() {
+        // A zero on the diagonal, in a pivot block of its own: rows must be exchanged across.
+        let n = 60;
+        let mut pattern = Pattern {
+            column_start: vec![0],
+            rows: Vec::new(),
+        };
+        let mut values = Vec::new();
+        for column in 0..n {
+            for row in [column ^ 1, column] {
+                pattern.rows.push(row as u32);
+                values.push(if row == column { 1e-30 } else { 2.0 });
+            }
+            let start = pattern.rows.len() - 2;
+            if column % 2 == 0 {
+                pattern.rows.swap(start, start + 1);
+                values.swap(start, start + 1);
+            }
+            pattern.column_start.push(pattern.rows.len() as u32);
+        }
+        let mut solver = LinearSolver::new(&pattern, false).unwrap();
+        solver.factorise(&values).unwrap();
+        let x = solver.solve(&vec![1.0; n]).unwrap();
+        assert!(x.iter().all(|x| (x - 0.5).abs() < 1e-15));
+    }
+
+    #[test]
     fn refuses_a_singular_system() {
-        let mut solver = LinearSolver::new(&two_by_two()).unwrap();
+        let mut solver = LinearSolver::new(&two_by_two(), false).unwrap();
         let refused =
             solver.factorise(&[1.0, 2.0, 2.0, 4.0]).is_err() || solver.solve(&[1.0, 1.0]).is_err();
         assert!(refused);

@@ -1,6 +1,7 @@
 //! Full Newton iterations with consistent tangents and a line search.
 
 use super::linear::LinearSolver;
+use super::linear_domain::LinearDomain;
 use crate::assembly::System;
 use crate::case::SolverInput;
 use crate::group::{Group, PointFailure};
@@ -34,7 +35,7 @@ pub struct Loads {
 
 impl Loads {
     /// External forces and what is left of the forces out of balance.
-    fn external(&self, lambda: f64) -> Vec<f64> {
+    pub fn external(&self, lambda: f64) -> Vec<f64> {
         let ends = self.force_start.iter().zip(&self.force_end);
         ends.zip(&self.out_of_balance)
             .map(|((start, end), rest)| start + lambda * (end - start) + (1.0 - lambda) * rest)
@@ -108,6 +109,8 @@ pub struct StepFailure {
 pub struct Newton<'a> {
     /// Unknowns.
     system: &'a System,
+    /// Linear groups that stand beside the system as one element.
+    domain: Option<&'a LinearDomain>,
     /// Equations.
     solver: &'a mut LinearSolver,
     /// Elements and their state.
@@ -118,6 +121,8 @@ pub struct Newton<'a> {
     costs: &'a mut Costs,
     scale: f64,
     largest_stiffness: f64,
+    /// Forces of the domain at the end of the step if its boundary stays where it is.
+    domain_forces: Vec<f64>,
 }
 
 /// Internal forces, residual by equation, and the residual's norm relative to the forces in play.
@@ -134,6 +139,7 @@ impl<'a> Newton<'a> {
     /// Iterations on these elements and equations.
     pub fn new(
         system: &'a System,
+        domain: Option<&'a LinearDomain>,
         solver: &'a mut LinearSolver,
         groups: &'a mut [Group],
         settings: &'a SolverInput,
@@ -141,12 +147,14 @@ impl<'a> Newton<'a> {
     ) -> Self {
         Self {
             system,
+            domain,
             solver,
             groups,
             settings,
             costs,
             scale: 0.0,
             largest_stiffness: 0.0,
+            domain_forces: Vec::new(),
         }
     }
 
@@ -164,6 +172,9 @@ impl<'a> Newton<'a> {
         guess: Option<Vec<f64>>,
     ) -> Result<StepSuccess, StepFailure> {
         self.scale = loads.scale;
+        if let Some(domain) = self.domain {
+            self.domain_forces = domain.forces(lambda_end);
+        }
         let mut iterations = Vec::new();
         let outcome = self.iterate(
             loads,
@@ -277,10 +288,15 @@ impl<'a> Newton<'a> {
     ) -> Result<Vec<f64>, StepFailure> {
         let start = Instant::now();
         let mut values = Vec::new();
+        self.system.assemble(self.groups, &mut values);
+        if let Some(domain) = self.domain {
+            self.system.add_domain(domain.stiffness(), &mut values);
+        }
         let mut coupling = vec![0.0; residual.len()];
-        let with_coupling = prescribed.map(|p| (p, coupling.as_mut_slice()));
-        self.system
-            .assemble(self.groups, &mut values, with_coupling);
+        if let Some(increment) = prescribed {
+            self.system
+                .prescribed_forces(self.groups, increment, &mut coupling);
+        }
         let largest = values
             .iter()
             .fold(0.0_f64, |largest, value| largest.max(value.abs()));
@@ -370,7 +386,10 @@ impl<'a> Newton<'a> {
         self.costs.evaluations += 1;
         let mut internal = vec![0.0; increment.len()];
         let mut unreliable = None;
-        for group in &mut *self.groups {
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            if !self.system.includes(number) {
+                continue;
+            }
             let success = group.evaluate(increment, Operator::Consistent, time, time_increment)?;
             group
                 .kinematics
@@ -380,6 +399,17 @@ impl<'a> Newton<'a> {
                 .map(|(_, why)| format!("group `{}`: {why}", group.name)));
         }
         self.system.fold(&mut internal);
+        // Forces in play are those of the groups: together with the domain's they cancel out.
+        let of_groups = norm(&internal);
+        if let Some(domain) = self.domain {
+            let boundary = self.system.boundary();
+            let moved: Vec<f64> = boundary.iter().map(|&dof| increment[dof]).collect();
+            let mut forces = self.domain_forces.clone();
+            domain.add_product(&moved, &mut forces);
+            for (&dof, force) in boundary.iter().zip(forces) {
+                internal[dof] += force;
+            }
+        }
         let residual: Vec<f64> = self
             .system
             .free()
@@ -387,7 +417,7 @@ impl<'a> Newton<'a> {
             .map(|&dof| external[dof] - internal[dof])
             .collect();
         let imposed = norm(external).max(self.scale);
-        let scale = norm(&internal).max(imposed);
+        let scale = of_groups.max(imposed);
         let size = norm(&residual);
         let relative = if scale > 0.0 { size / scale } else { 0.0 };
         // Only where no force has ever acted: a load must be measured against itself.
