@@ -1,23 +1,30 @@
 //! The part of a model whose laws are linear: assembled and factorised once in a phase, and
 //! condensed onto the unknowns it shares with the rest.
 //!
-//! Counted from the start of the phase, with loads proportional to λ, its equations are
+//! Its equations between two states of equilibrium, with loads proportional to λ, are
 //!
-//! - K_ii u_i + K_ib u_b = r_i(λ), K_bi u_i + K_bb u_b = r_b(λ) + f_b (1)
+//! - K_ii Δu_i + K_ib Δu_b = Δλ r_i, K_bi Δu_i + K_bb Δu_b = Δλ r_b + Δf_b (1)
 //!
 //! with interior unknowns i, boundary unknowns b, and forces f_b from the elements beyond the
-//! boundary. The right-hand sides are r(λ) = r₀ + λ r₁: external forces less the internal ones at
-//! the start of the phase less those of the prescribed displacements. Eliminating u_i leaves
+//! boundary. r are the external forces of the phase less those of its prescribed displacements.
+//! Eliminating Δu_i leaves
 //!
-//! - S u_b = r_b' (λ) + f_b, r' = r_b − K_bi K_ii⁻¹ r_i (2)
+//! - S Δu_b = Δλ r' + Δf_b, r' = r_b − K_bi K_ii⁻¹ r_i (2)
 //!
-//! which is all that the iterations see. u_i follows from the first of (1) when it is wanted.
+//! which is all that the iterations see. Δu_i follows from the first of (1) when it is wanted.
+//! Everything is counted from the last state that was completed, so round-off does not add up.
 
 use super::Singular;
 use super::multifrontal::{Kind, Multifrontal};
-use super::newton::Loads;
+use super::newton::{Loads, norm};
 use crate::assembly::{System, Tie};
 use crate::group::Group;
+use crate::plugin::Operator;
+
+/// Corrections of a complete state, at most.
+const REFINEMENTS: usize = 3;
+/// The residual of a complete state is brought this far below its tolerance if it can be.
+const REFINED: f64 = 1e-2;
 
 /// The linear part of a model during one phase.
 #[derive(Debug)]
@@ -26,11 +33,16 @@ pub struct LinearDomain {
     factors: Multifrontal,
     /// Degrees of freedom of the boundary, in the order of the Schur complement.
     boundary: Vec<usize>,
-    /// L⁻¹ r_i for λ⁰ and λ¹.
-    y: [Vec<f64>; 2],
-    /// r' for λ⁰ and λ¹.
-    condensed: [Vec<f64>; 2],
-    /// Displacements of the boundary since the start of the phase.
+    /// Of every unknown, whether it is one of them.
+    on_boundary: Vec<bool>,
+    /// L⁻¹ r_i.
+    y: Vec<f64>,
+    /// r'.
+    condensed: Vec<f64>,
+    /// The last complete state: its load factor, and the internal forces on the boundary.
+    lambda: f64,
+    forces: Vec<f64>,
+    /// Displacements of the boundary since then.
     moved: Vec<f64>,
 }
 
@@ -90,10 +102,13 @@ impl LinearDomain {
         let domain = Self {
             moved: vec![0.0; boundary.len()],
             boundary,
+            on_boundary: kept,
             factors,
             system,
-            y: Default::default(),
-            condensed: Default::default(),
+            y: Vec::new(),
+            condensed: Vec::new(),
+            lambda: 0.0,
+            forces: Vec::new(),
         };
         Ok(Some((domain, rest)))
     }
@@ -103,58 +118,55 @@ impl LinearDomain {
         self.factors.schur()
     }
 
-    /// Sets up the right-hand sides of a phase that starts from the groups' committed state.
+    /// Sets up a phase that starts from the groups' committed state.
     pub fn start(&mut self, groups: &[Group], loads: &Loads) {
         let n_dofs = self.system.n_dofs();
-        let mut internal = vec![0.0; n_dofs];
-        for (number, group) in groups.iter().enumerate() {
-            if self.system.includes(number) {
-                group
-                    .kinematics
-                    .add_forces(&group.stress.committed, &mut internal);
-            }
-        }
-        self.system.fold(&mut internal);
         let mut prescribed = vec![0.0; n_dofs];
         for &(dof, start, end) in &loads.prescribed {
             prescribed[dof] = end - start;
         }
-        let n = self.system.n_equations();
-        let mut by_prescribed = vec![0.0; n];
+        let mut right = vec![0.0; self.system.n_equations()];
         self.system
-            .prescribed_forces(groups, &prescribed, &mut by_prescribed);
+            .prescribed_forces(groups, &prescribed, &mut right);
         let (at_start, at_end) = (loads.external(0.0), loads.external(1.0));
-        let mut is_boundary = vec![false; n_dofs];
-        self.boundary
-            .iter()
-            .for_each(|&dof| is_boundary[dof] = true);
-        let mut constant = vec![0.0; n];
-        let mut slope = vec![0.0; n];
-        for (equation, &dof) in self.system.free().iter().enumerate() {
-            constant[equation] = -internal[dof];
-            slope[equation] = -by_prescribed[equation];
+        let unknowns = self.system.free().iter().zip(&self.on_boundary);
+        for (right, (&dof, on_boundary)) in right.iter_mut().zip(unknowns) {
+            *right = -*right;
             // External forces on the boundary are left to the equations of the rest.
-            if !is_boundary[dof] {
-                constant[equation] += at_start[dof];
-                slope[equation] += at_end[dof] - at_start[dof];
+            if !on_boundary {
+                *right += at_end[dof] - at_start[dof];
             }
         }
-        let (y_0, condensed_0) = self.factors.forward(&constant);
-        let (y_1, condensed_1) = self.factors.forward(&slope);
-        self.y = [y_0, y_1];
-        self.condensed = [condensed_0, condensed_1];
+        (self.y, self.condensed) = self.factors.forward(&right);
+        let internal = self.internal(groups, |group| &group.stress.committed);
+        self.complete(0.0, &internal);
+    }
+
+    /// Internal forces of the domain's groups under a stress of theirs, by degree of freedom.
+    fn internal(&self, groups: &[Group], stress: impl Fn(&Group) -> &[f64]) -> Vec<f64> {
+        let mut internal = vec![0.0; self.system.n_dofs()];
+        for (number, group) in groups.iter().enumerate() {
+            if self.system.includes(number) {
+                group.kinematics.add_forces(stress(group), &mut internal);
+            }
+        }
+        self.system.fold(&mut internal);
+        internal
+    }
+
+    /// Counts from this state on: a load factor, and the internal forces of the domain's groups.
+    fn complete(&mut self, lambda: f64, internal: &[f64]) {
+        self.lambda = lambda;
+        self.forces = self.boundary.iter().map(|&dof| internal[dof]).collect();
         self.moved.fill(0.0);
     }
 
-    /// Internal forces on the boundary at load factor λ if it stays where it is, by
-    /// [`System::boundary`].
-    pub fn forces(&self, lambda: f64) -> Vec<f64> {
-        let [constant, slope] = &self.condensed;
-        let mut forces: Vec<f64> = constant
-            .iter()
-            .zip(slope)
-            .map(|(c, s)| -(c + lambda * s))
-            .collect();
+    /// Internal forces on the boundary at load factor λ if it stays where it is, in the order of
+    /// the system's boundary.
+    pub fn forces_at(&self, lambda: f64) -> Vec<f64> {
+        let rise = lambda - self.lambda;
+        let forces = self.forces.iter().zip(&self.condensed);
+        let mut forces: Vec<f64> = forces.map(|(force, r)| force - rise * r).collect();
         self.add_product(&self.moved, &mut forces);
         forces
     }
@@ -176,25 +188,78 @@ impl LinearDomain {
         }
     }
 
-    /// Displacements since the start of the phase at load factor λ, by degree of freedom: all
-    /// unknowns of the domain. Others are left alone.
-    pub fn expand(&self, lambda: f64, displacement: &mut [f64]) {
-        let [y_0, y_1] = &self.y;
-        let y: Vec<f64> = y_0.iter().zip(y_1).map(|(a, b)| a + lambda * b).collect();
-        let values = self.factors.backward(&y, &self.moved);
-        for (&dof, value) in self.system.free().iter().zip(values) {
-            displacement[dof] = value;
-        }
-    }
-
-    /// Degrees of freedom of the unknowns in the interior.
-    pub fn interior(&self) -> impl Iterator<Item = usize> {
-        let on_boundary = |dof: &usize| self.boundary.binary_search(dof).is_ok();
-        self.system
+    /// Brings the domain's groups from the last complete state to load factor λ and to where the
+    /// boundary is, and makes that the last complete state. `increment` holds the displacements
+    /// since then, by degree of freedom; those of the unknowns are filled in here.
+    ///
+    /// # Errors
+    /// Why the groups are not in equilibrium.
+    pub fn bring_up(
+        &mut self,
+        groups: &mut [Group],
+        loads: &Loads,
+        lambda: f64,
+        increment: &mut [f64],
+        tolerance: f64,
+    ) -> Result<(), String> {
+        let external = loads.external(lambda);
+        let rise = lambda - self.lambda;
+        let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
+        for (&dof, value) in self
+            .system
             .free()
             .iter()
-            .copied()
-            .filter(move |dof| !on_boundary(dof))
+            .zip(self.factors.backward(&y, &self.moved))
+        {
+            increment[dof] = value;
+        }
+        let mut tries = 0..REFINEMENTS;
+        let internal = loop {
+            self.system.follow(increment);
+            for (number, group) in groups.iter_mut().enumerate() {
+                if self.system.includes(number) {
+                    group
+                        .evaluate(increment, Operator::None, 0.0, 0.0)
+                        .map_err(|failure| failure.to_string())?;
+                }
+            }
+            let internal = self.internal(groups, |group| &group.stress.trial);
+            let left = |(&dof, held): (&usize, &bool)| {
+                if *held {
+                    0.0
+                } else {
+                    external[dof] - internal[dof]
+                }
+            };
+            let dofs = self.system.free().iter().zip(&self.on_boundary);
+            let residual: Vec<f64> = dofs.map(left).collect();
+            let relative =
+                norm(&residual) / norm(&internal).max(loads.scale).max(f64::MIN_POSITIVE);
+            if relative <= REFINED * tolerance {
+                break internal;
+            }
+            if tries.next().is_none() {
+                if relative <= tolerance {
+                    break internal;
+                }
+                return Err(format!(
+                    "the condensed equations of the linear groups lose accuracy: residual \
+                     {relative:.1e}, tolerance {tolerance:.1e}; try `equations = \"sparse\"`"
+                ));
+            }
+            let (y, _) = self.factors.forward(&residual);
+            let correction = self.factors.backward(&y, &vec![0.0; self.boundary.len()]);
+            for (&dof, value) in self.system.free().iter().zip(correction) {
+                increment[dof] += value;
+            }
+        };
+        for (number, group) in groups.iter_mut().enumerate() {
+            if self.system.includes(number) {
+                group.commit();
+            }
+        }
+        self.complete(lambda, &internal);
+        Ok(())
     }
 
     /// Degrees of freedom of the domain's unknowns, boundary included.

@@ -14,7 +14,7 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 const EXACT: f64 = 1e-3;
-/// Round-off of K u, relative to the largest entry of K and the norm of u.
+/// Round-off of K u, relative to the forces it is the difference of.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 /// Loads over a phase, as functions of the load factor λ from 0 to 1.
@@ -130,8 +130,6 @@ struct Balance {
     internal: Vec<f64>,
     residual: Vec<f64>,
     relative: f64,
-    /// The residual is no more than round-off of K u.
-    at_round_off: bool,
     unreliable: Option<String>,
 }
 
@@ -173,7 +171,7 @@ impl<'a> Newton<'a> {
     ) -> Result<StepSuccess, StepFailure> {
         self.scale = loads.scale;
         if let Some(domain) = self.domain {
-            self.domain_forces = domain.forces(lambda_end);
+            self.domain_forces = domain.forces_at(lambda_end);
         }
         let mut iterations = Vec::new();
         let outcome = self.iterate(
@@ -229,7 +227,7 @@ impl<'a> Newton<'a> {
                 && last
                     .correction
                     .is_some_and(|c| c <= self.settings.displacement_tolerance);
-            let small_residual = balance.relative <= tolerance || balance.at_round_off;
+            let small_residual = balance.relative <= tolerance;
             if balance.relative <= EXACT * tolerance || (small_residual && small_correction) {
                 return Ok(StepSuccess {
                     increment,
@@ -399,8 +397,8 @@ impl<'a> Newton<'a> {
                 .map(|(_, why)| format!("group `{}`: {why}", group.name)));
         }
         self.system.fold(&mut internal);
-        // Forces in play are those of the groups: together with the domain's they cancel out.
-        let of_groups = norm(&internal);
+        // Forces in play before those of the domain cancel them out.
+        let in_play = norm(&internal);
         if let Some(domain) = self.domain {
             let boundary = self.system.boundary();
             let moved: Vec<f64> = boundary.iter().map(|&dof| increment[dof]).collect();
@@ -417,24 +415,28 @@ impl<'a> Newton<'a> {
             .map(|&dof| external[dof] - internal[dof])
             .collect();
         let imposed = norm(external).max(self.scale);
-        let scale = of_groups.max(imposed);
+        // Where no force has ever acted, what is below round-off of K u counts as none.
+        let floor = if imposed > 0.0 {
+            0.0
+        } else {
+            let cancelling = self.largest_stiffness * norm(increment) + norm(&self.domain_forces);
+            ROUND_OFF * cancelling / self.settings.force_tolerance
+        };
+        let scale = in_play.max(imposed).max(floor);
         let size = norm(&residual);
         let relative = if scale > 0.0 { size / scale } else { 0.0 };
-        // Only where no force has ever acted: a load must be measured against itself.
-        let at_round_off =
-            imposed <= 0.0 && size <= ROUND_OFF * self.largest_stiffness * norm(increment);
         self.costs.laws += start.elapsed();
         Ok(Balance {
             internal,
             residual,
             relative,
-            at_round_off,
             unreliable,
         })
     }
 }
 
-fn norm(v: &[f64]) -> f64 {
+/// 2-norm.
+pub(super) fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
