@@ -41,6 +41,9 @@ enum Command {
     Point {
         /// A driver file.
         driver: PathBuf,
+        /// Run only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
         /// File for the table; standard output if left out.
         #[arg(long)]
         csv: Option<PathBuf>,
@@ -91,7 +94,11 @@ fn main() -> ExitCode {
 fn execute(command: Command) -> Result<(), Error> {
     match command {
         Command::Run { case, variant, out } => run_cases(&case, variant.as_deref(), out.as_deref()),
-        Command::Point { driver, csv } => run_point(&driver, csv.as_deref()),
+        Command::Point {
+            driver,
+            variant,
+            csv,
+        } => run_point(&driver, variant.as_deref(), csv.as_deref()),
         Command::Report { folders, out } => write_report(&folders, out),
         Command::Laws { id } => show_laws(id.as_deref()),
     }
@@ -155,11 +162,9 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
     outcome
 }
 
-/// The table goes to standard output or a file, the report to the error stream.
-fn run_point(driver: &Path, csv: Option<&Path>) -> Result<(), Error> {
-    let report = host::point::run_file(driver, csv)?;
-    eprint!("{report}");
-    Ok(())
+/// Tables go to standard output or files, what came out of each driver to the error stream.
+fn run_point(driver: &Path, variant: Option<&str>, csv: Option<&Path>) -> Result<(), Error> {
+    host::point::run_file_variants(driver, variant, csv, |report| eprintln!("{report}"))
 }
 
 fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
