@@ -155,6 +155,8 @@ impl Results {
             .chain(probes.names())
             .chain(["iterations"]);
         let log_path = folder.join("log.jsonl");
+        let summary = Summary::new(case, model, probes);
+        write_summary(folder, &summary.running())?;
         Ok(Self {
             history: Table::create(folder.join("history.csv"), columns)?,
             profile: Profile::create(folder, settings.profile, model)?,
@@ -164,7 +166,7 @@ impl Results {
                 file: create(&log_path)?,
                 path: log_path,
             },
-            summary: Summary::new(case, model, probes),
+            summary,
             figures: Figures::new(
                 &case.file.title,
                 &case.file.figures,
@@ -272,7 +274,7 @@ impl Results {
                 "reason": warning,
             }))?;
         }
-        self.summary.last_increment(place, &record.probes);
+        self.summary.last_increment(place, record);
         self.figures.increment(place, &record.probes);
         self.figures.cuts(place, of, snapshot.groups);
         self.seconds += start.elapsed();
@@ -289,7 +291,13 @@ impl Results {
         &self.figures
     }
 
-    /// Writes the summary; the run's error, if there is one, goes into it.
+    /// Warnings about results that laws call inaccurate, one for each phase that has any.
+    pub fn unreliable(&self) -> Vec<String> {
+        self.summary.unreliable()
+    }
+
+    /// Draws the figures and writes the summary; the run's error, if there is one, and its
+    /// warnings go into it.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
@@ -297,18 +305,26 @@ impl Results {
         &mut self,
         groups: &[Group],
         total: Duration,
+        warnings: &[String],
         error: Option<&Error>,
     ) -> Result<(), Error> {
-        self.figures.draw(&self.folder)?;
-        let summary = self.summary.finish(groups, total, self.seconds, error);
+        let drawn = self.figures.draw(&self.folder);
+        let summary = self
+            .summary
+            .finish(groups, [total, self.seconds], warnings, error);
         self.log
             .line(&json!({ "event": "end", "status": summary["status"] }))?;
-        let path = self.folder.join("summary.json");
-        // Written whole or not at all.
-        let partial = self.folder.join("summary.json.part");
-        let text = serde_json::to_string_pretty(&summary)
-            .map_err(|error| Error::Internal(error.to_string()))?;
-        std::fs::write(&partial, text + "\n").map_err(|error| unwritable(&partial, error))?;
-        std::fs::rename(&partial, &path).map_err(|error| unwritable(&path, error))
+        write_summary(&self.folder, &summary)?;
+        drawn
     }
+}
+
+/// Writes the summary whole or not at all.
+fn write_summary(folder: &Path, summary: &Value) -> Result<(), Error> {
+    let path = folder.join("summary.json");
+    let partial = folder.join("summary.json.part");
+    let text = serde_json::to_string_pretty(summary)
+        .map_err(|error| Error::Internal(error.to_string()))?;
+    std::fs::write(&partial, text + "\n").map_err(|error| unwritable(&partial, error))?;
+    std::fs::rename(&partial, &path).map_err(|error| unwritable(&path, error))
 }
