@@ -1,9 +1,10 @@
 //! Results in a folder: `history.csv`, `profile.csv`, `points.csv`, `fields.pvd` with `*.vtu`,
 //! `summary.json`, `log.jsonl`. Rows are flushed as increments converge, so whatever was reported
-//! is on disk.
+//! is on disk. What an earlier run left in the folder is removed first.
 
 mod fields;
 mod figure;
+mod leftovers;
 mod points;
 mod profile;
 mod summary;
@@ -138,7 +139,7 @@ impl LogFile {
 }
 
 impl Results {
-    /// Creates the folder and its files.
+    /// Creates the folder and its files, and removes those of an earlier run.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
@@ -149,6 +150,7 @@ impl Results {
         probes: &Probes,
     ) -> Result<Self, Error> {
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
+        leftovers::remove(folder)?;
         let settings = case.file.output;
         let columns = ["phase", "increment", "time"]
             .into_iter()
@@ -317,6 +319,24 @@ impl Results {
         write_summary(&self.folder, &summary)?;
         drawn
     }
+}
+
+/// Removes from the common folder of a case's variants what an earlier run of them wrote there:
+/// figures over all of them, and their comparison.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    let is_figure = |stem: &str| {
+        let mut figures = case.file.figures.iter();
+        figures.any(|figure| figure.name.get_ref() == stem)
+    };
+    leftovers::remove_if(folder, |name| {
+        name == "report.html" || name.strip_suffix(".svg").is_some_and(is_figure)
+    })
 }
 
 /// Writes the summary whole or not at all.
