@@ -88,8 +88,9 @@ fn refuses_a_variant_that_there_is_not() {
         let outcome = place.run(&[command, "file.toml", "--variant", "smoth"]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
         assert!(
-            outcome
-                .says("there is no variant `smoth`: did you mean `smooth`? There is: rough, smooth"),
+            outcome.says(
+                "there is no variant `smoth`: did you mean `smooth`? There is: rough, smooth"
+            ),
             "{}",
             outcome.stderr
         );
