@@ -146,9 +146,10 @@ impl Summary {
             let first =
                 first.map(|(p, why)| format!("; first in increment {}: {why}", p.increment));
             format!(
-                "phase `{}`: {} steps with results that a law calls inaccurate{}",
+                "phase `{}`: {} step{} with results that a law calls inaccurate{}",
                 phase.name,
                 phase.unreliable,
+                if phase.unreliable == 1 { "" } else { "s" },
                 first.unwrap_or_default()
             )
         };
@@ -444,4 +445,51 @@ fn law(built: &BuiltLaw) -> Value {
         "internal_variables": variables,
         "warnings": built.warnings,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inaccurate_results_are_one_warning_a_phase() {
+        let mut summary = Summary {
+            head: Map::new(),
+            probe_names: Vec::new(),
+            phases: Vec::new(),
+            last: None,
+            unreliable: Vec::new(),
+        };
+        for (phase, increment, warning) in [
+            ("a", 1, None),
+            ("a", 2, Some("slow")),
+            ("a", 3, Some("slower")),
+            ("b", 1, None),
+            ("c", 4, Some("odd")),
+        ] {
+            let place = Place {
+                phase: phase.to_owned(),
+                increment,
+            };
+            let record = IncrementRecord {
+                warning: warning.map(str::to_owned),
+                ..IncrementRecord::default()
+            };
+            summary.last_increment(&place, &record);
+        }
+        for (phase, unreliable) in [("a", 3), ("b", 0), ("c", 1)] {
+            summary.phase(PhaseRecord {
+                unreliable,
+                ..PhaseRecord::new(phase, 0, 0.0)
+            });
+        }
+        let what = "with results that a law calls inaccurate; first in increment";
+        assert_eq!(
+            summary.unreliable(),
+            [
+                format!("phase `a`: 3 steps {what} 2: slow"),
+                format!("phase `c`: 1 step {what} 4: odd"),
+            ]
+        );
+    }
 }
