@@ -1,4 +1,5 @@
 //! `pilum point`: a driver file with variants, all of them or one.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, DONE, Outcome, Place};
 use tests::case::table;
