@@ -8,7 +8,7 @@
 use clap::{Parser, Subcommand};
 use host::case::Case;
 use host::error::{Error, Place, suggestion};
-use host::output::Figures;
+use host::output::{Figures, remove_comparison};
 use host::plugin::SearchPath;
 use host::run::{Observer, check, run};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -41,6 +41,9 @@ enum Command {
     Point {
         /// A driver file.
         driver: PathBuf,
+        /// Run only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
         /// File for the table; standard output if left out.
         #[arg(long)]
         csv: Option<PathBuf>,
@@ -91,14 +94,18 @@ fn main() -> ExitCode {
 fn execute(command: Command) -> Result<(), Error> {
     match command {
         Command::Run { case, variant, out } => run_cases(&case, variant.as_deref(), out.as_deref()),
-        Command::Point { driver, csv } => run_point(&driver, csv.as_deref()),
+        Command::Point {
+            driver,
+            variant,
+            csv,
+        } => run_point(&driver, variant.as_deref(), csv.as_deref()),
         Command::Report { folders, out } => write_report(&folders, out),
         Command::Laws { id } => show_laws(id.as_deref()),
     }
 }
 
-/// Runs a case, or all variants of one. A variant that fails does not stop the others; the last
-/// failure is the outcome.
+/// Runs a case, or all variants of one, and writes the report of each, and their comparison. A
+/// variant that fails does not stop the others; the last failure is the outcome.
 fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(), Error> {
     let mut cases = Case::load(path)?;
     if let Some(wanted) = variant {
@@ -118,8 +125,17 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
     if cases.len() > 1 {
         cases.iter().try_for_each(check)?;
     }
+    let together = match (out, cases.first()) {
+        (Some(out), _) => out.to_owned(),
+        (None, case) => Path::new("results").join(case.map(Case::name).unwrap_or_default()),
+    };
+    if let [case, _, ..] = cases.as_slice() {
+        remove_comparison(&together, case)?;
+    }
     let mut outcome = Ok(());
+    let mut reports = Ok(());
     let mut drawn = Vec::new();
+    let mut folders = Vec::new();
     for case in &cases {
         let folder = match (out, &case.variant) {
             (None, _) => case.default_folder(),
@@ -132,34 +148,51 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
         let mut progress = Progress::new();
         let run = run(case, &folder, &mut progress);
         progress.finish();
+        let has_results = progress.has_begun;
         match run {
             Ok(figures) => {
                 println!("results in {}", folder.display());
                 drawn.extend(case.variant.clone().map(|variant| (variant, figures)));
             }
-            // The last failure is reported by the caller, earlier ones here.
-            Err(error) => {
-                if let Err(earlier) = std::mem::replace(&mut outcome, Err(error)) {
-                    eprintln!("{:?}", miette::Report::new(earlier));
-                }
+            Err(error) => keep_last(&mut outcome, error),
+        }
+        if has_results {
+            if let Err(error) = write_report(std::slice::from_ref(&folder), None) {
+                keep_last(&mut reports, error);
             }
+            folders.push(folder);
         }
     }
-    if drawn.len() > 1 {
-        let together = out.map_or_else(
-            || Path::new("results").join(cases[0].name()),
-            Path::to_owned,
-        );
-        Figures::draw_overlaid(&together, &drawn)?;
+    if drawn.len() > 1
+        && let Err(error) = Figures::draw_overlaid(&together, &drawn)
+    {
+        keep_last(&mut reports, error);
     }
-    outcome
+    if folders.len() > 1
+        && let Err(error) = write_report(&folders, Some(together))
+    {
+        keep_last(&mut reports, error);
+    }
+    match (outcome, reports) {
+        // What became of the run matters more than what became of its report.
+        (Err(run), Err(report)) => {
+            eprintln!("{:?}", miette::Report::new(report));
+            Err(run)
+        }
+        (outcome, reports) => outcome.and(reports),
+    }
 }
 
-/// The table goes to standard output or a file, the report to the error stream.
-fn run_point(driver: &Path, csv: Option<&Path>) -> Result<(), Error> {
-    let report = host::point::run_file(driver, csv)?;
-    eprint!("{report}");
-    Ok(())
+/// Keeps the last failure for the caller to report, and reports the one before it.
+fn keep_last(outcome: &mut Result<(), Error>, error: Error) {
+    if let Err(earlier) = std::mem::replace(outcome, Err(error)) {
+        eprintln!("{:?}", miette::Report::new(earlier));
+    }
+}
+
+/// Tables go to standard output or files, what came out of each driver to the error stream.
+fn run_point(driver: &Path, variant: Option<&str>, csv: Option<&Path>) -> Result<(), Error> {
+    host::point::run_file_variants(driver, variant, csv, |report| eprintln!("{report}"))
 }
 
 fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
@@ -182,6 +215,8 @@ fn show_laws(id: Option<&str>) -> Result<(), Error> {
 struct Progress {
     bar: Option<ProgressBar>,
     cut_backs: usize,
+    /// A phase has begun, so there is a folder with results.
+    has_begun: bool,
 }
 
 impl Progress {
@@ -189,6 +224,7 @@ impl Progress {
         Self {
             bar: None,
             cut_backs: 0,
+            has_begun: false,
         }
     }
 
@@ -210,6 +246,7 @@ impl Observer for Progress {
     fn phase(&mut self, name: &str, increments: usize) {
         self.finish();
         self.cut_backs = 0;
+        self.has_begun = true;
         if std::io::stderr().is_terminal() {
             let bar = ProgressBar::new(increments as u64);
             let template = "{prefix:16} {bar:32} {pos}/{len}  {msg}  {eta} left";

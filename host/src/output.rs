@@ -1,9 +1,10 @@
 //! Results in a folder: `history.csv`, `profile.csv`, `points.csv`, `fields.pvd` with `*.vtu`,
 //! `summary.json`, `log.jsonl`. Rows are flushed as increments converge, so whatever was reported
-//! is on disk.
+//! is on disk. What an earlier run left in the folder is removed first.
 
 mod fields;
 mod figure;
+mod leftovers;
 mod points;
 mod profile;
 mod summary;
@@ -136,7 +137,7 @@ impl LogFile {
 }
 
 impl Results {
-    /// Creates the folder and its files.
+    /// Creates the folder and its files, and removes those of an earlier run.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
@@ -147,12 +148,15 @@ impl Results {
         probes: &Probes,
     ) -> Result<Self, Error> {
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
+        leftovers::remove(folder)?;
         let settings = case.file.output;
         let columns = ["phase", "increment", "time"]
             .into_iter()
             .chain(probes.names())
             .chain(["iterations"]);
         let log_path = folder.join("log.jsonl");
+        let summary = Summary::new(case, model, probes);
+        write_summary(folder, &summary.running())?;
         Ok(Self {
             history: Table::create(folder.join("history.csv"), columns)?,
             profile: Profile::create(folder, settings.profile, model)?,
@@ -162,7 +166,7 @@ impl Results {
                 file: create(&log_path)?,
                 path: log_path,
             },
-            summary: Summary::new(case, model, probes),
+            summary,
             figures: Figures::new(
                 &case.file.title,
                 &case.file.figures,
@@ -270,7 +274,7 @@ impl Results {
                 "reason": warning,
             }))?;
         }
-        self.summary.last_increment(place, &record.probes);
+        self.summary.last_increment(place, record);
         self.figures.increment(place, &record.probes);
         self.figures.cuts(place, of, snapshot.groups);
         self.seconds += start.elapsed();
@@ -287,7 +291,13 @@ impl Results {
         &self.figures
     }
 
-    /// Writes the summary; the run's error, if there is one, goes into it.
+    /// Warnings about results that laws call inaccurate, one for each phase that has any.
+    pub fn unreliable(&self) -> Vec<String> {
+        self.summary.unreliable()
+    }
+
+    /// Draws the figures and writes the summary; the run's error, if there is one, and its
+    /// warnings go into it.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
@@ -295,18 +305,44 @@ impl Results {
         &mut self,
         groups: &[Group],
         total: Duration,
+        warnings: &[String],
         error: Option<&Error>,
     ) -> Result<(), Error> {
-        self.figures.draw(&self.folder)?;
-        let summary = self.summary.finish(groups, total, self.seconds, error);
+        let drawn = self.figures.draw(&self.folder);
+        let summary = self
+            .summary
+            .finish(groups, [total, self.seconds], warnings, error);
         self.log
             .line(&json!({ "event": "end", "status": summary["status"] }))?;
-        let path = self.folder.join("summary.json");
-        // Written whole or not at all.
-        let partial = self.folder.join("summary.json.part");
-        let text = serde_json::to_string_pretty(&summary)
-            .map_err(|error| Error::Internal(error.to_string()))?;
-        std::fs::write(&partial, text + "\n").map_err(|error| unwritable(&partial, error))?;
-        std::fs::rename(&partial, &path).map_err(|error| unwritable(&path, error))
+        write_summary(&self.folder, &summary)?;
+        drawn
     }
+}
+
+/// Removes from the common folder of a case's variants what an earlier run of them wrote there:
+/// figures over all of them, and their comparison.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    let is_figure = |stem: &str| {
+        let mut figures = case.file.figures.iter();
+        figures.any(|figure| figure.name.get_ref() == stem)
+    };
+    leftovers::remove_if(folder, |name| {
+        name == "report.html" || name.strip_suffix(".svg").is_some_and(is_figure)
+    })
+}
+
+/// Writes the summary whole or not at all.
+fn write_summary(folder: &Path, summary: &Value) -> Result<(), Error> {
+    let path = folder.join("summary.json");
+    let partial = folder.join("summary.json.part");
+    let text = serde_json::to_string_pretty(summary)
+        .map_err(|error| Error::Internal(error.to_string()))?;
+    std::fs::write(&partial, text + "\n").map_err(|error| unwritable(&partial, error))?;
+    std::fs::rename(&partial, &path).map_err(|error| unwritable(&path, error))
 }

@@ -54,6 +54,10 @@ pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Fi
     let model = Model::build(case)?;
     let probes = Probes::new(case, &model)?;
     check_figures(case, &probes)?;
+    let mut observer = Noting {
+        observer,
+        warnings: Vec::new(),
+    };
     for law in model.laws.values() {
         for warning in &law.warnings {
             observer.warning(warning);
@@ -61,10 +65,39 @@ pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Fi
     }
     let mut results = Results::create(folder, case, &model, &probes)?;
     let mut run = Run::new(case, model, probes);
-    let outcome = run.phases(&mut results, observer);
-    let finished = results.finish(&run.groups, started.elapsed(), outcome.as_ref().err());
+    let outcome = run.phases(&mut results, &mut observer);
+    for warning in results.unreliable() {
+        observer.warning(&warning);
+    }
+    let error = outcome.as_ref().err();
+    let finished = results.finish(&run.groups, started.elapsed(), &observer.warnings, error);
     outcome.and(finished)?;
     Ok(results.figures().clone())
+}
+
+/// An observer that also keeps the warnings, for the summary.
+struct Noting<'a> {
+    observer: &'a mut dyn Observer,
+    warnings: Vec<String>,
+}
+
+impl Observer for Noting<'_> {
+    fn phase(&mut self, name: &str, increments: usize) {
+        self.observer.phase(name, increments);
+    }
+
+    fn increment(&mut self, place: &Place, of: usize, iterations: usize) {
+        self.observer.increment(place, of, iterations);
+    }
+
+    fn cut_back(&mut self, place: &Place, reason: &str) {
+        self.observer.cut_back(place, reason);
+    }
+
+    fn warning(&mut self, message: &str) {
+        self.warnings.push(message.to_owned());
+        self.observer.warning(message);
+    }
 }
 
 struct Run<'a> {

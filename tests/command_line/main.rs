@@ -7,6 +7,7 @@ mod loading;
 mod mesh;
 mod names;
 mod parameters;
+mod point;
 mod program;
 mod results;
 mod syntax;

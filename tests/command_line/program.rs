@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use tempfile::TempDir;
 
 /// Exit codes, `host::error::Error::exit_code`.
@@ -152,21 +152,33 @@ impl Place {
         std::fs::write(path, contents).unwrap();
     }
 
-    /// Runs the program with this folder as its working directory.
-    pub(crate) fn run(&self, arguments: &[&str]) -> Outcome {
+    /// The program with this folder as its working directory.
+    fn command(&self, arguments: &[&str]) -> Command {
         let deps = std::env::current_exe()
             .unwrap()
             .parent()
             .unwrap()
             .to_owned();
-        let output = Command::new(program(&deps))
+        let mut command = Command::new(program(&deps));
+        command
             .args(arguments)
             .current_dir(self.folder.path())
             .env("PILUM_LAW_PATH", deps)
             .env("NO_COLOR", "1")
-            .env_remove("RUST_BACKTRACE")
-            .output()
-            .unwrap();
+            .env_remove("RUST_BACKTRACE");
+        command
+    }
+
+    /// Starts the program, without its messages.
+    pub(crate) fn start(&self, arguments: &[&str]) -> Child {
+        let mut command = self.command(arguments);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        command.spawn().unwrap()
+    }
+
+    /// Runs the program.
+    pub(crate) fn run(&self, arguments: &[&str]) -> Outcome {
+        let output = self.command(arguments).output().unwrap();
         Outcome {
             code: output.status.code(),
             stdout: String::from_utf8(output.stdout).unwrap(),

@@ -1,4 +1,5 @@
 //! What is printed and written, by runs that end well and by others.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, Place, edited};
 use crate::program::{Edit, JOINT};
@@ -31,7 +32,10 @@ fn prints_plain_lines_of_progress_and_one_line_of_result() {
     let place = Place::new();
     let outcome = place.run_case(CASE);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert_eq!(outcome.stdout, "results in out\n");
+    assert_eq!(
+        outcome.stdout,
+        "results in out\nreport in out/report.html\n"
+    );
     assert!(
         !outcome.stderr.contains(['\r', '\u{1b}']),
         "{:?}",
@@ -54,16 +58,52 @@ fn prints_plain_lines_of_progress_and_one_line_of_result() {
 
 #[test]
 fn warns_of_unusual_parameters_and_goes_on() {
-    let outcome = Place::new().run_case(CASE.replace("1e4", "2e9"));
+    let place = Place::new();
+    let outcome = place.run_case(CASE.replace("1e4", "2e9"));
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(
-        outcome.says(
-            "warning: law `elastic`: young_modulus = 2000000000 kPa is outside its usual range"
-        ),
-        "{}",
-        outcome.stderr
-    );
-    assert_eq!(outcome.stdout, "results in out\n");
+    let warning = "law `elastic`: young_modulus = 2000000000 kPa is outside its usual range";
+    let said = format!("warning: {warning}");
+    assert!(outcome.says(&said), "{}", outcome.stderr);
+    assert!(outcome.stdout.starts_with("results in out\n"));
+    assert_warns(&place, warning);
+}
+
+#[test]
+fn warns_of_a_phase_that_starts_out_of_balance() {
+    // What held the middle is given up.
+    let place = Place::new();
+    let outcome = place.run_case(edited(&[(
+        "[[phase]]\nname = \"push\"",
+        "[[phase]]\nname = \"hold\"\nincrements = 1\n\
+         displacement = [{ line = \"middle\", x = 1e-6 }]\n\n\
+         [[phase]]\nname = \"push\"\nfree = [{ line = \"middle\", components = [\"x\"] }]",
+    )]));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let warning = "phase `push` starts out of balance: ";
+    assert!(outcome.says(warning), "{}", outcome.stderr);
+    assert_warns(&place, warning);
+}
+
+#[test]
+fn a_run_without_anything_unusual_has_no_warnings() {
+    let place = Place::new();
+    assert_eq!(place.run_case(CASE).code, Some(DONE));
+    assert_eq!(summary(&place)["warnings"], serde_json::json!([]));
+}
+
+/// One of the summary's warnings starts like this, and the report shows it.
+fn assert_warns(place: &Place, start: &str) {
+    let summary = summary(place);
+    let warnings = summary["warnings"].as_array().unwrap();
+    let mut warnings = warnings.iter().filter_map(|warning| warning.as_str());
+    assert!(warnings.any(|warning| warning.starts_with(start)));
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains(&format!("<li>{start}")));
+}
+
+fn summary(place: &Place) -> serde_json::Value {
+    let text = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
 }
 
 #[test]
@@ -71,25 +111,185 @@ fn keeps_what_was_reached_when_there_is_no_equilibrium() {
     let place = Place::new();
     let outcome = place.run_case(sliding());
     assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert_eq!(outcome.stdout, "");
+    assert_eq!(outcome.stdout, "report in out/report.html\n");
     assert!(outcome.says("phase `push`"), "{}", outcome.stderr);
     assert!(outcome.says("no equilibrium"), "{}", outcome.stderr);
     // 40 of 100 kPa are 8 of 20 increments; the last one of them is the limit itself.
     let rows = table(&place.path("out/history.csv"));
     let pushed = rows.iter().filter(|row| row["phase"] == "push").count();
     assert!((7..=8).contains(&pushed), "{pushed} increments");
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
-    assert_ne!(summary["status"], "done");
+    assert_eq!(summary(&place)["status"], "no equilibrium");
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains("<span class=\"status failed\">no equilibrium</span>"));
 }
 
 #[test]
 fn leaves_earlier_results_alone_when_the_input_is_bad() {
     let place = Place::new();
     assert_eq!(place.run_case(CASE).code, Some(DONE));
-    let read = || std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let files = ["history.csv", "summary.json", "report.html"];
+    let read = || files.map(|file| std::fs::read(place.path("out").join(file)).unwrap());
     let before = read();
     let outcome = place.run_case(CASE.replace("\"traction_t\"", "\"traction_s\""));
     assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert_eq!(read(), before);
+    assert_eq!(outcome.stdout, "");
+    assert!(read() == before);
+}
+
+/// Everything a run can write, with a figure called `curve`.
+fn with_everything() -> String {
+    let figure = "[[figure]]\nname = \"curve\"\nx = \"settlement\"\ny = [\"tau\"]\n";
+    let output = "profile = \"phases\"\npoints = \"phases\"\nfields = \"increments\"\n";
+    edited(&[("profile = \"phases\"\n", output)]) + figure
+}
+
+#[test]
+fn removes_what_an_earlier_run_left_and_nothing_else() {
+    let place = Place::new();
+    assert_eq!(place.run_case(with_everything()).code, Some(DONE));
+    let left = [
+        "curve.svg",
+        "fields.pvd",
+        "fields_00000.vtu",
+        "fields_00003.vtu",
+        "points.csv",
+        "profile.csv",
+        "report.html",
+    ];
+    let foreign = [
+        "drawing.svg",
+        "fields_mine.vtu",
+        "fields_1.vtu",
+        "notes.txt",
+        "report.htm",
+        "fields_00009.vtu/inside",
+    ];
+    let is_there = |file: &str| place.path("out").join(file).is_file();
+    for file in left {
+        assert!(is_there(file), "{file} was not written");
+    }
+    for file in foreign {
+        place.write(&format!("out/{file}"), "mine");
+    }
+    // The next run writes none of them but the report, after which nobody asks here.
+    let quiet = sliding().replace("profile = \"phases\"", "profile = \"never\"");
+    assert_eq!(place.run_case(quiet).code, Some(NO_EQUILIBRIUM));
+    for file in left.iter().filter(|file| **file != "report.html") {
+        assert!(!is_there(file), "{file} is still there");
+    }
+    for file in foreign {
+        let text = std::fs::read_to_string(place.path("out").join(file)).unwrap();
+        assert_eq!(text, "mine", "{file}");
+    }
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains("no equilibrium") && !report.contains("id=\"contours\""));
+}
+
+/// The summary of a run that is killed in the middle.
+#[test]
+fn a_run_that_was_interrupted_says_running() {
+    let place = Place::new();
+    let long = CASE.replace(
+        "name = \"push\"\nincrements = 2",
+        "name = \"push\"\nincrements = 1000000",
+    );
+    place.write("case.toml", long);
+    let mut child = place.start(&["run", "case.toml", "--out", "out"]);
+    let begun = || {
+        let history = std::fs::read_to_string(place.path("out/history.csv"));
+        history.is_ok_and(|text| text.lines().any(|row| row.starts_with("push,")))
+    };
+    let start = std::time::Instant::now();
+    while !begun() {
+        assert!(start.elapsed() < std::time::Duration::from_mins(1));
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(summary(&place)["status"], "running");
+    assert!(!place.path("out/summary.json.part").exists());
+    let outcome = place.run(&["report", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains("stopped from outside or has not ended yet"));
+    // A run that ends says so, and nothing of the interrupted one is left.
+    assert_eq!(place.run_case(CASE).code, Some(DONE));
+    assert_eq!(summary(&place)["status"], "done");
+}
+
+#[test]
+fn a_report_that_cannot_be_written_does_not_hide_the_run() {
+    for (case, code) in [(CASE.to_owned(), BAD_INPUT), (sliding(), NO_EQUILIBRIUM)] {
+        let place = Place::new();
+        place.write("out/report.html/report.html/in_the_way", "");
+        let outcome = place.run_case(&case);
+        assert_eq!(outcome.code, Some(code), "{}", outcome.stderr);
+        assert!(
+            outcome.says("cannot write out/report.html"),
+            "{}",
+            outcome.stderr
+        );
+        let failed = code == NO_EQUILIBRIUM;
+        assert_eq!(outcome.says("no equilibrium beyond"), failed);
+        assert_eq!(outcome.stdout.contains("results in out"), !failed);
+    }
+}
+
+/// Two variants that run, and one that finds no equilibrium.
+fn variants() -> String {
+    let figure = "[[figure]]\nname = \"curve\"\nx = \"settlement\"\ny = [\"tau\"]\n";
+    let variants = "
+[[variant]]
+name = \"rough\"
+
+[[variant]]
+name = \"overloaded\"
+phase = [{ name = \"push\", pressure = [{ line = \"side\", value = 1000.0 }] }]
+
+[[variant]]
+name = \"rougher\"
+laws.joint.parameters.cohesion = 20.0
+";
+    let side = "pressure = [{ line = \"side\", value = 100.0 }]";
+    assert!(sliding().contains(side));
+    sliding().replace(side, "pressure = [{ line = \"side\", value = 1.0 }]") + figure + variants
+}
+
+#[test]
+fn compares_all_variants_that_have_results() {
+    let place = Place::new();
+    // Left by an earlier run of all variants, and by somebody else.
+    place.write("out/curve.svg", "old");
+    place.write("out/drawing.svg", "mine");
+    let outcome = place.run_case(variants());
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert_eq!(
+        outcome.stdout,
+        "results in out/rough\n\
+         report in out/rough/report.html\n\
+         report in out/overloaded/report.html\n\
+         results in out/rougher\n\
+         report in out/rougher/report.html\n\
+         report in out/report.html\n"
+    );
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains("<title>Comparison: rough, overloaded, rougher</title>"));
+    let read = |file: &str| std::fs::read_to_string(place.path(file)).unwrap();
+    assert!(read("out/curve.svg").starts_with("<svg"));
+    assert_eq!(read("out/drawing.svg"), "mine");
+}
+
+#[test]
+fn one_variant_alone_is_not_compared() {
+    let place = Place::new();
+    place.write("case.toml", variants());
+    let arguments = ["run", "case.toml", "--variant", "rough", "--out", "out"];
+    let outcome = place.run(&arguments);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_eq!(
+        outcome.stdout,
+        "results in out\nreport in out/report.html\n"
+    );
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(!report.contains("<title>Comparison"));
 }

@@ -92,6 +92,25 @@ fn a_run_that_was_stopped_is_unfinished() {
 }
 
 #[test]
+fn a_run_that_has_not_come_to_its_end_shows_what_its_log_warns_of() {
+    let place = copy();
+    edit(place.path(), "summary.json", |text| {
+        let mut summary: serde_json::Value = serde_json::from_str(text).unwrap();
+        summary["status"] = "running".into();
+        summary.as_object_mut().unwrap().remove("warnings").unwrap();
+        summary.to_string()
+    });
+    edit(place.path(), "log.jsonl", |text| {
+        let event = r#"{"event":"unreliable","phase":"press","increment":1,"reason":"too coarse"}"#;
+        format!("{text}{event}\n")
+    });
+    let page = report(place.path()).unwrap();
+    assert!(page.contains("<strong>unfinished.</strong>"));
+    assert!(page.contains("stopped from outside or has not ended yet"));
+    assert!(page.contains("<li>phase `press`, increment 1: too coarse</li>"));
+}
+
+#[test]
 fn rows_that_are_not_complete_are_left_out_with_a_note() {
     let place = copy();
     edit(place.path(), "history.csv", |text| {

@@ -461,7 +461,7 @@ fn range(values: impl Iterator<Item = f64>, margin: f64) -> std::ops::Range<f64>
         high.abs().max(1.0)
     };
     // A range that nearly reaches zero starts there.
-    let low = if low >= 0.0 && low < 0.3 * high {
+    let low = if low >= 0.0 && low < 0.2 * high {
         0.0
     } else {
         low - margin * width

@@ -1,5 +1,6 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
+use super::IncrementRecord;
 use crate::case::{Analysis, Case, FigureInput, GroupInput, ProbeInput, Reduce};
 use crate::error::{Error, Place};
 use crate::group::Group;
@@ -62,6 +63,8 @@ pub(super) struct Summary {
     probe_names: Vec<String>,
     phases: Vec<PhaseRecord>,
     last: Option<(Place, Vec<Option<f64>>)>,
+    /// By phase, the first increment with a result that a law calls inaccurate, and why.
+    unreliable: Vec<(Place, String)>,
 }
 
 impl Summary {
@@ -93,6 +96,11 @@ impl Summary {
         head.insert("groups".to_owned(), groups(case, model));
         head.insert("solver".to_owned(), solver(case));
         head.insert("figures".to_owned(), figures(case));
+        let pictures = case.file.figures.iter();
+        let pictures: Vec<String> = pictures
+            .map(|figure| format!("{}.svg", figure.name.get_ref()))
+            .collect();
+        head.insert("pictures".to_owned(), json!(pictures));
         head.insert("probe_units".to_owned(), probe_units(case, model));
         head.insert("laws".to_owned(), laws.into());
         head.insert(
@@ -108,11 +116,44 @@ impl Summary {
             probe_names: probes.names().map(str::to_owned).collect(),
             phases: Vec::new(),
             last: None,
+            unreliable: Vec::new(),
         }
     }
 
-    pub(super) fn last_increment(&mut self, place: &Place, probes: &[Option<f64>]) {
-        self.last = Some((place.clone(), probes.to_vec()));
+    /// What is known before the first increment.
+    pub(super) fn running(&self) -> Value {
+        let mut summary = self.head.clone();
+        summary.insert("status".to_owned(), json!("running"));
+        summary.into()
+    }
+
+    pub(super) fn last_increment(&mut self, place: &Place, record: &IncrementRecord) {
+        self.last = Some((place.clone(), record.probes.clone()));
+        let is_first = self
+            .unreliable
+            .last()
+            .is_none_or(|(p, _)| p.phase != place.phase);
+        if let Some(why) = record.warning.as_ref().filter(|_| is_first) {
+            self.unreliable.push((place.clone(), why.clone()));
+        }
+    }
+
+    /// Warnings about results that laws call inaccurate, one for each phase that has any.
+    pub(super) fn unreliable(&self) -> Vec<String> {
+        let phases = self.phases.iter().filter(|phase| phase.unreliable > 0);
+        let warning = |phase: &PhaseRecord| {
+            let first = self.unreliable.iter().find(|(p, _)| p.phase == phase.name);
+            let first =
+                first.map(|(p, why)| format!("; first in increment {}: {why}", p.increment));
+            format!(
+                "phase `{}`: {} step{} with results that a law calls inaccurate{}",
+                phase.name,
+                phase.unreliable,
+                if phase.unreliable == 1 { "" } else { "s" },
+                first.unwrap_or_default()
+            )
+        };
+        phases.map(warning).collect()
     }
 
     pub(super) fn phase(&mut self, record: PhaseRecord) {
@@ -132,11 +173,12 @@ impl Summary {
             .into()
     }
 
+    /// The whole summary. `seconds`: in total, and for output.
     pub(super) fn finish(
         &self,
         groups: &[Group],
-        total: Duration,
-        output: Duration,
+        [total, output]: [Duration; 2],
+        warnings: &[String],
         error: Option<&Error>,
     ) -> Value {
         let mut summary = self.head.clone();
@@ -150,6 +192,7 @@ impl Summary {
             }),
         );
         summary.insert("error".to_owned(), json!(error.map(ToString::to_string)));
+        summary.insert("warnings".to_owned(), json!(warnings));
         let phases: Vec<Value> = self
             .phases
             .iter()
@@ -402,4 +445,51 @@ fn law(built: &BuiltLaw) -> Value {
         "internal_variables": variables,
         "warnings": built.warnings,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inaccurate_results_are_one_warning_a_phase() {
+        let mut summary = Summary {
+            head: Map::new(),
+            probe_names: Vec::new(),
+            phases: Vec::new(),
+            last: None,
+            unreliable: Vec::new(),
+        };
+        for (phase, increment, warning) in [
+            ("a", 1, None),
+            ("a", 2, Some("slow")),
+            ("a", 3, Some("slower")),
+            ("b", 1, None),
+            ("c", 4, Some("odd")),
+        ] {
+            let place = Place {
+                phase: phase.to_owned(),
+                increment,
+            };
+            let record = IncrementRecord {
+                warning: warning.map(str::to_owned),
+                ..IncrementRecord::default()
+            };
+            summary.last_increment(&place, &record);
+        }
+        for (phase, unreliable) in [("a", 3), ("b", 0), ("c", 1)] {
+            summary.phase(PhaseRecord {
+                unreliable,
+                ..PhaseRecord::new(phase, 0, 0.0)
+            });
+        }
+        let what = "with results that a law calls inaccurate; first in increment";
+        assert_eq!(
+            summary.unreliable(),
+            [
+                format!("phase `a`: 3 steps {what} 2: slow"),
+                format!("phase `c`: 1 step {what} 4: odd"),
+            ]
+        );
+    }
 }

@@ -204,17 +204,18 @@ impl Run {
                 "there is no summary.json, so the run was stopped from outside or has not ended yet",
             );
         }
+        let status = text(&self.summary["status"]);
+        if status == "running" {
+            return Ending::Unfinished("the run was stopped from outside or has not ended yet");
+        }
         if !self.log.ended && !self.log.attempts.is_empty() {
             return Ending::Unfinished(
                 "log.jsonl has no end, so the run was stopped from outside or has not ended yet; \
                  summary.json may be of an earlier run",
             );
         }
-        match text(&self.summary["status"]) {
+        match status {
             "done" => Ending::Done,
-            "running" => {
-                Ending::Unfinished("the run was stopped from outside or has not ended yet")
-            }
             status => Ending::Failed(status.to_owned(), text(&self.summary["error"]).to_owned()),
         }
     }
@@ -238,19 +239,10 @@ impl Run {
             }
         };
         of_run.chain(of_laws).for_each(|warning| add(text(warning)));
+        // An interrupted run has not come to its summary of them.
         if !self.summary["warnings"].is_array() {
-            for phase in list(&self.summary["phases"]) {
-                let out_of_balance = phase["out_of_balance"].as_f64().unwrap_or_default();
-                if out_of_balance > 1e-6 {
-                    add(&format!(
-                        "phase `{}` starts out of balance: {:.2} % of the forces in play",
-                        text(&phase["name"]),
-                        100.0 * out_of_balance
-                    ));
-                }
-            }
+            self.log.unreliable.iter().for_each(|warning| add(warning));
         }
-        self.log.unreliable.iter().for_each(|warning| add(warning));
         warnings
     }
 

@@ -1,0 +1,83 @@
+//! What an earlier run left in a results folder, and what must not be mistaken for results of the
+//! next one.
+
+use super::unwritable;
+use crate::error::Error;
+use std::ffi::OsStr;
+use std::path::Path;
+
+/// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
+/// are begun anew by each.
+const NAMES: [&str; 6] = [
+    "profile.csv",
+    "points.csv",
+    "fields.pvd",
+    "report.html",
+    "summary.json",
+    "summary.json.part",
+];
+
+/// Removes what an earlier run wrote: files with the names a run gives, and the pictures that its
+/// `summary.json` lists. Everything else in the folder stays.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub(super) fn remove(folder: &Path) -> Result<(), Error> {
+    let pictures = pictures(folder);
+    let ours = |name: &str| {
+        NAMES.contains(&name) || is_field(name) || pictures.iter().any(|picture| picture == name)
+    };
+    remove_if(folder, ours)
+}
+
+/// Removes files of these names where there are any.
+pub(super) fn remove_if(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<(), Error> {
+    let unreadable = |error| unwritable(folder, error);
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        let is_folder = entry.file_type().map_err(unreadable)?.is_dir();
+        if !is_folder && entry.file_name().to_str().is_some_and(&ours) {
+            let path = entry.path();
+            std::fs::remove_file(&path).map_err(|error| unwritable(&path, error))?;
+        }
+    }
+    Ok(())
+}
+
+/// `fields_<n>.vtu`.
+fn is_field(name: &str) -> bool {
+    let number = name
+        .strip_prefix("fields_")
+        .and_then(|rest| rest.strip_suffix(".vtu"));
+    number.is_some_and(|n| n.len() >= 5 && n.bytes().all(|digit| digit.is_ascii_digit()))
+}
+
+/// Pictures of the earlier run, from its summary; none if that cannot be read.
+fn pictures(folder: &Path) -> Vec<String> {
+    let summary = std::fs::read(folder.join("summary.json")).unwrap_or_default();
+    let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap_or_default();
+    let names = summary["pictures"].as_array().into_iter().flatten();
+    names
+        .filter_map(|name| name.as_str())
+        .filter(|name| Path::new(name).extension() == Some(OsStr::new("svg")))
+        .map(str::to_owned)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_are_known_by_their_numbers() {
+        assert!(is_field("fields_00000.vtu") && is_field("fields_123456.vtu"));
+        for other in [
+            "fields_.vtu",
+            "fields_1.vtu",
+            "fields_0000a.vtu",
+            "fields_00000.vtu.bak",
+        ] {
+            assert!(!is_field(other), "{other}");
+        }
+    }
+}

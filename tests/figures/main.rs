@@ -1,0 +1,237 @@
+//! The figures in `cases/` are those that the cases draw. Every case is run, which takes about a
+//! minute, so the test is asked for by name:
+//!
+//! ```sh
+//! cargo test --release -p tests --test figures -- --ignored                  # compares
+//! PILUM_BLESS=1 cargo test --release -p tests --test figures -- --ignored    # rewrites those that differ
+//! ```
+#![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
+
+use host::case::Case;
+use host::error::Error;
+use host::output::Figures;
+use host::point::run_file_variants;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use tests::case::Silent;
+
+/// An input file in `cases/`; one of its variants, or nothing for all of them together; what the
+/// committed files are called, `*` standing for the figure; the figures.
+type Committed = (
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static [&'static str],
+);
+
+const COMMITTED: &[Committed] = &[
+    (
+        "aspect_ratio/case.toml",
+        "",
+        "aspect_ratio_*",
+        &["tau", "u_n"],
+    ),
+    ("aspect_ratio/joint.toml", "", "joint_*", &["tau"]),
+    (
+        "aspect_ratio/constant_volume.toml",
+        "",
+        "constant_volume_*",
+        &["tau", "sigma_n"],
+    ),
+    (
+        "aspect_ratio/constant_volume_joint.toml",
+        "",
+        "constant_volume_joint_*",
+        &["sigma_n"],
+    ),
+    (
+        "aspect_ratio/constant_modulus.toml",
+        "",
+        "constant_modulus_*",
+        &["sigma_n"],
+    ),
+    (
+        "chamber_confinement/case.toml",
+        "",
+        "*",
+        &["k_0_a", "k_0_b", "k_0_c"],
+    ),
+    ("chamber_instability/case.toml", "", "*", &["normal_stress"]),
+    (
+        "chamber_interface_model/case.toml",
+        "",
+        "*",
+        &["friction", "normal_stress"],
+    ),
+    (
+        "chamber_interface_model/dilating.toml",
+        "",
+        "*_dilating",
+        &["friction", "normal_stress"],
+    ),
+    (
+        "chamber_loading/case.toml",
+        "",
+        "*",
+        &["friction", "lateral_pressure"],
+    ),
+    (
+        "chamber_loading/case.toml",
+        "dilating",
+        "*",
+        &[
+            "loads",
+            "friction_along_shaft",
+            "normal_stress_along_shaft",
+            "settlement",
+        ],
+    ),
+    (
+        "chamber_mesh/case.toml",
+        "",
+        "*",
+        &[
+            "head_load",
+            "normal_stress",
+            "friction_along_shaft",
+            "normal_stress_along_shaft",
+        ],
+    ),
+    (
+        "chamber_mesh1/case.toml",
+        "",
+        "*",
+        &["mobilisation", "loads"],
+    ),
+    (
+        "chamber_soil_law/case.toml",
+        "",
+        "*",
+        &["friction", "normal_stress", "toe_load"],
+    ),
+    (
+        "shear_box/fontainebleau.toml",
+        "",
+        "*",
+        &["fontainebleau_tau", "fontainebleau_mu", "fontainebleau_u_n"],
+    ),
+    (
+        "shear_box/fontainebleau_softening.toml",
+        "",
+        "*",
+        &["softening_tau", "softening_mu", "softening_u_n"],
+    ),
+    (
+        "shear_box/silica.toml",
+        "",
+        "*",
+        &["silica_tau", "silica_mu", "silica_sigma_n", "silica_u_n"],
+    ),
+];
+
+fn cases() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases")
+}
+
+/// Pictures in the folders of the cases.
+fn pictures() -> BTreeSet<PathBuf> {
+    let entries = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().path())
+    };
+    entries(&cases())
+        .filter(|path| path.is_dir())
+        .flat_map(|folder| entries(&folder))
+        .filter(|path| path.extension().is_some_and(|ending| ending == "svg"))
+        .collect()
+}
+
+/// Draws the figures of an input file as the program does: those of a variant into a folder of its
+/// own, those over all variants beside these folders.
+fn draw(input: &str) -> TempDir {
+    let place = TempDir::new().unwrap();
+    let path = cases().join(input);
+    if input.starts_with("shear_box/") {
+        run_file_variants(&path, None, Some(&place.path().join("rows.csv")), |_| ()).unwrap();
+        return place;
+    }
+    let mut drawn = Vec::new();
+    for case in Case::load(&path).unwrap() {
+        let variant = case.variant.clone().unwrap_or_default();
+        let folder = place.path().join(&variant);
+        match host::run::run(&case, &folder, &mut Silent::default()) {
+            Ok(figures) => drawn.push((variant, figures)),
+            Err(Error::NoEquilibrium { .. }) => (),
+            Err(error) => panic!("{input}, {variant}: {error}"),
+        }
+    }
+    if drawn.len() > 1 {
+        Figures::draw_overlaid(place.path(), &drawn).unwrap();
+    }
+    place
+}
+
+/// Equal, but for coordinates that another machine rounds to the next whole point.
+fn alike(a: &str, b: &str) -> bool {
+    let words = |text: &str| -> Vec<String> {
+        let words = text.split([' ', ',', '"']);
+        words.map(str::to_owned).collect()
+    };
+    let near = |(a, b): (&String, &String)| match (a.parse::<i64>(), b.parse::<i64>()) {
+        (Ok(a), Ok(b)) => a.abs_diff(b) <= 1,
+        _ => a == b,
+    };
+    let (a, b) = (words(a), words(b));
+    a.len() == b.len() && a.iter().zip(&b).all(near)
+}
+
+#[test]
+fn every_figure_has_its_case() {
+    let named = COMMITTED.iter().flat_map(|(input, _, name, figures)| {
+        let folder = cases().join(input).parent().unwrap().to_owned();
+        let path = move |figure: &&str| folder.join(format!("{}.svg", name.replace('*', figure)));
+        figures.iter().map(path)
+    });
+    assert_eq!(named.collect::<BTreeSet<_>>(), pictures());
+}
+
+#[test]
+#[ignore = "runs every case, which takes about a minute"]
+fn the_committed_figures_are_those_of_the_cases() {
+    let bless = std::env::var_os("PILUM_BLESS").is_some_and(|value| value == "1");
+    let mut places: BTreeMap<&str, TempDir> = BTreeMap::new();
+    let mut differing = Vec::new();
+    for &(input, variant, name, figures) in COMMITTED {
+        let place = places.entry(input).or_insert_with(|| draw(input));
+        for figure in figures {
+            let drawn = place.path().join(variant).join(format!("{figure}.svg"));
+            let drawn = std::fs::read_to_string(drawn).unwrap();
+            let name = format!("{}.svg", name.replace('*', figure));
+            let path = cases().join(input).with_file_name(name);
+            let committed = std::fs::read_to_string(&path).unwrap_or_default();
+            if alike(&committed, &drawn) {
+                continue;
+            }
+            if bless {
+                std::fs::write(path, drawn).unwrap();
+            } else {
+                differing.push(path);
+            }
+        }
+    }
+    assert!(
+        differing.is_empty(),
+        "figures differ from what the cases draw: {differing:#?}\nrewrite them with: \
+         PILUM_BLESS=1 cargo test --release -p tests --test figures -- --ignored"
+    );
+}
+
+#[test]
+fn figures_a_point_apart_are_alike() {
+    let figure = "<polyline points=\"10,20 30,40 \"/><text>1.5</text>";
+    assert!(alike(figure, &figure.replace("20", "21")));
+    assert!(!alike(figure, &figure.replace("20", "22")));
+    assert!(!alike(figure, &figure.replace("1.5", "1.6")));
+    assert!(!alike(figure, &figure.replace("30,40 ", "")));
+}
