@@ -5,7 +5,13 @@
 //! or tied: a combination of others, as the mid-thickness nodes of a thin layer with mean strain.
 
 use crate::group::Group;
+use rayon::prelude::*;
 use std::ops::Range;
+
+/// Elements that one thread takes at a time.
+const PIECE: usize = 256;
+/// Pieces that are computed before their matrices are added up.
+const ROUND: usize = 16;
 
 /// A degree of freedom that follows others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -215,10 +221,24 @@ impl System {
     pub fn assemble(&self, groups: &[Group], values: &mut Vec<f64>) {
         values.clear();
         values.resize(self.pattern.rows.len(), 0.0);
-        let mut matrix = ElementMatrix::default();
         for (group, maps) in groups.iter().zip(&self.elements) {
-            for (e, map) in maps.iter().enumerate() {
-                for (slot, value) in map.slots.iter().zip(matrix.of(group, e, map)) {
+            // Elements share entries: they are added in one order, whoever computed them.
+            for (round, maps) in maps.chunks(ROUND * PIECE).enumerate() {
+                let compute = |(piece, maps): (usize, &[ElementMap])| {
+                    let mut matrices = Vec::new();
+                    let mut matrix = ElementMatrix::default();
+                    for (e, map) in (ROUND * PIECE * round + PIECE * piece..).zip(maps) {
+                        matrices.extend_from_slice(matrix.of(group, e, map));
+                    }
+                    matrices
+                };
+                let pieces: Vec<Vec<f64>> = if maps.len() > PIECE {
+                    maps.par_chunks(PIECE).enumerate().map(compute).collect()
+                } else {
+                    vec![compute((0, maps))]
+                };
+                let slots = maps.iter().flat_map(|map| &map.slots);
+                for (slot, value) in slots.zip(pieces.iter().flatten()) {
                     if *slot != u32::MAX {
                         values[*slot as usize] += value;
                     }

@@ -10,7 +10,14 @@ use crate::element::Kinematics;
 use crate::input::BuiltLaw;
 use crate::plugin::{BatchFailure, BatchSuccess, End, Operator, Start, Strided};
 use layer::Layer;
+use rayon::prelude::*;
 use std::sync::Arc;
+
+/// Points that one thread takes at a time.
+const BATCH: usize = 1024;
+
+/// Number of a batch, and where its fluxes, internal variables and operators go.
+type Batch<'a> = (usize, &'a mut [f64], &'a mut [f64], &'a mut [f64]);
 
 /// Values of all points, before and during an increment.
 #[derive(Clone, Debug, Default)]
@@ -350,24 +357,60 @@ impl Group {
             Some(layer) if self.law.built.law.n_components() == 2 => &layer.jump,
             _ => &self.strain,
         };
-        let rows = Strided::rows(self.law.built.law.n_components());
-        self.law.built.law.integrate(
-            &Start {
-                n_points: self.kinematics.n_points(),
-                gradient: (&gradient.committed, rows),
-                gradient_end: (&gradient.trial, rows),
-                flux: (&self.stress.committed, place),
-                state: &self.internal.committed,
-                time,
-                time_increment,
-            },
-            operator,
-            End {
-                flux: (&mut self.stress.trial, place),
-                state: &mut self.internal.trial,
-                operator: operators,
-            },
-        )
+        let law = &self.law.built.law;
+        let (n, n_states) = (law.n_components(), law.n_states());
+        let rows = Strided::rows(n);
+        let (committed, state) = (&self.stress.committed, &self.internal.committed);
+        let batch = |(number, flux, state_end, operator_end): Batch<'_>| {
+            let first = number * BATCH;
+            let n_points = flux.len() / place.point;
+            let points = |values: &'_ [f64], stride: usize| {
+                first * stride..values.len().min((first + n_points) * stride)
+            };
+            law.integrate(
+                &Start {
+                    n_points,
+                    gradient: (&gradient.committed[points(&gradient.committed, n)], rows),
+                    gradient_end: (&gradient.trial[points(&gradient.trial, n)], rows),
+                    flux: (&committed[points(committed, place.point)], place),
+                    state: &state[points(state, n_states)],
+                    time,
+                    time_increment,
+                },
+                operator,
+                End {
+                    flux: (flux, place),
+                    state: state_end,
+                    operator: operator_end,
+                },
+            )
+            .map_err(|failure| BatchFailure {
+                point: first + failure.point,
+                ..failure
+            })
+            .map(|success| BatchSuccess {
+                unreliable: success.unreliable.map(|(point, why)| (first + point, why)),
+            })
+        };
+        let (flux, state_end) = (&mut self.stress.trial, &mut self.internal.trial);
+        if self.kinematics.n_points() <= BATCH {
+            return batch((0, flux, state_end, operators));
+        }
+        let mut states = state_end.chunks_mut(BATCH * n_states.max(1));
+        let work: Vec<Batch<'_>> = flux
+            .chunks_mut(BATCH * place.point)
+            .zip(operators.chunks_mut(BATCH * n * n))
+            .enumerate()
+            .map(|(number, (flux, operators))| {
+                (number, flux, states.next().unwrap_or_default(), operators)
+            })
+            .collect();
+        let outcomes: Vec<_> = work.into_par_iter().map(batch).collect();
+        let mut all = BatchSuccess::default();
+        for outcome in outcomes {
+            all.unreliable = all.unreliable.or(outcome?.unreliable);
+        }
+        Ok(all)
     }
 
     fn locate(&self, failure: &BatchFailure) -> PointFailure {

@@ -3,7 +3,11 @@
 use super::shape::{gauss, quad_shape};
 use super::{Axes, Kinematics, depth};
 use crate::case::Analysis;
-use nalgebra::{SMatrix, SVector};
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+/// Elements that one thread takes at a time.
+const PIECE: usize = 256;
 
 /// 8-node quads of one group.
 #[derive(Debug)]
@@ -121,20 +125,6 @@ impl Point {
             position,
         })
     }
-
-    /// The matrix B of this point: strains from displacements along the element's axes.
-    fn b(&self, axes: &Axes) -> SMatrix<f64, 4, 16> {
-        let mut b = SMatrix::zeros();
-        for i in 0..8 {
-            b[(0, 2 * i)] = self.a[i];
-            b[(1, 2 * i + 1)] = self.b[i];
-            b[(2, 2 * i)] = self.h[i] * axes.along[0];
-            b[(2, 2 * i + 1)] = self.h[i] * axes.across[0];
-            b[(3, 2 * i)] = self.b[i];
-            b[(3, 2 * i + 1)] = self.a[i];
-        }
-        b
-    }
 }
 
 impl Kinematics for Quad8 {
@@ -167,69 +157,235 @@ impl Kinematics for Quad8 {
     }
 
     fn add_gradients(&self, displacement: &[f64], out: &mut [f64]) {
-        let mut strains = out.chunks_exact_mut(4);
-        for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
-            let u = nodes.map(|n| [displacement[2 * n], displacement[2 * n + 1]]);
-            let u_1 = u.map(|u| axes.along[0] * u[0] + axes.along[1] * u[1]);
-            let u_2 = u.map(|u| axes.across[0] * u[0] + axes.across[1] * u[1]);
-            for (point, strain) in self.points_of(element).iter().zip(&mut strains) {
-                for i in 0..8 {
-                    strain[0] += point.a[i] * u_1[i];
-                    strain[1] += point.b[i] * u_2[i];
-                    strain[2] += point.h[i] * u[i][0];
-                    strain[3] += point.b[i] * u_1[i] + point.a[i] * u_2[i];
-                }
-            }
+        let per_element = 4 * self.points_per_element;
+        let piece = |(number, out): (usize, &mut [f64])| {
+            let elements = self;
+            let first = number * PIECE;
+            Arch::new().dispatch(Gradients {
+                elements,
+                first,
+                displacement,
+                out,
+            });
+        };
+        if self.nodes.len() > PIECE {
+            let pieces = out.par_chunks_mut(PIECE * per_element).enumerate();
+            pieces.for_each(piece);
+        } else {
+            piece((0, out));
         }
     }
 
     fn add_forces(&self, flux: &[f64], force: &mut [f64]) {
-        let mut stresses = flux.chunks_exact(4);
-        for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
-            for (point, s) in self.points_of(element).iter().zip(&mut stresses) {
-                let w = point.weight;
-                for i in 0..8 {
-                    let f_1 = w * (point.a[i] * s[0] + point.b[i] * s[3]);
-                    let f_2 = w * (point.b[i] * s[1] + point.a[i] * s[3]);
-                    let f_r = w * point.h[i] * s[2];
-                    force[2 * nodes[i]] += axes.along[0] * f_1 + axes.across[0] * f_2 + f_r;
-                    force[2 * nodes[i] + 1] += axes.along[1] * f_1 + axes.across[1] * f_2;
+        let per_element = 4 * self.points_per_element;
+        let forces_of = |(number, flux): (usize, &[f64])| {
+            let elements = self;
+            let first = number * PIECE;
+            Arch::new().dispatch(Forces {
+                elements,
+                first,
+                flux,
+            })
+        };
+        // Elements share nodes: their forces are added in one order, whoever computed them.
+        let mut add = |number: usize, of_piece: Vec<[[f64; 2]; 8]>| {
+            for (nodes, forces) in self.nodes[number * PIECE..].iter().zip(of_piece) {
+                for (node, f) in nodes.iter().zip(forces) {
+                    force[2 * node] += f[0];
+                    force[2 * node + 1] += f[1];
                 }
             }
+        };
+        if self.nodes.len() > PIECE {
+            let pieces = flux.par_chunks(PIECE * per_element).enumerate();
+            let forces: Vec<_> = pieces.map(forces_of).collect();
+            forces
+                .into_iter()
+                .enumerate()
+                .for_each(|(number, of_piece)| add(number, of_piece));
+        } else {
+            add(0, forces_of((0, flux)));
         }
     }
 
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
-        let axes = &self.axes[element];
-        let mut k = SMatrix::<f64, 16, 16>::zeros();
-        for (point, tangent) in self.points_of(element).iter().zip(tangent.chunks_exact(16)) {
-            let b = point.b(axes);
-            let d = SMatrix::<f64, 4, 4>::from_row_slice(tangent);
-            k += b.tr_mul(&(d * b * point.weight));
-        }
-        if *axes != Axes::GLOBAL {
-            k = to_global(&k, axes);
-        }
-        for (row, out) in out.chunks_exact_mut(16).enumerate() {
-            for (column, out) in out.iter_mut().enumerate() {
-                *out = k[(row, column)];
-            }
+        let elements = self;
+        Arch::new().dispatch(Stiffness {
+            elements,
+            element,
+            tangent,
+            out,
+        });
+    }
+}
+
+/// Strains of consecutive elements, compiled for the processor's own vector instructions.
+struct Gradients<'a> {
+    elements: &'a Quad8,
+    first: usize,
+    displacement: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl WithSimd for Gradients<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let per_element = 4 * self.elements.points_per_element;
+        for (element, out) in (self.first..).zip(self.out.chunks_exact_mut(per_element)) {
+            self.elements
+                .element_gradients(element, self.displacement, out);
         }
     }
 }
 
-/// Turns every 2 × 2 block from the element's axes to the global ones: Rᵀ k R.
-fn to_global(k: &SMatrix<f64, 16, 16>, axes: &Axes) -> SMatrix<f64, 16, 16> {
-    let r = SMatrix::<f64, 2, 2>::from_rows(&[
-        SVector::from(axes.along).transpose(),
-        SVector::from(axes.across).transpose(),
-    ]);
-    let mut out = SMatrix::<f64, 16, 16>::zeros();
-    for i in (0..16).step_by(2) {
-        for j in (0..16).step_by(2) {
-            let block = r.tr_mul(&k.fixed_view::<2, 2>(i, j)) * r;
-            out.fixed_view_mut::<2, 2>(i, j).copy_from(&block);
+/// Nodal forces of consecutive elements, likewise.
+struct Forces<'a> {
+    elements: &'a Quad8,
+    first: usize,
+    flux: &'a [f64],
+}
+
+impl WithSimd for Forces<'_> {
+    type Output = Vec<[[f64; 2]; 8]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let fluxes = self.flux.chunks_exact(4 * self.elements.points_per_element);
+        let mut forces = Vec::with_capacity(fluxes.len());
+        for (element, flux) in (self.first..).zip(fluxes) {
+            forces.push(self.elements.element_forces(element, flux));
+        }
+        forces
+    }
+}
+
+/// Stiffness of one element, likewise.
+struct Stiffness<'a> {
+    elements: &'a Quad8,
+    element: usize,
+    tangent: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl WithSimd for Stiffness<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.elements
+            .element_stiffness(self.element, self.tangent, self.out);
+    }
+}
+
+/// Σ u v, in pairs.
+#[inline(always)]
+fn dot(u: &[f64; 8], v: &[f64; 8]) -> f64 {
+    let p: [f64; 8] = std::array::from_fn(|i| u[i] * v[i]);
+    let q: [f64; 4] = std::array::from_fn(|i| p[i] + p[i + 4]);
+    (q[0] + q[2]) + (q[1] + q[3])
+}
+
+/// The arithmetic of one element, inlined into what is compiled for the processor.
+impl Quad8 {
+    #[inline(always)]
+    fn element_gradients(&self, element: usize, displacement: &[f64], strains: &mut [f64]) {
+        let (nodes, axes) = (&self.nodes[element], &self.axes[element]);
+        let u_r: [f64; 8] = std::array::from_fn(|i| displacement[2 * nodes[i]]);
+        let u_z: [f64; 8] = std::array::from_fn(|i| displacement[2 * nodes[i] + 1]);
+        let turned = |axis: [f64; 2]| -> [f64; 8] {
+            std::array::from_fn(|i| axis[0] * u_r[i] + axis[1] * u_z[i])
+        };
+        let (u_1, u_2) = (turned(axes.along), turned(axes.across));
+        for (point, strain) in self
+            .points_of(element)
+            .iter()
+            .zip(strains.chunks_exact_mut(4))
+        {
+            strain[0] += dot(&point.a, &u_1);
+            strain[1] += dot(&point.b, &u_2);
+            strain[2] += dot(&point.h, &u_r);
+            strain[3] += dot(&point.b, &u_1) + dot(&point.a, &u_2);
         }
     }
-    out
+
+    /// Nodal forces in global axes.
+    #[inline(always)]
+    fn element_forces(&self, element: usize, flux: &[f64]) -> [[f64; 2]; 8] {
+        let axes = &self.axes[element];
+        let (mut f_1, mut f_2, mut f_r) = ([0.0; 8], [0.0; 8], [0.0; 8]);
+        for (point, s) in self.points_of(element).iter().zip(flux.chunks_exact(4)) {
+            let s: [f64; 4] = std::array::from_fn(|c| point.weight * s[c]);
+            for i in 0..8 {
+                f_1[i] += point.a[i] * s[0] + point.b[i] * s[3];
+                f_2[i] += point.b[i] * s[1] + point.a[i] * s[3];
+                f_r[i] += point.h[i] * s[2];
+            }
+        }
+        std::array::from_fn(|i| {
+            [
+                axes.along[0] * f_1[i] + axes.across[0] * f_2[i] + f_r[i],
+                axes.along[1] * f_1[i] + axes.across[1] * f_2[i],
+            ]
+        })
+    }
+
+    /// Σ Bᵀ D B w, by blocks: with displacements u₁, u₂ along the element's axes,
+    /// column i of B is (a, 0, h e₁, b) for u₁ and (0, b, h e₂, a) for u₂, where e is the radial
+    /// direction in these axes.
+    #[inline(always)]
+    fn element_stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
+        let axes = &self.axes[element];
+        let radial = [axes.along[0], axes.across[0]];
+        let points = self.points_of(element);
+        // D B w of every point: by component, for u₁ and u₂.
+        let mut db = [[[[0.0; 8]; 4]; 2]; 9];
+        for ((point, d), db) in points.iter().zip(tangent.chunks_exact(16)).zip(&mut db) {
+            let (w, [on_1, on_2]) = (point.weight, db);
+            for c in 0..4 {
+                let d: [f64; 4] = std::array::from_fn(|e| w * d[4 * c + e]);
+                let hoop = [d[2] * radial[0], d[2] * radial[1]];
+                for j in 0..8 {
+                    on_1[c][j] = d[0] * point.a[j] + hoop[0] * point.h[j] + d[3] * point.b[j];
+                    on_2[c][j] = d[1] * point.b[j] + hoop[1] * point.h[j] + d[3] * point.a[j];
+                }
+            }
+        }
+        for i in 0..8 {
+            // Rows of u₁ and u₂ of node i.
+            let mut k = [[[0.0; 8]; 2]; 2];
+            for (point, db) in points.iter().zip(&db) {
+                let (a, b) = (point.a[i], point.b[i]);
+                let h = [point.h[i] * radial[0], point.h[i] * radial[1]];
+                for (column, d) in db.iter().enumerate() {
+                    for j in 0..8 {
+                        k[0][column][j] += a * d[0][j] + h[0] * d[2][j] + b * d[3][j];
+                        k[1][column][j] += b * d[1][j] + h[1] * d[2][j] + a * d[3][j];
+                    }
+                }
+            }
+            let rows = &mut out[32 * i..32 * (i + 1)];
+            if *axes == Axes::GLOBAL {
+                for j in 0..8 {
+                    for c in 0..2 {
+                        rows[2 * j + c] = k[0][c][j];
+                        rows[16 + 2 * j + c] = k[1][c][j];
+                    }
+                }
+            } else {
+                // Rᵀ k R, with the axes as rows of R.
+                let r = [axes.along, axes.across];
+                for j in 0..8 {
+                    for c in 0..2 {
+                        for e in 0..2 {
+                            rows[16 * c + 2 * j + e] = (0..2)
+                                .map(|p| r[p][c] * (k[p][0][j] * r[0][e] + k[p][1][j] * r[1][e]))
+                                .sum();
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
