@@ -452,7 +452,15 @@ fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), B
     Ok(())
 }
 
-/// Whether all values are finite; without a branch for each.
+/// Whether all values are finite: 0 times a finite number is 0. Eight sums at a time and no branch,
+/// so that it costs little more than reading the values.
 fn all_finite(values: &[f64]) -> bool {
-    values.iter().fold(true, |ok, v| ok & v.is_finite())
+    let (chunks, rest) = values.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for chunk in chunks {
+        for (sum, value) in sums.iter_mut().zip(chunk) {
+            *sum += 0.0 * value;
+        }
+    }
+    sums.iter().sum::<f64>() == 0.0 && rest.iter().all(|v| v.is_finite())
 }
