@@ -4,10 +4,12 @@
 mod elasticity;
 mod return_mapping;
 mod spectral;
+mod substeps;
 mod surface;
 #[cfg(test)]
 mod tests;
 
+use abi::substepping::Scheme;
 use abi::{
     ContinuumLaw, Description, Failure, Parameter, Refusal, SolidPoint, SolidResponse, Tangent,
     Variable,
@@ -33,6 +35,18 @@ abi::parameters! {
         dilatancy_angle: Parameter::new(c"ψ", c"deg").at_least(0.0).below(90.0).usual(0.0, 30.0),
         /// Bound on the largest principal stress, at most c cot φ; none if left out.
         tensile_strength: Parameter::new(c"R_t", c"kPa").at_least(0.0).optional(),
+        /// How the flow is integrated.
+        scheme: Parameter::new(c"scheme", c"-")
+            .one_of(abi::choices!(c"implicit", c"explicit", c"error_controlled"))
+            .default(0.0),
+        /// Number of steps of the explicit scheme in an increment, whole.
+        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e6).default(10.0),
+        /// Relative error that a step of the error-controlled scheme may have.
+        scheme_tolerance: Parameter::new(c"ε_s", c"-")
+            .above(0.0)
+            .below(1.0)
+            .usual(1e-10, 1e-2)
+            .default(1e-6),
     }
 }
 
@@ -52,6 +66,7 @@ abi::internal_variables! {
 pub struct MohrCoulomb {
     elasticity: Elasticity,
     pyramid: Pyramid,
+    scheme: Scheme,
 }
 
 impl ContinuumLaw for MohrCoulomb {
@@ -79,6 +94,7 @@ impl ContinuumLaw for MohrCoulomb {
                 p.dilatancy_angle,
                 Some(p.tensile_strength).filter(below_apex),
             ),
+            scheme: Scheme::new(p.scheme, p.substeps, p.scheme_tolerance)?,
         })
     }
 
@@ -127,6 +143,9 @@ impl ContinuumLaw for MohrCoulomb {
             if self.pyramid.admits(largest, smallest) {
                 return Ok(elastic());
             }
+            if self.scheme != Scheme::Implicit {
+                return self.substeps(point, &trial, tangent);
+            }
             let principal = circle.principal();
             let end = self.pyramid.return_stress(&principal.stress);
             let consistent = || {
@@ -150,6 +169,9 @@ impl ContinuumLaw for MohrCoulomb {
             let s = &principal.stress;
             if self.pyramid.admits(s[0], s[2]) {
                 return Ok(elastic());
+            }
+            if self.scheme != Scheme::Implicit {
+                return self.substeps(point, &trial, tangent);
             }
             let end = self.pyramid.return_stress(s);
             let consistent = || {

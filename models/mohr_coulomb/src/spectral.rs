@@ -240,7 +240,7 @@ pub(crate) fn bounds(stress: &[f64]) -> (f64, f64) {
 }
 
 /// Eigenvalues in descending order and their unit vectors, column by column.
-fn jacobi(mut a: Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+pub(crate) fn jacobi(mut a: Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
     /// Convergence is quadratic: four or five sweeps in practice.
     const MAX_SWEEPS: usize = 12;
     let negligible = 0.01 * f64::EPSILON * a.amax();
