@@ -9,9 +9,11 @@ is missing and how to get it, and the others still run.
 
 laws    Mohr-Coulomb and elasticity of MFront, from the Python wheel of OpenGeoSys
         (`python3 -m venv FOLDER && FOLDER/bin/pip install ogs==6.5.9`; FOLDER by --ogs or PILUM_OGS)
+linked  the peer is the law itself, linked into the calling program instead of opened as a plugin
 """
 
 import argparse
+import json
 import os
 import shutil
 import statistics
@@ -124,7 +126,34 @@ def laws(options):
     return met and factor <= 2
 
 
-PARTS = {"laws": laws}
+def linked(options):
+    """The same law, linked statically and opened as a plugin."""
+    cargo, compiler, law = program("cargo"), program("cc"), "mohr_coulomb"
+    target = Path(json.loads(run(cargo, "metadata", "--no-deps", "--format-version", 1,
+                                 "--manifest-path", ROOT / "Cargo.toml"))["target_directory"])
+    manifest = ("--manifest-path", ROOT / "models" / law / "Cargo.toml")
+    run(cargo, "build", "--release", "--quiet", *manifest)
+    # Built aside, since a crate type of its own would replace the shared library.
+    aside = target / "linked"
+    run(cargo, "rustc", "--release", "--quiet", "--crate-type", "staticlib", "--target-dir", aside, *manifest)
+    with tempfile.TemporaryDirectory() as folder:
+        both = Path(folder) / "linked"
+        run(compiler, "-O2", "-I", ROOT / "abi" / "include", "-o", both, HERE / "peers" / "linked.c",
+            aside / "release" / f"lib{law}.a", "-lpthread", "-ldl", "-lm", "-lgcc_s")
+        rows = [line.split("\t") for line in
+                run(both, target / "release" / f"lib{law}.so", 201).splitlines()]
+    print(f"linked: `{law}` with tangent, ns per integration point, CPU time; no allocation in any call")
+    print("| batch | linked | plugin | plugin / linked | goal |")
+    print("|---|---|---|---|---|")
+    met = True
+    for batch, a, b, ratio in rows:
+        goal = 1.02 if int(batch) >= 64 else None
+        met = met and (goal is None or float(ratio) <= goal)
+        print(f"| {batch} | {a} | {b} | {ratio} | {goal or ''} |")
+    return met
+
+
+PARTS = {"laws": laws, "linked": linked}
 
 
 def main():
