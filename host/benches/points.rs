@@ -14,8 +14,10 @@ mod scenario;
 
 use host::plugin::Operator;
 use rustix::time::{ClockId, clock_gettime};
-use scenario::{N_POINTS, NAMES, Scenario};
+use scenario::{NAMES, Scenario};
 
+/// Points of a scenario that is timed.
+const N_POINTS: usize = 20_000;
 /// Points of a scenario whose instructions are counted.
 const N_COUNTED: usize = 1024;
 const RUNS: usize = 15;
@@ -29,7 +31,7 @@ fn main() {
         .collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words[..] {
-        ["names"] => NAMES.iter().for_each(|name| println!("{name}")),
+        ["names"] => println!("{}", NAMES.join("\n")),
         ["call", name, operator, times] => {
             let mut scenario = Scenario::new(name, N_COUNTED);
             for _ in 0..times.parse().expect("a number of times") {
@@ -54,9 +56,9 @@ fn table(batch: usize, names: &[&str]) {
     let names = if names.is_empty() { NAMES } else { names };
     for name in names {
         let mut scenario = Scenario::new(name, N_POINTS);
+        let n_points = N_POINTS as f64;
         for operator in ["none", "consistent"] {
             let wanted = operator_named(operator);
-            let n_points = scenario.len() as f64;
             let [median, least] = cpu_seconds(|| scenario.step(batch, wanted));
             let (median, least) = (median / n_points * 1e9, least / n_points * 1e9);
             println!("{name}\t{operator}\t{median:.2}\t{least:.2}");

@@ -8,9 +8,6 @@ use abi::Hypothesis;
 use host::plugin::{End, Law, Operator, SearchPath, Start, Strided};
 use std::hint::black_box;
 
-/// Points of a scenario.
-pub(crate) const N_POINTS: usize = 20_000;
-
 /// Soil of the comparison: E, ν, c in kPa, φ, ψ in degrees.
 const SOIL: &[(&str, f64)] = &[
     ("young_modulus", 34e3),
@@ -63,6 +60,9 @@ enum Flow {
     Plastic,
 }
 
+/// The gradient reached before a step, and its increment in the step.
+type Drawn = ([f64; 6], [f64; 6]);
+
 /// A law and what is done to its points. Gradients have up to six components.
 struct Recipe<'a> {
     law: &'a str,
@@ -70,8 +70,8 @@ struct Recipe<'a> {
     parameters: &'static [(&'static str, f64)],
     /// Flux of every point before anything has happened, kPa.
     flux: [f64; 6],
-    /// Draws the gradient reached before the step, and its increment in the step.
-    draw: fn(&mut Random, usize) -> ([f64; 6], [f64; 6]),
+    /// For a number of components.
+    draw: fn(&mut Random, usize) -> Drawn,
     flow: Flow,
 }
 
@@ -157,7 +157,7 @@ impl Random {
 }
 
 /// Each component within 1e-4, from rest.
-fn small_strain(random: &mut Random, n: usize) -> ([f64; 6], [f64; 6]) {
+fn small_strain(random: &mut Random, n: usize) -> Drawn {
     ([0.0; 6], random.components(n).map(|e| 2e-4 * e))
 }
 
@@ -165,25 +165,27 @@ fn small_strain(random: &mut Random, n: usize) -> ([f64; 6], [f64; 6]) {
 fn mostly_shear(random: &mut Random, n: usize) -> [f64; 6] {
     let mut e = random.components(n);
     let mean = (e[0] + e[1] + e[2]) / 3.0;
-    e[..3].iter_mut().for_each(|e| *e -= 0.9 * mean);
+    for e in &mut e[..3] {
+        *e -= 0.9 * mean;
+    }
     scaled(e, 1.0)
 }
 
 /// 0.25 % to 0.75 % in one step from rest.
-fn large_strain(random: &mut Random, n: usize) -> ([f64; 6], [f64; 6]) {
+fn large_strain(random: &mut Random, n: usize) -> Drawn {
     let direction = mostly_shear(random, n);
     let size = 5e-3 * (0.5 + random.unit());
     ([0.0; 6], scaled(direction, size))
 }
 
 /// 0.5 % to the surface, then 1e-4 further in the same direction.
-fn restart(random: &mut Random, n: usize) -> ([f64; 6], [f64; 6]) {
+fn restart(random: &mut Random, n: usize) -> Drawn {
     let direction = mostly_shear(random, n);
     (scaled(direction, 5e-3), scaled(direction, 1e-4))
 }
 
 /// 1.5 % of triaxial compression along 22, then 1e-4 further.
-fn edge(random: &mut Random, n: usize) -> ([f64; 6], [f64; 6]) {
+fn edge(random: &mut Random, n: usize) -> Drawn {
     let mut direction = random.components(n).map(|e| 1e-6 * e);
     for (c, e) in [0.35, -1.0, 0.35].into_iter().enumerate() {
         direction[c] += e;
@@ -192,14 +194,14 @@ fn edge(random: &mut Random, n: usize) -> ([f64; 6], [f64; 6]) {
 }
 
 /// Within the first elastic range.
-fn stuck(random: &mut Random, _: usize) -> ([f64; 6], [f64; 6]) {
+fn stuck(random: &mut Random, _: usize) -> Drawn {
     let mut jump = [0.0; 6];
     (jump[0], jump[1]) = (1e-7 * random.centred(), 1e-7 * random.centred());
     ([0.0; 6], jump)
 }
 
 /// Up to 3 mm of slip, then 20 µm further while the faces move by up to 2 µm.
-fn slipping(random: &mut Random, _: usize) -> ([f64; 6], [f64; 6]) {
+fn slipping(random: &mut Random, _: usize) -> Drawn {
     let (mut before, mut step) = ([0.0; 6], [0.0; 6]);
     before[1] = 3e-3 * random.unit() + 1e-4;
     (step[0], step[1]) = (4e-6 * random.centred(), 2e-5);
@@ -208,7 +210,9 @@ fn slipping(random: &mut Random, _: usize) -> ([f64; 6], [f64; 6]) {
 
 fn scaled(mut e: [f64; 6], size: f64) -> [f64; 6] {
     let norm = e.iter().map(|e| e * e).sum::<f64>().sqrt();
-    e.iter_mut().for_each(|e| *e *= size / norm);
+    for e in &mut e {
+        *e *= size / norm;
+    }
     e
 }
 
@@ -314,11 +318,6 @@ impl Scenario {
             while !reach(&law, &recipe, &mut random, &mut points, i) {}
         }
         Self { law, points }
-    }
-
-    /// Number of points.
-    pub(crate) fn len(&self) -> usize {
-        self.points.len()
     }
 
     /// Carries every point over its step, in batches of this size (the last one may be shorter).

@@ -386,8 +386,8 @@ fn judge(
     factor: &[f64],
     message: String,
 ) -> Result<BatchSuccess, BatchFailure> {
-    let no_complaint = |ok: bool, s: &Status| ok & (*s == raw::PILUM_OK);
-    if status.iter().fold(worst == raw::PILUM_OK, no_complaint) {
+    // `PILUM_OK` is 0.
+    if status.iter().fold(worst, |all, s| all | s) == raw::PILUM_OK {
         return Ok(BatchSuccess::default());
     }
     let severity = |s: Status| if s < 0 { 100 - s } else { s };
