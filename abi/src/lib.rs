@@ -7,6 +7,7 @@ pub mod law;
 pub mod layout;
 pub mod raw;
 pub mod status;
+pub mod substepping;
 pub mod version;
 
 pub use descriptor::{Description, Hypothesis, InternalVariables, Parameter, Parameters, Variable};

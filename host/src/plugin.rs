@@ -16,6 +16,7 @@ use abi::raw::{self, Status};
 use abi::status::Outcome;
 use library::{Call, LawHandle, OwnedInstance};
 use sha2::{Digest, Sha256};
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -307,9 +308,18 @@ impl Law {
         operator: Operator,
         end: End<'_>,
     ) -> Result<BatchSuccess, BatchFailure> {
+        OUTCOMES.with_borrow_mut(|outcomes| self.integrate_with(outcomes, start, operator, end))
+    }
+
+    fn integrate_with(
+        &self,
+        outcomes: &mut Outcomes,
+        start: &Start<'_>,
+        operator: Operator,
+        end: End<'_>,
+    ) -> Result<BatchSuccess, BatchFailure> {
         let n = self.n_components();
-        let mut status = vec![raw::PILUM_E_INTERNAL; start.n_points];
-        let mut factor = vec![f64::NAN; start.n_points];
+        let (status, factor) = outcomes.unwritten(start.n_points);
         let (flux, flux_place) = end.flux;
         let (worst, message) = self.instance.integrate(Call {
             request: raw::PILUM_REQ_FLUX
@@ -330,20 +340,42 @@ impl Law {
             flux1: Some((&mut *flux, flux_place)),
             state1: &mut *end.state,
             tangent: &mut *end.operator,
-            status: &mut status,
-            step_factor: &mut factor,
+            status: &mut *status,
+            step_factor: &mut *factor,
         });
-        let success = judge(worst, &status, &factor, message)?;
+        let success = judge(worst, status, factor, message)?;
         let n_states = self.n_states();
-        let mut outputs = vec![
+        let n_operator = if operator == Operator::None { 0 } else { n * n };
+        let outputs = [
             (&*flux, flux_place, n),
             (&*end.state, Strided::rows(n_states), n_states),
+            (&*end.operator, Strided::rows(n_operator), n_operator),
         ];
-        if operator != Operator::None {
-            outputs.push((&*end.operator, Strided::rows(n * n), n * n));
-        }
         finite(&outputs, start.n_points)?;
         Ok(success)
+    }
+}
+
+/// Room for the outcomes of one call. Each thread keeps its own from call to call, so that a call
+/// allocates nothing once the largest batch has been seen.
+#[derive(Debug, Default)]
+struct Outcomes {
+    status: Vec<Status>,
+    factor: Vec<f64>,
+}
+
+thread_local! {
+    static OUTCOMES: RefCell<Outcomes> = RefCell::default();
+}
+
+impl Outcomes {
+    /// Outcomes of so many points as they are before a law has written them.
+    fn unwritten(&mut self, n_points: usize) -> (&mut [Status], &mut [f64]) {
+        self.status.clear();
+        self.status.resize(n_points, raw::PILUM_E_INTERNAL);
+        self.factor.clear();
+        self.factor.resize(n_points, f64::NAN);
+        (&mut self.status, &mut self.factor)
     }
 }
 
@@ -354,6 +386,10 @@ fn judge(
     factor: &[f64],
     message: String,
 ) -> Result<BatchSuccess, BatchFailure> {
+    // `PILUM_OK` is 0.
+    if status.iter().fold(worst, |all, s| all | s) == raw::PILUM_OK {
+        return Ok(BatchSuccess::default());
+    }
     let severity = |s: Status| if s < 0 { 100 - s } else { s };
     let point = (0..status.len())
         .rev()
@@ -393,20 +429,38 @@ fn judge(
 
 /// Distrusts success: every output must be finite.
 fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), BatchFailure> {
+    let whole = |(values, place, n): &(&[f64], Strided, usize)| {
+        let packed = place.component == 1 && place.point == *n;
+        packed && all_finite(&values[place.offset..place.offset + n_points * n])
+    };
+    if outputs.iter().all(whole) {
+        return Ok(());
+    }
     for point in 0..n_points {
         for (values, place, n) in outputs {
-            for c in 0..*n {
-                if !values[place.offset + point * place.point + c * place.component].is_finite() {
-                    return Err(BatchFailure {
-                        point,
-                        outcome: Outcome::Numeric,
-                        message: "the law claims success with a result that is not finite"
-                            .to_owned(),
-                        factor: None,
-                    });
-                }
+            let first = place.offset + point * place.point;
+            if !(0..*n).all(|c| values[first + c * place.component].is_finite()) {
+                return Err(BatchFailure {
+                    point,
+                    outcome: Outcome::Numeric,
+                    message: "the law claims success with a result that is not finite".to_owned(),
+                    factor: None,
+                });
             }
         }
     }
     Ok(())
+}
+
+/// Whether all values are finite: 0 times a finite number is 0. Eight sums at a time and no branch,
+/// so that it costs little more than reading the values.
+fn all_finite(values: &[f64]) -> bool {
+    let (chunks, rest) = values.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for chunk in chunks {
+        for (sum, value) in sums.iter_mut().zip(chunk) {
+            *sum += 0.0 * value;
+        }
+    }
+    sums.iter().sum::<f64>() == 0.0 && rest.iter().all(|v| v.is_finite())
 }

@@ -246,3 +246,65 @@ fn the_initial_normal_stress_fixes_the_stiffness() {
     );
     assert_relative_eq!(run.last("sigma_ni"), 50.0);
 }
+
+fn by_scheme(scheme: &str, segment: &str) -> Run {
+    follow(&format!(
+        "law = 'mepi'\nhypothesis = 'interface_2d'\n{PARAMETERS}{scheme}\n[initial]\n\
+         traction = {{ n = -100 }}\n[[segment]]\n{segment}"
+    ))
+}
+
+/// One increment of constant volume: substeps alone carry it to the quadrature.
+#[test]
+fn explicit_substeps_converge_linearly_and_controlled_ones_meet_their_tolerance() {
+    let mepi = truth();
+    let end = mepi.at(1e-3, 100.0, mepi.k_n);
+    let locked = "increments = 1\ncontrol = { t = { jump = 1e-3 }, n = { jump = 0 } }";
+    let errors = |scheme: String| {
+        let run = by_scheme(&scheme, locked);
+        [
+            (run.last("traction_n") + end.sigma).abs() / end.sigma,
+            (run.last("traction_t") - end.tau).abs() / end.tau,
+            (run.last("plastic_slip") - end.slip).abs() / end.slip,
+        ]
+    };
+    let explicit = [400, 800, 1600].map(|n| errors(format!("scheme = 'explicit'\nsubsteps = {n}")));
+    for pair in explicit.windows(2) {
+        for (coarse, fine) in pair[0].iter().zip(pair[1]) {
+            assert!((1.6..2.5).contains(&(coarse / fine)), "{explicit:?}");
+        }
+    }
+    for tolerance in [1e-4, 1e-6] {
+        let scheme = format!("scheme = 'error_controlled'\nscheme_tolerance = {tolerance:e}");
+        let largest = errors(scheme).into_iter().fold(0.0, f64::max);
+        assert!(largest < 10.0 * tolerance, "{largest:e} at {tolerance:e}");
+    }
+}
+
+/// The driver finds equilibrium with the continuum tangent, and the dilatancy has no error left of
+/// the end-point rule.
+#[test]
+fn error_control_follows_the_dilatancy_at_constant_normal_stress() {
+    let expected = -truth().at(2e-3, 100.0, 0.0).contraction;
+    let run = by_scheme(
+        "scheme = 'error_controlled'",
+        "increments = 200\ncontrol = { t = { jump = 2e-3 } }",
+    );
+    let jump = run.last("jump_n");
+    assert_relative_eq!(jump, expected, max_relative = 1e-4);
+    assert_relative_eq!(run.last("traction_n"), -100.0, max_relative = DRIVER);
+}
+
+#[test]
+fn a_part_of_a_substep_is_refused() {
+    let refused = crate::driver::attempt(&format!(
+        "law = 'mepi'\nhypothesis = 'interface_2d'\n{PARAMETERS}scheme = 'explicit'\n\
+         substeps = 2.5\n[initial]\ntraction = {{ n = -100 }}\n[[segment]]\nincrements = 1\n\
+         control = {{ t = {{ jump = 1e-3 }} }}"
+    ));
+    assert!(
+        refused.error().to_string().contains("2.5"),
+        "{}",
+        refused.error()
+    );
+}

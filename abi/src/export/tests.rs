@@ -8,7 +8,31 @@
 use super::*;
 use crate::law::{InterfaceResponse, Refusal};
 use crate::{Variable, describe};
+use std::alloc::{GlobalAlloc, Layout, System};
 use std::ptr::{null, null_mut};
+
+/// Counts what each thread allocates.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: everything is handed to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: contract of `alloc`.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, p: *mut u8, layout: Layout) {
+        // SAFETY: contract of `dealloc`.
+        unsafe { System.dealloc(p, layout) };
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
 
 crate::parameters! {
     /// What the probe does.
@@ -355,4 +379,52 @@ fn only_fractions_are_passed_on_as_step_factors() {
 fn a_panic_in_drop_is_contained() {
     destroyed(created(PANIC_IN_DROP, 0.0));
     destroyed(null_mut());
+}
+
+/// The boundary itself allocates nothing, whether a point succeeds, asks for a cut or is refused.
+#[test]
+fn a_call_does_not_allocate() {
+    for (deed, value) in [(CARRY, 0.0), (CUT, 0.5)] {
+        let instance = created(deed, value);
+        for state in [0.0, f64::NAN] {
+            let (zeros, state0) = ([0.0; 2], [state]);
+            let (mut flux, mut state1, mut tangent) = ([0.0; 2], [0.0; 1], [0.0; 4]);
+            let (mut outcome, mut factor) = (raw::PILUM_OK, 0.0);
+            let mut message = Buffer::new();
+            let view = |p: *const f64| View {
+                p,
+                point: 0,
+                component: 1,
+            };
+            let view_mut = |p: *mut f64| ViewMut {
+                p,
+                point: 0,
+                component: 1,
+            };
+            let batch = Batch {
+                struct_size: size_of::<Batch>() as u32,
+                request: raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT,
+                n_points: 1,
+                first_point: 0,
+                time: 0.0,
+                time_increment: 1.0,
+                gradient0: view(zeros.as_ptr()),
+                gradient1: view(zeros.as_ptr()),
+                flux0: view(zeros.as_ptr()),
+                state0: view(state0.as_ptr()),
+                flux1: view_mut(flux.as_mut_ptr()),
+                state1: view_mut(state1.as_mut_ptr()),
+                tangent: view_mut(tangent.as_mut_ptr()),
+                status: &raw mut outcome,
+                step_factor: &raw mut factor,
+                message: message.0.as_mut_ptr(),
+                message_capacity: message.0.len(),
+            };
+            let before = ALLOCATIONS.get();
+            // SAFETY: contract of `integrate`: the instance lives, the batch is true.
+            unsafe { integrate::<Interface<Probe>>(instance, &raw const batch) };
+            assert_eq!(ALLOCATIONS.get(), before);
+        }
+        destroyed(instance);
+    }
 }

@@ -48,6 +48,7 @@ impl ContinuumLaw for Elastic {
         })
     }
 
+    #[inline]
     fn update<const N: usize>(
         &self,
         point: &SolidPoint<N, ()>,

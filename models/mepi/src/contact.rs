@@ -3,9 +3,11 @@
 use crate::first_root::last_that;
 use crate::interface::{Constants, Interface, State};
 use crate::return_mapping::{Flow, Increment, Sample};
+use crate::substeps::{Path, Sliding};
+use abi::substepping::Scheme;
 use abi::{Failure, InterfacePoint, InterfaceResponse, Tangent};
 
-type Matrix = [[f64; 2]; 2];
+pub(crate) type Matrix = [[f64; 2]; 2];
 
 /// The part of the increment that acts on a point in contact, compression and contraction positive.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +37,7 @@ pub(crate) fn update(
     }
     let constants = law.constants(state.sigma_ni);
     let mut end = match contact(&constants, point) {
-        Ok(contact) => close_or_slide(&constants, state, &contact, tangent)?,
+        Ok(contact) => close_or_slide(&constants, law.scheme, state, &contact, tangent)?,
         Err(gap) => open(State { gap, ..state }),
     };
     if tangent == Tangent::Elastic {
@@ -96,6 +98,7 @@ fn open(state: State) -> InterfaceResponse<State> {
 #[inline]
 fn close_or_slide(
     constants: &Constants,
+    scheme: Scheme,
     state: State,
     contact: &Contact,
     tangent: Tangent,
@@ -127,6 +130,9 @@ fn close_or_slide(
             State { gap: 0.0, ..state },
             elastic,
         ));
+    }
+    if scheme != Scheme::Implicit && contact.sigma >= 0.0 {
+        return substeps(constants, scheme, state, contact);
     }
     let sign = 1.0_f64.copysign(tau_trial);
     match increment.flow()? {
@@ -162,6 +168,62 @@ fn close_or_slide(
             constants, state, contact, &increment, exhausted,
         ))),
     }
+}
+
+/// The flow by substeps. Where it loses contact, the rest of the increment is left to the implicit
+/// scheme, which knows how contact is lost.
+#[cold]
+fn substeps(
+    constants: &Constants,
+    scheme: Scheme,
+    state: State,
+    contact: &Contact,
+) -> Result<InterfaceResponse<State>, Failure> {
+    let path = Path {
+        constants,
+        contraction: contact.contraction,
+        slip: contact.slip,
+    };
+    let start = Sliding {
+        sigma: contact.sigma,
+        tau: contact.tau,
+        xi: state.plastic_slip,
+        contraction: 0.0,
+        done: 0.0,
+        loses_contact: false,
+    };
+    let end = path.follow(&start, scheme)?;
+    let state = State {
+        plastic_contraction: state.plastic_contraction + end.contraction,
+        plastic_slip: end.xi,
+        gap: 0.0,
+        ..state
+    };
+    if end.loses_contact {
+        let left = 1.0 - end.done;
+        let rest = Contact {
+            sigma: end.sigma,
+            tau: end.tau,
+            contraction: left * contact.contraction,
+            slip: left * contact.slip,
+            slip_by_jump: contact.slip_by_jump,
+        };
+        return close_or_slide(
+            constants,
+            Scheme::Implicit,
+            state,
+            &rest,
+            Tangent::Consistent,
+        );
+    }
+    let by_trial = path.continuum_tangent(&end)?;
+    Ok(response(
+        constants,
+        contact,
+        [end.sigma, end.tau],
+        state,
+        by_trial,
+    ))
 }
 
 /// The state after plastic flow in contact, Eq. (14).

@@ -1,6 +1,7 @@
 //! What the two laws share: their common parameters made ready, and the internal variables.
 
 use crate::hardening::{Hardening, Softening};
+use abi::substepping::Scheme;
 use abi::{Failure, Refusal, Variable};
 
 abi::internal_variables! {
@@ -63,6 +64,7 @@ pub(crate) struct Interface {
     one_root: bool,
     /// Constants of the points whose `σ_ni` is the parameter.
     given: Option<Constants>,
+    pub(crate) scheme: Scheme,
 }
 
 /// The largest value of (z tanh z − 1)/cosh z, which is 0.25114…
@@ -70,7 +72,7 @@ pub(crate) const STABILISATION_BOUND: f64 = 0.2512;
 
 impl Interface {
     /// Checks how the parameters go together.
-    pub(crate) fn new(common: Common, peak: Option<Peak>) -> Result<Self, Refusal> {
+    pub(crate) fn new(common: Common, peak: Option<Peak>, scheme: Scheme) -> Result<Self, Refusal> {
         let Common {
             mu_0, mu_p, mu_c0, ..
         } = common;
@@ -87,6 +89,10 @@ impl Interface {
                 format!("{mu_r} is above mu_p = {mu_p}"),
             ));
         }
+        if scheme != Scheme::Implicit && peak.is_some_and(|peak| peak.published) {
+            let reason = "only `implicit` follows the jump of `peak = \"published\"`";
+            return Err(Refusal::new("scheme", reason));
+        }
         // Bounds of μ d(Δλ β)/dΔλ before and after the characteristic state, see LAW.md.
         let coupling = (0.25 * mu_c0 * mu_c0).max(STABILISATION_BOUND * mu_p * (mu_p - mu_c0));
         let mut law = Self {
@@ -94,6 +100,7 @@ impl Interface {
             peak,
             one_root: common.k_n * coupling < common.k_t,
             given: None,
+            scheme,
         };
         if !common.sigma_ni.is_nan() {
             law.given = Some(law.computed_constants(common.sigma_ni));

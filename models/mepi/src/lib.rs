@@ -9,6 +9,7 @@ mod interface;
 mod mepi;
 mod mepi_softening;
 mod return_mapping;
+mod substeps;
 #[cfg(test)]
 mod tests;
 

@@ -2,6 +2,7 @@
 
 use crate::contact;
 use crate::interface::{Common, Interface, State};
+use abi::substepping::Scheme;
 use abi::{
     Description, Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Parameter, Refusal,
     Tangent,
@@ -32,6 +33,18 @@ abi::parameters! {
         p_0: Parameter::new(c"p_0", c"kPa").above(0.0).usual(1.0, 1e3).default(1.0),
         /// Initial normal stress, compression positive; taken from the initial state if left out.
         sigma_ni: Parameter::new(c"σ_ni", c"kPa").above(0.0).usual(1e-1, 1e5).optional(),
+        /// How the flow is integrated.
+        scheme: Parameter::new(c"scheme", c"-")
+            .one_of(abi::choices!(c"implicit", c"explicit", c"error_controlled"))
+            .default(0.0),
+        /// Number of steps of the explicit scheme in an increment, whole.
+        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e6).default(10.0),
+        /// Relative error that a step of the error-controlled scheme may have.
+        scheme_tolerance: Parameter::new(c"ε_s", c"-")
+            .above(0.0)
+            .below(1.0)
+            .usual(1e-10, 1e-2)
+            .default(1e-6),
     }
 }
 
@@ -52,6 +65,7 @@ impl InterfaceLaw for Mepi {
     type State = State;
 
     fn new(p: Parameters) -> Result<Self, Refusal> {
+        let scheme = Scheme::new(p.scheme, p.substeps, p.scheme_tolerance)?;
         let common = Common {
             k_n: p.k_n,
             k_t: p.k_t,
@@ -65,7 +79,7 @@ impl InterfaceLaw for Mepi {
             p_0: p.p_0,
             sigma_ni: p.sigma_ni,
         };
-        Interface::new(common, None).map(Self)
+        Interface::new(common, None, scheme).map(Self)
     }
 
     fn initial_state(&self, traction: &[f64; 2]) -> Result<State, Failure> {

@@ -2,6 +2,7 @@
 
 use crate::contact;
 use crate::interface::{Common, Interface, Peak, State};
+use abi::substepping::Scheme;
 use abi::{
     Description, Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Parameter, Refusal,
     Tangent,
@@ -42,6 +43,18 @@ abi::parameters! {
         peak: Parameter::new(c"peak", c"-")
             .one_of(abi::choices!(c"continuous", c"published"))
             .default(0.0),
+        /// How the flow is integrated.
+        scheme: Parameter::new(c"scheme", c"-")
+            .one_of(abi::choices!(c"implicit", c"explicit", c"error_controlled"))
+            .default(0.0),
+        /// Number of steps of the explicit scheme in an increment, whole.
+        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e6).default(10.0),
+        /// Relative error that a step of the error-controlled scheme may have.
+        scheme_tolerance: Parameter::new(c"ε_s", c"-")
+            .above(0.0)
+            .below(1.0)
+            .usual(1e-10, 1e-2)
+            .default(1e-6),
     }
 }
 
@@ -63,6 +76,7 @@ impl InterfaceLaw for MepiSoftening {
     type State = State;
 
     fn new(p: Parameters) -> Result<Self, Refusal> {
+        let scheme = Scheme::new(p.scheme, p.substeps, p.scheme_tolerance)?;
         let common = Common {
             k_n: p.k_n,
             k_t: p.k_t,
@@ -82,7 +96,7 @@ impl InterfaceLaw for MepiSoftening {
             u_tp: p.u_tp,
             published: p.peak > 0.5,
         };
-        Interface::new(common, Some(peak)).map(Self)
+        Interface::new(common, Some(peak), scheme).map(Self)
     }
 
     fn initial_state(&self, traction: &[f64; 2]) -> Result<State, Failure> {

@@ -8,6 +8,7 @@ mod contact;
 mod extremes;
 mod paths;
 mod scalar_equation;
+mod schemes;
 mod tangent;
 mod truth;
 
@@ -28,6 +29,9 @@ const TABLE_4: mepi::Parameters = mepi::Parameters {
     t: 2e-3,
     p_0: 100.0,
     sigma_ni: f64::NAN,
+    scheme: 0.0,
+    substeps: 10.0,
+    scheme_tolerance: 1e-6,
 };
 
 /// Table II, thickness for L/t = 25.
@@ -43,6 +47,9 @@ const TABLE_2: mepi::Parameters = mepi::Parameters {
     t: 4e-4,
     p_0: 100.0,
     sigma_ni: 100.0,
+    scheme: 0.0,
+    substeps: 10.0,
+    scheme_tolerance: 1e-6,
 };
 
 /// Table I, Fontainebleau sand, loose.
@@ -62,6 +69,9 @@ const FONTAINEBLEAU: mepi_softening::Parameters = mepi_softening::Parameters {
     a_0: 4.0,
     u_tp: 1.4e-3,
     peak: 0.0,
+    scheme: 0.0,
+    substeps: 10.0,
+    scheme_tolerance: 1e-6,
 };
 
 /// Table I, silica sand, dense.
@@ -81,6 +91,9 @@ const SILICA: mepi_softening::Parameters = mepi_softening::Parameters {
     a_0: 12.0,
     u_tp: 4.3e-4,
     peak: 0.0,
+    scheme: 0.0,
+    substeps: 10.0,
+    scheme_tolerance: 1e-6,
 };
 
 fn published(p: mepi_softening::Parameters) -> mepi_softening::Parameters {

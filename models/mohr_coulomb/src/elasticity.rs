@@ -3,7 +3,7 @@
 //! `E`, `ν` Young's modulus and Poisson's ratio, `λ`, `G` Lamé's constants; Voigt components
 //! 11 22 33 12 \[13 23\] with engineering shear strains.
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// Isotropic elastic constants.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +12,10 @@ pub(crate) struct Elasticity {
     pub(crate) poisson_ratio: f64,
     pub(crate) lambda: f64,
     pub(crate) shear_modulus: f64,
+    /// 1/(2G).
+    shear_compliance: f64,
+    /// 1/(3λ + 2G).
+    bulk_compliance: f64,
 }
 
 impl Elasticity {
@@ -21,6 +25,8 @@ impl Elasticity {
             poisson_ratio: nu,
             lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
             shear_modulus: e / (2.0 * (1.0 + nu)),
+            shear_compliance: (1.0 + nu) / e,
+            bulk_compliance: (1.0 - 2.0 * nu) / e,
         }
     }
 
@@ -30,10 +36,10 @@ impl Elasticity {
         &self,
         stress: &[f64; N],
         strain_increment: &[f64; N],
-    ) -> SVector<f64, N> {
+    ) -> [f64; N] {
         let (lambda, g) = (self.lambda, self.shear_modulus);
         let volumetric = strain_increment[0] + strain_increment[1] + strain_increment[2];
-        SVector::from_fn(|i, _| {
+        std::array::from_fn(|i| {
             stress[i]
                 + if i < 3 {
                     lambda * volumetric + 2.0 * g * strain_increment[i]
@@ -44,6 +50,7 @@ impl Elasticity {
     }
 
     /// Elastic operator, Eq. (1), row by row.
+    #[inline]
     pub(crate) fn operator<const N: usize>(&self) -> [[f64; N]; N] {
         let mut d = [[0.0; N]; N];
         for i in 0..N {
@@ -68,8 +75,7 @@ impl Elasticity {
     pub(crate) fn equivalent_strains(&self, stress: &Vector3<f64>) -> (f64, f64) {
         let sum = stress.sum();
         let deviator = stress.add_scalar(-sum / 3.0);
-        let g = self.shear_modulus;
-        let shear = (2.0 / 3.0 * deviator.norm_squared()).sqrt() / (2.0 * g);
-        (shear, sum / (3.0 * self.lambda + 2.0 * g))
+        let shear = (2.0 / 3.0 * deviator.norm_squared()).sqrt() * self.shear_compliance;
+        (shear, sum * self.bulk_compliance)
     }
 }

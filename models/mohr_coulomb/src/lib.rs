@@ -4,18 +4,20 @@
 mod elasticity;
 mod return_mapping;
 mod spectral;
+mod substeps;
 mod surface;
 #[cfg(test)]
 mod tests;
 
+use abi::substepping::Scheme;
 use abi::{
     ContinuumLaw, Description, Failure, Parameter, Refusal, SolidPoint, SolidResponse, Tangent,
     Variable,
 };
 use elasticity::Elasticity;
-use nalgebra::SMatrix;
+use nalgebra::Vector3;
 use return_mapping::Returned;
-use spectral::Principal;
+use spectral::{MohrCircle, Pair, Spatial};
 use surface::Pyramid;
 
 abi::parameters! {
@@ -33,6 +35,18 @@ abi::parameters! {
         dilatancy_angle: Parameter::new(c"ψ", c"deg").at_least(0.0).below(90.0).usual(0.0, 30.0),
         /// Bound on the largest principal stress, at most c cot φ; none if left out.
         tensile_strength: Parameter::new(c"R_t", c"kPa").at_least(0.0).optional(),
+        /// How the flow is integrated.
+        scheme: Parameter::new(c"scheme", c"-")
+            .one_of(abi::choices!(c"implicit", c"explicit", c"error_controlled"))
+            .default(0.0),
+        /// Number of steps of the explicit scheme in an increment, whole.
+        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e6).default(10.0),
+        /// Relative error that a step of the error-controlled scheme may have.
+        scheme_tolerance: Parameter::new(c"ε_s", c"-")
+            .above(0.0)
+            .below(1.0)
+            .usual(1e-10, 1e-2)
+            .default(1e-6),
     }
 }
 
@@ -52,6 +66,7 @@ abi::internal_variables! {
 pub struct MohrCoulomb {
     elasticity: Elasticity,
     pyramid: Pyramid,
+    scheme: Scheme,
 }
 
 impl ContinuumLaw for MohrCoulomb {
@@ -79,6 +94,7 @@ impl ContinuumLaw for MohrCoulomb {
                 p.dilatancy_angle,
                 Some(p.tensile_strength).filter(below_apex),
             ),
+            scheme: Scheme::new(p.scheme, p.substeps, p.scheme_tolerance)?,
         })
     }
 
@@ -92,68 +108,90 @@ impl ContinuumLaw for MohrCoulomb {
         let trial = self
             .elasticity
             .trial_stress(&point.stress, &point.strain_increment);
-        if !trial.norm_squared().is_finite() {
+        if !trial.iter().map(|s| s * s).sum::<f64>().is_finite() {
             return Err(Failure::Numeric("the elastic predictor overflows"));
         }
-        let (largest, smallest) = spectral::extremes(&trial);
+        let operator = |consistent: &dyn Fn() -> [[f64; N]; N]| match tangent {
+            Tangent::None => [[0.0; N]; N],
+            Tangent::Elastic => self.elasticity.operator(),
+            Tangent::Consistent => consistent(),
+        };
         let elastic = || SolidResponse {
-            stress: trial.into(),
+            stress: trial,
             state: point.state,
-            tangent: self.elasticity.operator(),
+            tangent: operator(&|| self.elasticity.operator()),
             unreliable: None,
         };
-        // Eqs. (2) and (3).
-        if self.pyramid.admits(largest, smallest) {
-            return Ok(elastic());
+        let plastic = |trial: &Vector3<f64>, end: &Returned, stress, tangent| {
+            // Eq. (13).
+            let (shear, dilation) = self.elasticity.equivalent_strains(&(trial - end.stress));
+            SolidResponse {
+                stress,
+                state: State {
+                    plastic_strain: point.state.plastic_strain + shear,
+                    plastic_dilation: point.state.plastic_dilation + dilation,
+                },
+                tangent,
+                unreliable: None,
+            }
+        };
+        // Eqs. (2) and (3), (10), (11).
+        let g = self.elasticity.shear_modulus;
+        if N == 4 {
+            let circle = MohrCircle::of(&trial);
+            let (largest, smallest) = circle.extremes();
+            if self.pyramid.admits(largest, smallest) {
+                return Ok(elastic());
+            }
+            if self.scheme != Scheme::Implicit {
+                return self.substeps(point, &trial, tangent);
+            }
+            let principal = circle.principal();
+            let end = self.pyramid.return_stress(&principal.stress);
+            let consistent = || {
+                let moduli = self.pyramid.in_plane_moduli(end.zone, principal.pair);
+                let spin = end.spin(&principal.stress, principal.pair);
+                resized(principal.tangent(moduli, g * spin).map(resized))
+            };
+            let stress = resized(principal.compose(&end.stress));
+            Ok(plastic(
+                &principal.stress,
+                &end,
+                stress,
+                operator(&consistent),
+            ))
+        } else {
+            let (above, below) = spectral::bounds(&trial);
+            if self.pyramid.admits(above, below) {
+                return Ok(elastic());
+            }
+            let principal = Spatial::of(&trial);
+            let s = &principal.stress;
+            if self.pyramid.admits(s[0], s[2]) {
+                return Ok(elastic());
+            }
+            if self.scheme != Scheme::Implicit {
+                return self.substeps(point, &trial, tangent);
+            }
+            let end = self.pyramid.return_stress(s);
+            let consistent = || {
+                let shear = Pair::ALL.map(|pair| g * end.spin(s, pair));
+                resized(
+                    principal
+                        .tangent(self.pyramid.moduli(end.zone), shear)
+                        .map(resized),
+                )
+            };
+            let stress = resized(principal.compose(&end.stress));
+            Ok(plastic(s, &end, stress, operator(&consistent)))
         }
-        let principal = Principal::of(&trial);
-        if N > 4
-            && self
-                .pyramid
-                .admits(principal.stress[0], principal.stress[2])
-        {
-            return Ok(elastic());
-        }
-        let end = self.pyramid.return_stress(&principal.stress);
-        // Eq. (13).
-        let lost = principal.stress - end.stress;
-        let (shear, dilation) = self.elasticity.equivalent_strains(&lost);
-        Ok(SolidResponse {
-            // Eq. (11).
-            stress: principal.compose(&end.stress),
-            state: State {
-                plastic_strain: point.state.plastic_strain + shear,
-                plastic_dilation: point.state.plastic_dilation + dilation,
-            },
-            tangent: match tangent {
-                Tangent::None => [[0.0; N]; N],
-                Tangent::Elastic => self.elasticity.operator(),
-                Tangent::Consistent => self.consistent_tangent(&principal, &end),
-            },
-            unreliable: None,
-        })
     }
 }
 
-impl MohrCoulomb {
-    /// Eq. (11), row by row.
-    #[inline]
-    fn consistent_tangent<const N: usize>(
-        &self,
-        principal: &Principal<N>,
-        end: &Returned,
-    ) -> [[f64; N]; N] {
-        let spin = end.spin(&principal.stress);
-        let mut operator = SMatrix::<f64, N, N>::zeros();
-        operator
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(self.pyramid.moduli(end.zone));
-        for i in 3..N {
-            operator[(i, i)] = self.elasticity.shear_modulus * spin[principal.pairs[i - 3]];
-        }
-        let tangent = principal.axes.tr_mul(&(operator * principal.axes));
-        tangent.transpose().into()
-    }
+/// An array whose length the compiler does not know to be `N`.
+#[inline]
+fn resized<T: Copy, const M: usize, const N: usize>(values: [T; M]) -> [T; N] {
+    std::array::from_fn(|i| values[i])
 }
 
 /// Relative rounding of c cot φ.

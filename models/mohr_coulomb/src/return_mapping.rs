@@ -5,6 +5,7 @@
 //! | `s₁ ≥ s₂ ≥ s₃` | `s` | trial principal stresses, tension positive |
 //! | `Δ` | `d` | G times the plastic multiplier, kPa |
 
+use crate::spectral::Pair;
 use crate::surface::{CutOff, Pyramid};
 use nalgebra::Vector3;
 
@@ -44,26 +45,24 @@ pub(crate) struct Returned {
 }
 
 impl Returned {
-    /// `(s_i − s_j)/(s_i* − s_j*)` for the pairs 12, 13, 23: what the return leaves of a shear
-    /// increment in the principal axes, Eq. (11).
+    /// `(s_i − s_j)/(s_i* − s_j*)` of a pair: what the return leaves of a shear increment between
+    /// the two principal axes, Eq. (11).
     #[inline]
-    pub(crate) fn spin(&self, trial: &Vector3<f64>) -> [f64; 3] {
-        // Where two trial values coincide the return leaves both alone or merges both.
-        let merged = [0.0, 0.0, f64::from(self.zone == Zone::TensionPlane)];
+    pub(crate) fn spin(&self, trial: &Vector3<f64>, pair: Pair) -> f64 {
         let [x, y] = self.gaps;
-        let trial_gaps = [
-            trial[0] - trial[1],
-            trial[0] - trial[2],
-            trial[1] - trial[2],
-        ];
-        let gaps = [x, x + y, y];
-        std::array::from_fn(|p| {
-            if trial_gaps[p] > 0.0 {
-                gaps[p] / trial_gaps[p]
-            } else {
-                merged[p]
-            }
-        })
+        // Where two trial values coincide the return leaves both alone or merges both.
+        let (gap, merged) = match pair {
+            Pair::First12 => (x, 0.0),
+            Pair::Outer13 => (x + y, 0.0),
+            Pair::Last23 => (y, f64::from(self.zone == Zone::TensionPlane)),
+        };
+        let [i, j, _] = pair.places();
+        let trial_gap = trial[i] - trial[j];
+        if trial_gap > 0.0 {
+            gap / trial_gap
+        } else {
+            merged
+        }
     }
 }
 

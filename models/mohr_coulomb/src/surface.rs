@@ -9,6 +9,7 @@
 
 use crate::elasticity::Elasticity;
 use crate::return_mapping::Zone;
+use crate::spectral::{InPlaneModuli, Pair, in_plane_moduli};
 use nalgebra::{Matrix3, Vector3};
 
 /// (1 ± sin)/2 of an angle, without cancellation near 90°.
@@ -75,6 +76,7 @@ pub(crate) struct Pyramid {
     pub(crate) edge_23: Direction,
     pub(crate) cut_off: Option<CutOff>,
     moduli: [Matrix3<f64>; 10],
+    in_plane_moduli: [[InPlaneModuli; 3]; 10],
 }
 
 /// c cot φ; infinite for φ = 0.
@@ -143,6 +145,7 @@ impl Pyramid {
                 s3: (phi.upper * t - strength) / phi.lower,
             }),
             moduli,
+            in_plane_moduli: moduli.map(|m| Pair::ALL.map(|pair| in_plane_moduli(&m, pair))),
         }
     }
 
@@ -178,5 +181,11 @@ impl Pyramid {
     #[inline]
     pub(crate) fn moduli(&self, zone: Zone) -> &Matrix3<f64> {
         &self.moduli[zone as usize]
+    }
+
+    /// The same as the plane of these two axes sees it.
+    #[inline]
+    pub(crate) fn in_plane_moduli(&self, zone: Zone, pair: Pair) -> &InPlaneModuli {
+        &self.in_plane_moduli[zone as usize][pair as usize]
     }
 }

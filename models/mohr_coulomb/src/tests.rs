@@ -6,6 +6,7 @@
 )]
 
 mod reference;
+mod schemes;
 mod sweep;
 mod tangent;
 mod zones;
@@ -26,8 +27,22 @@ fn handy(tensile_strength: Option<f64>) -> Parameters {
         friction_angle: 30.0,
         dilatancy_angle: 0.0,
         tensile_strength: tensile_strength.unwrap_or(f64::NAN),
+        ..IMPLICIT
     }
 }
+
+/// The defaults of the scheme; everything else is left out.
+const IMPLICIT: Parameters = Parameters {
+    young_modulus: f64::NAN,
+    poisson_ratio: f64::NAN,
+    cohesion: f64::NAN,
+    friction_angle: f64::NAN,
+    dilatancy_angle: f64::NAN,
+    tensile_strength: f64::NAN,
+    scheme: 0.0,
+    substeps: 10.0,
+    scheme_tolerance: 1e-6,
+};
 
 fn law(p: Parameters) -> MohrCoulomb {
     MohrCoulomb::new(p).unwrap()
@@ -176,6 +191,7 @@ impl Random {
             friction_angle,
             dilatancy_angle: friction_angle * self.one_of(&[0.0, 0.0, 0.4, 1.0]),
             tensile_strength: share * apex.min(3.0) * scale,
+            ..IMPLICIT
         }
     }
 }

@@ -27,6 +27,7 @@ fn stays_admissible_on_random_walks() {
             a_0: random.decades(1e-2, 1e3),
             u_tp: random.decades(1e-6, 1e-1),
             peak: f64::from(u8::from(random.unit() < 0.5)),
+            ..FONTAINEBLEAU
         };
         let law = softening(p);
         let sigma_ni = random.decades(1e-6, 1e6);

@@ -4,6 +4,7 @@ use super::*;
 use crate::hardening::sech_tanh;
 use crate::interface::{Common, Interface, Peak};
 use crate::return_mapping::{Flow, Increment, Sample};
+use abi::substepping::Scheme;
 
 /// An interface with parameters over many decades, and `σ_ni`.
 fn random_interface(random: &mut Random) -> (Interface, f64) {
@@ -29,7 +30,10 @@ fn random_interface(random: &mut Random) -> (Interface, f64) {
     };
     let peak = (random.unit() < 0.6).then_some(peak);
     let sigma_ni = random.decades(1e-6, 1e6);
-    (Interface::new(common, peak).unwrap(), sigma_ni)
+    (
+        Interface::new(common, peak, Scheme::Implicit).unwrap(),
+        sigma_ni,
+    )
 }
 
 #[test]

@@ -27,7 +27,7 @@ fn error<const N: usize>(p: &Parameters, trial: [f64; N], probe: f64) -> Option<
             let end = law
                 .update(&rested(trial, increment), Tangent::None)
                 .unwrap();
-            (zone(&law, &moved.into()) == here).then_some(end.stress)
+            (zone(&law, &moved) == here).then_some(end.stress)
         };
         let (ahead, behind) = (probed(1.0)?, probed(-1.0)?);
         for i in 0..N {

@@ -6,10 +6,10 @@
 //! the pyramid meets the cut-off at s₃ = (3.75 − 10)/0.25 = −25 kPa.
 
 use super::{Zone, distance, excess, from_trial, handy, law, rested, size, turned};
-use crate::spectral::Principal;
+use crate::spectral::Spatial;
 use abi::{ContinuumLaw as _, Tangent};
 use approx::assert_relative_eq;
-use nalgebra::{SVector, Vector3};
+use nalgebra::Vector3;
 
 fn check(zone: Zone, tensile_strength: Option<f64>, trial: [f64; 3], expected: [f64; 3]) {
     let p = handy(tensile_strength);
@@ -224,7 +224,7 @@ fn repeated_values_have_orthonormal_axes() {
         for nudge in [0.0, 1e-300, 1e-16, 1e-12, 1e-8] {
             let mut stress: [f64; 6] = turned(values, [0.3, 1.1, 2.0]);
             stress[4] += nudge;
-            let principal = Principal::of(&SVector::from(stress));
+            let principal = Spatial::of(&stress);
             let back = principal.compose(&principal.stress);
             assert!(distance(&back, &stress) < 4e-15);
             assert!(distance(&principal.stress.into(), &values) < 2.0 * nudge + 4e-15);

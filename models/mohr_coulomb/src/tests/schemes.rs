@@ -1,0 +1,196 @@
+//! The schemes against each other: order, tolerance, and what they leave alone.
+
+use super::{IMPLICIT, Random, distance, excess, law, rested, size};
+use crate::{MohrCoulomb, Parameters, State};
+use abi::{ContinuumLaw as _, SolidPoint, Tangent};
+
+/// Sand of the comparison with other programs.
+const SAND: Parameters = Parameters {
+    young_modulus: 34e3,
+    poisson_ratio: 0.3,
+    cohesion: 1.0,
+    friction_angle: 36.5,
+    dilatancy_angle: 12.0,
+    ..IMPLICIT
+};
+
+fn explicit(substeps: f64) -> MohrCoulomb {
+    law(Parameters {
+        scheme: 1.0,
+        substeps,
+        ..SAND
+    })
+}
+
+fn controlled(scheme_tolerance: f64) -> MohrCoulomb {
+    law(Parameters {
+        scheme: 2.0,
+        scheme_tolerance,
+        ..SAND
+    })
+}
+
+/// Principal stresses at the start, along 11 22 33: axes that shearing turns.
+const START: [f64; 3] = [-60.0, -150.0, -60.0];
+
+/// Follows a straight path in equal increments.
+fn follow<const N: usize>(
+    law: &MohrCoulomb,
+    strain: &[f64; N],
+    increments: u32,
+) -> ([f64; N], State) {
+    let mut stress = [0.0; N];
+    stress[..3].copy_from_slice(&START);
+    let mut point: SolidPoint<N, State> = rested(stress, strain.map(|e| e / f64::from(increments)));
+    for _ in 0..increments {
+        let end = law.update(&point, Tangent::None).unwrap();
+        (point.stress, point.state) = (end.stress, end.state);
+    }
+    (point.stress, point.state)
+}
+
+/// Shearing that turns the axes on a face.
+const TURNING: [f64; 4] = [1e-3, -3e-3, 0.0, 8e-3];
+
+/// The same to the triaxial edge: radial and hoop strain are alike, and shear comes to it.
+const TO_THE_EDGE: [f64; 4] = [2e-3, -8e-3, 2e-3, 3e-3];
+
+#[test]
+fn the_error_of_explicit_steps_falls_as_one_over_their_number() {
+    for strain in [TURNING, TO_THE_EDGE] {
+        let reference = fine(&strain);
+        let error = |n| distance(&follow(&explicit(n), &strain, 1).0, &reference);
+        let errors = [40.0, 80.0, 160.0, 320.0].map(error);
+        for pair in errors.windows(2) {
+            let order = (pair[0] / pair[1]).log2();
+            assert!((0.8..1.2).contains(&order), "{errors:?}");
+        }
+    }
+}
+
+/// The implicit scheme is of first order: twice the result of fine steps less that of steps twice as
+/// long is of second.
+fn fine<const N: usize>(strain: &[f64; N]) -> [f64; N] {
+    let (one, _) = follow(&law(SAND), strain, 20_000);
+    let (two, _) = follow(&law(SAND), strain, 40_000);
+    std::array::from_fn(|c| 2.0 * two[c] - one[c])
+}
+
+#[test]
+fn error_control_meets_its_tolerance() {
+    for strain in [TURNING, TO_THE_EDGE] {
+        let reference = fine(&strain);
+        for tolerance in [1e-3, 1e-4, 1e-5, 1e-6] {
+            let (stress, _) = follow(&controlled(tolerance), &strain, 1);
+            let error = distance(&stress, &reference) / size(&reference);
+            assert!(error < 10.0 * tolerance, "{error:e} at {tolerance:e}");
+            assert!(excess(&SAND, &stress) < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn error_control_meets_its_tolerance_in_space() {
+    let strain = [1e-3, -4e-3, 2e-3, 5e-3, -3e-3, 2e-3];
+    let reference = fine(&strain);
+    for tolerance in [1e-3, 1e-5] {
+        let (stress, _) = follow(&controlled(tolerance), &strain, 1);
+        let error = distance(&stress, &reference) / size(&reference);
+        assert!(error < 10.0 * tolerance, "{error:e} at {tolerance:e}");
+    }
+}
+
+/// Where the axes do not turn and the zone does not change, the schemes agree to rounding, plastic
+/// strains included.
+#[test]
+fn without_turning_all_schemes_are_exact() {
+    let strain = [2e-3, -9e-3, 1e-3, 0.0];
+    let (stress, state) = follow(&law(SAND), &strain, 1);
+    for law in [explicit(1.0), explicit(7.0), controlled(1e-6)] {
+        let (other, its_state) = follow(&law, &strain, 1);
+        assert!(
+            distance(&stress, &other) < 1e-11 * size(&stress),
+            "{stress:?} {other:?}"
+        );
+        assert!((state.plastic_strain - its_state.plastic_strain).abs() < 1e-14);
+        assert!((state.plastic_dilation - its_state.plastic_dilation).abs() < 1e-14);
+    }
+}
+
+/// An increment that ends inside the surface is the same by every scheme, bit by bit, and splitting
+/// off the elastic part of one that leaves it changes nothing.
+#[test]
+fn elastic_splits_change_nothing() {
+    let inside = [1e-4, -3e-4, 1e-4, 2e-4];
+    for other in [explicit(10.0), controlled(1e-6)] {
+        assert_eq!(
+            follow(&other, &inside, 1).0,
+            follow(&law(SAND), &inside, 1).0
+        );
+        let (whole, _) = follow(&other, &TURNING, 1);
+        let mut point: SolidPoint<4, State> = rested(
+            [START[0], START[1], START[2], 0.0],
+            TURNING.map(|e| 0.01 * e),
+        );
+        point.stress = other.update(&point, Tangent::None).unwrap().stress;
+        point.strain_increment = TURNING.map(|e| 0.99 * e);
+        let split = other.update(&point, Tangent::None).unwrap().stress;
+        assert!(
+            distance(&whole, &split) < 1e-9 * size(&whole),
+            "{whole:?} {split:?}"
+        );
+    }
+}
+
+/// The tangent is that of a small increment from the end.
+#[test]
+fn the_tangent_is_the_continuum_one() {
+    for strain in [TURNING, TO_THE_EDGE] {
+        let law = controlled(1e-8);
+        let mut point: SolidPoint<4, State> = rested([START[0], START[1], START[2], 0.0], strain);
+        let end = law.update(&point, Tangent::Consistent).unwrap();
+        point.stress = end.stress;
+        point.strain_increment = strain.map(|e| 1e-5 * e);
+        let next = law.update(&point, Tangent::None).unwrap().stress;
+        for i in 0..4 {
+            let predicted: f64 = (0..4)
+                .map(|j| end.tangent[i][j] * point.strain_increment[j])
+                .sum();
+            let found = next[i] - end.stress[i];
+            assert!(
+                (predicted - found).abs() < 1e-3 * 34e3 * 1e-5 * size(&strain),
+                "{predicted} {found}"
+            );
+        }
+    }
+}
+
+/// Every scheme ends near the surface or says why not, and its numbers are finite.
+#[test]
+fn stands_random_states() {
+    let mut random = Random(5);
+    for k in 0..400 {
+        let angles = [0.0, 10.0, 36.5, 60.0];
+        let scale = 10_f64.powf(random.between(-1.0, 3.0));
+        let p = Parameters {
+            scheme: if k % 2 == 0 { 1.0 } else { 2.0 },
+            scheme_tolerance: 1e-4,
+            ..random.parameters(&angles, scale)
+        };
+        let stress = super::turned::<6>(random.principal(scale), random.angles());
+        let increment: [f64; 6] =
+            std::array::from_fn(|_| random.between(-3.0, 3.0) * scale / p.young_modulus);
+        let law = law(p);
+        if let Ok(end) = law.update(&rested(stress, increment), Tangent::Consistent) {
+            assert!(
+                end.stress
+                    .iter()
+                    .chain(end.tangent.as_flattened())
+                    .all(|v| v.is_finite())
+            );
+            if p.scheme > 1.5 {
+                assert!(excess(&p, &end.stress) < 1e-12, "{p:?}");
+            }
+        }
+    }
+}
