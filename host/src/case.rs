@@ -486,6 +486,8 @@ pub struct SolverInput {
     pub max_halvings: u32,
     /// Whether to search along a correction that makes the residual grow.
     pub line_search: bool,
+    /// Whether to relax viscously where Newton iterations come to a standstill.
+    pub relaxation: bool,
 }
 
 /// A tolerance: not below what double precision reaches, and not above the quantity itself.
@@ -519,6 +521,7 @@ impl Default for SolverInput {
             max_iterations: 25,
             max_halvings: 10,
             line_search: true,
+            relaxation: true,
         }
     }
 }

@@ -252,6 +252,13 @@ impl<'a> Run<'a> {
                             record.unreliable += 1;
                             done.warning.get_or_insert_with(|| why.clone());
                         }
+                        if success.relaxed {
+                            record.relaxed += 1;
+                            observer.warning(&format!(
+                                "{place}: Newton iterations came to a standstill; viscous \
+                                 relaxation led to the next equilibrium"
+                            ));
+                        }
                         if success.iterations.len() <= EASY {
                             step = (REGROWTH * step).min(1.0 / n as f64);
                         }
@@ -433,9 +440,15 @@ impl<'a> Run<'a> {
 
     fn no_equilibrium(place: &Place, lambda: f64, n: usize, failure: &StepFailure) -> Error {
         let reached = lambda * n as f64;
+        let culprit = failure
+            .culprit
+            .as_ref()
+            .map(|culprit| format!("\n  {culprit}"))
+            .unwrap_or_default();
         Error::NoEquilibrium {
             message: format!(
-                "{place}: no equilibrium beyond {reached:.4} of {n} increments\n  last attempt: {}",
+                "{place}: no equilibrium beyond {reached:.4} of {n} increments\n  last attempt: \
+                 {}{culprit}",
                 failure.reason
             ),
             hint: Some(

@@ -1,5 +1,6 @@
 //! Finding equilibrium: Newton iterations within a step, and the sparse equations they solve.
 
+mod diagnosis;
 mod linear;
 mod newton;
 

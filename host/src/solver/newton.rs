@@ -1,10 +1,15 @@
-//! Full Newton iterations with consistent tangents and a line search.
+//! Full Newton iterations with consistent tangents and a line search; viscous relaxation where
+//! they come to a standstill.
 
+mod relaxation;
+
+use super::diagnosis::{self, Snapshot};
 use super::linear::LinearSolver;
 use crate::assembly::System;
 use crate::case::SolverInput;
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
+use relaxation::{Relaxation, Task};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
@@ -60,6 +65,14 @@ pub struct Iteration {
     pub correction: Option<f64>,
     /// Fraction of the correction that was taken.
     pub step_length: f64,
+    /// Share of the elastic stiffness added to the tangent; 0 in a Newton iteration.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub viscosity: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(value: &f64) -> bool {
+    value.abs() <= 0.0
 }
 
 /// Seconds by part, and counts.
@@ -88,6 +101,8 @@ pub struct StepSuccess {
     pub iterations: Vec<Iteration>,
     /// Points whose laws call their result inaccurate.
     pub unreliable: Option<String>,
+    /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
+    pub relaxed: bool,
 }
 
 /// A step that did not. The committed state is untouched.
@@ -101,6 +116,8 @@ pub struct StepFailure {
     pub factor: Option<f64>,
     /// A law that no smaller step will help.
     pub defect: Option<PointFailure>,
+    /// What keeps the iterations from settling, if that could be found out.
+    pub culprit: Option<String>,
 }
 
 /// What iterations work on.
@@ -210,11 +227,21 @@ impl<'a> Newton<'a> {
             residual: balance.relative,
             correction: None,
             step_length: 1.0,
+            viscosity: 0.0,
         });
-        for _ in 0..=self.settings.max_iterations {
+        let task = Task {
+            external: &external,
+            prescribed: &prescribed,
+            period,
+        };
+        let mut relaxation: Option<Relaxation> = None;
+        // Where the last series of Newton iterations starts.
+        let mut first = 0;
+        loop {
             let last = iterations[iterations.len() - 1];
             let tolerance = self.settings.force_tolerance;
             let small_correction = last.step_length >= 1.0
+                && is_zero(&last.viscosity)
                 && last
                     .correction
                     .is_some_and(|c| c <= self.settings.displacement_tolerance);
@@ -225,10 +252,29 @@ impl<'a> Newton<'a> {
                     internal: balance.internal,
                     iterations: std::mem::take(iterations),
                     unreliable: balance.unreliable,
+                    relaxed: relaxation.is_some(),
                 });
             }
-            if iterations.len() > self.settings.max_iterations {
+            let series = &iterations[first..];
+            if series.len() > self.settings.max_iterations {
                 break;
+            }
+            if self.settings.relaxation && relaxation::stands_still(series) {
+                if relaxation.is_none() {
+                    relaxation = self.start_relaxation(&task);
+                }
+                let Some(relaxation) = &mut relaxation else {
+                    break;
+                };
+                match self.relax(relaxation, &task, iterations) {
+                    Ok(state) => (increment, balance) = state,
+                    Err(failure) => {
+                        let culprit = self.diagnose(&increment, &balance, &external, period);
+                        return Err(StepFailure { culprit, ..failure });
+                    }
+                }
+                first = iterations.len() - 1;
+                continue;
             }
             let correction = self.correction(&balance.residual, None)?;
             let (step_length, next, at) =
@@ -239,15 +285,35 @@ impl<'a> Newton<'a> {
                 residual: balance.relative,
                 correction: Some(norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE)),
                 step_length,
+                viscosity: 0.0,
             });
         }
+        let culprit = self.diagnose(&increment, &balance, &external, period);
         Err(StepFailure {
+            culprit,
             reason: format!(
                 "no equilibrium after {} iterations: residual {:.1e}, tolerance {:.1e}",
                 self.settings.max_iterations, balance.relative, self.settings.force_tolerance
             ),
             ..plain("")
         })
+    }
+
+    /// Does one iteration more and compares: what keeps the iterations from settling.
+    fn diagnose(
+        &mut self,
+        increment: &[f64],
+        balance: &Balance,
+        external: &[f64],
+        period: (f64, f64),
+    ) -> Option<String> {
+        // A relaxation that could not be started has left other tangents behind.
+        self.evaluate(increment, external, period).ok()?;
+        let before = Snapshot::of(self.groups);
+        let correction = self.correction(&balance.residual, None).ok()?;
+        self.search(increment, &correction, balance, external, period)
+            .ok()?;
+        diagnosis::compare(self.groups, &before)
     }
 
     /// Displacement increments that the tangent at the start predicts.
@@ -414,6 +480,7 @@ fn plain(reason: &str) -> StepFailure {
         reason: reason.to_owned(),
         factor: None,
         defect: None,
+        culprit: None,
     }
 }
 
@@ -428,5 +495,6 @@ fn failed_law(failure: PointFailure) -> StepFailure {
         reason: failure.to_string(),
         factor: failure.failure.factor,
         defect: defective.then_some(failure),
+        culprit: None,
     }
 }
