@@ -67,8 +67,10 @@ impl Change {
             .zip(&b.tangent)
             .map(|(a, b)| a - b)
             .collect();
-        let relative =
-            norm(&difference) / norm(&a.tangent).max(norm(&b.tangent)).max(f64::MIN_POSITIVE);
+        let relative = norm(&difference)
+            / norm(&a.tangent)
+                .max(norm(&b.tangent))
+                .max(f64::MIN_POSITIVE);
         (relative >= NOTABLE).then_some(Self::Tangent(relative))
     }
 }

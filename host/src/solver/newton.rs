@@ -66,13 +66,7 @@ pub struct Iteration {
     /// Fraction of the correction that was taken.
     pub step_length: f64,
     /// Share of the elastic stiffness added to the tangent; 0 in a Newton iteration.
-    #[serde(skip_serializing_if = "is_zero")]
     pub viscosity: f64,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-fn is_zero(value: &f64) -> bool {
-    value.abs() <= 0.0
 }
 
 /// Seconds by part, and counts.
@@ -241,7 +235,7 @@ impl<'a> Newton<'a> {
             let last = iterations[iterations.len() - 1];
             let tolerance = self.settings.force_tolerance;
             let small_correction = last.step_length >= 1.0
-                && is_zero(&last.viscosity)
+                && last.viscosity <= 0.0
                 && last
                     .correction
                     .is_some_and(|c| c <= self.settings.displacement_tolerance);

@@ -1,10 +1,10 @@
 //! Viscous relaxation: from a step that Newton iterations cannot finish to an equilibrium.
 //!
 //! Newton's method assumes an equilibrium nearby. In a material whose flow is not associated, or
-//! whose contacts open, the branch of equilibria can end: at one point the law changes its piece,
-//! the determinant of K changes its sign with it, and beyond neither piece has an equilibrium.
-//! Iterations then alternate between the two for ever, however small the step (the residual of
-//! the cycle is proportional to the step). What a real body does there is to move on, quickly,
+//! whose contacts open, the branch of equilibria can end where one point reaches another piece of
+//! its law: followed on, neither piece leads to an equilibrium. Iterations then alternate between
+//! the two for ever, however small the step (the residual of the cycle is proportional to the
+//! step). What a real body does there is to move on, quickly,
 //! until it finds the next stable equilibrium. The relaxation follows that motion with a
 //! viscosity proportional to the elastic stiffness,
 //!
