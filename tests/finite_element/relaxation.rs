@@ -54,8 +54,8 @@ fn relaxation_finds_the_next_equilibrium() {
             .any(|e| e["viscosity"].as_f64().unwrap() > 0.0)
     );
     for increment in 1..=20 {
-        let own = loading.iter().filter(|e| e["increment"] == increment);
-        let last = own.last().expect("an iteration");
+        let mut own = loading.iter().filter(|e| e["increment"] == increment);
+        let last = own.next_back().expect("an iteration");
         assert!(last["residual"].as_f64().unwrap() <= 1e-9, "{last}");
         assert_eq!(last["viscosity"], 0.0, "{last}");
     }
