@@ -229,6 +229,9 @@ impl<'a> Newton<'a> {
             period,
         };
         let mut relaxation: Option<Relaxation> = None;
+        let mut may_relax = self.settings.relaxation;
+        // Where Newton iterations first came to a standstill, and how many they were.
+        let mut standstill = (Vec::new(), 0);
         // Where the last series of Newton iterations starts.
         let mut first = 0;
         loop {
@@ -253,21 +256,27 @@ impl<'a> Newton<'a> {
             if series.len() > self.settings.max_iterations {
                 break;
             }
-            if self.settings.relaxation && relaxation::stands_still(series) {
+            if may_relax && relaxation::stands_still(series) {
                 if relaxation.is_none() {
+                    standstill = (increment, series.len());
                     relaxation = self.start_relaxation(&task);
                 }
-                let Some(relaxation) = &mut relaxation else {
-                    break;
-                };
-                match self.relax(relaxation, &task, iterations) {
-                    Ok(state) => (increment, balance) = state,
-                    Err(failure) => {
-                        let culprit = self.diagnose(&increment, &balance, &external, period);
-                        return Err(StepFailure { culprit, ..failure });
-                    }
+                let relaxed = relaxation
+                    .as_mut()
+                    .and_then(|relaxation| self.relax(relaxation, &task, iterations).ok());
+                if let Some(state) = relaxed {
+                    (increment, balance) = state;
+                    first = iterations.len() - 1;
+                } else {
+                    // Newton iterations go on where they stood, for as many as are left to them.
+                    may_relax = false;
+                    relaxation = None;
+                    increment = std::mem::take(&mut standstill.0);
+                    balance = self
+                        .evaluate(&increment, &external, period)
+                        .map_err(failed_law)?;
+                    first = iterations.len() - standstill.1;
                 }
-                first = iterations.len() - 1;
                 continue;
             }
             let correction = self.correction(&balance.residual, None)?;
@@ -286,8 +295,15 @@ impl<'a> Newton<'a> {
         Err(StepFailure {
             culprit,
             reason: format!(
-                "no equilibrium after {} iterations: residual {:.1e}, tolerance {:.1e}",
-                self.settings.max_iterations, balance.relative, self.settings.force_tolerance
+                "no equilibrium after {} iterations{}: residual {:.1e}, tolerance {:.1e}",
+                self.settings.max_iterations,
+                if may_relax == self.settings.relaxation {
+                    ""
+                } else {
+                    ", nor by viscous relaxation"
+                },
+                balance.relative,
+                self.settings.force_tolerance
             ),
             ..plain("")
         })
@@ -301,8 +317,6 @@ impl<'a> Newton<'a> {
         external: &[f64],
         period: (f64, f64),
     ) -> Option<String> {
-        // A relaxation that could not be started has left other tangents behind.
-        self.evaluate(increment, external, period).ok()?;
         let before = Snapshot::of(self.groups);
         let correction = self.correction(&balance.residual, None).ok()?;
         self.search(increment, &correction, balance, external, period)
