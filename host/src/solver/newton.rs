@@ -291,22 +291,31 @@ impl<'a> Newton<'a> {
                 viscosity: 0.0,
             });
         }
-        let culprit = self.diagnose(&increment, &balance, &external, period);
-        Err(StepFailure {
-            culprit,
-            reason: format!(
-                "no equilibrium after {} iterations{}: residual {:.1e}, tolerance {:.1e}",
-                self.settings.max_iterations,
-                if may_relax == self.settings.relaxation {
-                    ""
-                } else {
-                    ", nor by viscous relaxation"
-                },
-                balance.relative,
-                self.settings.force_tolerance
-            ),
-            ..plain("")
-        })
+        let relaxed_in_vain = may_relax != self.settings.relaxation;
+        Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
+    }
+
+    /// What is said of iterations that have come to their end.
+    fn no_equilibrium(
+        &mut self,
+        increment: &[f64],
+        balance: &Balance,
+        task: &Task<'_>,
+        relaxed_in_vain: bool,
+    ) -> StepFailure {
+        let tried = if relaxed_in_vain {
+            ", nor by viscous relaxation"
+        } else {
+            ""
+        };
+        let reason = format!(
+            "no equilibrium after {} iterations{tried}: residual {:.1e}, tolerance {:.1e}",
+            self.settings.max_iterations, balance.relative, self.settings.force_tolerance
+        );
+        StepFailure {
+            culprit: self.diagnose(increment, balance, task.external, task.period),
+            ..plain(&reason)
+        }
     }
 
     /// Does one iteration more and compares: what keeps the iterations from settling.
