@@ -486,6 +486,8 @@ pub struct SolverInput {
     pub max_halvings: u32,
     /// Whether to search along a correction that makes the residual grow.
     pub line_search: bool,
+    /// Whether to relax viscously where Newton iterations come to a standstill.
+    pub relaxation: bool,
     /// What becomes of linear groups.
     pub equations: Equations,
 }
@@ -546,6 +548,7 @@ impl Default for SolverInput {
             max_halvings: 10,
             line_search: true,
             equations: Equations::Auto,
+            relaxation: true,
         }
     }
 }

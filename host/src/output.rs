@@ -198,6 +198,7 @@ impl Results {
                 "residual": iteration.residual,
                 "correction": iteration.correction,
                 "step_length": iteration.step_length,
+                "viscosity": iteration.viscosity,
             }))?;
         }
         Ok(())

@@ -298,6 +298,13 @@ impl<'a> Run<'a> {
                             record.unreliable += 1;
                             done.warning.get_or_insert_with(|| why.clone());
                         }
+                        if success.relaxed {
+                            record.relaxed += 1;
+                            observer.warning(&format!(
+                                "{place}: Newton iterations came to a standstill; viscous \
+                                 relaxation led to the next equilibrium"
+                            ));
+                        }
                         if success.iterations.len() <= EASY {
                             step = (REGROWTH * step).min(1.0 / n as f64);
                         }
@@ -317,14 +324,16 @@ impl<'a> Run<'a> {
                             return Err(Error::plugin(format!("{place}: {defect}")));
                         }
                         if step < smallest {
-                            return Err(Self::no_equilibrium(&place, lambda, n, &failure.reason));
+                            return Err(Self::no_equilibrium(&place, lambda, n, &failure));
                         }
                     }
                 }
             }
             let reaction = self
                 .whole(equations, loads, lambda, record)
-                .map_err(|why| Self::no_equilibrium(&place, lambda, n, &why))?;
+                .map_err(|why| {
+                    Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why))
+                })?;
             let snapshot = Snapshot {
                 groups: &self.groups,
                 ties: &self.model.ties,
@@ -563,11 +572,18 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn no_equilibrium(place: &Place, lambda: f64, n: usize, reason: &str) -> Error {
+    fn no_equilibrium(place: &Place, lambda: f64, n: usize, failure: &StepFailure) -> Error {
         let reached = lambda * n as f64;
+        let culprit = failure
+            .culprit
+            .as_ref()
+            .map(|culprit| format!("\n  {culprit}"))
+            .unwrap_or_default();
         Error::NoEquilibrium {
             message: format!(
-                "{place}: no equilibrium beyond {reached:.4} of {n} increments\n  last attempt: {reason}"
+                "{place}: no equilibrium beyond {reached:.4} of {n} increments\n  last attempt: \
+                 {}{culprit}",
+                failure.reason
             ),
             hint: Some(
                 "results up to the last whole increment in equilibrium are written; \

@@ -1,6 +1,7 @@
 //! Finding equilibrium: Newton iterations within a step, the sparse equations they solve, and the
 //! linear part of a model that takes no part in them.
 
+mod diagnosis;
 mod linear;
 mod linear_domain;
 mod multifrontal;

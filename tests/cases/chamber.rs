@@ -18,8 +18,12 @@ fn case(name: &str) -> PathBuf {
 
 fn run(name: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
-    let observer = run_case(&case(name), folder.path()).unwrap();
-    assert_eq!(observer.warnings, Vec::<String>::new());
+    let mut warnings = run_case(&case(name), folder.path()).unwrap().warnings;
+    if name == "chamber_oriented" {
+        // Its README says so.
+        warnings.retain(|warning| !warning.contains("viscous relaxation"));
+    }
+    assert_eq!(warnings, Vec::<String>::new());
     folder
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Goal      a run that finds no equilibrium stops at the last one and says so
 //! Geometry, boundary, laws: cases/chamber_instability/README.md
-//! Asserts   exit code 2, results up to the last equilibrium; remedies that converge, and what they give
+//! Asserts   exit code 2, results up to the last equilibrium, the point that loses contact; remedies that converge, and what they give
 
 use crate::variant::{finished, run};
 
@@ -19,7 +19,16 @@ fn without_equilibrium_the_run_stops_at_the_last_one() {
         let run = run(CASE, variant);
         let error = run.outcome.as_ref().unwrap_err();
         assert_eq!(error.exit_code(), 2, "{variant}: {error}");
-        assert!(error.to_string().contains("phase `loading`, increment 1"));
+        let message = error.to_string();
+        assert!(message.contains("phase `loading`, increment 1"));
+        assert!(
+            message.contains("group `interface`, element 10, point "),
+            "{variant}: {message}"
+        );
+        assert!(
+            message.contains("contact opens and closes there"),
+            "{variant}: {message}"
+        );
         let summary = &run.summary;
         assert_eq!(summary["status"], "no equilibrium");
         assert_eq!(summary["last_equilibrium"]["phase"], "confinement");

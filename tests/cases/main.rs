@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
 
 mod aspect_ratio;
+mod bonded_pile;
 mod chamber;
 mod chamber_confinement;
 mod chamber_instability;

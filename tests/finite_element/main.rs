@@ -16,6 +16,7 @@ mod patch_joint;
 mod patch_layer;
 mod patch_solid;
 mod phases;
+mod relaxation;
 mod setup;
 mod sliding_block;
 mod thick_cylinder;

@@ -30,6 +30,8 @@ pub struct PhaseRecord {
     pub cut_backs: usize,
     /// Steps with results that a law calls inaccurate.
     pub unreliable: usize,
+    /// Steps that viscous relaxation led to equilibrium.
+    pub relaxed: usize,
     /// Matrices factorised.
     pub factorisations: u64,
     /// Costs by part.
@@ -49,6 +51,7 @@ impl PhaseRecord {
             iterations: 0,
             cut_backs: 0,
             unreliable: 0,
+            relaxed: 0,
             factorisations: 0,
             costs: Costs::default(),
             probes: Vec::new(),
@@ -205,6 +208,7 @@ impl Summary {
                     "iterations": p.iterations,
                     "cut_backs": p.cut_backs,
                     "unreliable_steps": p.unreliable,
+                    "relaxed_steps": p.relaxed,
                     "factorisations": p.factorisations,
                     "evaluations": p.costs.evaluations,
                     "seconds": {

@@ -1,11 +1,16 @@
-//! Full Newton iterations with consistent tangents and a line search.
+//! Full Newton iterations with consistent tangents and a line search; viscous relaxation where
+//! they come to a standstill.
 
+mod relaxation;
+
+use super::diagnosis::{self, Snapshot};
 use super::linear::LinearSolver;
 use super::linear_domain::LinearDomain;
 use crate::assembly::System;
 use crate::case::SolverInput;
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
+use relaxation::{Relaxation, Task};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
@@ -61,6 +66,8 @@ pub struct Iteration {
     pub correction: Option<f64>,
     /// Fraction of the correction that was taken.
     pub step_length: f64,
+    /// Share of the elastic stiffness added to the tangent; 0 in a Newton iteration.
+    pub viscosity: f64,
 }
 
 /// Seconds by part, and counts.
@@ -83,12 +90,12 @@ pub struct Costs {
 pub struct StepSuccess {
     /// Displacement increments, by degree of freedom.
     pub increment: Vec<f64>,
-    /// Internal forces, by degree of freedom (those of tied ones moved to what they follow).
-    pub internal: Vec<f64>,
     /// What happened.
     pub iterations: Vec<Iteration>,
     /// Points whose laws call their result inaccurate.
     pub unreliable: Option<String>,
+    /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
+    pub relaxed: bool,
 }
 
 /// A step that did not. The committed state is untouched.
@@ -102,6 +109,21 @@ pub struct StepFailure {
     pub factor: Option<f64>,
     /// A law that no smaller step will help.
     pub defect: Option<PointFailure>,
+    /// What keeps the iterations from settling, if that could be found out.
+    pub culprit: Option<String>,
+}
+
+impl StepFailure {
+    /// A failure of which nothing more is known.
+    pub fn because(reason: String) -> Self {
+        Self {
+            iterations: Vec::new(),
+            reason,
+            factor: None,
+            defect: None,
+            culprit: None,
+        }
+    }
 }
 
 /// What iterations work on.
@@ -125,9 +147,8 @@ pub struct Newton<'a> {
     domain_forces: Vec<f64>,
 }
 
-/// Internal forces, residual by equation, and the residual's norm relative to the forces in play.
+/// Residual by equation, and the residual's norm relative to the forces in play.
 struct Balance {
-    internal: Vec<f64>,
     residual: Vec<f64>,
     relative: f64,
     unreliable: Option<String>,
@@ -219,11 +240,24 @@ impl<'a> Newton<'a> {
             residual: balance.relative,
             correction: None,
             step_length: 1.0,
+            viscosity: 0.0,
         });
-        for _ in 0..=self.settings.max_iterations {
+        let task = Task {
+            external: &external,
+            prescribed: &prescribed,
+            period,
+        };
+        let mut relaxation: Option<Relaxation> = None;
+        let mut may_relax = self.settings.relaxation;
+        // Where Newton iterations first came to a standstill, and how many they were.
+        let mut standstill = (Vec::new(), 0);
+        // Where the last series of Newton iterations starts.
+        let mut first = 0;
+        loop {
             let last = iterations[iterations.len() - 1];
             let tolerance = self.settings.force_tolerance;
             let small_correction = last.step_length >= 1.0
+                && last.viscosity <= 0.0
                 && last
                     .correction
                     .is_some_and(|c| c <= self.settings.displacement_tolerance);
@@ -231,13 +265,37 @@ impl<'a> Newton<'a> {
             if balance.relative <= EXACT * tolerance || (small_residual && small_correction) {
                 return Ok(StepSuccess {
                     increment,
-                    internal: balance.internal,
                     iterations: std::mem::take(iterations),
                     unreliable: balance.unreliable,
+                    relaxed: relaxation.is_some(),
                 });
             }
-            if iterations.len() > self.settings.max_iterations {
+            let series = &iterations[first..];
+            if series.len() > self.settings.max_iterations {
                 break;
+            }
+            if may_relax && relaxation::stands_still(series) {
+                if relaxation.is_none() {
+                    standstill = (increment, series.len());
+                    relaxation = self.start_relaxation(&task);
+                }
+                let relaxed = relaxation
+                    .as_mut()
+                    .and_then(|relaxation| self.relax(relaxation, &task, iterations).ok());
+                if let Some(state) = relaxed {
+                    (increment, balance) = state;
+                    first = iterations.len() - 1;
+                } else {
+                    // Newton iterations go on where they stood, for as many as are left to them.
+                    may_relax = false;
+                    relaxation = None;
+                    increment = std::mem::take(&mut standstill.0);
+                    balance = self
+                        .evaluate(&increment, &external, period)
+                        .map_err(failed_law)?;
+                    first = iterations.len() - standstill.1;
+                }
+                continue;
             }
             let correction = self.correction(&balance.residual, None)?;
             let (step_length, next, at) =
@@ -248,15 +306,49 @@ impl<'a> Newton<'a> {
                 residual: balance.relative,
                 correction: Some(norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE)),
                 step_length,
+                viscosity: 0.0,
             });
         }
-        Err(StepFailure {
-            reason: format!(
-                "no equilibrium after {} iterations: residual {:.1e}, tolerance {:.1e}",
-                self.settings.max_iterations, balance.relative, self.settings.force_tolerance
-            ),
-            ..plain("")
-        })
+        let relaxed_in_vain = may_relax != self.settings.relaxation;
+        Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
+    }
+
+    /// What is said of iterations that have come to their end.
+    fn no_equilibrium(
+        &mut self,
+        increment: &[f64],
+        balance: &Balance,
+        task: &Task<'_>,
+        relaxed_in_vain: bool,
+    ) -> StepFailure {
+        let tried = if relaxed_in_vain {
+            ", nor by viscous relaxation"
+        } else {
+            ""
+        };
+        let reason = format!(
+            "no equilibrium after {} iterations{tried}: residual {:.1e}, tolerance {:.1e}",
+            self.settings.max_iterations, balance.relative, self.settings.force_tolerance
+        );
+        StepFailure {
+            culprit: self.diagnose(increment, balance, task.external, task.period),
+            ..plain(&reason)
+        }
+    }
+
+    /// Does one iteration more and compares: what keeps the iterations from settling.
+    fn diagnose(
+        &mut self,
+        increment: &[f64],
+        balance: &Balance,
+        external: &[f64],
+        period: (f64, f64),
+    ) -> Option<String> {
+        let before = Snapshot::of(self.groups);
+        let correction = self.correction(&balance.residual, None).ok()?;
+        self.search(increment, &correction, balance, external, period)
+            .ok()?;
+        diagnosis::compare(self.groups, &before)
     }
 
     /// Displacement increments that the tangent at the start predicts.
@@ -285,11 +377,7 @@ impl<'a> Newton<'a> {
         prescribed: Option<&[f64]>,
     ) -> Result<Vec<f64>, StepFailure> {
         let start = Instant::now();
-        let mut values = Vec::new();
-        self.system.assemble(self.groups, &mut values);
-        if let Some(domain) = self.domain {
-            self.system.add_domain(domain.stiffness(), &mut values);
-        }
+        let values = self.stiffness();
         let mut coupling = vec![0.0; residual.len()];
         if let Some(increment) = prescribed {
             self.system
@@ -317,6 +405,16 @@ impl<'a> Newton<'a> {
         }
         self.system.follow(&mut correction);
         Ok(correction)
+    }
+
+    /// The matrix from the tangents of the last evaluation.
+    fn stiffness(&self) -> Vec<f64> {
+        let mut values = Vec::new();
+        self.system.assemble(self.groups, &mut values);
+        if let Some(domain) = self.domain {
+            self.system.add_domain(domain.stiffness(), &mut values);
+        }
+        values
     }
 
     /// Takes the longest of a few fractions of the correction that does not make the residual
@@ -427,7 +525,6 @@ impl<'a> Newton<'a> {
         let relative = if scale > 0.0 { size / scale } else { 0.0 };
         self.costs.laws += start.elapsed();
         Ok(Balance {
-            internal,
             residual,
             relative,
             unreliable,
@@ -441,12 +538,7 @@ pub(super) fn norm(v: &[f64]) -> f64 {
 }
 
 fn plain(reason: &str) -> StepFailure {
-    StepFailure {
-        iterations: Vec::new(),
-        reason: reason.to_owned(),
-        factor: None,
-        defect: None,
-    }
+    StepFailure::because(reason.to_owned())
 }
 
 fn failed_law(failure: PointFailure) -> StepFailure {
@@ -460,5 +552,6 @@ fn failed_law(failure: PointFailure) -> StepFailure {
         reason: failure.to_string(),
         factor: failure.failure.factor,
         defect: defective.then_some(failure),
+        culprit: None,
     }
 }

@@ -1,0 +1,130 @@
+//! What keeps iterations from settling: two iterates compared, point by point.
+//!
+//! The host knows no law. It sees stresses that are zero in one iterate and not in the next, and
+//! tangents that change although the displacements hardly do.
+
+use crate::case::Formulation;
+use crate::group::Group;
+
+/// Smallest relative change of a tangent that is worth a word.
+const NOTABLE: f64 = 0.01;
+
+/// Stresses and tangents of all points of an iterate, group by group.
+#[derive(Debug)]
+pub(super) struct Snapshot(Vec<Vec<PointState>>);
+
+#[derive(Clone, Debug)]
+struct PointState {
+    /// The stresses (tractions) that a law answers for.
+    stress: Vec<f64>,
+    tangent: Vec<f64>,
+}
+
+impl Snapshot {
+    /// The trial state of the last evaluation.
+    pub(super) fn of(groups: &[Group]) -> Self {
+        Self(groups.iter().map(states).collect())
+    }
+}
+
+fn states(group: &Group) -> Vec<PointState> {
+    let n = group.kinematics.n_components();
+    let per_element = group.kinematics.points_per_element();
+    let state = |point: usize| {
+        let tangents = group.element_tangents(point / per_element);
+        let stress = &group.stress.trial[n * point..][..n];
+        PointState {
+            stress: if group.formulation == Formulation::ThinLayer {
+                // Across and along the layer.
+                vec![stress[1], stress[3]]
+            } else {
+                stress.to_vec()
+            },
+            tangent: tangents[point % per_element * n * n..][..n * n].to_vec(),
+        }
+    };
+    (0..group.kinematics.n_points()).map(state).collect()
+}
+
+/// How a point differs between two iterates; greater is worse.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+enum Change {
+    /// The tangent, relative to the larger one.
+    Tangent(f64),
+    /// The stress is zero in one of them; its size in the other, in kPa.
+    Vanishes(f64),
+}
+
+impl Change {
+    fn between(a: &PointState, b: &PointState) -> Option<Self> {
+        let sizes = (norm(&a.stress), norm(&b.stress));
+        if (sizes.0 <= 0.0) != (sizes.1 <= 0.0) {
+            return Some(Self::Vanishes(sizes.0.max(sizes.1)));
+        }
+        let difference: Vec<f64> = a
+            .tangent
+            .iter()
+            .zip(&b.tangent)
+            .map(|(a, b)| a - b)
+            .collect();
+        let relative = norm(&difference)
+            / norm(&a.tangent)
+                .max(norm(&b.tangent))
+                .max(f64::MIN_POSITIVE);
+        (relative >= NOTABLE).then_some(Self::Tangent(relative))
+    }
+}
+
+/// Names the point that differs most between the snapshot and the present iterate; `None` if no
+/// point's tangent changes notably.
+pub(super) fn compare(groups: &[Group], before: &Snapshot) -> Option<String> {
+    let mut changed = 0;
+    let mut worst: Option<(Change, &Group, usize)> = None;
+    for (group, old) in groups.iter().zip(&before.0) {
+        for (point, (old, new)) in old.iter().zip(&states(group)).enumerate() {
+            let Some(change) = Change::between(old, new) else {
+                continue;
+            };
+            changed += 1;
+            if worst.is_none_or(|(worst, ..)| change > worst) {
+                worst = Some((change, group, point));
+            }
+        }
+    }
+    let (change, group, point) = worst?;
+    let per_element = group.kinematics.points_per_element();
+    let [x, y] = group.kinematics.position(point);
+    let what = match (change, group.formulation) {
+        (Change::Vanishes(_), Formulation::ThinLayer | Formulation::ZeroThickness) => {
+            "traction zero (no contact) in one iteration and not in the next: contact opens and \
+             closes there"
+                .to_owned()
+        }
+        (Change::Vanishes(_), Formulation::Solid) => {
+            "stress zero in one iteration and not in the next: the material comes apart and \
+             closes there"
+                .to_owned()
+        }
+        (Change::Tangent(relative), _) => format!(
+            "tangent changes by {:.0} % from one iteration to the next: the law changes its \
+             branch there (yield, unloading, an edge of its surface)",
+            100.0 * relative
+        ),
+    };
+    let others = match changed - 1 {
+        0 => String::new(),
+        1 => ", and at one point more".to_owned(),
+        n => format!(", and at {n} points more"),
+    };
+    Some(format!(
+        "group `{}`, element {}, point {} at ({x:.4}, {y:.4}), law `{}`: {what}{others}",
+        group.name,
+        point / per_element + 1,
+        point % per_element + 1,
+        group.law.built.law.description().id,
+    ))
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}

@@ -1,0 +1,83 @@
+//! Where a branch of equilibria ends.
+//!
+//! Goal        iterations that alternate between two pieces of the law come to the next stable
+//!             equilibrium by viscous relaxation, or say what they alternate between
+//! Geometry    the chamber of `cases/chamber_mesh1`, interface with means over the thickness
+//! Boundary    as there; confined in 10 increments, the head pushed by 2 mm in 20
+//! Law         mohr_coulomb without cohesion (not associated), mepi in the interface
+//! Asserts     equilibrium of the loads, every increment ended by Newton iterations within the
+//!             tolerance; without relaxation, exit code 2 and the point that alternates
+
+use crate::setup::{Results, assert_close, fail, run};
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// The chamber with sand that yields.
+fn chamber(solver: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/chamber_mesh1/case.toml");
+    let mut text = std::fs::read_to_string(path).unwrap();
+    for (old, new) in [
+        (
+            "law = \"elastic\"\nparameters = { young_modulus = 34e3, poisson_ratio = 0.3 }",
+            "law = \"mohr_coulomb\"\nparameters = { young_modulus = 34e3, poisson_ratio = 0.3, \
+             cohesion = 0.0, friction_angle = 36.5, dilatancy_angle = 12.0 }",
+        ),
+        ("integration = \"full\"", "integration = \"mean\""),
+        ("increments = 1\n", "increments = 10\n"),
+        ("increments = 50", "increments = 20"),
+        ("-0.005", "-0.002"),
+        (
+            "[probes]",
+            "[probes]\ntop = { line = \"sand_top\", quantity = \"reaction_z\" }",
+        ),
+    ] {
+        assert_eq!(text.matches(old).count(), 1, "{old}");
+        text = text.replace(old, new);
+    }
+    text + solver
+}
+
+#[test]
+fn relaxation_finds_the_next_equilibrium() {
+    let finished = run(&chamber(""));
+    let loading = &finished.summary()["phases"][1];
+    assert!(loading["relaxed_steps"].as_u64().unwrap() >= 1, "{loading}");
+    assert_eq!(loading["cut_backs"], 0);
+    let iterations = finished.events("iteration");
+    let loading: Vec<_> = iterations
+        .iter()
+        .filter(|e| e["phase"] == "loading")
+        .collect();
+    assert!(
+        loading
+            .iter()
+            .any(|e| e["viscosity"].as_f64().unwrap() > 0.0)
+    );
+    for increment in 1..=20 {
+        let mut own = loading.iter().filter(|e| e["increment"] == increment);
+        let last = own.next_back().expect("an iteration");
+        assert!(last["residual"].as_f64().unwrap() <= 1e-9, "{last}");
+        assert_eq!(last["viscosity"], 0.0, "{last}");
+    }
+    let plate = 100.0 * PI * 0.262 * 0.262;
+    let (top, head) = (
+        finished.in_phase("loading", "top"),
+        finished.in_phase("loading", "q_t"),
+    );
+    for (top, head) in top.iter().zip(&head) {
+        assert_close("loads", head - top, plate, 1e-8, plate);
+    }
+    assert!(head.windows(2).all(|pair| pair[1] > pair[0]), "{head:?}");
+}
+
+#[test]
+fn a_standstill_is_explained() {
+    let failed = fail(&chamber("\n[solver]\nrelaxation = false\n"));
+    assert_eq!(failed.error.exit_code(), 2);
+    let message = failed.error.to_string();
+    assert!(message.contains("group `sand`, element "), "{message}");
+    assert!(
+        message.contains("the law changes its branch there"),
+        "{message}"
+    );
+}
