@@ -172,6 +172,19 @@ impl System {
         !self.elements[group].is_empty()
     }
 
+    /// Mesh lines of the unknowns, from those of the nodes.
+    pub fn lines(&self, of_nodes: &[[u32; 2]]) -> Vec<[u32; 2]> {
+        self.free.iter().map(|&dof| of_nodes[dof / 2]).collect()
+    }
+
+    /// Gives up what only the matrix needs: it will not be assembled again.
+    pub fn forget_matrix(&mut self) {
+        self.pattern = Pattern::default();
+        for map in self.elements.iter_mut().flatten() {
+            map.slots = Vec::new();
+        }
+    }
+
     /// Equation of a degree of freedom.
     pub fn equation(&self, dof: usize) -> Option<usize> {
         self.equation[dof]
@@ -384,23 +397,44 @@ impl Pattern {
         equation: &[Option<usize>],
         elements: impl Iterator<Item = &'a [usize]>,
     ) -> Self {
-        // Elements of every column, then their rows, sorted and each once.
-        let mut columns: Vec<Vec<u32>> = vec![Vec::new(); n];
-        for dofs in elements {
-            let equations = dofs.iter().filter_map(|&dof| equation[dof]);
-            let equations: Vec<u32> = equations.map(|equation| equation as u32).collect();
-            for &column in &equations {
-                columns[column as usize].extend_from_slice(&equations);
+        // Elements by equation, then the rows of every column, sorted and each once.
+        let elements: Vec<Vec<u32>> = elements
+            .map(|dofs| {
+                let equations = dofs.iter().filter_map(|&dof| equation[dof]);
+                equations.map(|equation| equation as u32).collect()
+            })
+            .collect();
+        let mut start = vec![0_usize; n + 1];
+        for &column in elements.iter().flatten() {
+            start[column as usize + 1] += 1;
+        }
+        for column in 0..n {
+            start[column + 1] += start[column];
+        }
+        let mut next = start.clone();
+        let mut of_column = vec![0_u32; start[n]];
+        for (number, equations) in elements.iter().enumerate() {
+            for &column in equations {
+                of_column[next[column as usize]] = number as u32;
+                next[column as usize] += 1;
             }
         }
         let mut pattern = Self {
             column_start: vec![0],
             rows: Vec::new(),
         };
-        for mut rows in columns {
-            rows.sort_unstable();
-            rows.dedup();
-            pattern.rows.append(&mut rows);
+        let mut met_in = vec![u32::MAX; n];
+        for column in 0..n {
+            let first = pattern.rows.len();
+            for &element in &of_column[start[column]..start[column + 1]] {
+                for &row in &elements[element as usize] {
+                    if met_in[row as usize] != column as u32 {
+                        met_in[row as usize] = column as u32;
+                        pattern.rows.push(row);
+                    }
+                }
+            }
+            pattern.rows[first..].sort_unstable();
             pattern.column_start.push(pattern.rows.len() as u32);
         }
         pattern

@@ -9,7 +9,7 @@ use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    LinearDomain, LinearSolver, Loads, Newton, Singular, StepFailure, StepSuccess,
+    LinearDomain, LinearSolver, Loads, Newton, Singular, StepFailure, StepSuccess, mesh_lines,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -499,13 +499,14 @@ impl<'a> Run<'a> {
         loads: &mut Loads,
     ) -> Result<PhaseEquations, Singular> {
         let (groups, ties) = (&self.groups, &self.model.ties);
+        let lines = mesh_lines(&self.mesh.nodes);
         let wanted = self.file().solver.equations;
         let condensed = if wanted == Equations::Sparse {
             None
         } else {
             // Groups that are held by the others alone cannot be condensed.
             let always = wanted == Equations::Condensed;
-            LinearDomain::new(groups, is_prescribed, ties, always).unwrap_or(None)
+            LinearDomain::new(groups, is_prescribed, ties, &lines, always).unwrap_or(None)
         };
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),
@@ -518,7 +519,9 @@ impl<'a> Run<'a> {
             .iter()
             .all(|group| group.is_linear() && group.is_symmetric());
         let symmetric = domain.is_none() && all_symmetric;
-        let solver = LinearSolver::new(&system.pattern, symmetric)?;
+        // A dense boundary leaves nothing to dissect.
+        let own_lines = domain.is_none().then(|| system.lines(&lines));
+        let solver = LinearSolver::new(&system.pattern, symmetric, own_lines.as_deref())?;
         let mut unknowns = system.free().to_vec();
         unknowns.extend(domain.iter().flat_map(|domain| domain.unknowns()));
         unknowns.sort_unstable();

@@ -2,11 +2,13 @@
 //! linear part of a model that takes no part in them.
 
 mod diagnosis;
+mod dissection;
 mod linear;
 mod linear_domain;
 mod multifrontal;
 mod newton;
 
+pub use dissection::mesh_lines;
 pub use linear::{LinearSolver, Singular};
 pub use linear_domain::LinearDomain;
 pub use newton::{Costs, Iteration, Loads, Newton, StepFailure, StepSuccess};

@@ -38,18 +38,23 @@ struct RowExchanges {
 pub struct Singular;
 
 impl LinearSolver {
-    /// Analyses a pattern. Matrices that are `symmetric` have to be positive definite.
+    /// Analyses a pattern. Matrices that are `symmetric` have to be positive definite. `lines` are
+    /// the mesh lines on which the unknowns lie, see [`super::mesh_lines`].
     ///
     /// # Errors
     /// [`Singular`] if the pattern alone makes the matrix singular, or memory runs out.
-    pub fn new(pattern: &Pattern, symmetric: bool) -> Result<Self, Singular> {
+    pub fn new(
+        pattern: &Pattern,
+        symmetric: bool,
+        lines: Option<&[[u32; 2]]>,
+    ) -> Result<Self, Singular> {
         let kind = if symmetric {
             Kind::Symmetric
         } else {
             Kind::Unsymmetric
         };
         Ok(Self {
-            multifrontal: Multifrontal::new(pattern, kind, &vec![false; pattern.n()])?,
+            multifrontal: Multifrontal::new(pattern, kind, &vec![false; pattern.n()], lines)?,
             pattern: pattern.clone(),
             values: Vec::new(),
             factorised: false,
@@ -186,7 +191,7 @@ mod tests {
 
     #[test]
     fn solves_an_unsymmetric_system() {
-        let mut solver = LinearSolver::new(&two_by_two(), false).unwrap();
+        let mut solver = LinearSolver::new(&two_by_two(), false, None).unwrap();
         // Columns (4, 1), (2, 3).
         solver.factorise(&[4.0, 1.0, 2.0, 3.0]).unwrap();
         let x = solver.solve(&[8.0, 7.0]).unwrap();
@@ -214,7 +219,7 @@ mod tests {
             }
             pattern.column_start.push(pattern.rows.len() as u32);
         }
-        let mut solver = LinearSolver::new(&pattern, false).unwrap();
+        let mut solver = LinearSolver::new(&pattern, false, None).unwrap();
         solver.factorise(&values).unwrap();
         let x = solver.solve(&vec![1.0; n]).unwrap();
         assert!(x.iter().all(|x| (x - 0.5).abs() < 1e-15));
@@ -222,7 +227,7 @@ mod tests {
 
     #[test]
     fn refuses_a_singular_system() {
-        let mut solver = LinearSolver::new(&two_by_two(), false).unwrap();
+        let mut solver = LinearSolver::new(&two_by_two(), false, None).unwrap();
         let refused =
             solver.factorise(&[1.0, 2.0, 2.0, 4.0]).is_err() || solver.solve(&[1.0, 1.0]).is_err();
         assert!(refused);

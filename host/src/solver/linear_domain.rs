@@ -55,7 +55,7 @@ fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
 }
 
 impl LinearDomain {
-    /// Condenses the linear groups. `None` if there are none, or it does not pay unless `always`.
+    /// Condenses the linear groups of a mesh whose nodes lie on these lines. `None` if there are none, or it does not pay unless `always`.
     ///
     /// # Errors
     /// [`Singular`] if they are not held where they are not connected to the rest.
@@ -63,9 +63,10 @@ impl LinearDomain {
         groups: &[Group],
         prescribed: &[bool],
         ties: &[Tie],
+        lines: &[[u32; 2]],
         always: bool,
     ) -> Result<Option<(Self, System)>, Singular> {
-        let system = System::new(groups, Group::is_linear, prescribed, ties, None);
+        let mut system = System::new(groups, Group::is_linear, prescribed, ties, None);
         if system.n_equations() == 0 {
             return Ok(None);
         }
@@ -93,9 +94,11 @@ impl LinearDomain {
         } else {
             Kind::Unsymmetric
         };
-        let mut factors = Multifrontal::new(&system.pattern, kind, &kept)?;
+        let mut factors =
+            Multifrontal::new(&system.pattern, kind, &kept, Some(&system.lines(lines)))?;
         let mut values = Vec::new();
         system.assemble(groups, &mut values);
+        system.forget_matrix();
         factors.factorise(&values)?;
         let free = system.free();
         let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();

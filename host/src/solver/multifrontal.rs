@@ -13,7 +13,7 @@
 //! row exchanges inside a supernode only. The caller checks solutions by their residual and has
 //! another method at hand for matrices that need more.
 
-use super::Singular;
+use super::{Singular, dissection};
 use crate::assembly::Pattern;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor as cholesky_kernel;
@@ -21,6 +21,7 @@ use faer::linalg::lu::partial_pivoting::factor as lu_kernel;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul as triangular_matmul};
 use faer::linalg::triangular_solve as triangular;
+use faer::perm::PermRef;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -35,6 +36,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Branches with fewer floating-point operations than this are not worth a task of their own.
 const TASK: f64 = 4e6;
+/// Unknowns from which on nested dissection leaves less fill than minimum degree.
+const WORTH_DISSECTING: usize = 5_000;
 /// Columns of an update matrix that are computed as one piece. Fixed, so that the result is the
 /// same for any number of threads.
 const PIECE: usize = 256;
@@ -108,9 +111,15 @@ pub(super) struct Multifrontal {
 }
 
 impl Multifrontal {
-    /// Analyses a pattern. `kept` says of every equation whether it is kept.
-    pub(super) fn new(pattern: &Pattern, kind: Kind, kept: &[bool]) -> Result<Self, Singular> {
-        let analysis = Analysis::new(pattern, kind, kept)?;
+    /// Analyses a pattern. `kept` says of every equation whether it is kept, `lines` on which mesh
+    /// lines it lies; without them the order of elimination is found from the pattern alone.
+    pub(super) fn new(
+        pattern: &Pattern,
+        kind: Kind,
+        kept: &[bool],
+        lines: Option<&[[u32; 2]]>,
+    ) -> Result<Self, Singular> {
+        let analysis = Analysis::new(pattern, kind, kept, lines)?;
         let fronts = analysis.fronts.iter().map(|_| Mutex::default()).collect();
         Ok(Self {
             analysis,
@@ -506,7 +515,12 @@ fn in_pieces(
 }
 
 impl Analysis {
-    fn new(pattern: &Pattern, kind: Kind, kept: &[bool]) -> Result<Self, Singular> {
+    fn new(
+        pattern: &Pattern,
+        kind: Kind,
+        kept: &[bool],
+        lines: Option<&[[u32; 2]]>,
+    ) -> Result<Self, Singular> {
         let eliminated: Vec<u32> = (0..kept.len() as u32)
             .filter(|&equation| !kept[equation as usize])
             .collect();
@@ -530,7 +544,7 @@ impl Analysis {
             position[equation as usize] = at;
         }
         if !eliminated.is_empty() {
-            let supernodes = Supernodes::new(pattern, &eliminated)?;
+            let supernodes = Supernodes::new(pattern, &eliminated, lines)?;
             analysis.order = supernodes.order;
             for (at, &equation) in (0..).zip(&analysis.order) {
                 position[equation as usize] = at;
@@ -731,8 +745,12 @@ struct Supernodes {
 }
 
 impl Supernodes {
-    /// Orders by approximate minimum degree and amalgamates, by `faer`.
-    fn new(pattern: &Pattern, eliminated: &[u32]) -> Result<Self, Singular> {
+    /// Orders by nested dissection, or by approximate minimum degree, and amalgamates.
+    fn new(
+        pattern: &Pattern,
+        eliminated: &[u32],
+        lines: Option<&[[u32; 2]]>,
+    ) -> Result<Self, Singular> {
         let mut number = vec![u32::MAX; pattern.n()];
         for (new, &equation) in (0..).zip(eliminated) {
             number[equation as usize] = new;
@@ -754,8 +772,22 @@ impl Supernodes {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
+        let lines = lines.filter(|_| n >= WORTH_DISSECTING);
+        let (mut forward, mut inverse) = (Vec::new(), vec![0; n]);
+        if let Some(lines) = lines {
+            let of_eliminated = eliminated.iter().map(|&equation| lines[equation as usize]);
+            forward = dissection::order(&of_eliminated.collect::<Vec<_>>());
+            for (at, &unknown) in (0..).zip(&forward) {
+                inverse[unknown as usize] = at;
+            }
+        }
+        let ordering = if lines.is_some() {
+            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n))
+        } else {
+            SymmetricOrdering::Amd
+        };
         let symbolic: SymbolicCholesky<u32> =
-            factorize_symbolic_cholesky(matrix, Side::Lower, SymmetricOrdering::Amd, settings)
+            factorize_symbolic_cholesky(matrix, Side::Lower, ordering, settings)
                 .map_err(|_| Singular)?;
         let SymbolicCholeskyRaw::Supernodal(supernodal) = symbolic.raw() else {
             return Err(Singular);
@@ -823,7 +855,7 @@ mod tests {
     fn check_solution(skew: f64, kind: Kind) {
         let (pattern, values, dense) = grid(14, skew);
         let n = pattern.n();
-        let mut factors = Multifrontal::new(&pattern, kind, &vec![false; n]).unwrap();
+        let mut factors = Multifrontal::new(&pattern, kind, &vec![false; n], None).unwrap();
         factors.factorise(&values).unwrap();
         let right = right_side(n);
         let (y, kept) = factors.forward(&right);
@@ -846,7 +878,7 @@ mod tests {
             let n = pattern.n();
             // A line through the middle, and a corner.
             let kept: Vec<bool> = (0..n).map(|i| i / 9 == 4 || i == 80).collect();
-            let mut factors = Multifrontal::new(&pattern, kind, &kept).unwrap();
+            let mut factors = Multifrontal::new(&pattern, kind, &kept, None).unwrap();
             factors.factorise(&values).unwrap();
             let inside = |want: bool| (0..n).filter(|&i| kept[i] == want).collect::<Vec<_>>();
             let (e, k) = (inside(false), inside(true));
@@ -877,7 +909,7 @@ mod tests {
                 .unwrap();
             pool.install(|| {
                 let mut factors =
-                    Multifrontal::new(&pattern, Kind::Unsymmetric, &vec![false; n]).unwrap();
+                    Multifrontal::new(&pattern, Kind::Unsymmetric, &vec![false; n], None).unwrap();
                 factors.factorise(&values).unwrap();
                 let (y, kept) = factors.forward(&right_side(n));
                 factors.backward(&y, &kept)
@@ -890,10 +922,10 @@ mod tests {
     fn refuses_what_it_cannot_factorise() {
         let (pattern, mut values, _) = grid(5, 0.0);
         let none = vec![false; pattern.n()];
-        let mut cholesky = Multifrontal::new(&pattern, Kind::Symmetric, &none).unwrap();
+        let mut cholesky = Multifrontal::new(&pattern, Kind::Symmetric, &none, None).unwrap();
         values.iter_mut().for_each(|value| *value = -*value);
         assert_eq!(cholesky.factorise(&values), Err(Singular));
-        let mut lu = Multifrontal::new(&pattern, Kind::Unsymmetric, &none).unwrap();
+        let mut lu = Multifrontal::new(&pattern, Kind::Unsymmetric, &none, None).unwrap();
         assert_eq!(lu.factorise(&vec![0.0; values.len()]), Err(Singular));
     }
 
@@ -903,7 +935,7 @@ mod tests {
             column_start: vec![0],
             rows: Vec::new(),
         };
-        let mut factors = Multifrontal::new(&pattern, Kind::Unsymmetric, &[]).unwrap();
+        let mut factors = Multifrontal::new(&pattern, Kind::Unsymmetric, &[], None).unwrap();
         factors.factorise(&[]).unwrap();
         assert_eq!(factors.forward(&[]), (vec![], vec![]));
     }

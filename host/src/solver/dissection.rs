@@ -1,0 +1,108 @@
+//! Nested dissection of a mesh by its own lines: an order of elimination with little fill.
+//!
+//! A set of unknowns is cut along the mesh line that halves it across its longer side; the
+//! unknowns on the line are eliminated after those on both sides, which do not touch each other
+//! (George 1973). What is cut where only bears on speed: any order gives a right factorisation.
+
+/// Sets within so few mesh lines each way are not cut any more.
+const SMALLEST: u32 = 4;
+
+/// Numbers of the mesh lines through every position, by coordinate: equal coordinates have equal
+/// numbers. Corners of 8-node elements have even numbers, their mid-side nodes odd ones.
+pub fn mesh_lines(positions: &[[f64; 2]]) -> Vec<[u32; 2]> {
+    let mut lines = vec![[0; 2]; positions.len()];
+    for axis in 0..2 {
+        let mut order: Vec<usize> = (0..positions.len()).collect();
+        order.sort_unstable_by(|&a, &b| positions[a][axis].total_cmp(&positions[b][axis]));
+        let mut line = 0;
+        for pair in 0..order.len() {
+            if pair > 0 {
+                let step = positions[order[pair]][axis] - positions[order[pair - 1]][axis];
+                line += u32::from(step > 0.0);
+            }
+            lines[order[pair]][axis] = line;
+        }
+    }
+    lines
+}
+
+/// An order of elimination of unknowns that lie on these mesh lines.
+pub(super) fn order(lines: &[[u32; 2]]) -> Vec<u32> {
+    let mut all: Vec<u32> = (0..lines.len() as u32).collect();
+    let mut order = Vec::with_capacity(all.len());
+    dissect(lines, &mut all, &mut order);
+    order
+}
+
+/// Appends a set to the order: one side, the other side, and what separates them.
+fn dissect(lines: &[[u32; 2]], set: &mut [u32], order: &mut Vec<u32>) {
+    let Some([(low, high), (low_y, high_y)]) = extents(lines, set) else {
+        return;
+    };
+    let ((low, high), axis) = if high_y - low_y > high - low {
+        ((low_y, high_y), 1)
+    } else {
+        ((low, high), 0)
+    };
+    if high - low <= SMALLEST {
+        order.extend_from_slice(set);
+        return;
+    }
+    let line = |unknown: u32| lines[unknown as usize][axis];
+    let half = set.len() / 2;
+    let (_, &mut middle, _) =
+        set.select_nth_unstable_by_key(half, |&unknown| (line(unknown), unknown));
+    // An even line, so that no element reaches across it.
+    let cut = (line(middle) / 2 * 2).clamp(low + 1, high - 1);
+    set.sort_unstable_by_key(|&unknown| (line(unknown).cmp(&cut) as i8, unknown));
+    let before = set.partition_point(|&unknown| line(unknown) < cut);
+    let on = set[before..].partition_point(|&unknown| line(unknown) == cut);
+    let (below, rest) = set.split_at_mut(before);
+    let (separator, above) = rest.split_at_mut(on);
+    // A line without unknowns separates nothing.
+    if below.is_empty() || above.is_empty() {
+        order.extend_from_slice(below);
+        order.extend_from_slice(above);
+    } else {
+        dissect(lines, below, order);
+        dissect(lines, above, order);
+    }
+    order.extend_from_slice(separator);
+}
+
+/// Least and greatest line, by axis.
+fn extents(lines: &[[u32; 2]], set: &[u32]) -> Option<[(u32, u32); 2]> {
+    let of = |axis: usize| {
+        let along = set.iter().map(|&unknown| lines[unknown as usize][axis]);
+        Some((along.clone().min()?, along.max()?))
+    };
+    Some([of(0)?, of(1)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cuts_a_strip_in_its_middle() {
+        let positions: Vec<[f64; 2]> = (0..33).map(|i| [f64::from(i) * 0.1, 0.0]).collect();
+        let lines = mesh_lines(&positions);
+        assert_eq!(lines[7], [7, 0]);
+        let order = order(&lines);
+        assert_eq!(order.len(), 33);
+        assert_eq!(*order.last().unwrap(), 16);
+        let place = |i: u32| order.iter().position(|&o| o == i).unwrap();
+        // One side stands before the other.
+        assert!((0..16).map(place).max().unwrap() < (17..33).map(place).min().unwrap());
+    }
+
+    #[test]
+    fn orders_every_unknown_once() {
+        let positions: Vec<[f64; 2]> = (0..500)
+            .map(|i| [f64::from(i % 23).sqrt(), f64::from(i / 23)])
+            .collect();
+        let mut order = order(&mesh_lines(&positions));
+        order.sort_unstable();
+        assert!(order.into_iter().eq(0..500));
+    }
+}
