@@ -23,7 +23,7 @@ pub struct Tie {
 }
 
 /// Compressed columns: row numbers, sorted, of every column.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pattern {
     /// Start of every column, and the end.
     pub column_start: Vec<u32>,
@@ -177,12 +177,12 @@ impl System {
         self.free.iter().map(|&dof| of_nodes[dof / 2]).collect()
     }
 
-    /// Gives up what only the matrix needs: it will not be assembled again.
-    pub fn forget_matrix(&mut self) {
-        self.pattern = Pattern::default();
+    /// Gives up what only the matrix needs, which will not be assembled again. Returns its pattern.
+    pub fn forget_matrix(&mut self) -> Pattern {
         for map in self.elements.iter_mut().flatten() {
             map.slots = Vec::new();
         }
+        std::mem::take(&mut self.pattern)
     }
 
     /// Equation of a degree of freedom.

@@ -10,7 +10,8 @@ use host::case::Case;
 use host::error::{Error, Place, suggestion};
 use host::output::{Figures, remove_comparison};
 use host::plugin::SearchPath;
-use host::run::{Observer, check, run};
+use host::run::{Observer, check, run_reusing};
+use host::solver::Reuse;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -36,6 +37,9 @@ enum Command {
         /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Threads; the results do not depend on it [default: all processors].
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        threads: Option<u16>,
     },
     /// Lead one law at one integration point along a path.
     Point {
@@ -93,7 +97,20 @@ fn main() -> ExitCode {
 
 fn execute(command: Command) -> Result<(), Error> {
     match command {
-        Command::Run { case, variant, out } => run_cases(&case, variant.as_deref(), out.as_deref()),
+        Command::Run {
+            case,
+            variant,
+            out,
+            threads,
+        } => {
+            if let Some(n) = threads {
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(n.into())
+                    .build_global()
+                    .map_err(|error| Error::Internal(error.to_string()))?;
+            }
+            run_cases(&case, variant.as_deref(), out.as_deref())
+        }
         Command::Point {
             driver,
             variant,
@@ -136,6 +153,8 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
     let mut reports = Ok(());
     let mut drawn = Vec::new();
     let mut folders = Vec::new();
+    // Variants on one mesh share the factors of its linear part.
+    let mut reuse = Reuse::default();
     for case in &cases {
         let folder = match (out, &case.variant) {
             (None, _) => case.default_folder(),
@@ -146,7 +165,7 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
             eprintln!("variant {name}");
         }
         let mut progress = Progress::new();
-        let run = run(case, &folder, &mut progress);
+        let run = run_reusing(case, &folder, &mut progress, &mut reuse);
         progress.finish();
         let has_results = progress.has_begun;
         match run {

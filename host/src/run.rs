@@ -9,7 +9,8 @@ use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    LinearDomain, LinearSolver, Loads, Newton, Singular, StepFailure, StepSuccess, mesh_lines,
+    LinearDomain, LinearSolver, Loads, Newton, Reuse, Singular, StepFailure, StepSuccess,
+    mesh_lines,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -50,6 +51,19 @@ pub fn check(case: &Case) -> Result<(), Error> {
 /// Bad input before anything is written; no equilibrium or plugin trouble after the last state
 /// of equilibrium has been written.
 pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Figures, Error> {
+    run_reusing(case, folder, observer, &mut Reuse::default())
+}
+
+/// As [`run`], with what earlier runs have factorised.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_reusing(
+    case: &Case,
+    folder: &Path,
+    observer: &mut dyn Observer,
+    reuse: &mut Reuse,
+) -> Result<Figures, Error> {
     let started = Instant::now();
     let model = Model::build(case)?;
     let probes = Probes::new(case, &model)?;
@@ -64,7 +78,7 @@ pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Fi
         }
     }
     let mut results = Results::create(folder, case, &model, &probes)?;
-    let mut run = Run::new(case, model, probes);
+    let mut run = Run::new(case, model, probes, reuse);
     let outcome = run.phases(&mut results, &mut observer);
     for warning in results.unreliable() {
         observer.warning(&warning);
@@ -118,6 +132,8 @@ struct Run<'a> {
     time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     largest_force: f64,
+    /// Factors of linear parts.
+    reuse: &'a mut Reuse,
 }
 
 /// The equations of one phase.
@@ -148,7 +164,7 @@ struct ModelRest {
 }
 
 impl<'a> Run<'a> {
-    fn new(case: &'a Case, model: Model, probes: Probes) -> Self {
+    fn new(case: &'a Case, model: Model, probes: Probes, reuse: &'a mut Reuse) -> Self {
         let Model {
             mesh,
             groups,
@@ -169,6 +185,7 @@ impl<'a> Run<'a> {
             force: vec![0.0; n_dofs],
             time: 0.0,
             largest_force: 0.0,
+            reuse,
         };
         for support in &case.file.supports {
             for dof in run.dofs(support.line.get_ref(), &support.fixed) {
@@ -248,8 +265,11 @@ impl<'a> Run<'a> {
             results,
             observer,
         );
-        record.factorisations =
-            equations.solver.factorisations + u64::from(equations.domain.is_some());
+        let factorised = equations
+            .domain
+            .as_ref()
+            .is_some_and(|domain| domain.factorised);
+        record.factorisations = equations.solver.factorisations + u64::from(factorised);
         self.time += 1.0;
         results.phase(record);
         outcome
@@ -419,24 +439,29 @@ impl<'a> Run<'a> {
         record: &mut PhaseRecord,
     ) -> Result<Vec<f64>, String> {
         let started = Instant::now();
+        let mut reaction = vec![0.0; self.displacement.len()];
+        for (number, group) in self.groups.iter().enumerate() {
+            if equations.system.includes(number) {
+                let stress = &group.stress.committed;
+                group.kinematics.add_forces(stress, &mut reaction);
+            }
+        }
+        fold(&self.model.ties, &mut reaction);
         if let Some(domain) = &mut equations.domain {
             let moved = self.displacement.iter().zip(&equations.at_last);
             let mut increment: Vec<f64> = moved.map(|(u, last)| u - last).collect();
             let tolerance = self.case.file.solver.force_tolerance;
-            domain.bring_up(&mut self.groups, loads, lambda, &mut increment, tolerance)?;
+            let internal =
+                domain.bring_up(&mut self.groups, loads, lambda, &mut increment, tolerance)?;
+            for (reaction, internal) in reaction.iter_mut().zip(internal) {
+                *reaction += internal;
+            }
             for &dof in domain.unknowns() {
                 self.displacement[dof] = equations.at_last[dof] + increment[dof];
             }
         }
         equations.system.follow(&mut self.displacement);
         equations.at_last.copy_from_slice(&self.displacement);
-        let mut reaction = vec![0.0; self.displacement.len()];
-        for group in &self.groups {
-            group
-                .kinematics
-                .add_forces(&group.stress.committed, &mut reaction);
-        }
-        fold(&self.model.ties, &mut reaction);
         for (force, external) in reaction.iter_mut().zip(&self.force) {
             *force -= external;
         }
@@ -498,7 +523,7 @@ impl<'a> Run<'a> {
         is_prescribed: &[bool],
         loads: &mut Loads,
     ) -> Result<PhaseEquations, Singular> {
-        let (groups, ties) = (&self.groups, &self.model.ties);
+        let (case, groups, ties) = (self.case, &self.groups, &self.model.ties);
         let lines = mesh_lines(&self.mesh.nodes);
         let wanted = self.file().solver.equations;
         let condensed = if wanted == Equations::Sparse {
@@ -506,7 +531,10 @@ impl<'a> Run<'a> {
         } else {
             // Groups that are held by the others alone cannot be condensed.
             let always = wanted == Equations::Condensed;
-            LinearDomain::new(groups, is_prescribed, ties, &lines, always).unwrap_or(None)
+            // A case of one phase has nothing to reuse, unless others follow it.
+            let may_recur = case.variant.is_some() || case.file.phases.len() > 1;
+            let reuse = may_recur.then_some(&mut *self.reuse);
+            LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
         };
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),

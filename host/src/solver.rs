@@ -10,5 +10,5 @@ mod newton;
 
 pub use dissection::mesh_lines;
 pub use linear::{LinearSolver, Singular};
-pub use linear_domain::LinearDomain;
+pub use linear_domain::{LinearDomain, Reuse};
 pub use newton::{Costs, Iteration, Loads, Newton, StepFailure, StepSuccess};

@@ -6,6 +6,7 @@
     reason = "part of the tests"
 )]
 
+mod condensed;
 mod cut_back;
 mod cylinder;
 mod footing;

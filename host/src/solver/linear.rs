@@ -74,6 +74,10 @@ impl LinearSolver {
         if let Some(other) = &mut self.row_exchanges {
             other.factors = None;
         }
+        if values.is_empty() {
+            self.factorised = true;
+            return Ok(());
+        }
         self.factorisations += 1;
         self.factorised = self.multifrontal.factorise(values).is_ok();
         if self.factorised {

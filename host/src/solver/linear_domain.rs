@@ -17,20 +17,76 @@
 use super::Singular;
 use super::multifrontal::{Kind, Multifrontal};
 use super::newton::{Loads, norm};
-use crate::assembly::{System, Tie};
+use crate::assembly::{Pattern, System, Tie};
 use crate::group::Group;
 use crate::plugin::Operator;
+use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Corrections of a complete state, at most.
 const REFINEMENTS: usize = 3;
-/// The residual of a complete state is brought this far below its tolerance if it can be.
-const REFINED: f64 = 1e-2;
+/// A complete state whose residual is within this of the tolerance is left as it is.
+const REFINED: f64 = 0.1;
+
+/// Matrices whose factors are remembered.
+const REMEMBERED: usize = 3;
+
+/// Factors of the linear parts that were condensed last, for phases and cases with the same ones:
+/// another interface law on the same mesh, the same law under other loads.
+#[derive(Debug, Default)]
+pub struct Reuse {
+    /// The latest last.
+    known: VecDeque<Condensed>,
+}
+
+/// A matrix and what became of it.
+#[derive(Debug)]
+struct Condensed {
+    kind: Kind,
+    pattern: Pattern,
+    values: Vec<f64>,
+    kept: Vec<bool>,
+    factors: Arc<Multifrontal>,
+}
+
+impl Reuse {
+    /// The factors of a matrix that is known, to the bit.
+    fn find(
+        &self,
+        kind: Kind,
+        pattern: &Pattern,
+        values: &[f64],
+        kept: &[bool],
+    ) -> Option<Arc<Multifrontal>> {
+        let same = |known: &&Condensed| {
+            known.kind == kind
+                && known.kept == kept
+                && known.pattern == *pattern
+                && known
+                    .values
+                    .iter()
+                    .map(|v| v.to_bits())
+                    .eq(values.iter().map(|v| v.to_bits()))
+        };
+        let known = self.known.iter().find(same)?;
+        Some(Arc::clone(&known.factors))
+    }
+
+    fn remember(&mut self, condensed: Condensed) {
+        if self.known.len() == REMEMBERED {
+            self.known.pop_front();
+        }
+        self.known.push_back(condensed);
+    }
+}
 
 /// The linear part of a model during one phase.
 #[derive(Debug)]
 pub struct LinearDomain {
     system: System,
-    factors: Multifrontal,
+    factors: Arc<Multifrontal>,
+    /// Whether the factors were made for this phase.
+    pub factorised: bool,
     /// Degrees of freedom of the boundary, in the order of the Schur complement.
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
@@ -65,6 +121,7 @@ impl LinearDomain {
         ties: &[Tie],
         lines: &[[u32; 2]],
         always: bool,
+        reuse: Option<&mut Reuse>,
     ) -> Result<Option<(Self, System)>, Singular> {
         let mut system = System::new(groups, Group::is_linear, prescribed, ties, None);
         if system.n_equations() == 0 {
@@ -94,12 +151,31 @@ impl LinearDomain {
         } else {
             Kind::Unsymmetric
         };
-        let mut factors =
-            Multifrontal::new(&system.pattern, kind, &kept, Some(&system.lines(lines)))?;
         let mut values = Vec::new();
         system.assemble(groups, &mut values);
-        system.forget_matrix();
-        factors.factorise(&values)?;
+        let known = reuse
+            .as_ref()
+            .and_then(|reuse| reuse.find(kind, &system.pattern, &values, &kept));
+        let factorised = known.is_none();
+        let factors = if let Some(factors) = known {
+            factors
+        } else {
+            let lines = system.lines(lines);
+            let mut factors = Multifrontal::new(&system.pattern, kind, &kept, Some(&lines))?;
+            let pattern = system.forget_matrix();
+            factors.factorise(&values)?;
+            let factors = Arc::new(factors);
+            if let Some(reuse) = reuse {
+                reuse.remember(Condensed {
+                    kind,
+                    pattern,
+                    values,
+                    kept: kept.clone(),
+                    factors: Arc::clone(&factors),
+                });
+            }
+            factors
+        };
         let free = system.free();
         let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();
         let domain = Self {
@@ -107,6 +183,7 @@ impl LinearDomain {
             boundary,
             on_boundary: kept,
             factors,
+            factorised,
             system,
             y: Vec::new(),
             condensed: Vec::new(),
@@ -192,7 +269,8 @@ impl LinearDomain {
     }
 
     /// Brings the domain's groups from the last complete state to load factor λ and to where the
-    /// boundary is, and makes that the last complete state. `increment` holds the displacements
+    /// boundary is, and makes that the last complete state. Returns their internal forces, by
+    /// degree of freedom. `increment` holds the displacements
     /// since then, by degree of freedom; those of the unknowns are filled in here.
     ///
     /// # Errors
@@ -204,7 +282,7 @@ impl LinearDomain {
         lambda: f64,
         increment: &mut [f64],
         tolerance: f64,
-    ) -> Result<(), String> {
+    ) -> Result<Vec<f64>, String> {
         let external = loads.external(lambda);
         let rise = lambda - self.lambda;
         let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
@@ -262,7 +340,7 @@ impl LinearDomain {
             }
         }
         self.complete(lambda, &internal);
-        Ok(())
+        Ok(internal)
     }
 
     /// Degrees of freedom of the domain's unknowns, boundary included.
