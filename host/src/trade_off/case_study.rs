@@ -358,11 +358,19 @@ pub(super) fn law_schemes(case: &Case, scratch: &Scratch) -> Result<Vec<(String,
             let run = trial(case, &settings, scratch, false).ok()?;
             Some(run.rows)
         };
-        let all = schemes(
+        let mut all = schemes(
             built.law.description(),
             |id| used(built, id),
             |a, b| few(a) != few(b),
         );
+        // The finest is the finest that runs at all.
+        for i in (1..all.len()).rev() {
+            let has_coarser = all[i - 1].choice == all[i].choice;
+            if all[i].is_finest && has_coarser && few(&all[i].values).is_none() {
+                all[i].is_finest = false;
+                all[i - 1].is_finest = true;
+            }
+        }
         let named = all.into_iter().filter(|scheme| !scheme.label.is_empty());
         found.extend(named.map(|scheme| (name.clone(), scheme)));
     }
