@@ -5,13 +5,13 @@ pub(crate) mod base;
 
 use crate::error::{Error, Source};
 use crate::input::{Named, ParameterTable};
-use serde::{Deserialize, Deserializer, de};
+use serde::{Deserialize, Deserializer, Serialize, de};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
 /// A case file and its text.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Case {
     /// Text and path, for messages.
     pub source: Source,
@@ -86,7 +86,7 @@ impl Case {
 }
 
 /// The keys of a case file. Units: kN, m, kPa; angles in degrees.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CaseFile {
     /// What the case is.
@@ -121,6 +121,36 @@ pub struct CaseFile {
     /// What is written.
     #[serde(default)]
     pub output: OutputInput,
+    /// Relative error of the probes that the run may have; settings that reach it are then found
+    /// by a study before the run.
+    #[serde(default, deserialize_with = "accuracy")]
+    pub accuracy: Option<Spanned<f64>>,
+    /// The settings that such a study chose.
+    #[serde(skip)]
+    pub chosen: Option<Chosen>,
+}
+
+/// Settings chosen for an `accuracy`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Chosen {
+    /// Relative error asked for.
+    pub asked: f64,
+    /// Relative error estimated.
+    pub reached: f64,
+    /// It is at most what was asked for.
+    pub is_reached: bool,
+    /// How the error was estimated.
+    pub estimate: String,
+    /// Increments by phase.
+    pub increments: Vec<(String, usize)>,
+    /// Tolerance of the residual.
+    pub force_tolerance: f64,
+    /// Tolerance of the correction.
+    pub displacement_tolerance: f64,
+    /// Parameters of laws that differ from the file, as `law.parameter = value`.
+    pub parameters: Vec<String>,
+    /// Runs that the study took.
+    pub runs: usize,
 }
 
 /// Kinematics of the plane.
@@ -134,7 +164,7 @@ pub enum Analysis {
 }
 
 /// A structured mesh of 8-node quads.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
     /// Where columns and rows start; (0, 0) if left out.
@@ -169,7 +199,7 @@ fn one() -> f64 {
 }
 
 /// A rectangle of elements.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegionInput {
     /// The group its elements belong to.
@@ -208,7 +238,7 @@ pub enum Coordinate {
 }
 
 /// A law with its parameters.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LawInput {
     /// Id of the law.
@@ -222,7 +252,7 @@ pub struct LawInput {
 }
 
 /// A group of elements.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GroupInput {
     /// What the elements do.
@@ -319,7 +349,7 @@ pub struct StressInput {
 }
 
 /// Displacements of a line held at zero.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupportInput {
     /// The line.
@@ -329,7 +359,7 @@ pub struct SupportInput {
 }
 
 /// A loading phase. Loads and prescribed displacements stay until a later phase changes them.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseInput {
     /// Name, used in results.
@@ -354,7 +384,7 @@ pub struct PhaseInput {
 }
 
 /// Prescribed displacements of a line, m.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DisplacementInput {
     /// The line.
@@ -368,7 +398,7 @@ pub struct DisplacementInput {
 }
 
 /// Displacements of a line that become free.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FreeInput {
     /// The line.
@@ -378,7 +408,7 @@ pub struct FreeInput {
 }
 
 /// A pressure on a boundary line, kPa.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PressureInput {
     /// The line.
@@ -388,7 +418,7 @@ pub struct PressureInput {
 }
 
 /// A quantity written for every increment.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeInput {
     /// Over the nodes of this line.
@@ -469,7 +499,7 @@ pub struct CutInput {
 }
 
 /// Solver settings.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverInput {
     /// Largest residual force, relative to the largest of the forces in play (2-norms).
@@ -528,6 +558,15 @@ fn iterations<'de, D: Deserializer<'de>>(input: D) -> Result<usize, D::Error> {
 /// A step halved more often than this hardly moves the load factor in double precision.
 fn halvings<'de, D: Deserializer<'de>>(input: D) -> Result<u32, D::Error> {
     within(u32::deserialize(input)?, 0, 40)
+}
+
+/// A relative error that can be aimed at.
+fn accuracy<'de, D: Deserializer<'de>>(input: D) -> Result<Option<Spanned<f64>>, D::Error> {
+    let asked = Spanned::<f64>::deserialize(input)?;
+    match *asked.get_ref() {
+        value if value > 0.0 && value <= 0.5 => Ok(Some(asked)),
+        value => Err(de::Error::custom(format!("{value:?} is outside (0, 0.5]"))),
+    }
 }
 
 fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {

@@ -79,6 +79,18 @@ pub enum ParameterValue {
 /// Parameters of a law as written in a file.
 pub type ParameterTable = Named<ParameterValue>;
 
+/// Sets some parameters, whether the file gives them or not.
+pub fn set_parameters(table: &mut ParameterTable, values: &[(String, ParameterValue)]) {
+    for (id, value) in values {
+        if let Some((_, written)) = table.iter_mut().find(|(key, _)| key.get_ref() == id) {
+            *written.get_mut() = value.clone();
+        } else {
+            let key = Spanned::new(0..0, id.clone());
+            table.insert(key, Spanned::new(0..0, value.clone()));
+        }
+    }
+}
+
 /// A parameter as it was used, for the record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UsedParameter {

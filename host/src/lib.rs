@@ -4,7 +4,7 @@
 //! ([`plugin`], built by [`input`]), both joined in a [`model`] of [`group`]s of [`element`]s;
 //! [`run`] leads it through phases and increments with [`assembly`] and [`solver`]; [`probe`]s and
 //! [`output`] write what comes out. Beside them: [`point`], one law at one integration point, and
-//! [`laws`], what there is to know about a law.
+//! [`laws`], what there is to know about a law, and [`trade_off`], what accuracy costs.
 
 pub mod assembly;
 pub mod case;
@@ -22,3 +22,4 @@ pub mod probe;
 pub mod report;
 pub mod run;
 pub mod solver;
+pub mod trade_off;

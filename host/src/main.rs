@@ -12,6 +12,7 @@ use host::output::{Figures, remove_comparison};
 use host::plugin::SearchPath;
 use host::run::{Observer, check, run_reusing};
 use host::solver::Reuse;
+use host::trade_off;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -60,6 +61,26 @@ enum Command {
         /// The report's file [default: report.html in the folder, or beside the folders].
         #[arg(long)]
         out: Option<PathBuf>,
+    },
+    /// Measure what accuracy costs: the settings of a case or driver, error against CPU time.
+    TradeOff {
+        /// A case file, a folder with `case.toml`, or a driver file.
+        input: PathBuf,
+        /// Study only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
+        /// Folder for the results [default: `results/trade_off_NAME`].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Divide the mesh of a case by 4 too, not only by 2.
+        #[arg(long)]
+        fine: bool,
+        /// Most increments per segment of a driver.
+        #[arg(long, default_value_t = 1000)]
+        max_increments: usize,
+        /// Instead: what stiffness the interfaces of no thickness should have.
+        #[arg(long)]
+        interface_stiffness: bool,
     },
     /// List the laws found, or show all about one of them.
     Laws {
@@ -117,6 +138,28 @@ fn execute(command: Command) -> Result<(), Error> {
             csv,
         } => run_point(&driver, variant.as_deref(), csv.as_deref()),
         Command::Report { folders, out } => write_report(&folders, out),
+        Command::TradeOff {
+            input,
+            variant,
+            out,
+            fine,
+            max_increments,
+            interface_stiffness,
+        } => {
+            let options = trade_off::Options {
+                variant,
+                out,
+                fine,
+                most_increments: max_increments,
+                interface_stiffness,
+            };
+            trade_off::run(
+                &input,
+                &options,
+                &mut |text| println!("{text}"),
+                &mut |doing| eprintln!("{doing}"),
+            )
+        }
         Command::Laws { id } => show_laws(id.as_deref()),
     }
 }
@@ -165,7 +208,7 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
             eprintln!("variant {name}");
         }
         let mut progress = Progress::new();
-        let run = run_reusing(case, &folder, &mut progress, &mut reuse);
+        let run = run_accurately(case, &folder, &mut progress, &mut reuse);
         progress.finish();
         let has_results = progress.has_begun;
         match run {
@@ -200,6 +243,41 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
         }
         (outcome, reports) => outcome.and(reports),
     }
+}
+
+/// Runs a case; where it asks for an accuracy, with settings that reach it.
+fn run_accurately(
+    case: &Case,
+    folder: &Path,
+    progress: &mut Progress,
+    reuse: &mut Reuse,
+) -> Result<Figures, Error> {
+    let studied = trade_off::reach(case, folder)?;
+    let case = studied.as_ref().unwrap_or(case);
+    if let Some(chosen) = &case.file.chosen {
+        let increments: Vec<String> = chosen
+            .increments
+            .iter()
+            .map(|(phase, n)| format!("{phase} {n}"))
+            .collect();
+        let settings = format!(
+            "error {:.1e} estimated, {:.1e} asked for; increments {}, force tolerance {:e} {}",
+            chosen.reached,
+            chosen.asked,
+            increments.join(", "),
+            chosen.force_tolerance,
+            chosen.parameters.join(" ")
+        );
+        if chosen.is_reached {
+            progress.say(&format!("accuracy: {}", settings.trim_end()));
+        } else {
+            progress.warning(&format!(
+                "the accuracy is not reached: {}",
+                settings.trim_end()
+            ));
+        }
+    }
+    run_reusing(case, folder, progress, reuse)
 }
 
 /// Keeps the last failure for the caller to report, and reports the one before it.

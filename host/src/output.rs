@@ -9,6 +9,7 @@ mod points;
 mod profile;
 mod summary;
 
+pub(crate) use figure::COLOURS;
 pub use figure::{Figures, check_figures, check_table_figures};
 pub use summary::PhaseRecord;
 

@@ -11,3 +11,4 @@ mod point;
 mod program;
 mod results;
 mod syntax;
+mod trade_off;

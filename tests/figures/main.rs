@@ -134,14 +134,15 @@ fn cases() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases")
 }
 
-/// Pictures in the folders of the cases.
+/// Pictures in the folders of the cases. Those of `trade_off` show measured times, which no run
+/// repeats; the test target of that name draws them.
 fn pictures() -> BTreeSet<PathBuf> {
     let entries = |folder: &Path| {
         let entries = std::fs::read_dir(folder).unwrap();
         entries.map(|entry| entry.unwrap().path())
     };
     entries(&cases())
-        .filter(|path| path.is_dir())
+        .filter(|path| path.is_dir() && !path.ends_with("trade_off"))
         .flat_map(|folder| entries(&folder))
         .filter(|path| path.extension().is_some_and(|ending| ending == "svg"))
         .collect()

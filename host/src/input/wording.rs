@@ -42,7 +42,7 @@ pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
             found_in_words(found),
             expected_in_words(expected)
         )),
-        None if message.starts_with("expected") || message.contains(" is outside [") => {
+        None if message.starts_with("expected") || message.contains(" is outside ") => {
             of_key(message.to_owned())
         }
         None => at(message.to_owned()),

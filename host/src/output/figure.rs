@@ -11,7 +11,7 @@ use std::path::Path;
 /// Size of a figure in points.
 const SIZE: (u32, u32) = (640, 420);
 /// Colours that stay apart for most eyes and in grey (Okabe & Ito), then some more.
-const COLOURS: [RGBColor; 10] = [
+pub(crate) const COLOURS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),

@@ -98,6 +98,9 @@ impl Summary {
         head.insert("analysis".to_owned(), json!(analysis(case)));
         head.insert("groups".to_owned(), groups(case, model));
         head.insert("solver".to_owned(), solver(case));
+        if let Some(chosen) = &case.file.chosen {
+            head.insert("accuracy".to_owned(), json!(chosen));
+        }
         head.insert("figures".to_owned(), figures(case));
         let pictures = case.file.figures.iter();
         let pictures: Vec<String> = pictures

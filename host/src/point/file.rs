@@ -3,7 +3,7 @@
 use super::{N_MAX, Vector};
 use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
-use crate::input::{self, Named, ParameterTable};
+use crate::input::{self, Named, ParameterTable, ParameterValue};
 use crate::plugin::{Law, SearchPath, Strided};
 use abi::Hypothesis;
 use abi::status::Outcome;
@@ -16,7 +16,7 @@ use toml::Spanned;
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 100_000_000;
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     law: Spanned<String>,
@@ -34,7 +34,7 @@ struct File {
     figures: Vec<FigureInput>,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Initial {
     traction: Option<Spanned<Named<f64>>>,
@@ -43,14 +43,14 @@ struct Initial {
     internal: Named<f64>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SegmentTable {
     increments: Spanned<i64>,
     control: IndexMap<Spanned<String>, Spanned<ControlTable>>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ControlTable {
     jump: Option<Spanned<f64>>,
@@ -103,6 +103,7 @@ pub struct Driver {
     pub(super) figures: Vec<FigureInput>,
     source: Source,
     place_of_initial: Range<usize>,
+    file: File,
 }
 
 impl Driver {
@@ -134,6 +135,7 @@ impl Driver {
     }
 
     fn build(source: &Source, variant: Option<String>, file: File) -> Result<Self, Error> {
+        let given = file.clone();
         let hypothesis = hypothesis(source, &file.hypothesis)?;
         let segments = segments(source, &file, hypothesis)?;
         let place_of_initial = file
@@ -164,6 +166,7 @@ impl Driver {
             figures: file.figures,
             source: source.clone(),
             place_of_initial,
+            file: given,
         };
         driver.internal = driver.initial_internal(&initial.internal)?;
         driver.check_figures(source)?;
@@ -173,6 +176,59 @@ impl Driver {
     /// The law.
     pub fn law(&self) -> &Law {
         &self.law
+    }
+
+    /// Name of the variant, if the file stands for several drivers.
+    pub fn variant(&self) -> Option<&str> {
+        self.variant.as_deref()
+    }
+
+    /// Title.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Increments of each segment.
+    pub fn segment_increments(&self) -> Vec<usize> {
+        self.segments.iter().map(|s| s.increments).collect()
+    }
+
+    /// Follows the same path in other increments, one number for each segment.
+    pub fn set_increments(&mut self, increments: &[usize]) {
+        for (segment, &increments) in self.segments.iter_mut().zip(increments) {
+            segment.increments = increments.max(1);
+        }
+    }
+
+    /// The value of a parameter of the law, of a choice its number: as in the file, or the law's
+    /// default.
+    pub fn parameter(&self, id: &str) -> Option<f64> {
+        let mut declared = self.law.description().parameters.iter();
+        let declared = declared.find(|p| p.id == id)?;
+        let mut written = self.file.parameters.iter();
+        match written.find(|(key, _)| key.get_ref() == id) {
+            None => declared.default,
+            Some((_, value)) => match value.get_ref() {
+                ParameterValue::Number(number) => Some(*number),
+                ParameterValue::Integer(number) => Some(*number as f64),
+                ParameterValue::Label(label) => {
+                    let number = declared.choices.iter().position(|choice| choice == label);
+                    number.map(|number| number as f64)
+                }
+            },
+        }
+    }
+
+    /// The same path with other values of some parameters.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the law does not take them.
+    pub fn with_parameters(&self, values: &[(String, ParameterValue)]) -> Result<Self, Error> {
+        let mut file = self.file.clone();
+        input::set_parameters(&mut file.parameters, values);
+        let mut driver = Self::build(&self.source, self.variant.clone(), file)?;
+        driver.set_increments(&self.segment_increments());
+        Ok(driver)
     }
 
     /// Number of increments of all segments.

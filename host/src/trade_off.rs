@@ -1,0 +1,193 @@
+//! What accuracy costs: `pilum trade-off`.
+//!
+//! A study runs a driver or a case under many settings and measures each against a reference that
+//! is finer than all of them and says how far it is converged. [`run`] is the command;
+//! [`reach`] goes the other way round and finds settings for an error that is asked for.
+
+mod accuracy;
+mod case_study;
+mod clock;
+mod diagram;
+mod division;
+mod driver_study;
+mod page;
+mod pareto;
+mod sampled;
+mod scheme;
+mod stiffness;
+mod study;
+mod table;
+mod trial;
+
+pub use accuracy::reach;
+pub use sampled::Convergence;
+pub use study::{Measurement, Reference, Row, Study};
+
+use crate::case::{Case, base};
+use crate::error::{Error, Source, suggestion};
+use crate::point::Driver;
+use std::path::{Path, PathBuf};
+use trial::Scratch;
+
+/// What is asked of a study.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Only this variant.
+    pub variant: Option<String>,
+    /// Folder of the results; `results/trade_off_<name>` if left out.
+    pub out: Option<PathBuf>,
+    /// Divide meshes by 4 too.
+    pub fine: bool,
+    /// Most increments per segment of a driver, the reference excepted.
+    pub most_increments: usize,
+    /// Study the stiffness of zero-thickness interfaces instead.
+    pub interface_stiffness: bool,
+}
+
+/// Studies a driver or a case, or all its variants, and writes the results. `show` takes the
+/// tables, `say` what is being done.
+///
+/// # Errors
+/// Bad input before anything is written; the failure of the file's own settings or of every
+/// reference; [`Error::Unwritable`].
+pub fn run(
+    path: &Path,
+    options: &Options,
+    show: &mut dyn FnMut(&str),
+    say: &mut dyn FnMut(&str),
+) -> Result<(), Error> {
+    if options.most_increments == 0 {
+        let message = "--max-increments is 0, expected at least 1";
+        return Err(Error::Usage(message.to_owned()));
+    }
+    let path = if path.is_dir() {
+        path.join("case.toml")
+    } else {
+        path.to_owned()
+    };
+    if is_driver(&path)? {
+        if options.interface_stiffness {
+            let message = "--interface-stiffness needs a case: a driver has no elements beside it";
+            return Err(Error::Usage(message.to_owned()));
+        }
+        run_drivers(&path, options, show)
+    } else {
+        run_cases(&path, options, show, say)
+    }
+}
+
+/// A driver has a path of segments.
+fn is_driver(path: &Path) -> Result<bool, Error> {
+    let (_, files) = base::read::<toml::Table>(Source::read(path)?)?;
+    let mut tables = files.iter().map(|(_, table)| table);
+    Ok(tables.any(|table| table.contains_key("hypothesis") || table.contains_key("segment")))
+}
+
+fn run_drivers(path: &Path, options: &Options, show: &mut dyn FnMut(&str)) -> Result<(), Error> {
+    let mut drivers = Driver::read(path)?;
+    let stem = path.file_stem().unwrap_or_default();
+    let stem = stem.to_string_lossy().into_owned();
+    let name = |driver: &Driver| driver.variant().map(str::to_owned);
+    keep(&mut drivers, options.variant.as_deref(), name)?;
+    let folder = options.folder(&stem);
+    for driver in &drivers {
+        let name = full_name(&stem, driver.variant());
+        let study = driver_study::study(driver, &name, options.most_increments)?;
+        finish(&study, &options.place(&folder, driver.variant()), show)?;
+    }
+    Ok(())
+}
+
+fn run_cases(
+    path: &Path,
+    options: &Options,
+    show: &mut dyn FnMut(&str),
+    say: &mut dyn FnMut(&str),
+) -> Result<(), Error> {
+    let mut cases = Case::load(path)?;
+    keep(&mut cases, options.variant.as_deref(), |c| {
+        c.variant.clone()
+    })?;
+    cases.iter().try_for_each(crate::run::check)?;
+    let folder = options.folder(&cases.first().map(Case::name).unwrap_or_default());
+    for case in &cases {
+        let name = full_name(&case.name(), case.variant.as_deref());
+        let place = options.place(&folder, case.variant.as_deref());
+        if options.interface_stiffness {
+            stiffness::run(case, &name, &place, show, say)?;
+            continue;
+        }
+        let study = {
+            let scratch = Scratch::new(&place)?;
+            case_study::study(case, &name, options.fine, &scratch, say)?
+        };
+        finish(&study, &place, show)?;
+    }
+    Ok(())
+}
+
+/// Keeps the variant that is asked for.
+fn keep<T>(
+    all: &mut Vec<T>,
+    wanted: Option<&str>,
+    name: impl Fn(&T) -> Option<String>,
+) -> Result<(), Error> {
+    let Some(wanted) = wanted else { return Ok(()) };
+    let names: Vec<String> = all.iter().filter_map(&name).collect();
+    all.retain(|one| name(one).as_deref() == Some(wanted));
+    if all.is_empty() {
+        let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
+        let message = format!("there is no variant `{wanted}`: {known}");
+        return Err(Error::Usage(message));
+    }
+    Ok(())
+}
+
+fn full_name(name: &str, variant: Option<&str>) -> String {
+    match variant {
+        Some(variant) => format!("{name}, {variant}"),
+        None => name.to_owned(),
+    }
+}
+
+impl Options {
+    fn folder(&self, name: &str) -> PathBuf {
+        let default = || Path::new("results").join(format!("trade_off_{name}"));
+        self.out.clone().unwrap_or_else(default)
+    }
+
+    /// The folder of one study: that of all, or one inside it for each variant.
+    fn place(&self, folder: &Path, variant: Option<&str>) -> PathBuf {
+        match variant {
+            Some(variant) if self.variant.is_none() => folder.join(variant),
+            _ => folder.to_owned(),
+        }
+    }
+}
+
+/// Writes table, diagram and page, and shows the table.
+fn finish(study: &Study, folder: &Path, show: &mut dyn FnMut(&str)) -> Result<(), Error> {
+    let diagram = study.diagram().map_err(Error::Internal)?;
+    let page = study.page(&diagram)?;
+    std::fs::create_dir_all(folder).map_err(|source| unwritable(folder, source))?;
+    let table = folder.join("trade_off.csv");
+    study
+        .write_csv(&table)
+        .map_err(|error| unwritable(&table, std::io::Error::other(error)))?;
+    write(&folder.join("trade_off.svg"), &diagram)?;
+    write(&folder.join("trade_off.html"), &page)?;
+    show(&study.text());
+    show(&format!("results in {}", folder.display()));
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Error> {
+    std::fs::write(path, text).map_err(|source| unwritable(path, source))
+}
+
+fn unwritable(path: &Path, source: std::io::Error) -> Error {
+    Error::Unwritable {
+        path: path.to_owned(),
+        source,
+    }
+}

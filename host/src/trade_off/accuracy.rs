@@ -1,0 +1,237 @@
+//! Settings that reach an accuracy: `accuracy = 0.01` in a case file.
+//!
+//! Increments are doubled from a quarter of the file's on until the estimated error of the finest
+//! run is below the target; of the runs made, the coarsest that is good enough is chosen. The
+//! error of the mesh is not part of it.
+
+use super::case_study::law_schemes;
+use super::sampled::Sampled;
+use super::scheme::Scheme;
+use super::trial::{Scratch, Settings, Trial, trial};
+use crate::case::{Case, Chosen};
+use crate::error::Error;
+use crate::input::ParameterValue;
+use std::path::Path;
+
+/// Factors of the file's increments.
+const FACTORS: [f64; 9] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
+/// Tolerances tried, coarse to fine.
+const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
+/// Share of the target that increments may use up, and share that the tolerance may.
+const SHARES: [f64; 2] = [0.85, 0.1];
+/// The finest run has to be better than the target by this factor before any run is chosen.
+const MARGIN: f64 = 0.7;
+/// Another scheme than the file's has to be cheaper by this factor.
+const WORTH_A_CHANGE: f64 = 0.8;
+/// Bounds of the order that is extrapolated with. A larger one is not relied on.
+const ORDERS: [f64; 2] = [0.3, 1.0];
+
+/// The case with settings that reach the accuracy it asks for; `None` if it asks for none.
+/// `folder` is where the study may write, and leaves nothing.
+///
+/// # Errors
+/// Bad input before anything is written; no equilibrium with any settings; [`Error::Unwritable`].
+pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
+    let Some(accuracy) = &case.file.accuracy else {
+        return Ok(None);
+    };
+    crate::run::check(case)?;
+    if case.file.probes.is_empty() {
+        let message = "`accuracy` is the error of the [probes], and there are none";
+        return Err(case.source.error(accuracy.span(), message).into());
+    }
+    let scratch = Scratch::new(folder)?;
+    let mut search = Search {
+        case,
+        scratch: &scratch,
+        asked: *accuracy.get_ref(),
+        runs: 0,
+    };
+    let (settings, found) = search.best()?;
+    let (settings, tolerance_error) = search.loosened(settings, &found)?;
+    let reached = found.error + tolerance_error;
+    let mut chosen = settings.apply(case)?;
+    let phases = chosen.file.phases.iter();
+    let increments = phases.map(|phase| {
+        let name = phase.name.get_ref().clone();
+        (name, *phase.increments.get_ref())
+    });
+    chosen.file.chosen = Some(Chosen {
+        asked: search.asked,
+        reached,
+        is_reached: reached <= search.asked,
+        estimate: found.estimate,
+        increments: increments.collect(),
+        force_tolerance: chosen.file.solver.force_tolerance,
+        displacement_tolerance: chosen.file.solver.displacement_tolerance,
+        parameters: settings.law.iter().flat_map(parameters).collect(),
+        runs: search.runs,
+    });
+    Ok(Some(chosen))
+}
+
+/// `law.parameter = value`.
+fn parameters((law, values, _): &(String, Vec<(String, ParameterValue)>, String)) -> Vec<String> {
+    let written = |(id, value): &(String, ParameterValue)| {
+        let value = match value {
+            ParameterValue::Number(number) => number.to_string(),
+            ParameterValue::Integer(number) => number.to_string(),
+            ParameterValue::Label(label) => format!("{label:?}"),
+        };
+        format!("{law}.{id} = {value}")
+    };
+    values.iter().map(written).collect()
+}
+
+/// Settings that are good enough, or the best there are.
+struct Found {
+    factor: f64,
+    /// Estimated relative error of the run with these settings.
+    error: f64,
+    estimate: String,
+    trial: Trial,
+    scale: Vec<f64>,
+}
+
+struct Search<'a> {
+    case: &'a Case,
+    scratch: &'a Scratch,
+    asked: f64,
+    runs: usize,
+}
+
+impl Search<'_> {
+    /// Of the file's scheme and the others, the cheapest that is good enough.
+    fn best(&mut self) -> Result<(Settings, Found), Error> {
+        let schemes: Vec<(String, Scheme)> = law_schemes(self.case, self.scratch)?;
+        let plain = Settings::default();
+        let mut best = (
+            plain.clone(),
+            self.with(&plain, FACTORS[FACTORS.len() - 1])?,
+        );
+        let others = schemes.iter().filter(|(_, s)| s.is_finest && !s.is_default);
+        for (law, scheme) in others {
+            let settings = Settings {
+                law: Some(scheme.of(law)),
+                ..Settings::default()
+            };
+            // More increments than the file's scheme needs do not pay.
+            let Ok(found) = self.with(&settings, f64::max(best.1.factor, 1.0)) else {
+                continue;
+            };
+            let good = |found: &Found| found.error <= SHARES[0] * self.asked;
+            let is_cheaper = found.trial.seconds < WORTH_A_CHANGE * best.1.trial.seconds;
+            if good(&found) && (is_cheaper || !good(&best.1)) {
+                best = (settings, found);
+            }
+        }
+        let (settings, found) = best;
+        let settings = Settings {
+            increments: found.factor,
+            ..settings
+        };
+        Ok((settings, found))
+    }
+
+    /// Doubles increments until the finest run is good enough.
+    fn with(&mut self, settings: &Settings, most: f64) -> Result<Found, Error> {
+        let mut levels: Vec<(f64, Trial)> = Vec::new();
+        let mut last_increments = Vec::new();
+        let mut failure = None;
+        for factor in FACTORS.into_iter().filter(|f| *f <= f64::max(most, 2.0)) {
+            let settings = Settings {
+                increments: factor,
+                ..settings.clone()
+            };
+            let phases = settings.apply(self.case)?.file.phases;
+            let increments: Vec<usize> = phases.iter().map(|p| *p.increments.get_ref()).collect();
+            if increments == last_increments {
+                continue;
+            }
+            last_increments = increments;
+            self.runs += 1;
+            match trial(self.case, &settings, self.scratch, false) {
+                Ok(trial) => levels.push((factor, trial)),
+                Err(error @ Error::NoEquilibrium { .. }) => {
+                    // Finer runs are not compared with coarser ones across a gap.
+                    levels.clear();
+                    failure = Some(error);
+                    continue;
+                }
+                Err(error) => return Err(error),
+            }
+            if let Some(estimated) = finest_error(&levels)
+                && estimated <= MARGIN * self.asked
+            {
+                break;
+            }
+        }
+        let Some((_, finest)) = levels.last() else {
+            let none = || Error::Internal("no level of increments was tried".to_owned());
+            return Err(failure.unwrap_or_else(none));
+        };
+        let finest = finest.clone();
+        let scale = finest.rows.largest();
+        let of_finest = finest_error(&levels).unwrap_or(f64::INFINITY);
+        let error = |rows: &Sampled| rows.difference(&finest.rows, &scale) + of_finest;
+        let n = levels.len();
+        let enough = levels
+            .iter()
+            .position(|(_, trial)| error(&trial.rows) <= SHARES[0] * self.asked);
+        let finest_factor = levels[n - 1].0;
+        let (factor, trial) = levels.swap_remove(enough.unwrap_or(n - 1));
+        Ok(Found {
+            factor,
+            error: error(&trial.rows),
+            estimate: format!(
+                "the difference of two runs with increments × {} and × {} of the file, \
+                 extrapolated with an order of at most {}, plus the difference of the chosen run \
+                 to the finest, plus the effect of the tolerance; largest over probes and common \
+                 rows, relative to the largest value of the probe. The error of the mesh is not \
+                 included",
+                finest_factor / 2.0,
+                finest_factor,
+                ORDERS[1]
+            ),
+            trial,
+            scale,
+        })
+    }
+
+    /// The loosest tolerance that takes fewer iterations and hardly changes the result, and how
+    /// much that is.
+    fn loosened(&mut self, settings: Settings, found: &Found) -> Result<(Settings, f64), Error> {
+        let given = self.case.file.solver.force_tolerance;
+        for tolerance in TOLERANCES.into_iter().filter(|t| *t > given) {
+            let loose = Settings {
+                tolerance: Some(tolerance),
+                ..settings.clone()
+            };
+            self.runs += 1;
+            let trial = match trial(self.case, &loose, self.scratch, false) {
+                Ok(trial) => trial,
+                Err(Error::NoEquilibrium { .. }) => continue,
+                Err(error) => return Err(error),
+            };
+            let change = trial.rows.difference(&found.trial.rows, &found.scale);
+            if change <= SHARES[1] * self.asked && trial.counts[0] < found.trial.counts[0] {
+                return Ok((loose, change));
+            }
+        }
+        Ok((settings, 0.0))
+    }
+}
+
+/// Estimated relative error of the finest of at least three levels.
+fn finest_error(levels: &[(f64, Trial)]) -> Option<f64> {
+    let [.., (_, coarse), (_, middle), (_, fine)] = levels else {
+        return None;
+    };
+    let scale = fine.rows.largest();
+    let differences =
+        [(coarse, middle), (middle, fine)].map(|(a, b)| a.rows.difference(&b.rows, &scale));
+    let order = (differences[0] / differences[1]).log2();
+    let order = if order.is_nan() { ORDERS[1] } else { order };
+    let order = order.clamp(ORDERS[0], ORDERS[1]);
+    Some(differences[1] / (order.exp2() - 1.0))
+}

@@ -1,0 +1,198 @@
+//! The study of a driver: increments per segment × integration scheme of the law.
+
+use super::clock::seconds_of_a_call;
+use super::sampled::Sampled;
+use super::scheme::{Scheme, schemes};
+use super::study::{Measurement, ROWS, Reference, Row, Study};
+use crate::error::Error;
+use crate::point::Driver;
+
+/// Increments per segment.
+const INCREMENTS: [usize; 10] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
+/// The reference has this many times the largest number of increments.
+const FINER: usize = 16;
+/// Increments per segment at which schemes are told apart.
+const FEW: usize = 10;
+/// What is counted.
+const COUNTS: &[&str] = &[ROWS, "law_calls", "cut_backs"];
+
+/// Runs the matrix. `most` bounds the increments per segment.
+pub(super) fn study(driver: &Driver, name: &str, most: usize) -> Result<Study, Error> {
+    let n_segments = driver.segment_increments().len();
+    // The file's own setting has to run, whatever becomes of the others.
+    follow(driver)?;
+    let schemes = schemes(
+        driver.law().description(),
+        |id| driver.parameter(id),
+        |a, b| {
+            let run = |values| {
+                let mut driver = driver.with_parameters(values).ok()?;
+                driver.set_increments(&vec![FEW; n_segments]);
+                follow(&driver).ok().map(|(rows, _)| rows)
+            };
+            run(a) != run(b)
+        },
+    );
+    let drivers = schemes
+        .into_iter()
+        .map(|scheme| Ok((driver.with_parameters(&scheme.values)?, scheme)))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let finest = INCREMENTS.into_iter().rfind(|n| *n <= most).unwrap_or(1) * FINER;
+    let found = find_reference(&drivers, n_segments, finest)?;
+    let mut study = Study {
+        name: name.to_owned(),
+        title: driver.title().to_owned(),
+        columns: found.rows.names.clone(),
+        counts: COUNTS,
+        references: vec![found.reference],
+        rows: Vec::new(),
+        notes: found.notes,
+    };
+    let own = driver.segment_increments();
+    for (mut driver, scheme) in drivers {
+        let mut numbers: Vec<Vec<usize>> = INCREMENTS
+            .into_iter()
+            .filter(|n| *n <= most)
+            .map(|n| vec![n; n_segments])
+            .collect();
+        if scheme.is_default && !numbers.contains(&own) {
+            numbers.push(own.clone());
+        }
+        for increments in numbers {
+            driver.set_increments(&increments);
+            let outcome = measure(&driver, &found.rows, &found.scale);
+            study.rows.push(Row {
+                family: family(&scheme),
+                label: label(&scheme, &increments),
+                is_default: scheme.is_default && increments == own,
+                reference: 0,
+                outcome: outcome.map_err(|error| in_one_line(&error)),
+            });
+        }
+    }
+    study.judge();
+    Ok(study)
+}
+
+struct Found {
+    rows: Sampled,
+    scale: Vec<f64>,
+    reference: Reference,
+    notes: Vec<String>,
+}
+
+/// The finest run of the scheme that is converged furthest; the others, as far as they come, are
+/// notes.
+fn find_reference(
+    drivers: &[(Driver, Scheme)],
+    n_segments: usize,
+    finest: usize,
+) -> Result<Found, Error> {
+    let mut candidates = Vec::new();
+    let mut failure = None;
+    for (driver, scheme) in drivers.iter().filter(|(_, scheme)| scheme.is_finest) {
+        let run = |n: usize| {
+            let mut driver = driver.with_parameters(&scheme.values)?;
+            driver.set_increments(&vec![n; n_segments]);
+            follow(&driver).map(|(rows, _)| rows)
+        };
+        match (run(finest / 4), run(finest / 2), run(finest)) {
+            (Ok(coarse), Ok(middle), Ok(fine)) => {
+                let scale = scale(&fine);
+                let labels = [finest / 2, finest].map(|n| label(scheme, &vec![n; n_segments]));
+                let reference = Reference::new(labels, [&coarse, &middle, &fine], &scale);
+                candidates.push((reference, fine, scale));
+            }
+            (Err(error), _, _) | (_, Err(error), _) | (_, _, Err(error)) => failure = Some(error),
+        }
+    }
+    candidates.sort_by(|(a, ..), (b, ..)| {
+        let [a, b] = [a, b].map(|reference| reference.convergence.uncertainty);
+        a.total_cmp(&b)
+    });
+    let mut candidates = candidates.into_iter();
+    let Some((reference, rows, scale)) = candidates.next() else {
+        return Err(failure.unwrap_or_else(|| Error::Internal("no scheme to try".to_owned())));
+    };
+    let other = |(other, its_rows, _): (Reference, Sampled, Vec<f64>)| {
+        format!(
+            "{} differs from the reference by {:.1e}, its own estimate is {:.1e}",
+            other.label,
+            its_rows.difference(&rows, &scale),
+            other.convergence.uncertainty
+        )
+    };
+    let notes = candidates.map(other).collect();
+    Ok(Found {
+        rows,
+        scale,
+        reference,
+        notes,
+    })
+}
+
+/// Fluxes are compared relative to the largest of all of them.
+fn scale(rows: &Sampled) -> Vec<f64> {
+    let largest = rows.largest();
+    let most = largest.iter().copied().fold(0.0, f64::max);
+    vec![most; largest.len()]
+}
+
+fn family(scheme: &Scheme) -> String {
+    if scheme.label.is_empty() {
+        "increments".to_owned()
+    } else {
+        scheme.label.clone()
+    }
+}
+
+fn label(scheme: &Scheme, increments: &[usize]) -> String {
+    let uniform = increments.windows(2).all(|pair| pair[0] == pair[1]);
+    let numbers: Vec<String> = increments.iter().map(usize::to_string).collect();
+    let increments = match numbers.first() {
+        Some(one) if uniform && one == "1" => "1 increment".to_owned(),
+        Some(one) if uniform => format!("{one} increments"),
+        _ => format!("{} increments", numbers.join(" + ")),
+    };
+    if scheme.label.is_empty() {
+        increments
+    } else {
+        format!("{}, {increments}", scheme.label)
+    }
+}
+
+/// An error's message in one line.
+pub(super) fn in_one_line(error: &Error) -> String {
+    let message = error.to_string();
+    let lines: Vec<&str> = message.lines().map(str::trim).collect();
+    lines.join("; ")
+}
+
+/// Tractions or stresses along the path, and the counts.
+fn follow(driver: &Driver) -> Result<(Sampled, Vec<u64>), Error> {
+    let lengths = driver.segment_increments();
+    let n = driver.law().n_components();
+    let names = driver.columns()[n..2 * n].to_vec();
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    let report = driver.run(|row| {
+        if row.increment > 0 {
+            rows.push(row.flux.to_vec());
+        }
+        Ok(())
+    })?;
+    let mut rows = rows.into_iter();
+    let stretches = lengths.iter().map(|&n| rows.by_ref().take(n).collect());
+    let sampled = Sampled {
+        names,
+        stretches: stretches.collect(),
+    };
+    let counts = [report.increments, report.calls, report.cut_backs];
+    Ok((sampled, counts.map(|n| n as u64).to_vec()))
+}
+
+fn measure(driver: &Driver, reference: &Sampled, scale: &[f64]) -> Result<Measurement, Error> {
+    let (rows, counts) = follow(driver)?;
+    let errors = rows.differences(reference, scale);
+    let seconds = seconds_of_a_call(|| driver.run(|_| Ok(())).map(|_| ()))?;
+    Ok(Measurement::new(seconds, counts, errors))
+}

@@ -1,0 +1,198 @@
+//! What a study found: settings with their errors and costs, and the references they are measured
+//! against.
+
+use super::pareto::front;
+use super::sampled::{Convergence, Sampled, worst};
+
+/// The settings of one driver or case.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Name of the case or driver, with its variant.
+    pub name: String,
+    /// Title.
+    pub title: String,
+    /// Names of the values whose errors are measured.
+    pub columns: Vec<String>,
+    /// Names of the counts.
+    pub counts: &'static [&'static str],
+    /// What errors are measured against. The first holds for settings that leave the model (mesh,
+    /// elements) as it is.
+    pub references: Vec<Reference>,
+    /// Settings.
+    pub rows: Vec<Row>,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+}
+
+/// What errors are measured against.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Settings in words.
+    pub label: String,
+    /// The next finest settings in words.
+    pub next: String,
+    /// How far it is converged.
+    pub convergence: Convergence,
+}
+
+/// A setting.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// What varies.
+    pub family: String,
+    /// The setting in words.
+    pub label: String,
+    /// It is what the file asks for.
+    pub is_default: bool,
+    /// Number of the reference.
+    pub reference: usize,
+    /// What became of it, or why it failed.
+    pub outcome: Result<Measurement, String>,
+}
+
+/// Error and cost.
+#[derive(Clone, Debug)]
+pub struct Measurement {
+    /// CPU time, s.
+    pub seconds: f64,
+    /// Counts, in the order of the study's names.
+    pub counts: Vec<u64>,
+    /// Relative errors, in the order of the study's columns.
+    pub errors: Vec<f64>,
+    /// The largest of them.
+    pub error: f64,
+    /// The error is below the uncertainty of the reference, and cannot be told from 0.
+    pub is_below: bool,
+    /// No setting with the same reference is cheaper and as accurate.
+    pub is_optimal: bool,
+}
+
+/// The count of rows that a setting gives, where settings differ in it.
+pub(super) const ROWS: &str = "increments";
+
+impl Measurement {
+    /// Before it is compared with others.
+    pub(super) fn new(seconds: f64, counts: Vec<u64>, errors: Vec<f64>) -> Self {
+        Self {
+            seconds,
+            counts,
+            error: worst(&errors),
+            errors,
+            is_below: false,
+            is_optimal: false,
+        }
+    }
+}
+
+impl Reference {
+    /// From three runs, coarse to fine, and the labels of the last two.
+    pub(super) fn new(labels: [String; 2], runs: [&Sampled; 3], scale: &[f64]) -> Self {
+        let [next, label] = labels;
+        Self {
+            label,
+            next,
+            convergence: Convergence::of_runs(runs, scale),
+        }
+    }
+
+    /// What it is and how far it is converged, in one line.
+    pub fn statement(&self) -> String {
+        let Convergence {
+            difference,
+            order,
+            uncertainty,
+        } = self.convergence;
+        let order = order.map_or_else(
+            || "order not observed".to_owned(),
+            |order| format!("observed order {order:.2}"),
+        );
+        format!(
+            "{}; differs by {difference:.1e} from {}, {order}: reference converged to \
+             {uncertainty:.0e}",
+            self.label, self.next
+        )
+    }
+}
+
+impl Study {
+    /// Marks what lies below the uncertainty of its reference, and what nothing beats.
+    pub(super) fn judge(&mut self) {
+        for number in 0..self.references.len() {
+            let floor = self.references[number].convergence.uncertainty;
+            let points: Vec<Option<(f64, f64)>> = self
+                .rows
+                .iter()
+                .map(|row| {
+                    let measured = row.outcome.as_ref().ok()?;
+                    (row.reference == number)
+                        .then_some((measured.seconds, measured.error.max(floor)))
+                })
+                .collect();
+            for (row, is_optimal) in self.rows.iter_mut().zip(front(&points)) {
+                if let (true, Ok(measured)) = (row.reference == number, &mut row.outcome) {
+                    measured.is_optimal = is_optimal;
+                    measured.is_below = measured.error < floor;
+                }
+            }
+        }
+    }
+
+    /// Settings that ran, with this reference.
+    pub fn measured(&self, reference: usize) -> impl Iterator<Item = (&Row, &Measurement)> {
+        let rows = self.rows.iter().filter(move |r| r.reference == reference);
+        rows.filter_map(|row| Some((row, row.outcome.as_ref().ok()?)))
+    }
+
+    /// Where the default stands, in one sentence.
+    pub fn verdict(&self) -> String {
+        let Some((row, default)) = self.measured(0).find(|(row, _)| row.is_default) else {
+            return "default: no result".to_owned();
+        };
+        let floor = self.references[row.reference].convergence.uncertainty;
+        let error = if default.is_below {
+            format!("error below {floor:.0e}, the uncertainty of the reference")
+        } else {
+            format!("error {}", percent(default.error))
+        };
+        let as_good = |m: &Measurement| m.error.max(floor) <= default.error.max(floor);
+        let cheapest = |wanted: &dyn Fn(&Measurement) -> bool| {
+            self.measured(0)
+                .filter(|(_, m)| as_good(m) && wanted(m))
+                .min_by(|(_, a), (_, b)| a.seconds.total_cmp(&b.seconds))
+                .filter(|(best, _)| !best.is_default)
+        };
+        let compared = |(best, m): (&Row, &Measurement)| {
+            let ratio = default.seconds / m.seconds;
+            format!("{ratio:.1}× the cost of the cheapest ({})", best.label)
+        };
+        let any = cheapest(&|_| true).map(compared);
+        let rows = self.counts.iter().position(|name| *name == ROWS);
+        let of_as_many_rows = rows.map(|i| {
+            let found = cheapest(&|m: &Measurement| m.counts[i] >= default.counts[i]);
+            found.map(compared)
+        });
+        let none = || "no cheaper one".to_owned();
+        let found = match (any, of_as_many_rows) {
+            (None, _) => none(),
+            (Some(any), None) => any,
+            (Some(any), Some(many)) if many.as_ref() == Some(&any) => any,
+            (Some(any), Some(many)) => format!(
+                "{any}; of those with as many rows: {}",
+                many.unwrap_or_else(none)
+            ),
+        };
+        format!(
+            "default ({}): {error}. Of the settings that are as accurate: {found}",
+            row.label
+        )
+    }
+}
+
+/// A relative error in words.
+pub(super) fn percent(error: f64) -> String {
+    if error >= 1e-4 {
+        format!("{:.2} %", 100.0 * error)
+    } else {
+        format!("{error:.1e}")
+    }
+}

@@ -1,0 +1,334 @@
+//! Running a case under changed settings, without output of its own.
+
+use super::clock::cpu_seconds;
+use super::division::divide;
+use super::sampled::Sampled;
+use super::scheme::{Values, short};
+use crate::case::{Case, Equations, Formulation, Integration, OutputInput, SolverInput};
+use crate::error::{Error, Place};
+use crate::input::set_parameters;
+use crate::run::{Observer, run};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// A choice of the solver: key and value in the case file, and how it is set.
+pub(super) struct SolverChoice {
+    pub(super) key: &'static str,
+    pub(super) value: &'static str,
+    pub(super) set: fn(&mut SolverInput),
+}
+
+impl std::fmt::Debug for SolverChoice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} = {:?}", self.key, self.value)
+    }
+}
+
+/// All choices of the solver that a study tries.
+pub(super) const SOLVER_CHOICES: &[SolverChoice] = &[
+    choice("equations", "auto", |s| s.equations = Equations::Auto),
+    choice("equations", "condensed", |s| {
+        s.equations = Equations::Condensed;
+    }),
+    choice("equations", "sparse", |s| s.equations = Equations::Sparse),
+    choice("line_search", "true", |s| s.line_search = true),
+    choice("line_search", "false", |s| s.line_search = false),
+];
+
+const fn choice(key: &'static str, value: &'static str, set: fn(&mut SolverInput)) -> SolverChoice {
+    SolverChoice { key, value, set }
+}
+
+/// Settings that differ from those of the case file.
+#[derive(Clone, Debug)]
+pub(super) struct Settings {
+    /// Factor of the increments of every phase.
+    pub(super) increments: f64,
+    /// Tolerance of the residual; that of the correction keeps its ratio to it.
+    pub(super) tolerance: Option<f64>,
+    /// The mesh is divided by this.
+    pub(super) division: usize,
+    /// Integration of thin layers.
+    pub(super) integration: Option<Integration>,
+    /// Parameters of a law, with words for them.
+    pub(super) law: Option<(String, Values, String)>,
+    /// A choice of the solver.
+    pub(super) solver: Option<&'static SolverChoice>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            increments: 1.0,
+            tolerance: None,
+            division: 1,
+            integration: None,
+            law: None,
+            solver: None,
+        }
+    }
+}
+
+impl Settings {
+    /// In words, as far as they differ from the file.
+    pub(super) fn label(&self) -> String {
+        let mut words = Vec::new();
+        words.extend(self.law.as_ref().map(|(_, _, label)| label.clone()));
+        if (self.increments - 1.0).abs() > 0.0 {
+            words.push(format!("increments × {}", short(self.increments)));
+        }
+        words.extend(self.tolerance.map(|t| format!("tolerance {}", short(t))));
+        if self.division > 1 {
+            words.push(format!("mesh / {}", self.division));
+        }
+        let integration = self.integration.map(|integration| match integration {
+            Integration::Full => "integration full",
+            Integration::Reduced => "integration reduced",
+            Integration::Mean => "integration mean",
+            Integration::Nodes => "integration nodes",
+        });
+        words.extend(integration.map(str::to_owned));
+        words.extend(self.solver.map(|c| format!("{} {}", c.key, c.value)));
+        if words.is_empty() {
+            return "as in the file".to_owned();
+        }
+        words.join(", ")
+    }
+
+    /// The case with these settings.
+    ///
+    /// # Errors
+    /// Those of building the mesh.
+    pub(super) fn apply(&self, case: &Case) -> Result<Case, Error> {
+        let mut case = case.clone();
+        if self.division > 1 {
+            divide(&mut case, self.division)?;
+        }
+        let file = &mut case.file;
+        for phase in &mut file.phases {
+            let n = *phase.increments.get_ref();
+            let scaled = scaled(n, self.increments);
+            *phase.increments.get_mut() = scaled;
+            let cuts = file.figures.iter_mut().filter(|figure| {
+                let named = figure.phase.as_ref();
+                named.is_none_or(|p| p.get_ref() == phase.name.get_ref())
+            });
+            for cut in cuts.filter_map(|figure| figure.points.as_mut()) {
+                let moved = |k: &mut usize| *k = (*k * scaled).div_ceil(n);
+                cut.increments.iter_mut().for_each(moved);
+            }
+        }
+        if let Some(tolerance) = self.tolerance {
+            let solver = &mut file.solver;
+            let ratio = solver.displacement_tolerance / solver.force_tolerance;
+            solver.force_tolerance = tolerance;
+            solver.displacement_tolerance = (ratio * tolerance).clamp(1e-14, 1.0);
+        }
+        if let Some(integration) = self.integration {
+            let layers = file.groups.values_mut().map(toml::Spanned::get_mut);
+            for group in layers.filter(|g| g.formulation == Formulation::ThinLayer) {
+                group.integration = Some(toml::Spanned::new(0..0, integration));
+            }
+        }
+        if let Some((name, values, _)) = &self.law {
+            let laws = file.laws.iter_mut();
+            for (_, law) in laws.filter(|(key, _)| key.get_ref() == name) {
+                set_parameters(&mut law.get_mut().parameters, values);
+            }
+        }
+        if let Some(choice) = self.solver {
+            (choice.set)(&mut file.solver);
+        }
+        Ok(case)
+    }
+}
+
+/// A number of increments times a factor. Fewer ones are, where there is such a number nearby,
+/// a divisor, so that all their rows stay rows.
+fn scaled(n: usize, factor: f64) -> usize {
+    let wanted = n as f64 * factor;
+    let distance = |d: usize| (d as f64 / wanted).ln().abs();
+    if factor < 1.0
+        && let Some(divisor) = (1..=n)
+            .filter(|d| n.is_multiple_of(*d))
+            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+        && distance(divisor) <= f64::ln(1.6)
+    {
+        return divisor;
+    }
+    (wanted.round() as usize).max(1)
+}
+
+/// A folder that is gone when this is dropped.
+#[derive(Debug)]
+pub(super) struct Scratch {
+    folder: PathBuf,
+}
+
+impl Scratch {
+    /// A folder inside another one, which is made if needed.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub(super) fn new(within: &Path) -> Result<Self, Error> {
+        let folder = within.join(".trial");
+        std::fs::create_dir_all(&folder).map_err(|source| Error::Unwritable {
+            path: folder.clone(),
+            source,
+        })?;
+        Ok(Self { folder })
+    }
+
+    /// The folder.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // Results of trials are worth nothing; what cannot be removed does no harm.
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+/// What is counted.
+pub(super) const COUNTS: &[&str] = &["iterations", "factorisations", "law_calls", "cut_backs"];
+
+/// What came out of a trial.
+#[derive(Clone, Debug)]
+pub(super) struct Trial {
+    /// Probes by phase and increment.
+    pub(super) rows: Sampled,
+    /// CPU time from the first phase on, s; the least of the repetitions.
+    pub(super) seconds: f64,
+    /// Counts, in the order of [`COUNTS`].
+    pub(super) counts: Vec<u64>,
+}
+
+/// Repetitions of a trial end after this many, or when they took so many seconds.
+const MOST_REPETITIONS: usize = 8;
+const LONG_ENOUGH: f64 = 0.5;
+
+/// Runs a case under some settings: once, or until its CPU time is known.
+///
+/// # Errors
+/// Those of the run.
+pub(super) fn trial(
+    case: &Case,
+    settings: &Settings,
+    scratch: &Scratch,
+    timed: bool,
+) -> Result<Trial, Error> {
+    let mut case = settings.apply(case)?;
+    case.file.output = OutputInput::default();
+    measure(&mut case, scratch, timed)
+}
+
+/// Runs a case as it is, but for its figures.
+///
+/// # Errors
+/// Those of the run.
+pub(super) fn measure(case: &mut Case, scratch: &Scratch, timed: bool) -> Result<Trial, Error> {
+    case.file.figures.clear();
+    let mut seconds = f64::INFINITY;
+    let mut spent = 0.0;
+    for _ in 0..if timed { MOST_REPETITIONS } else { 1 } {
+        let mut meter = Meter::default();
+        run(case, scratch.folder(), &mut meter)?;
+        let took = cpu_seconds() - meter.started.unwrap_or_default();
+        seconds = seconds.min(took);
+        spent += took;
+        if spent > LONG_ENOUGH {
+            break;
+        }
+    }
+    let phases: Vec<&str> = case
+        .file
+        .phases
+        .iter()
+        .map(|phase| phase.name.get_ref().as_str())
+        .collect();
+    Ok(Trial {
+        rows: history(&scratch.folder().join("history.csv"), &phases)?,
+        seconds,
+        counts: counts(&summary(scratch.folder())?),
+    })
+}
+
+/// Takes the time when the first phase begins: reading input and opening libraries do not count.
+#[derive(Debug, Default)]
+struct Meter {
+    started: Option<f64>,
+}
+
+impl Observer for Meter {
+    fn phase(&mut self, _: &str, _: usize) {
+        self.started.get_or_insert_with(cpu_seconds);
+    }
+
+    fn increment(&mut self, _: &Place, _: usize, _: usize) {}
+
+    fn cut_back(&mut self, _: &Place, _: &str) {}
+
+    fn warning(&mut self, _: &str) {}
+}
+
+/// Probes of a history by phase and increment.
+fn history(path: &Path, phases: &[&str]) -> Result<Sampled, Error> {
+    let broken = |error: csv::Error| Error::Internal(format!("{}: {error}", path.display()));
+    let mut reader = csv::Reader::from_path(path).map_err(broken)?;
+    let headers = reader.headers().map_err(broken)?.clone();
+    let probes: Vec<usize> = (0..headers.len())
+        .filter(|&i| !["phase", "increment", "time", "iterations"].contains(&&headers[i]))
+        .collect();
+    let mut sampled = Sampled {
+        names: probes.iter().map(|&i| headers[i].to_owned()).collect(),
+        stretches: vec![Vec::new(); phases.len()],
+    };
+    for row in reader.records() {
+        let row = row.map_err(broken)?;
+        if let Some(number) = phases.iter().position(|name| *name == &row[0]) {
+            let value = |&i: &usize| row[i].parse().unwrap_or(f64::NAN);
+            sampled.stretches[number].push(probes.iter().map(value).collect());
+        }
+    }
+    Ok(sampled)
+}
+
+/// `summary.json` of a run.
+pub(super) fn summary(folder: &Path) -> Result<Value, Error> {
+    let path = folder.join("summary.json");
+    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    serde_json::from_str(&text).map_err(|error| Error::Internal(error.to_string()))
+}
+
+fn counts(summary: &Value) -> Vec<u64> {
+    let phases = summary["phases"].as_array().map_or(&[][..], Vec::as_slice);
+    let of_phases = |key: &str| phases.iter().filter_map(|p| p[key].as_u64()).sum();
+    let calls = summary["law_calls_by_group"].as_object();
+    let calls = calls.map_or(0, |calls| calls.values().filter_map(Value::as_u64).sum());
+    vec![
+        of_phases("iterations"),
+        of_phases("factorisations"),
+        calls,
+        of_phases("cut_backs"),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fewer_increments_divide_the_given_ones() {
+        let cases = [(50, 0.25, 10), (50, 0.5, 25), (1, 0.25, 1), (37, 0.25, 9)];
+        for (n, factor, expected) in cases {
+            assert_eq!(scaled(n, factor), expected, "{n} × {factor}");
+        }
+        assert_eq!(scaled(50, 4.0), 200);
+    }
+}

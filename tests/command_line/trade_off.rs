@@ -1,0 +1,323 @@
+//! `pilum trade-off`, and `accuracy` in a case file.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, DONE, JOINT, Outcome, Place, edited, refuses};
+use std::collections::BTreeMap;
+use tests::case::table;
+
+/// Sheared at constant normal stiffness: the law is integrated implicitly, first order.
+const DRIVER: &str = r#"title = "A joint at constant normal stiffness"
+law = "mepi"
+hypothesis = "interface_2d"
+
+[parameters]
+k_n = 0.86e5
+k_t = 0.37e5
+n = 0.55
+mu_0 = 0.0
+mu_p = 0.78
+mu_c0 = 0.67
+a = 0.00045
+c_0 = 0.05
+t = 0.002
+
+[initial]
+traction = { n = -100.0 }
+
+[[segment]]
+increments = 20
+control = { t = { jump = 5.0e-3 }, n = { stiffness = 1.0e5 } }
+"#;
+
+/// Edits that make the layer of the case harden, sheared far enough, in more increments.
+const HARDENING: &[(&str, &str)] = &[
+    ("law = \"coulomb_joint\"", "law = \"mepi\""),
+    (
+        "normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
+         dilatancy_angle = 5.0\n",
+        "k_n = 1e6\nk_t = 4e5\nn = 0.0\nmu_0 = 0.1\nmu_p = 0.7\nmu_c0 = 0.4\na = 0.008\nc_0 = 1.0\n\
+         t = 0.01\nsigma_ni = 5.0\np_0 = 5.0\n",
+    ),
+    (
+        "formulation = \"thin_layer\"\n",
+        "formulation = \"thin_layer\"\nintegration = \"mean\"\n\
+         initial_stress = { 11 = -5.0, 22 = -5.0, 33 = -5.0 }\n",
+    ),
+    (
+        "name = \"push\"\nincrements = 2",
+        "name = \"push\"\nincrements = 8",
+    ),
+    ("x = 1e-5", "x = 2e-3"),
+];
+
+type Row = BTreeMap<String, String>;
+
+fn study(place: &Place, file: &str, text: &str, more: &[&str]) -> Outcome {
+    place.write(file, text);
+    place.run(&[&["trade-off", file, "--out", "out"], more].concat())
+}
+
+fn rows(place: &Place) -> Vec<Row> {
+    table(&place.path("out/trade_off.csv"))
+}
+
+fn number(row: &Row, column: &str) -> f64 {
+    row[column].parse().unwrap()
+}
+
+/// Rows of the scheme `implicit`, or of a law without schemes, by increments.
+fn implicit(rows: &[Row]) -> Vec<&Row> {
+    let is_implicit = |row: &&Row| ["implicit", "increments"].contains(&row["family"].as_str());
+    rows.iter().filter(is_implicit).collect()
+}
+
+#[test]
+fn the_error_of_a_driver_falls_with_its_increments_at_first_order() {
+    let place = Place::new();
+    let outcome = study(&place, "joint.toml", DRIVER, &["--max-increments", "500"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let rows = rows(&place);
+    let implicit = implicit(&rows);
+    let error = |n: usize| {
+        let of = |row: &&&Row| row["increments"] == n.to_string();
+        number(implicit.iter().find(of).unwrap(), "error")
+    };
+    for [n, finer] in [[50, 100], [100, 200]] {
+        let ratio = error(n) / error(finer);
+        assert!((1.7..2.3).contains(&ratio), "{n} to {finer}: {ratio}");
+    }
+    // Counts are those of the path, and more increments never take fewer calls.
+    let calls: Vec<f64> = implicit.iter().map(|r| number(r, "law_calls")).collect();
+    assert!(calls.is_sorted(), "{calls:?}");
+    let default: Vec<&Row> = rows.iter().filter(|r| r["default"] == "true").collect();
+    assert_eq!(default.len(), 1);
+    assert_eq!(default[0]["increments"], "20");
+}
+
+#[test]
+fn the_reference_says_how_far_it_is_converged_and_errors_below_are_marked() {
+    let place = Place::new();
+    let outcome = study(&place, "joint.toml", DRIVER, &["--max-increments", "10"]);
+    let said = &outcome.stdout;
+    let (_, after) = said.split_once("reference converged to ").unwrap();
+    let uncertainty: f64 = after.lines().next().unwrap().parse().unwrap();
+    assert!(uncertainty > 0.0 && uncertainty < 0.1, "{said}");
+    assert!(said.contains("differs by "), "{said}");
+    assert!(
+        said.lines().any(|line| line.starts_with("default (")),
+        "{said}"
+    );
+    for row in rows(&place) {
+        let error = number(&row, "error");
+        // The statement has one digit.
+        if (error / uncertainty - 1.0).abs() > 0.5 {
+            let is_below = error < uncertainty;
+            assert_eq!(row["below_uncertainty"], is_below.to_string(), "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn the_pareto_front_falls_and_nothing_lies_below_it() {
+    let place = Place::new();
+    let outcome = study(&place, "joint.toml", DRIVER, &["--max-increments", "50"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let point = |row: &Row| (number(row, "cpu_seconds"), number(row, "error"));
+    let rows: Vec<Row> = rows(&place)
+        .into_iter()
+        .filter(|r| r["failure"].is_empty())
+        .collect();
+    let on_front = |row: &&Row| row["optimal"] == "true" && row["below_uncertainty"] == "false";
+    let mut front: Vec<(f64, f64)> = rows.iter().filter(on_front).map(point).collect();
+    front.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert!(!front.is_empty());
+    assert!(front.is_sorted_by(|a, b| a.1 > b.1), "{front:?}");
+    for (cost, error) in &front {
+        let beaten = rows.iter().map(point).any(|(c, e)| c < *cost && e < *error);
+        assert!(!beaten, "{cost} s, {error}");
+    }
+}
+
+#[test]
+fn draws_the_diagram_and_the_page() {
+    let place = Place::new();
+    let outcome = study(&place, "joint.toml", DRIVER, &["--max-increments", "5"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let svg = std::fs::read_to_string(place.path("out/trade_off.svg")).unwrap();
+    let page = std::fs::read_to_string(place.path("out/trade_off.html")).unwrap();
+    let n_rows = rows(&place).len();
+    // A mark for every setting at least, and the ring around the default.
+    assert!(svg.matches("<circle").count() > n_rows, "{n_rows}");
+    assert!(page.contains("<svg") && page.matches("<tr>").count() > n_rows);
+}
+
+#[test]
+fn a_case_is_measured_on_its_mesh_and_against_a_finer_one() {
+    let place = Place::new();
+    let outcome = study(&place, "case.toml", &edited(HARDENING), &[]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let rows = rows(&place);
+    let error = |label: &str| {
+        let row = rows.iter().find(|row| row["setting"] == label);
+        number(row.unwrap_or_else(|| panic!("{label}")), "error")
+    };
+    assert!(error("increments × 4") < error("as in the file"));
+    assert!(error("as in the file") < error("increments × 0.25"));
+    // The solver's way through the equations does not change the answer.
+    let sparse = error("equations sparse") - error("as in the file");
+    assert!(sparse.abs() < 1e-6, "{sparse}");
+    let meshes = rows.iter().filter(|row| row["reference"] == "mesh / 2");
+    let families: Vec<&str> = meshes.map(|row| row["family"].as_str()).collect();
+    assert_eq!(families, ["mesh", "integration", "integration"]);
+    // Trials leave nothing behind.
+    let left = std::fs::read_dir(place.path("out")).unwrap().count();
+    assert_eq!(left, 3);
+}
+
+#[test]
+fn proposes_the_stiffness_of_a_joint_from_the_elements_beside_it() {
+    let place = Place::new();
+    let outcome = study(
+        &place,
+        "case.toml",
+        &edited(JOINT),
+        &["--interface-stiffness"],
+    );
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let rows = table(&place.path("out/interface_stiffness.csv"));
+    // Soil: E = 1e4 kPa, ν = 0.3, elements 0.5 m high above and below the joint.
+    let (young, nu, size) = (1e4, 0.3, 0.5);
+    let oedometric = young * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
+    let shear = young / (2.0 * (1.0 + nu));
+    for row in &rows {
+        let factor = number(row, "factor");
+        let expected = [factor * oedometric / size, factor * shear / size];
+        for (column, expected) in ["k_n", "k_t"].iter().zip(expected) {
+            let found = number(row, column);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{column} {found}");
+        }
+    }
+    let done: Vec<&Row> = rows.iter().filter(|r| r["failure"].is_empty()).collect();
+    assert!(done.len() >= 3, "{rows:?}");
+    let penetration: Vec<f64> = done.iter().map(|r| number(r, "penetration")).collect();
+    assert!(penetration.is_sorted_by(|a, b| a > b), "{penetration:?}");
+    assert!(outcome.stdout.contains("plateau"), "{}", outcome.stdout);
+}
+
+#[test]
+fn refuses_what_it_cannot_study() {
+    let place = Place::new();
+    let no_probes = edited(&[(
+        "settlement = { line = \"top\", quantity = \"displacement_y\", scale = -1000.0 }\n\
+         tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } }\n",
+        "",
+    )]);
+    let slip = DRIVER.replace("mu_p", "mu_q");
+    let refused: &[(&str, &str, &[&str], &str)] = &[
+        (
+            "joint.toml",
+            DRIVER,
+            &["--max-increments", "0"],
+            "at least 1",
+        ),
+        ("joint.toml", DRIVER, &["--variant", "rough"], "no variant"),
+        (
+            "joint.toml",
+            DRIVER,
+            &["--interface-stiffness"],
+            "needs a case",
+        ),
+        ("joint.toml", &slip, &[], "no parameter `mu_q`"),
+        ("case.toml", &no_probes, &[], "there are no [probes]"),
+        (
+            "case.toml",
+            &edited(&[]),
+            &["--interface-stiffness"],
+            "zero_thickness",
+        ),
+    ];
+    for (file, text, more, says) in refused {
+        let outcome = study(&place, file, text, more);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
+        assert!(outcome.says(says), "{says}: {}", outcome.stderr);
+        assert_eq!(outcome.stdout, "");
+    }
+    let missing = place.run(&["trade-off", "nothing.toml"]);
+    assert_eq!(missing.code, Some(BAD_INPUT));
+}
+
+#[test]
+fn refuses_accuracies_that_are_none() {
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "zero",
+                &[("analysis", "accuracy = ^0.0\nanalysis")],
+                &["`accuracy`: 0.0 is outside (0, 0.5]"],
+            ),
+            (
+                "more than a half",
+                &[("analysis", "accuracy = ^0.6\nanalysis")],
+                &["`accuracy`: 0.6 is outside (0, 0.5]"],
+            ),
+            (
+                "negative",
+                &[("analysis", "accuracy = ^-0.01\nanalysis")],
+                &["`accuracy`: -0.01 is outside (0, 0.5]"],
+            ),
+            (
+                "a text",
+                &[("analysis", "accuracy = ^\"high\"\nanalysis")],
+                &["`accuracy`: found the text \"high\", expected a number"],
+            ),
+        ],
+    );
+}
+
+/// Probes of a history by name, with the part of the phase they belong to.
+fn history(place: &Place, folder: &str, increments: usize) -> Vec<Row> {
+    let rows = table(&place.path(&format!("{folder}/history.csv")));
+    let rows: Vec<Row> = rows.into_iter().filter(|r| r["phase"] == "push").collect();
+    assert_eq!(rows.len(), increments);
+    rows
+}
+
+#[test]
+fn an_accuracy_that_was_asked_for_is_reached() {
+    let place = Place::new();
+    let asked = 0.01;
+    let text = edited(HARDENING).replacen("analysis", "accuracy = 0.01\nanalysis", 1);
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let chosen = &summary["accuracy"];
+    assert_eq!(chosen["asked"], 0.01);
+    assert_eq!(chosen["is_reached"], true);
+    assert!(chosen["reached"].as_f64().unwrap() <= asked);
+    let n = chosen["increments"][1][1].as_u64().unwrap() as usize;
+    let run = history(&place, "out", n);
+
+    // Independent of the study: 32 times the increments chosen, tight tolerances.
+    let finer = 32 * n;
+    let mut fine = edited(HARDENING);
+    let solver = "[solver]\nforce_tolerance = 1e-11\ndisplacement_tolerance = 1e-9\n";
+    fine = fine.replacen("[solver]\n", solver, 1);
+    fine = fine.replacen("increments = 8", &format!("increments = {finer}"), 1);
+    place.write("fine.toml", fine);
+    let outcome = place.run(&["run", "fine.toml", "--out", "fine"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let fine = history(&place, "fine", finer);
+    for probe in ["settlement", "tau"] {
+        let largest = fine
+            .iter()
+            .map(|r| number(r, probe).abs())
+            .fold(0.0, f64::max);
+        for (i, row) in run.iter().enumerate() {
+            let expected = number(&fine[32 * (i + 1) - 1], probe);
+            let error = (number(row, probe) - expected).abs() / largest;
+            assert!(error <= asked, "{probe}, increment {}: {error}", i + 1);
+        }
+    }
+}
