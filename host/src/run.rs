@@ -9,7 +9,7 @@ use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    LinearDomain, LinearSolver, Loads, Newton, Singular, StepFailure, StepSuccess,
+    LinearDomain, LinearSolver, Loads, Matrix, Newton, Singular, StepFailure, StepSuccess,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,8 +29,9 @@ pub trait Observer {
 
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
-/// Iterations up to which a step counts as easy, so that the next one may be larger.
-const EASY: usize = 8;
+/// Share of the method's own limit of iterations up to which a step counts as easy, so that the
+/// next one may be larger.
+const EASY: f64 = 0.34;
 /// Smallest and largest reduction of a step at a cut-back.
 const CUT: [f64; 2] = [0.1, 0.5];
 
@@ -128,6 +129,8 @@ struct PhaseEquations {
     /// The groups that do not.
     domain: Option<LinearDomain>,
     solver: LinearSolver,
+    /// What the solver holds factorised.
+    matrix: Matrix,
     /// Forces out of balance at the start, relative to the forces in play.
     out_of_balance: f64,
     n_unknowns: usize,
@@ -250,6 +253,7 @@ impl<'a> Run<'a> {
         );
         record.factorisations =
             equations.solver.factorisations + u64::from(equations.domain.is_some());
+        record.fallbacks = equations.solver.fallbacks;
         self.time += 1.0;
         results.phase(record);
         outcome
@@ -266,6 +270,7 @@ impl<'a> Run<'a> {
     ) -> Result<(), Error> {
         let n = *phase.increments.get_ref();
         let mut step = 1.0 / n as f64;
+        let easy = EASY * self.file().solver.method.max_iterations() as f64;
         let smallest = step / f64::powi(2.0, self.file().solver.max_halvings as i32);
         // The last step of this phase: its length and displacement increments.
         let mut last: Option<(f64, Vec<f64>)> = None;
@@ -305,7 +310,7 @@ impl<'a> Run<'a> {
                                  relaxation led to the next equilibrium"
                             ));
                         }
-                        if success.iterations.len() <= EASY {
+                        if success.iterations.len() as f64 <= easy {
                             step = (REGROWTH * step).min(1.0 / n as f64);
                         }
                         self.accept(&success, loads, equations, end);
@@ -367,7 +372,7 @@ impl<'a> Run<'a> {
         let mut newton = Newton::new(
             &equations.system,
             equations.domain.as_ref(),
-            &mut equations.solver,
+            (&mut equations.solver, &mut equations.matrix),
             &mut self.groups,
             settings,
             &mut record.costs,
@@ -531,6 +536,7 @@ impl<'a> Run<'a> {
             system,
             domain,
             solver,
+            matrix: Matrix::default(),
             out_of_balance,
             n_unknowns: unknowns.len(),
             at_last: self.displacement.clone(),

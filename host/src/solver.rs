@@ -9,4 +9,4 @@ mod newton;
 
 pub use linear::{LinearSolver, Singular};
 pub use linear_domain::LinearDomain;
-pub use newton::{Costs, Iteration, Loads, Newton, StepFailure, StepSuccess};
+pub use newton::{Costs, Iteration, Loads, Matrix, Newton, StepFailure, StepSuccess};
