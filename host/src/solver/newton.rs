@@ -26,7 +26,7 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 const EXACT: f64 = 1e-3;
 /// A quasi-Newton matrix is renewed where this many iterations (the state before them included)
 /// have not brought the residual down to this fraction.
-const PATIENCE: usize = 4;
+const PATIENCE: usize = 6;
 const PROGRESS: f64 = 0.1;
 /// Round-off of K u, relative to the forces it is the difference of.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
@@ -285,12 +285,12 @@ impl<'a> Newton<'a> {
             step_length: 1.0,
             viscosity: 0.0,
         });
-        let mut acceleration = Acceleration::default();
+        let quasi = self.settings.method == Method::QuasiNewton;
+        let mut acceleration = quasi.then(Acceleration::default);
         // Where the iterations with the present matrix start.
         let mut since = 0;
         let mut relaxation: Option<Relaxation> = None;
-        let method = self.settings.method;
-        let relaxes = self.settings.relaxation && method == Method::Newton;
+        let relaxes = self.settings.relaxation && self.settings.method == Method::Newton;
         let mut may_relax = relaxes;
         // Where Newton iterations first came to a standstill, and how many they were.
         let mut standstill = (Vec::new(), 0);
@@ -343,16 +343,19 @@ impl<'a> Newton<'a> {
             self.stalls = stalls(&iterations[since..]);
             if self.prepare(&increment, &task)? {
                 since = iterations.len() - 1;
-                acceleration.clear();
+                acceleration = quasi.then(Acceleration::default);
             }
-            let unaided = self.solve(&balance.residual, None)?;
-            let correction = if method == Method::QuasiNewton {
-                acceleration.improve(&unaided)
-            } else {
-                unaided.clone()
-            };
-            let (step_length, next, at) = self.search(&increment, &correction, &balance, &task)?;
-            acceleration.took(unaided, &correction, step_length);
+            let mut correction = self.solve(&balance.residual, None)?;
+            if let Some(acceleration) = &mut acceleration {
+                correction = acceleration.improve(correction);
+            }
+            let relative = norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE);
+            let ends = self.probably_ends(&iterations[first..], relative);
+            let (step_length, next, at) =
+                self.search(&increment, &correction, &balance, &task, ends)?;
+            if let Some(acceleration) = &mut acceleration {
+                acceleration.took(&correction, step_length);
+            }
             increment = next;
             balance = at;
             iterations.push(Iteration {
@@ -364,6 +367,18 @@ impl<'a> Newton<'a> {
         }
         let relaxed_in_vain = relaxes != may_relax;
         Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
+    }
+
+    /// Whether a correction of this relative size will probably be the last one, the residual
+    /// falling quadratically: r₃ = r₂ (r₂/r₁)².
+    fn probably_ends(&self, iterations: &[Iteration], correction: f64) -> bool {
+        let [.., before, last] = iterations else {
+            return false;
+        };
+        let expected = last.residual * (last.residual / before.residual).powi(2);
+        let tolerance = self.settings.force_tolerance;
+        expected <= EXACT * tolerance
+            || (expected <= tolerance && correction <= self.settings.displacement_tolerance)
     }
 
     /// What is said of iterations that have come to their end.
@@ -405,7 +420,9 @@ impl<'a> Newton<'a> {
         self.prepare(increment, task).ok()?;
         let before = Snapshot::of(self.groups);
         let correction = self.solve(&balance.residual, None).ok()?;
-        let (_, moved, _) = self.search(increment, &correction, balance, task).ok()?;
+        let (_, moved, _) = self
+            .search(increment, &correction, balance, task, true)
+            .ok()?;
         self.evaluate(&moved, task, Operator::Consistent).ok()?;
         diagnosis::compare(self.groups, &before)
     }
@@ -426,13 +443,15 @@ impl<'a> Newton<'a> {
 
     /// Takes the longest of a few fractions of the correction that does not make the residual
     /// grow; if all do, the one with the smallest residual. A law that fails is treated like a
-    /// residual that grows, unless every fraction fails.
+    /// residual that grows, unless every fraction fails. Where the step probably `ends` here,
+    /// tangents are left out.
     fn search(
         &mut self,
         increment: &[f64],
         correction: &[f64],
         before: &Balance,
         task: &Task<'_>,
+        ends: bool,
     ) -> Result<(f64, Vec<f64>, Balance), StepFailure> {
         let mut best: Option<(f64, Vec<f64>, Balance)> = None;
         // Below the tolerance the residual may grow: there it is round-off.
@@ -449,7 +468,11 @@ impl<'a> Newton<'a> {
                 .zip(correction)
                 .map(|(u, d)| u + length * d)
                 .collect();
-            let operator = self.operator();
+            let operator = if ends {
+                Operator::None
+            } else {
+                self.operator()
+            };
             match self.evaluate(&moved, task, operator) {
                 Ok(balance) if balance.relative <= enough => {
                     return Ok((length, moved, balance));

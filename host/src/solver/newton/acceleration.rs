@@ -25,24 +25,18 @@ pub(super) struct Acceleration {
 }
 
 impl Acceleration {
-    /// Forgets all moves: there is another matrix.
-    pub(super) fn clear(&mut self) {
-        self.moves.clear();
-        self.last = None;
-    }
-
     /// δ from f.
-    pub(super) fn improve(&mut self, correction: &[f64]) -> Vec<f64> {
+    pub(super) fn improve(&mut self, correction: Vec<f64>) -> Vec<f64> {
         if let Some([before, moved]) = self.last.take() {
             if self.moves.len() == DEPTH {
                 self.moves.remove(0);
             }
-            self.moves.push([moved, difference(correction, &before)]);
+            self.moves.push([moved, difference(&correction, &before)]);
         }
         // Gram–Schmidt, the latest move first; s is carried along with y.
         let mut basis: Vec<[Vec<f64>; 2]> = Vec::new();
-        let mut improved = correction.to_vec();
-        let mut rest = correction.to_vec();
+        let mut improved = correction.clone();
+        let mut rest = correction.clone();
         for [s, y] in self.moves.iter().rev() {
             let (mut s, mut y) = (s.clone(), y.clone());
             let size = norm(&y);
@@ -64,13 +58,15 @@ impl Acceleration {
             subtract(&mut improved, gamma, &s);
             basis.push([s, y]);
         }
+        self.last = Some([correction, Vec::new()]);
         improved
     }
 
-    /// From f, this share of δ was taken.
-    pub(super) fn took(&mut self, correction: Vec<f64>, improved: &[f64], share: f64) {
-        let moved = improved.iter().map(|d| share * d).collect();
-        self.last = Some([correction, moved]);
+    /// This share of δ was taken.
+    pub(super) fn took(&mut self, improved: &[f64], share: f64) {
+        if let Some([_, moved]) = &mut self.last {
+            moved.extend(improved.iter().map(|d| share * d));
+        }
     }
 }
 
@@ -108,11 +104,11 @@ mod tests {
         for _ in 0..5 {
             let correction = f(&u);
             sizes.push(norm(&correction));
-            let moved = acceleration.improve(&correction);
+            let moved = acceleration.improve(correction);
             for (u, d) in u.iter_mut().zip(&moved) {
                 *u += d;
             }
-            acceleration.took(correction, &moved, 1.0);
+            acceleration.took(&moved, 1.0);
         }
         assert!(sizes[3] > 1e-3 && sizes[4] < 1e-12, "{sizes:?}");
     }
@@ -120,13 +116,14 @@ mod tests {
     #[test]
     fn a_move_that_says_nothing_new_is_left_out() {
         let mut acceleration = Acceleration::default();
-        let first = acceleration.improve(&[2.0, 0.0]);
-        acceleration.took(vec![2.0, 0.0], &first, 1.0);
-        let second = acceleration.improve(&[1.0, 0.0]);
+        let first = acceleration.improve(vec![2.0, 0.0]);
+        acceleration.took(&first, 1.0);
         // The secant through f(0) = 2 and f(2) = 1 meets zero two further on.
+        let second = acceleration.improve(vec![1.0, 0.0]);
         assert_eq!(second, [2.0, 0.0]);
-        acceleration.took(vec![1.0, 0.0], &second, 0.5);
-        let third = acceleration.improve(&[0.5, 0.0]);
+        acceleration.took(&second, 0.5);
+        // f(3) = 1/2 is on the same line.
+        let third = acceleration.improve(vec![0.5, 0.0]);
         assert!((third[0] - 1.0).abs() < 1e-12, "{third:?}");
     }
 }
