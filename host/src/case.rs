@@ -502,15 +502,17 @@ pub struct CutInput {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverInput {
+    /// Which matrix the iterations use.
+    pub method: Method,
     /// Largest residual force, relative to the largest of the forces in play (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub force_tolerance: f64,
     /// Largest correction, relative to the displacement increment (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub displacement_tolerance: f64,
-    /// Iterations after which an increment is cut back.
+    /// Iterations after which an increment is cut back; those of the method if left out.
     #[serde(deserialize_with = "iterations")]
-    pub max_iterations: usize,
+    pub max_iterations: Option<usize>,
     /// An increment is halved at most so many times.
     #[serde(deserialize_with = "halvings")]
     pub max_halvings: u32,
@@ -520,6 +522,52 @@ pub struct SolverInput {
     pub relaxation: bool,
     /// What becomes of linear groups.
     pub equations: Equations,
+}
+
+impl SolverInput {
+    /// Iterations after which an increment is cut back.
+    pub fn max_iterations(&self) -> usize {
+        self.max_iterations
+            .unwrap_or_else(|| self.method.max_iterations())
+    }
+}
+
+/// Which matrix the iterations use.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Consistent tangents at every iteration.
+    #[default]
+    Newton,
+    /// Consistent tangents at the first iteration of every step.
+    ModifiedNewton,
+    /// The elastic stiffness, factorised once a phase.
+    InitialStress,
+    /// Consistent tangents of an earlier iteration, renewed where there is no progress; the
+    /// corrections are accelerated by what the last ones achieved.
+    QuasiNewton,
+}
+
+impl Method {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Newton => "newton",
+            Self::ModifiedNewton => "modified_newton",
+            Self::InitialStress => "initial_stress",
+            Self::QuasiNewton => "quasi_newton",
+        }
+    }
+
+    /// Iterations that are allowed by default: the slower the method, the more.
+    pub fn max_iterations(self) -> usize {
+        match self {
+            Self::Newton => 25,
+            Self::ModifiedNewton => 200,
+            Self::InitialStress => 1000,
+            Self::QuasiNewton => 100,
+        }
+    }
 }
 
 /// How the equations of a phase are set up.
@@ -551,8 +599,8 @@ fn tolerance<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
     within(f64::deserialize(input)?, 1e-14, 1.0)
 }
 
-fn iterations<'de, D: Deserializer<'de>>(input: D) -> Result<usize, D::Error> {
-    within(usize::deserialize(input)?, 1, 10_000)
+fn iterations<'de, D: Deserializer<'de>>(input: D) -> Result<Option<usize>, D::Error> {
+    within(usize::deserialize(input)?, 1, 10_000).map(Some)
 }
 
 /// A step halved more often than this hardly moves the load factor in double precision.
@@ -581,9 +629,10 @@ fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: 
 impl Default for SolverInput {
     fn default() -> Self {
         Self {
+            method: Method::default(),
             force_tolerance: 1e-9,
             displacement_tolerance: 1e-7,
-            max_iterations: 25,
+            max_iterations: None,
             max_halvings: 10,
             line_search: true,
             equations: Equations::Auto,

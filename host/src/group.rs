@@ -11,6 +11,7 @@ use crate::input::BuiltLaw;
 use crate::plugin::{BatchFailure, BatchSuccess, End, Operator, Start, Strided};
 use layer::Layer;
 use rayon::prelude::*;
+use serde::Serialize;
 use std::sync::Arc;
 
 /// Points that one thread takes at a time.
@@ -50,6 +51,30 @@ pub struct GroupLaw {
     pub built: Arc<BuiltLaw>,
     /// Initial values of internal variables that override the law's own, by number.
     pub initial: Vec<(usize, f64)>,
+}
+
+/// How often a group has called a law, calls included that came to nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LawCalls {
+    /// Id of the law.
+    pub law: String,
+    /// Points carried through an increment.
+    pub points: u64,
+    /// How many of them with an operator, consistent or elastic.
+    pub operators: u64,
+}
+
+/// Bytes that a group keeps for its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Bytes {
+    /// Strains, before and during an increment; of a thin layer also jumps.
+    pub strain: usize,
+    /// Stresses, before and during an increment.
+    pub stress: usize,
+    /// Internal variables, before and during an increment.
+    pub internal: usize,
+    /// Tangents.
+    pub tangents: usize,
 }
 
 /// A failed point, by element.
@@ -111,8 +136,8 @@ pub struct Group {
     pub internal: Field,
     /// The law.
     pub law: GroupLaw,
-    /// Points carried through the law so far, calls included that came to nothing.
-    pub law_calls: u64,
+    /// Calls of the laws used so far; the last one is that of the current law.
+    pub law_calls: Vec<LawCalls>,
     layer: Option<Layer>,
     /// Tangents of the element, point by point; of a linear law, those of one element only.
     tangent: Vec<f64>,
@@ -145,7 +170,7 @@ impl Group {
             stress: Field::new(stress),
             internal: Field::default(),
             law: law.clone(),
-            law_calls: 0,
+            law_calls: Vec::new(),
             layer,
             tangent: Vec::new(),
             tangents_are_constant: false,
@@ -169,6 +194,13 @@ impl Group {
     fn start_law(&mut self, law: GroupLaw, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
         self.law = law;
         let law = &self.law.built.law;
+        let id = &law.description().id;
+        if self.law_calls.last().is_none_or(|calls| calls.law != *id) {
+            self.law_calls.push(LawCalls {
+                law: id.clone(),
+                ..LawCalls::default()
+            });
+        }
         let n_points = self.kinematics.n_points();
         let starts_anew = kept.is_none();
         let mut internal = if let Some(kept) = kept {
@@ -251,7 +283,7 @@ impl Group {
     }
 
     /// Computes the trial state under displacement increments (two per node) since the committed
-    /// state, and the tangents if wanted.
+    /// state, and the tangents if wanted; else those of an earlier evaluation stay.
     ///
     /// # Errors
     /// The worst point.
@@ -282,14 +314,15 @@ impl Group {
             let result = self.run_law(operator, time, time_increment, &mut operators);
             if let (Ok(_), Some(layer)) = (&result, &self.layer) {
                 layer.stresses_along(&self.strain, &mut self.stress);
-                layer.tangents(&operators, &mut tangent);
+                if operator != Operator::None {
+                    layer.tangents(&operators, &mut tangent);
+                }
             }
             result
         } else {
             self.run_law(operator, time, time_increment, &mut tangent)
         };
         self.tangent = tangent;
-        self.law_calls += self.kinematics.n_points() as u64;
         result.map_err(|failure| self.locate(&failure))
     }
 
@@ -341,10 +374,20 @@ impl Group {
                 operator: &mut operator,
             },
         )?;
-        self.law_calls += 1;
+        self.count(1, Operator::Consistent);
         Ok(operator)
     }
 
+    fn count(&mut self, n_points: usize, operator: Operator) {
+        if let Some(calls) = self.law_calls.last_mut() {
+            calls.points += n_points as u64;
+            if operator != Operator::None {
+                calls.operators += n_points as u64;
+            }
+        }
+    }
+
+    /// Carries all points through the law. `operators` holds room for them, wanted or not.
     fn run_law(
         &mut self,
         operator: Operator,
@@ -352,6 +395,7 @@ impl Group {
         time_increment: f64,
         operators: &mut [f64],
     ) -> Result<BatchSuccess, BatchFailure> {
+        self.count(self.kinematics.n_points(), operator);
         let place = self.flux_place();
         let gradient = match &self.layer {
             Some(layer) if self.law.built.law.n_components() == 2 => &layer.jump,
@@ -447,6 +491,18 @@ impl Group {
             element * length
         };
         &self.tangent[start..start + length]
+    }
+
+    /// What the group keeps for its points.
+    pub fn bytes(&self) -> Bytes {
+        let field = |field: &Field| size_of_val(&*field.committed) + size_of_val(&*field.trial);
+        let jumps = self.layer.as_ref().map_or(0, |layer| field(&layer.jump));
+        Bytes {
+            strain: field(&self.strain) + jumps,
+            stress: field(&self.stress),
+            internal: field(&self.internal),
+            tangents: size_of_val(&*self.tangent),
+        }
     }
 
     /// Makes the trial state the committed one.

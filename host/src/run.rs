@@ -9,7 +9,7 @@ use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    LinearDomain, LinearSolver, Loads, Newton, Reuse, Singular, StepFailure, StepSuccess,
+    LinearDomain, LinearSolver, Loads, Matrix, Newton, Reuse, Singular, StepFailure, StepSuccess,
     mesh_lines,
 };
 use std::collections::BTreeMap;
@@ -30,8 +30,9 @@ pub trait Observer {
 
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
-/// Iterations up to which a step counts as easy, so that the next one may be larger.
-const EASY: usize = 8;
+/// Share of the method's own limit of iterations up to which a step counts as easy, so that the
+/// next one may be larger.
+const EASY: f64 = 0.34;
 /// Smallest and largest reduction of a step at a cut-back.
 const CUT: [f64; 2] = [0.1, 0.5];
 
@@ -144,6 +145,8 @@ struct PhaseEquations {
     /// The groups that do not.
     domain: Option<LinearDomain>,
     solver: LinearSolver,
+    /// What the solver holds factorised.
+    matrix: Matrix,
     /// Forces out of balance at the start, relative to the forces in play.
     out_of_balance: f64,
     n_unknowns: usize,
@@ -270,6 +273,7 @@ impl<'a> Run<'a> {
             .as_ref()
             .is_some_and(|domain| domain.factorised);
         record.factorisations = equations.solver.factorisations + u64::from(factorised);
+        record.fallbacks = equations.solver.fallbacks;
         self.time += 1.0;
         results.phase(record);
         outcome
@@ -286,6 +290,7 @@ impl<'a> Run<'a> {
     ) -> Result<(), Error> {
         let n = *phase.increments.get_ref();
         let mut step = 1.0 / n as f64;
+        let easy = EASY * self.file().solver.method.max_iterations() as f64;
         let smallest = step / f64::powi(2.0, self.file().solver.max_halvings as i32);
         // The last step of this phase: its length and displacement increments.
         let mut last: Option<(f64, Vec<f64>)> = None;
@@ -325,7 +330,7 @@ impl<'a> Run<'a> {
                                  relaxation led to the next equilibrium"
                             ));
                         }
-                        if success.iterations.len() <= EASY {
+                        if success.iterations.len() as f64 <= easy {
                             step = (REGROWTH * step).min(1.0 / n as f64);
                         }
                         self.accept(&success, loads, equations, end);
@@ -387,7 +392,7 @@ impl<'a> Run<'a> {
         let mut newton = Newton::new(
             &equations.system,
             equations.domain.as_ref(),
-            &mut equations.solver,
+            (&mut equations.solver, &mut equations.matrix),
             &mut self.groups,
             settings,
             &mut record.costs,
@@ -562,6 +567,7 @@ impl<'a> Run<'a> {
             system,
             domain,
             solver,
+            matrix: Matrix::default(),
             out_of_balance,
             n_unknowns: unknowns.len(),
             at_last: self.displacement.clone(),

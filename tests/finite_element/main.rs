@@ -11,6 +11,7 @@ mod cut_back;
 mod cylinder;
 mod footing;
 mod inclusion;
+mod methods;
 mod newton;
 mod patch;
 mod patch_joint;

@@ -10,6 +10,7 @@ use crate::plugin::hexadecimal_sha256;
 use crate::probe::Probes;
 use crate::solver::Costs;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::time::Duration;
 use toml::Spanned;
 
@@ -34,6 +35,8 @@ pub struct PhaseRecord {
     pub relaxed: usize,
     /// Matrices factorised.
     pub factorisations: u64,
+    /// How many of them needed full row exchanges.
+    pub fallbacks: u64,
     /// Costs by part.
     pub costs: Costs,
     /// Values of the probes after its last increment.
@@ -53,6 +56,7 @@ impl PhaseRecord {
             unreliable: 0,
             relaxed: 0,
             factorisations: 0,
+            fallbacks: 0,
             costs: Costs::default(),
             probes: Vec::new(),
         }
@@ -213,6 +217,7 @@ impl Summary {
                     "unreliable_steps": p.unreliable,
                     "relaxed_steps": p.relaxed,
                     "factorisations": p.factorisations,
+                    "fallbacks": p.fallbacks,
                     "evaluations": p.costs.evaluations,
                     "seconds": {
                         "laws_and_forces": p.costs.laws.as_secs_f64(),
@@ -224,11 +229,19 @@ impl Summary {
             })
             .collect();
         summary.insert("phases".to_owned(), phases.into());
-        let mut calls: Map<String, Value> = Map::new();
-        for group in groups {
-            calls.insert(group.name.clone(), group.law_calls.into());
-        }
-        summary.insert("law_calls_by_group".to_owned(), calls.into());
+        let work = |work: fn(&Group) -> Value| -> Value {
+            let of_groups = groups.iter().map(|group| (group.name.clone(), work(group)));
+            of_groups.collect::<Map<_, _>>().into()
+        };
+        let points = |group: &Group| group.law_calls.iter().map(|c| c.points).sum::<u64>().into();
+        let operators = |group: &Group| {
+            let operators = group.law_calls.iter().map(|c| c.operators);
+            operators.sum::<u64>().into()
+        };
+        summary.insert("law_calls".to_owned(), law_calls(groups));
+        summary.insert("law_calls_by_group".to_owned(), work(points));
+        summary.insert("operators_by_group".to_owned(), work(operators));
+        summary.insert("state_bytes".to_owned(), work(|group| json!(group.bytes())));
         let last = self.last.as_ref();
         summary.insert(
             "last_equilibrium".to_owned(),
@@ -247,6 +260,24 @@ impl Summary {
         );
         summary.into()
     }
+}
+
+/// Points carried through every law, and how many of them with an operator, by the law's id.
+fn law_calls(groups: &[Group]) -> Value {
+    let mut totals: BTreeMap<&str, [u64; 2]> = BTreeMap::new();
+    for calls in groups.iter().flat_map(|group| &group.law_calls) {
+        let [points, operators] = totals.entry(&calls.law).or_default();
+        *points += calls.points;
+        *operators += calls.operators;
+    }
+    let of_laws = totals.into_iter();
+    of_laws
+        .map(|(law, [points, operators])| {
+            let calls = json!({ "points": points, "operators": operators });
+            (law.to_owned(), calls)
+        })
+        .collect::<Map<_, _>>()
+        .into()
 }
 
 /// The case file after those it is based on.
@@ -295,9 +326,10 @@ fn groups(case: &Case, model: &Model) -> Value {
 fn solver(case: &Case) -> Value {
     let solver = &case.file.solver;
     json!({
+        "method": solver.method.name(),
         "force_tolerance": solver.force_tolerance,
         "displacement_tolerance": solver.displacement_tolerance,
-        "max_iterations": solver.max_iterations,
+        "max_iterations": solver.max_iterations(),
         "max_halvings": solver.max_halvings,
         "line_search": solver.line_search,
     })

@@ -1,16 +1,21 @@
-//! Full Newton iterations with consistent tangents and a line search; viscous relaxation where
-//! they come to a standstill.
+//! Newton iterations and a line search; with consistent tangents, or with a matrix that is kept.
+//! Viscous relaxation where full Newton iterations come to a standstill.
 
+mod acceleration;
+mod matrix;
 mod relaxation;
+
+pub use matrix::Matrix;
 
 use super::diagnosis::{self, Snapshot};
 use super::linear::LinearSolver;
 use super::linear_domain::LinearDomain;
 use crate::assembly::System;
-use crate::case::SolverInput;
+use crate::case::{Method, SolverInput};
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
-use relaxation::{Relaxation, Task};
+use acceleration::Acceleration;
+use relaxation::Relaxation;
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
@@ -19,6 +24,10 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 const EXACT: f64 = 1e-3;
+/// A quasi-Newton matrix is renewed where this many iterations (the state before them included)
+/// have not brought the residual down to this fraction.
+const PATIENCE: usize = 6;
+const PROGRESS: f64 = 0.1;
 /// Round-off of K u, relative to the forces it is the difference of.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
@@ -135,6 +144,8 @@ pub struct Newton<'a> {
     domain: Option<&'a LinearDomain>,
     /// Equations.
     solver: &'a mut LinearSolver,
+    /// What is factorised.
+    matrix: &'a mut Matrix,
     /// Elements and their state.
     groups: &'a mut [Group],
     /// Settings.
@@ -142,9 +153,26 @@ pub struct Newton<'a> {
     /// Costs so far.
     costs: &'a mut Costs,
     scale: f64,
-    largest_stiffness: f64,
+    /// All groups are linear: there is one matrix only.
+    is_constant: bool,
+    /// What the last evaluation asked the laws for.
+    tangents: Operator,
+    /// The matrix has been renewed in this step.
+    renewed: bool,
+    /// The kept matrix makes too little progress.
+    stalls: bool,
     /// Forces of the domain at the end of the step if its boundary stays where it is.
     domain_forces: Vec<f64>,
+}
+
+/// A step's end.
+struct Task<'t> {
+    /// External forces, by degree of freedom.
+    external: &'t [f64],
+    /// Increments of prescribed displacements, by degree of freedom.
+    prescribed: &'t [f64],
+    /// Time at the start, and its increment.
+    period: (f64, f64),
 }
 
 /// Residual by equation, and the residual's norm relative to the forces in play.
@@ -159,20 +187,29 @@ impl<'a> Newton<'a> {
     pub fn new(
         system: &'a System,
         domain: Option<&'a LinearDomain>,
-        solver: &'a mut LinearSolver,
+        (solver, matrix): (&'a mut LinearSolver, &'a mut Matrix),
         groups: &'a mut [Group],
         settings: &'a SolverInput,
         costs: &'a mut Costs,
     ) -> Self {
+        let mut included = groups
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| system.includes(*i));
+        let is_constant = included.all(|(_, group)| group.is_linear());
         Self {
             system,
             domain,
             solver,
+            matrix,
             groups,
             settings,
             costs,
             scale: 0.0,
-            largest_stiffness: 0.0,
+            is_constant,
+            tangents: Operator::None,
+            renewed: false,
+            stalls: false,
             domain_forces: Vec::new(),
         }
     }
@@ -191,6 +228,7 @@ impl<'a> Newton<'a> {
         guess: Option<Vec<f64>>,
     ) -> Result<StepSuccess, StepFailure> {
         self.scale = loads.scale;
+        self.renewed = false;
         if let Some(domain) = self.domain {
             self.domain_forces = domain.forces_at(lambda_end);
         }
@@ -217,12 +255,16 @@ impl<'a> Newton<'a> {
         iterations: &mut Vec<Iteration>,
     ) -> Result<StepSuccess, StepFailure> {
         let external = loads.external(lambda_end);
-        let period = (time, lambda_end - lambda_start);
         let mut prescribed = vec![0.0; external.len()];
         for &(dof, start, end) in &loads.prescribed {
             prescribed[dof] =
                 Loads::value(start, end, lambda_end) - Loads::value(start, end, lambda_start);
         }
+        let task = Task {
+            external: &external,
+            prescribed: &prescribed,
+            period: (time, lambda_end - lambda_start),
+        };
         let mut increment = match guess {
             Some(mut guess) => {
                 for &(dof, ..) in &loads.prescribed {
@@ -231,10 +273,11 @@ impl<'a> Newton<'a> {
                 self.system.follow(&mut guess);
                 guess
             }
-            None => self.predict(&external, &prescribed, period)?,
+            None => self.predict(&task)?,
         };
+        let operator = self.operator();
         let mut balance = self
-            .evaluate(&increment, &external, period)
+            .evaluate(&increment, &task, operator)
             .map_err(failed_law)?;
         iterations.push(Iteration {
             residual: balance.relative,
@@ -242,13 +285,13 @@ impl<'a> Newton<'a> {
             step_length: 1.0,
             viscosity: 0.0,
         });
-        let task = Task {
-            external: &external,
-            prescribed: &prescribed,
-            period,
-        };
+        let quasi = self.settings.method == Method::QuasiNewton;
+        let mut acceleration = quasi.then(Acceleration::default);
+        // Where the iterations with the present matrix start.
+        let mut since = 0;
         let mut relaxation: Option<Relaxation> = None;
-        let mut may_relax = self.settings.relaxation;
+        let relaxes = self.settings.relaxation && self.settings.method == Method::Newton;
+        let mut may_relax = relaxes;
         // Where Newton iterations first came to a standstill, and how many they were.
         let mut standstill = (Vec::new(), 0);
         // Where the last series of Newton iterations starts.
@@ -271,7 +314,7 @@ impl<'a> Newton<'a> {
                 });
             }
             let series = &iterations[first..];
-            if series.len() > self.settings.max_iterations {
+            if series.len() > self.settings.max_iterations() {
                 break;
             }
             if may_relax && relaxation::stands_still(series) {
@@ -291,15 +334,28 @@ impl<'a> Newton<'a> {
                     relaxation = None;
                     increment = std::mem::take(&mut standstill.0);
                     balance = self
-                        .evaluate(&increment, &external, period)
+                        .evaluate(&increment, &task, Operator::Consistent)
                         .map_err(failed_law)?;
                     first = iterations.len() - standstill.1;
                 }
                 continue;
             }
-            let correction = self.correction(&balance.residual, None)?;
+            self.stalls = stalls(&iterations[since..]);
+            if self.prepare(&increment, &task)? {
+                since = iterations.len() - 1;
+                acceleration = quasi.then(Acceleration::default);
+            }
+            let mut correction = self.solve(&balance.residual, None)?;
+            if let Some(acceleration) = &mut acceleration {
+                correction = acceleration.improve(correction);
+            }
+            let relative = norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE);
+            let ends = self.probably_ends(&iterations[first..], relative);
             let (step_length, next, at) =
-                self.search(&increment, &correction, &balance, &external, period)?;
+                self.search(&increment, &correction, &balance, &task, ends)?;
+            if let Some(acceleration) = &mut acceleration {
+                acceleration.took(&correction, step_length);
+            }
             increment = next;
             balance = at;
             iterations.push(Iteration {
@@ -309,8 +365,20 @@ impl<'a> Newton<'a> {
                 viscosity: 0.0,
             });
         }
-        let relaxed_in_vain = may_relax != self.settings.relaxation;
+        let relaxed_in_vain = relaxes != may_relax;
         Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
+    }
+
+    /// Whether a correction of this relative size will probably be the last one, the residual
+    /// falling quadratically: r₃ = r₂ (r₂/r₁)².
+    fn probably_ends(&self, iterations: &[Iteration], correction: f64) -> bool {
+        let [.., before, last] = iterations else {
+            return false;
+        };
+        let expected = last.residual * (last.residual / before.residual).powi(2);
+        let tolerance = self.settings.force_tolerance;
+        expected <= EXACT * tolerance
+            || (expected <= tolerance && correction <= self.settings.displacement_tolerance)
     }
 
     /// What is said of iterations that have come to their end.
@@ -328,105 +396,62 @@ impl<'a> Newton<'a> {
         };
         let reason = format!(
             "no equilibrium after {} iterations{tried}: residual {:.1e}, tolerance {:.1e}",
-            self.settings.max_iterations, balance.relative, self.settings.force_tolerance
+            self.settings.max_iterations(),
+            balance.relative,
+            self.settings.force_tolerance
         );
         StepFailure {
-            culprit: self.diagnose(increment, balance, task.external, task.period),
+            culprit: self.diagnose(increment, balance, task),
             ..plain(&reason)
         }
     }
 
-    /// Does one iteration more and compares: what keeps the iterations from settling.
+    /// Does one iteration more and compares: what keeps Newton iterations from settling. With a
+    /// kept matrix they are slow, which says nothing of a point.
     fn diagnose(
         &mut self,
         increment: &[f64],
         balance: &Balance,
-        external: &[f64],
-        period: (f64, f64),
+        task: &Task<'_>,
     ) -> Option<String> {
+        if self.settings.method != Method::Newton {
+            return None;
+        }
+        self.prepare(increment, task).ok()?;
         let before = Snapshot::of(self.groups);
-        let correction = self.correction(&balance.residual, None).ok()?;
-        self.search(increment, &correction, balance, external, period)
+        let correction = self.solve(&balance.residual, None).ok()?;
+        let (_, moved, _) = self
+            .search(increment, &correction, balance, task, true)
             .ok()?;
+        self.evaluate(&moved, task, Operator::Consistent).ok()?;
         diagnosis::compare(self.groups, &before)
     }
 
     /// Displacement increments that the tangent at the start predicts.
-    fn predict(
-        &mut self,
-        external: &[f64],
-        prescribed: &[f64],
-        period: (f64, f64),
-    ) -> Result<Vec<f64>, StepFailure> {
-        let still = vec![0.0; external.len()];
-        let balance = self
-            .evaluate(&still, external, period)
-            .map_err(failed_law)?;
-        let mut increment = self.correction(&balance.residual, Some(prescribed))?;
-        for (value, prescribed) in increment.iter_mut().zip(prescribed) {
+    fn predict(&mut self, task: &Task<'_>) -> Result<Vec<f64>, StepFailure> {
+        let still = vec![0.0; task.external.len()];
+        let operator = self.operator();
+        let balance = self.evaluate(&still, task, operator).map_err(failed_law)?;
+        self.prepare(&still, task)?;
+        let mut increment = self.solve(&balance.residual, Some(task.prescribed))?;
+        for (value, prescribed) in increment.iter_mut().zip(task.prescribed) {
             *value += prescribed;
         }
         self.system.follow(&mut increment);
         Ok(increment)
     }
 
-    /// Solves K δ = residual − K_fp Δp with the tangents of the last evaluation.
-    fn correction(
-        &mut self,
-        residual: &[f64],
-        prescribed: Option<&[f64]>,
-    ) -> Result<Vec<f64>, StepFailure> {
-        let start = Instant::now();
-        let values = self.stiffness();
-        let mut coupling = vec![0.0; residual.len()];
-        if let Some(increment) = prescribed {
-            self.system
-                .prescribed_forces(self.groups, increment, &mut coupling);
-        }
-        let largest = values
-            .iter()
-            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        self.largest_stiffness = largest;
-        self.costs.assembly += start.elapsed();
-        let start = Instant::now();
-        let right: Vec<f64> = residual.iter().zip(&coupling).map(|(r, c)| r - c).collect();
-        let solution = self
-            .solver
-            .factorise(&values)
-            .and_then(|()| self.solver.solve(&right));
-        self.costs.equations += start.elapsed();
-        self.costs.factorisations += 1;
-        let solution = solution.map_err(|_| {
-            plain("the tangent matrix is singular: a part of the model can move freely")
-        })?;
-        let mut correction = vec![0.0; self.system.n_dofs()];
-        for (&dof, value) in self.system.free().iter().zip(solution) {
-            correction[dof] = value;
-        }
-        self.system.follow(&mut correction);
-        Ok(correction)
-    }
-
-    /// The matrix from the tangents of the last evaluation.
-    fn stiffness(&self) -> Vec<f64> {
-        let mut values = Vec::new();
-        self.system.assemble(self.groups, &mut values);
-        if let Some(domain) = self.domain {
-            self.system.add_domain(domain.stiffness(), &mut values);
-        }
-        values
-    }
-
     /// Takes the longest of a few fractions of the correction that does not make the residual
     /// grow; if all do, the one with the smallest residual. A law that fails is treated like a
-    /// residual that grows, unless every fraction fails.
+    /// residual that grows, unless every fraction fails. Where the step probably `ends` here,
+    /// tangents are left out.
     fn search(
         &mut self,
         increment: &[f64],
         correction: &[f64],
         before: &Balance,
-        external: &[f64],
-        period: (f64, f64),
+        task: &Task<'_>,
+        ends: bool,
     ) -> Result<(f64, Vec<f64>, Balance), StepFailure> {
         let mut best: Option<(f64, Vec<f64>, Balance)> = None;
         // Below the tolerance the residual may grow: there it is round-off.
@@ -443,7 +468,12 @@ impl<'a> Newton<'a> {
                 .zip(correction)
                 .map(|(u, d)| u + length * d)
                 .collect();
-            match self.evaluate(&moved, external, period) {
+            let operator = if ends {
+                Operator::None
+            } else {
+                self.operator()
+            };
+            match self.evaluate(&moved, task, operator) {
                 Ok(balance) if balance.relative <= enough => {
                     return Ok((length, moved, balance));
                 }
@@ -461,9 +491,8 @@ impl<'a> Newton<'a> {
         match (best, first_failure) {
             // The groups hold the state of the last fraction tried.
             (Some((length, moved, _)), _) => {
-                let balance = self
-                    .evaluate(&moved, external, period)
-                    .map_err(failed_law)?;
+                let operator = self.operator();
+                let balance = self.evaluate(&moved, task, operator).map_err(failed_law)?;
                 Ok((length, moved, balance))
             }
             (None, Some(failure)) => Err(failed_law(failure)),
@@ -471,14 +500,18 @@ impl<'a> Newton<'a> {
         }
     }
 
-    /// Trial state, internal forces and residual under displacement increments.
+    /// Trial state, internal forces and residual under displacement increments; also the
+    /// tangents if an `operator` is wanted.
     fn evaluate(
         &mut self,
         increment: &[f64],
-        external: &[f64],
-        (time, time_increment): (f64, f64),
+        task: &Task<'_>,
+        operator: Operator,
     ) -> Result<Balance, PointFailure> {
+        let (time, time_increment) = task.period;
+        let external = task.external;
         let start = Instant::now();
+        self.will_compute(operator);
         self.costs.evaluations += 1;
         let mut internal = vec![0.0; increment.len()];
         let mut unreliable = None;
@@ -486,7 +519,7 @@ impl<'a> Newton<'a> {
             if !self.system.includes(number) {
                 continue;
             }
-            let success = group.evaluate(increment, Operator::Consistent, time, time_increment)?;
+            let success = group.evaluate(increment, operator, time, time_increment)?;
             group
                 .kinematics
                 .add_forces(&group.stress.trial, &mut internal);
@@ -494,6 +527,7 @@ impl<'a> Newton<'a> {
                 .unreliable
                 .map(|(_, why)| format!("group `{}`: {why}", group.name)));
         }
+        self.tangents = operator;
         self.system.fold(&mut internal);
         // Forces in play before those of the domain cancel them out.
         let in_play = norm(&internal);
@@ -517,7 +551,7 @@ impl<'a> Newton<'a> {
         let floor = if imposed > 0.0 {
             0.0
         } else {
-            let cancelling = self.largest_stiffness * norm(increment) + norm(&self.domain_forces);
+            let cancelling = self.matrix.largest * norm(increment) + norm(&self.domain_forces);
             ROUND_OFF * cancelling / self.settings.force_tolerance
         };
         let scale = in_play.max(imposed).max(floor);
@@ -530,6 +564,14 @@ impl<'a> Newton<'a> {
             unreliable,
         })
     }
+}
+
+/// Whether iterations with one matrix make too little progress.
+fn stalls(iterations: &[Iteration]) -> bool {
+    let Some([before, .., last]) = iterations.last_chunk::<PATIENCE>() else {
+        return false;
+    };
+    last.residual > PROGRESS * before.residual
 }
 
 /// 2-norm.

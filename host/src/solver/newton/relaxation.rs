@@ -15,7 +15,7 @@
 //! the residual has fallen; they alone decide on convergence, by the same tolerances. The motion
 //! changes the path within the step only: laws still see one increment from the last equilibrium.
 
-use super::{Balance, Iteration, Newton, StepFailure, failed_law, norm, plain};
+use super::{Balance, Iteration, Newton, StepFailure, Task, failed_law, norm, plain};
 use crate::plugin::Operator;
 
 /// α. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
@@ -60,40 +60,21 @@ pub(super) fn stands_still(iterations: &[Iteration]) -> bool {
     least(&iterations[start..]) > PROGRESS * least(&iterations[..start])
 }
 
-/// What a relaxation works against.
-pub(super) struct Task<'t> {
-    /// External forces, by degree of freedom.
-    pub(super) external: &'t [f64],
-    /// Increments of prescribed displacements, by degree of freedom.
-    pub(super) prescribed: &'t [f64],
-    /// Time at the start, and its increment.
-    pub(super) period: (f64, f64),
-}
-
 impl Newton<'_> {
     /// Starts a relaxation from the elastic answer to the step; `None` if a law has no elastic
     /// operator or elasticity alone leaves the equations singular.
     pub(super) fn start_relaxation(&mut self, task: &Task<'_>) -> Option<Relaxation> {
         let still = vec![0.0; task.external.len()];
-        let before = self.evaluate(&still, task.external, task.period).ok()?;
-        for (number, group) in self.groups.iter_mut().enumerate() {
-            if !self.system.includes(number) {
-                continue;
-            }
-            let (time, time_increment) = task.period;
-            group
-                .evaluate(&still, Operator::Elastic, time, time_increment)
-                .ok()?;
-        }
-        let mut increment = self
-            .correction(&before.residual, Some(task.prescribed))
-            .ok()?;
+        let before = self.evaluate(&still, task, Operator::Elastic).ok()?;
+        let elastic = self.stiffness();
+        self.factorise(&elastic).ok()?;
+        let mut increment = self.solve(&before.residual, Some(task.prescribed)).ok()?;
         for (value, prescribed) in increment.iter_mut().zip(task.prescribed) {
             *value += prescribed;
         }
         self.system.follow(&mut increment);
         Some(Relaxation {
-            elastic: self.stiffness(),
+            elastic,
             increment,
             steps: 0,
         })
@@ -110,7 +91,7 @@ impl Newton<'_> {
         iterations: &mut Vec<Iteration>,
     ) -> Result<(Vec<f64>, Balance), StepFailure> {
         let mut balance = self
-            .evaluate(&relaxation.increment, task.external, task.period)
+            .evaluate(&relaxation.increment, task, Operator::Consistent)
             .map_err(failed_law)?;
         let mut largest = balance.relative;
         while relaxation.steps < MAX_STEPS {
@@ -121,7 +102,7 @@ impl Newton<'_> {
             }
             let before = balance.relative;
             balance = self
-                .evaluate(&relaxation.increment, task.external, task.period)
+                .evaluate(&relaxation.increment, task, Operator::Consistent)
                 .map_err(failed_law)?;
             iterations.push(Iteration {
                 residual: balance.relative,
@@ -153,17 +134,7 @@ impl Newton<'_> {
         for (value, elastic) in values.iter_mut().zip(elastic) {
             *value += VISCOSITY * elastic;
         }
-        let solution = self
-            .solver
-            .factorise(&values)
-            .and_then(|()| self.solver.solve(residual))
-            .map_err(|_| plain("the matrix of the viscous relaxation is singular"))?;
-        self.costs.factorisations += 1;
-        let mut correction = vec![0.0; self.system.n_dofs()];
-        for (&dof, value) in self.system.free().iter().zip(solution) {
-            correction[dof] = value;
-        }
-        self.system.follow(&mut correction);
-        Ok(correction)
+        self.factorise(&values)?;
+        self.solve(residual, None)
     }
 }
