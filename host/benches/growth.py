@@ -20,7 +20,7 @@ from math import log
 from pathlib import Path
 
 from chamber import bonded_case, mepi_case
-from programs import Missing, pilum, run_case
+from programs import Failed, Missing, pilum, run_case
 
 MEPI, PLASTIC = [1, 2, 4, 8, 16, 31], [10, 20, 40, 80, 100]
 MEPI_INCREMENTS, PLASTIC_INCREMENTS = 10, 4
@@ -100,7 +100,7 @@ def threads(options):
               f"{cpu[2]:.2f} | {wall[1] / wall[2]:.2f} |", flush=True)
         same = len({run.head for done in runs.values() for run in done}) == 1
         if not same:
-            raise Missing(f"{name}, size {size}: the head load depends on the number of threads")
+            raise Failed(f"{name}, size {size}: the head load depends on the number of threads")
 
 
 PARTS = {"mepi": mepi, "plastic": plastic, "threads": threads}
@@ -116,8 +116,8 @@ def main():
     try:
         for part in options.parts:
             PARTS[part](options)
-    except Missing as missing:
-        print(f"not measured: {missing}")
+    except (Missing, Failed) as why:
+        print(f"not measured: {why}")
         return 2
     return 0
 

@@ -25,7 +25,7 @@ from pathlib import Path
 import calculix
 import opengeosys
 from chamber import MESHES, Mesh, bonded_case
-from programs import ROOT, Missing, measure, pilum, program, run, run_case, target
+from programs import ROOT, Failed, Missing, measure, pilum, program, run, run_case, target
 
 HERE = Path(__file__).resolve().parent
 
@@ -216,15 +216,21 @@ def plastic(options):
         with tempfile.TemporaryDirectory() as folder:
             folder = Path(folder)
             opengeosys.write(mesh, folder, elastic=False)
-            for _ in range(options.rounds if completes else 1):
-                ours.append(run_case(ours_program, text, folder, "--variant", "bench"))
-                if completes or options.failing:
-                    theirs.append(measure([ogs, "pile.prj"], folder))
+            try:
+                for _ in range(options.rounds if completes else 1):
+                    ours.append(run_case(ours_program, text, folder, "--variant", "bench"))
+                    if completes or options.failing:
+                        theirs.append(measure([ogs, "pile.prj"], folder))
+            except Failed as failed:
+                print(f"| {name} | complete: missed |\n{failed}", flush=True)
+                met = False
+                continue
             done = bool(theirs) and theirs[-1].code == 0
             force = opengeosys.head_force(folder, mesh, elastic=False) if done else None
         last, a = ours[-1], middle(ours, lambda run: run.usage.cpu)
+        cut = f", {last.cut_backs} cut back" if last.cut_backs else ""
         row = (f"| {name} | {last.unknowns} | {a:.3f} | {middle(ours, lambda run: run.usage.memory):.0f} | "
-               f"{last.iterations} | {last.head:.2f} | ")
+               f"{last.iterations}{cut} | {last.head:.2f} | ")
         if not theirs:
             print(row + "not run | | | | | | complete: met | |", flush=True)
             continue
@@ -261,8 +267,8 @@ def main():
     for name in options.parts or PARTS:
         try:
             code = max(code, 0 if PARTS[name](options) else 1)
-        except Missing as missing:
-            print(f"{name}: not measured: {missing}")
+        except (Missing, Failed) as why:
+            print(f"{name}: not measured: {why}")
             code = 2
     return code
 

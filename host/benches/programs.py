@@ -21,6 +21,10 @@ class Missing(Exception):
     """What a measurement needs and does not find."""
 
 
+class Failed(Exception):
+    """A run of ours that did not come to its end."""
+
+
 def program(name):
     """A program on the path."""
     found = shutil.which(name)
@@ -66,12 +70,12 @@ class Done:
 
 
 def run_case(pilum, text, folder, *arguments, n_threads=1):
-    """Runs a case given by its text."""
+    """Runs a case given by its text. Raises `Failed`."""
     case, results = folder / "case.toml", folder / "results"
     case.write_text(text)
     usage = measure([pilum, "run", case, "--out", results, *arguments], folder, n_threads)
     if usage.code != 0:
-        raise Missing(f"pilum ended with {usage.code}:\n{usage.output[-2000:]}")
+        raise Failed(f"pilum ended with {usage.code}:\n{usage.output[-2000:]}")
     return Done(usage, results)
 
 
