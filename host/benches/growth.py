@@ -52,7 +52,11 @@ def table(title, run, sizes, increments, rounds):
     unknowns, seconds, each, memory = [], [], [], []
     program = pilum()
     for size in sizes:
-        runs = [run(program, size, increments) for _ in range(rounds)]
+        try:
+            runs = [run(program, size, increments) for _ in range(rounds)]
+        except Failed as failed:
+            print(f"| {size} | fails |\n{failed}", flush=True)
+            break
         last = runs[-1]
         unknowns.append(last.unknowns)
         seconds.append(statistics.median(run.usage.cpu for run in runs))
