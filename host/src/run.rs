@@ -556,7 +556,7 @@ impl<'a> Run<'a> {
         let own_lines = domain.is_none().then(|| system.lines(&lines));
         let solver = LinearSolver::new(&system.pattern, symmetric, own_lines.as_deref())?;
         let mut unknowns = system.free().to_vec();
-        unknowns.extend(domain.iter().flat_map(|domain| domain.unknowns()));
+        unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
         unknowns.sort_unstable();
         unknowns.dedup();
         let out_of_balance = self.out_of_balance(&unknowns, loads);

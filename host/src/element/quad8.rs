@@ -1,4 +1,8 @@
 //! 8-node quads: solids, and thin layers in their own axes.
+#![expect(
+    clippy::inline_always,
+    reason = "only what is inlined is compiled for the processor's own vector instructions"
+)]
 
 use super::shape::{gauss, quad_shape};
 use super::{Axes, Kinematics, depth};

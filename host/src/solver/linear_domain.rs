@@ -295,6 +295,7 @@ impl LinearDomain {
             increment[dof] = value;
         }
         let mut tries = 0..REFINEMENTS;
+        let mut before = f64::INFINITY;
         let internal = loop {
             self.system.follow(increment);
             for (number, group) in groups.iter_mut().enumerate() {
@@ -319,15 +320,17 @@ impl LinearDomain {
             if relative <= REFINED * tolerance {
                 break internal;
             }
-            if tries.next().is_none() {
+            // A residual that no longer falls has come down to round-off.
+            if relative > 0.5 * before || tries.next().is_none() {
                 if relative <= tolerance {
                     break internal;
                 }
                 return Err(format!(
-                    "the condensed equations of the linear groups lose accuracy: residual \
-                     {relative:.1e}, tolerance {tolerance:.1e}; try `equations = \"sparse\"`"
+                    "round-off of the linear groups' forces leaves a residual of {relative:.1e}, \
+                     tolerance {tolerance:.1e}: raise `force_tolerance`"
                 ));
             }
+            before = relative;
             let (y, _) = self.factors.forward(&residual);
             let correction = self.factors.backward(&y, &vec![0.0; self.boundary.len()]);
             for (&dof, value) in self.system.free().iter().zip(correction) {

@@ -29,7 +29,7 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
-use faer::{Accum, MatMut, MatRef, Par, Side};
+use faer::{Accum, MatMut, MatRef, Par, Side, Spec};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -261,14 +261,14 @@ impl Multifrontal {
         let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
         if symmetric {
             let scratch =
-                cholesky_kernel::cholesky_in_place_scratch::<f64>(k, Par::Seq, Default::default());
+                cholesky_kernel::cholesky_in_place_scratch::<f64>(k, Par::Seq, Spec::default());
             let mut memory = MemBuffer::new(scratch);
             cholesky_kernel::cholesky_in_place(
                 pivots.rb_mut(),
-                Default::default(),
+                cholesky_kernel::LltRegularization::default(),
                 Par::Seq,
                 MemStack::new(&mut memory),
-                Default::default(),
+                Spec::default(),
             )
             .map_err(|_| Singular)?;
             triangular::solve_lower_triangular_in_place(
@@ -281,8 +281,7 @@ impl Multifrontal {
         }
         front.exchange.resize(k, 0);
         front.exchange_inverse.resize(k, 0);
-        let scratch =
-            lu_kernel::lu_in_place_scratch::<usize, f64>(k, k, Par::Seq, Default::default());
+        let scratch = lu_kernel::lu_in_place_scratch::<usize, f64>(k, k, Par::Seq, Spec::default());
         let mut memory = MemBuffer::new(scratch);
         lu_kernel::lu_in_place(
             pivots.rb_mut(),
@@ -290,7 +289,7 @@ impl Multifrontal {
             &mut front.exchange_inverse,
             Par::Seq,
             MemStack::new(&mut memory),
-            Default::default(),
+            Spec::default(),
         );
         if (0..k).any(|i| pivots[(i, i)].abs() < f64::MIN_POSITIVE || !pivots[(i, i)].is_finite()) {
             return Err(Singular);

@@ -1,0 +1,164 @@
+//! The parts of a finite-element run, and whole runs: assembly and factorisation on the bonded
+//! pile's meshes, the chamber of mesh 1 with its condensed sand, and the bonded pile on its
+//! coarsest mesh. Wall-clock time.
+#![allow(clippy::expect_used, reason = "a bench stops at the first fault")]
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use host::assembly::System;
+use host::case::{Axis, Case};
+use host::error::Place;
+use host::group::Group;
+use host::model::Model;
+use host::plugin::Operator;
+use host::run::{Observer, run};
+use host::solver::LinearSolver;
+use std::path::Path;
+
+fn main() {
+    divan::main();
+}
+
+/// A case of the repository.
+fn case(name: &str, variant: Option<&str>) -> Case {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases");
+    let mut cases = Case::load(&folder.join(name)).expect("the case is there");
+    cases.retain(|case| case.variant.as_deref() == variant);
+    cases.pop().expect("the variant is there")
+}
+
+/// The equations of the bonded pile's phase, with the tangents of its start.
+struct Equations {
+    groups: Vec<Group>,
+    system: System,
+}
+
+impl Equations {
+    fn new(mesh: &str) -> Self {
+        let case = case("bonded_pile", Some(mesh));
+        let mut model = Model::build(&case).expect("the laws are built");
+        let n_dofs = 2 * model.mesh.nodes.len();
+        let mut prescribed = vec![false; n_dofs];
+        let supports = case.file.supports.iter();
+        let supports = supports.map(|s| (s.line.get_ref().as_str(), s.fixed.as_slice()));
+        for (line, fixed) in supports.chain([("pile_head", &[Axis::Y][..])]) {
+            for node in &model.mesh.lines[line].nodes {
+                for axis in fixed {
+                    prescribed[2 * node + usize::from(*axis == Axis::Y)] = true;
+                }
+            }
+        }
+        let still = vec![0.0; n_dofs];
+        for group in &mut model.groups {
+            let evaluated = group.evaluate(&still, Operator::Consistent, 0.0, 1.0);
+            evaluated.expect("the law starts");
+        }
+        let system = System::new(&model.groups, |_| true, &prescribed, &model.ties, None);
+        Self {
+            groups: model.groups,
+            system,
+        }
+    }
+
+    fn matrix(&self) -> Vec<f64> {
+        let mut values = Vec::new();
+        self.system.assemble(&self.groups, &mut values);
+        values
+    }
+}
+
+/// All element matrices, added up.
+#[divan::bench(args = ["m2k"])]
+fn assembly(bencher: Bencher<'_, '_>, mesh: &str) {
+    let equations = Equations::new(mesh);
+    let mut values = Vec::new();
+    bencher
+        .counter(ItemsCount::new(equations.system.n_equations()))
+        .bench_local(|| equations.system.assemble(&equations.groups, &mut values));
+}
+
+/// Order and supernodes of a pattern.
+#[divan::bench(args = ["m2k", "m5k"], sample_size = 1, sample_count = 20)]
+fn analysis(bencher: Bencher<'_, '_>, mesh: &str) {
+    let pattern = Equations::new(mesh).system.pattern;
+    bencher
+        .counter(ItemsCount::new(pattern.n()))
+        .bench_local(|| LinearSolver::new(&pattern, false).is_ok());
+}
+
+fn factorise(bencher: Bencher<'_, '_>, mesh: &str, symmetric: bool) {
+    let equations = Equations::new(mesh);
+    let pattern = &equations.system.pattern;
+    let mut solver = LinearSolver::new(pattern, symmetric).expect("the pattern is sound");
+    let values = equations.matrix();
+    bencher
+        .counter(ItemsCount::new(pattern.n()))
+        .bench_local(|| solver.factorise(&values).expect("the matrix is regular"));
+    assert_eq!(solver.fallbacks, 0, "the fast method did the work");
+}
+
+/// L Lᵀ.
+#[divan::bench(args = ["m2k", "m5k"], sample_size = 1, sample_count = 20)]
+fn symmetric(bencher: Bencher<'_, '_>, mesh: &str) {
+    factorise(bencher, mesh, true);
+}
+
+/// L U.
+#[divan::bench(args = ["m2k", "m5k"], sample_size = 1, sample_count = 20)]
+fn unsymmetric(bencher: Bencher<'_, '_>, mesh: &str) {
+    factorise(bencher, mesh, false);
+}
+
+/// One right-hand side, with the check of the solution.
+#[divan::bench(args = ["m2k", "m5k"], sample_size = 1, sample_count = 20)]
+fn solution(bencher: Bencher<'_, '_>, mesh: &str) {
+    let equations = Equations::new(mesh);
+    let pattern = &equations.system.pattern;
+    let mut solver = LinearSolver::new(pattern, false).expect("the pattern is sound");
+    let factorised = solver.factorise(&equations.matrix());
+    factorised.expect("the matrix is regular");
+    let right = vec![1.0; pattern.n()];
+    bencher
+        .counter(ItemsCount::new(pattern.n()))
+        .bench_local(|| solver.solve(&right).expect("the matrix is regular"));
+}
+
+/// Counts the increments of a run.
+#[derive(Default)]
+struct Increments(usize);
+
+impl Observer for Increments {
+    fn phase(&mut self, _: &str, _: usize) {}
+
+    fn increment(&mut self, _: &Place, _: usize, _: usize) {
+        self.0 += 1;
+    }
+
+    fn cut_back(&mut self, _: &Place, _: &str) {}
+
+    fn warning(&mut self, _: &str) {}
+}
+
+/// A whole run with its results, without their report; items are increments. The chamber's are one
+/// of confinement and 50 of loading.
+fn whole(bencher: Bencher<'_, '_>, case: &Case) {
+    let results = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("bench_{}", case.name()));
+    let mut count = Increments::default();
+    run(case, &results, &mut count).expect("the case runs");
+    bencher
+        .counter(ItemsCount::new(count.0))
+        .bench_local(|| run(case, &results, &mut Increments::default()).is_ok());
+    std::fs::remove_dir_all(&results).expect("the results are ours");
+}
+
+/// Elastic sand, condensed, and the interface law MEPI.
+#[divan::bench(sample_size = 1, sample_count = 20)]
+fn chamber_mesh1(bencher: Bencher<'_, '_>) {
+    whole(bencher, &case("chamber_mesh1", None));
+}
+
+/// Mohr–Coulomb soil: every equation in every iteration.
+#[divan::bench(sample_size = 1, sample_count = 20)]
+fn bonded_pile_m200(bencher: Bencher<'_, '_>) {
+    whole(bencher, &case("bonded_pile", Some("m200")));
+}
