@@ -293,3 +293,36 @@ fn one_variant_alone_is_not_compared() {
     let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
     assert!(!report.contains("<title>Comparison"));
 }
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    // Large enough to be shared: 2016 elements of Mohr–Coulomb soil.
+    let case =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/bonded_pile/case.toml");
+    let text = format!(
+        "base = {case:?}\n[output]\npoints = \"phases\"\n[[phase]]\nname = \"push\"\nincrements = 3\n\
+         displacement = [{{ line = \"pile_head\", z = -0.00015 }}]\n"
+    );
+    let place = Place::new();
+    place.write("case.toml", &text);
+    let results = ["1", "2", "3"].map(|threads| {
+        let outcome = place.run(&[
+            "run",
+            "case.toml",
+            "--variant",
+            "m2k",
+            "--threads",
+            threads,
+            "--out",
+            threads,
+        ]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        ["history.csv", "points.csv"]
+            .map(|name| std::fs::read(place.path(threads).join(name)).unwrap())
+    });
+    assert!(results[0][1].len() > 1_000_000);
+    assert!(results.iter().all(|files| *files == results[0]));
+    let outcome = place.run(&["run", "case.toml", "--threads", "0"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    assert!(outcome.says("--threads"), "{}", outcome.stderr);
+}

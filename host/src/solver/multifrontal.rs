@@ -922,7 +922,9 @@ mod tests {
         let (pattern, mut values, _) = grid(5, 0.0);
         let none = vec![false; pattern.n()];
         let mut cholesky = Multifrontal::new(&pattern, Kind::Symmetric, &none, None).unwrap();
-        values.iter_mut().for_each(|value| *value = -*value);
+        for value in &mut values {
+            *value = -*value;
+        }
         assert_eq!(cholesky.factorise(&values), Err(Singular));
         let mut lu = Multifrontal::new(&pattern, Kind::Unsymmetric, &none, None).unwrap();
         assert_eq!(lu.factorise(&vec![0.0; values.len()]), Err(Singular));

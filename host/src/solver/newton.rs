@@ -56,6 +56,15 @@ impl Loads {
             .collect()
     }
 
+    /// Increments of prescribed displacements between two load factors, by degree of freedom.
+    fn prescribed_increments(&self, from: f64, to: f64) -> Vec<f64> {
+        let mut increments = vec![0.0; self.force_start.len()];
+        for &(dof, start, end) in &self.prescribed {
+            increments[dof] = Self::value(start, end, to) - Self::value(start, end, from);
+        }
+        increments
+    }
+
     /// Value of a prescribed displacement; exact at both ends.
     fn value(start: f64, end: f64, lambda: f64) -> f64 {
         if lambda >= 1.0 {
@@ -255,11 +264,7 @@ impl<'a> Newton<'a> {
         iterations: &mut Vec<Iteration>,
     ) -> Result<StepSuccess, StepFailure> {
         let external = loads.external(lambda_end);
-        let mut prescribed = vec![0.0; external.len()];
-        for &(dof, start, end) in &loads.prescribed {
-            prescribed[dof] =
-                Loads::value(start, end, lambda_end) - Loads::value(start, end, lambda_start);
-        }
+        let prescribed = loads.prescribed_increments(lambda_start, lambda_end);
         let task = Task {
             external: &external,
             prescribed: &prescribed,
@@ -298,14 +303,7 @@ impl<'a> Newton<'a> {
         let mut first = 0;
         loop {
             let last = iterations[iterations.len() - 1];
-            let tolerance = self.settings.force_tolerance;
-            let small_correction = last.step_length >= 1.0
-                && last.viscosity <= 0.0
-                && last
-                    .correction
-                    .is_some_and(|c| c <= self.settings.displacement_tolerance);
-            let small_residual = balance.relative <= tolerance;
-            if balance.relative <= EXACT * tolerance || (small_residual && small_correction) {
+            if self.is_equilibrium(&balance, &last) {
                 return Ok(StepSuccess {
                     increment,
                     iterations: std::mem::take(iterations),
@@ -379,6 +377,18 @@ impl<'a> Newton<'a> {
         let tolerance = self.settings.force_tolerance;
         expected <= EXACT * tolerance
             || (expected <= tolerance && correction <= self.settings.displacement_tolerance)
+    }
+
+    /// Whether an iteration has ended in equilibrium.
+    fn is_equilibrium(&self, balance: &Balance, last: &Iteration) -> bool {
+        let tolerance = self.settings.force_tolerance;
+        let small_correction = last.step_length >= 1.0
+            && last.viscosity <= 0.0
+            && last
+                .correction
+                .is_some_and(|c| c <= self.settings.displacement_tolerance);
+        let small_residual = balance.relative <= tolerance;
+        balance.relative <= EXACT * tolerance || (small_residual && small_correction)
     }
 
     /// What is said of iterations that have come to their end.
