@@ -21,9 +21,9 @@ fn chamber(case: &str, variants: &str) -> Vec<Case> {
         .join("../cases")
         .join(case);
     let text = format!(
-        "base = {:?}\n[output]\nprofile = \"never\"\nfields = \"never\"\n[[phase]]\nname = \"loading\"\n\
+        "base = \"{}\"\n[output]\nprofile = \"never\"\nfields = \"never\"\n[[phase]]\nname = \"loading\"\n\
          increments = 10\ndisplacement = [{{ line = \"pile_head\", z = -0.001 }}]\n{variants}",
-        base.join("case.toml")
+        base.join("case.toml").display()
     );
     let file = folder.path().join("case.toml");
     std::fs::write(&file, text).unwrap();
