@@ -40,6 +40,26 @@ fn refinement_changes_the_shaft_little_and_the_toe_more() {
 }
 
 #[test]
+fn refined_by_2_4_and_8_the_loads_converge() {
+    let runs = ["mesh_1", "mesh_1_by_2", "mesh_1_by_4", "mesh_1_by_8"].map(|v| finished(CASE, v));
+    assert_eq!(runs[3].summary["mesh"]["nodes"], 33_739);
+    let steps = |probe| -> Vec<f64> {
+        let ends: Vec<f64> = runs.iter().map(|run| run.end("loading", probe)).collect();
+        ends.windows(2).map(|pair| pair[0] - pair[1]).collect()
+    };
+    // The singular corner slows the loads down, it does not stop them.
+    for probe in ["q_t", "q_p"] {
+        let [first, second, third] = steps(probe)[..] else {
+            panic!("three refinements")
+        };
+        assert!(first > 0.0 && second > 0.0 && third > 0.0);
+        assert!(second < 0.5 * first && third < 0.65 * second, "{probe}");
+    }
+    let last = steps("tau_shaft")[2] / runs[3].end("loading", "tau_shaft");
+    assert!(last.abs() < 1e-3, "{last}");
+}
+
+#[test]
 fn a_soft_element_relieves_the_toe_and_nothing_else() {
     let [stiff, soft] = ["stiff_end", "soft_end"].map(|v| finished(CASE, v));
     let ratio = |probe| soft.end("loading", probe) / stiff.end("loading", probe);
