@@ -12,7 +12,7 @@ use host::group::Group;
 use host::model::Model;
 use host::plugin::Operator;
 use host::run::{Observer, run};
-use host::solver::LinearSolver;
+use host::solver::{LinearSolver, mesh_lines};
 use std::path::Path;
 
 fn main() {
@@ -31,6 +31,8 @@ fn case(name: &str, variant: Option<&str>) -> Case {
 struct Equations {
     groups: Vec<Group>,
     system: System,
+    /// Mesh lines of the unknowns.
+    lines: Vec<[u32; 2]>,
 }
 
 impl Equations {
@@ -55,9 +57,15 @@ impl Equations {
         }
         let system = System::new(&model.groups, |_| true, &prescribed, &model.ties, None);
         Self {
+            lines: system.lines(&mesh_lines(&model.mesh.nodes)),
             groups: model.groups,
             system,
         }
+    }
+
+    fn solver(&self, symmetric: bool) -> LinearSolver {
+        let solver = LinearSolver::new(&self.system.pattern, symmetric, Some(&self.lines));
+        solver.expect("the pattern is sound")
     }
 
     fn matrix(&self) -> Vec<f64> {
@@ -80,16 +88,16 @@ fn assembly(bencher: Bencher<'_, '_>, mesh: &str) {
 /// Order and supernodes of a pattern.
 #[divan::bench(args = ["m2k", "m5k"], sample_size = 1, sample_count = 20)]
 fn analysis(bencher: Bencher<'_, '_>, mesh: &str) {
-    let pattern = Equations::new(mesh).system.pattern;
+    let equations = Equations::new(mesh);
     bencher
-        .counter(ItemsCount::new(pattern.n()))
-        .bench_local(|| LinearSolver::new(&pattern, false).is_ok());
+        .counter(ItemsCount::new(equations.system.n_equations()))
+        .bench_local(|| equations.solver(false));
 }
 
 fn factorise(bencher: Bencher<'_, '_>, mesh: &str, symmetric: bool) {
     let equations = Equations::new(mesh);
     let pattern = &equations.system.pattern;
-    let mut solver = LinearSolver::new(pattern, symmetric).expect("the pattern is sound");
+    let mut solver = equations.solver(symmetric);
     let values = equations.matrix();
     bencher
         .counter(ItemsCount::new(pattern.n()))
@@ -114,7 +122,7 @@ fn unsymmetric(bencher: Bencher<'_, '_>, mesh: &str) {
 fn solution(bencher: Bencher<'_, '_>, mesh: &str) {
     let equations = Equations::new(mesh);
     let pattern = &equations.system.pattern;
-    let mut solver = LinearSolver::new(pattern, false).expect("the pattern is sound");
+    let mut solver = equations.solver(false);
     let factorised = solver.factorise(&equations.matrix());
     factorised.expect("the matrix is regular");
     let right = vec![1.0; pattern.n()];
