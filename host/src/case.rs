@@ -583,17 +583,6 @@ pub enum Equations {
     Sparse,
 }
 
-impl Equations {
-    /// Name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Condensed => "condensed",
-            Self::Sparse => "sparse",
-        }
-    }
-}
-
 /// A tolerance: not below what double precision reaches, and not above the quantity itself.
 fn tolerance<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
     within(f64::deserialize(input)?, 1e-14, 1.0)

@@ -3,6 +3,7 @@
 //! The host knows no law. It sees stresses that are zero in one iterate and not in the next, and
 //! tangents that change although the displacements hardly do.
 
+use super::newton::norm;
 use crate::case::Formulation;
 use crate::group::Group;
 
@@ -123,8 +124,4 @@ pub(super) fn compare(groups: &[Group], before: &Snapshot) -> Option<String> {
         point % per_element + 1,
         group.law.built.law.description().id,
     ))
-}
-
-fn norm(v: &[f64]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

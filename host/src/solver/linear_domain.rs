@@ -102,7 +102,7 @@ pub struct LinearDomain {
     moved: Vec<f64>,
 }
 
-/// Whether groups are linear enough, and large enough beside the others, for condensation to pay.
+/// Whether condensation pays: the linear part is the larger one, and its boundary small.
 ///
 /// The dense equations of the boundary must not cost more than the sparse ones they replace.
 fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
@@ -111,7 +111,8 @@ fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
 }
 
 impl LinearDomain {
-    /// Condenses the linear groups of a mesh whose nodes lie on these lines. `None` if there are none, or it does not pay unless `always`.
+    /// Condenses the linear groups of a mesh whose nodes lie on these lines. `None` if there are
+    /// none, or if it does not pay and is not wanted `always`.
     ///
     /// # Errors
     /// [`Singular`] if they are not held where they are not connected to the rest.
@@ -270,8 +271,8 @@ impl LinearDomain {
 
     /// Brings the domain's groups from the last complete state to load factor λ and to where the
     /// boundary is, and makes that the last complete state. Returns their internal forces, by
-    /// degree of freedom. `increment` holds the displacements
-    /// since then, by degree of freedom; those of the unknowns are filled in here.
+    /// degree of freedom. `increment` holds the displacements since then, by degree of freedom;
+    /// those of the unknowns are filled in here.
     ///
     /// # Errors
     /// Why the groups are not in equilibrium.
