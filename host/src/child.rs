@@ -1,0 +1,333 @@
+//! Work that may crash, hang or eat all memory runs in a child process: this program again, with a
+//! hidden command. The child's death is an outcome like any other.
+
+use std::ffi::OsString;
+use std::io::{self, Read};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Tells the child its limit of memory, in bytes.
+const MEMORY: &str = "PILUM_CHILD_MEMORY";
+/// Most bytes that are kept of each of the two outputs; the rest is read and dropped.
+const MOST_OUTPUT: usize = 1 << 20;
+/// How long outputs are waited for once the child has ended: only what it has left behind can
+/// still hold them open.
+const LAST_WORDS: Duration = Duration::from_millis(200);
+
+/// What a child is to do, and within which limits.
+#[derive(Clone, Debug)]
+pub struct Work {
+    /// Arguments of this program: the hidden command and its own arguments.
+    pub arguments: Vec<OsString>,
+    /// Working directory; this process's if left out.
+    pub folder: Option<PathBuf>,
+    /// The child is killed after this time.
+    pub time: Duration,
+    /// Most address space, in bytes. Kept by [`enter`], on Unix only.
+    pub memory: Option<u64>,
+}
+
+/// How a child ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// By itself, with this code.
+    Exited(i32),
+    /// By a signal, its own fault or from outside.
+    Signal(i32),
+    /// It was killed when its time was over.
+    TimedOut,
+}
+
+/// What became of a child.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// How it ended.
+    pub ending: Ending,
+    /// What it wrote to its standard output, the first mebibyte.
+    pub stdout: Vec<u8>,
+    /// What it wrote to its error stream, the first mebibyte.
+    pub stderr: Vec<u8>,
+}
+
+impl std::fmt::Display for Ending {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Self::Exited(code) => write!(f, "exit code {code}"),
+            Self::Signal(number) => match signal_name(number) {
+                Some(name) => write!(f, "signal {number} ({name})"),
+                None => write!(f, "signal {number}"),
+            },
+            Self::TimedOut => f.write_str("killed when its time was over"),
+        }
+    }
+}
+
+/// Names of the signals that end a process by its own fault, by the numbers they have everywhere,
+/// and of those whose numbers differ on Linux.
+fn signal_name(number: i32) -> Option<&'static str> {
+    Some(match number {
+        4 => "illegal instruction",
+        5 => "trap",
+        6 => "aborted",
+        7 if cfg!(target_os = "linux") => "bus error",
+        8 => "arithmetic exception",
+        9 => "killed",
+        11 => "segmentation fault",
+        15 => "terminated",
+        31 if cfg!(target_os = "linux") => "forbidden system call",
+        _ => return None,
+    })
+}
+
+/// Runs this program once more and waits for its end. It has no input, and is gone with all
+/// processes of its group when this function returns.
+///
+/// # Errors
+/// The child cannot be started or waited for.
+pub fn run(work: &Work) -> io::Result<Outcome> {
+    let mut command = Command::new(std::env::current_exe()?);
+    command
+        .args(&work.arguments)
+        .env_remove(MEMORY)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    if let Some(folder) = &work.folder {
+        command.current_dir(folder);
+    }
+    if let Some(bytes) = work.memory {
+        command.env(MEMORY, bytes.to_string());
+    }
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    let mut child = command.spawn()?;
+    let stdout = collect(child.stdout.take());
+    let stderr = collect(child.stderr.take());
+    let status = wait(&mut child, work.time);
+    // Whatever the child has started would keep its outputs open.
+    kill_group(&mut child);
+    let ending = if let Some(status) = status? {
+        ending(status)
+    } else {
+        child.wait()?;
+        Ending::TimedOut
+    };
+    Ok(Outcome {
+        ending,
+        stdout: last_words(&stdout),
+        stderr: last_words(&stderr),
+    })
+}
+
+/// The child's status, or none if it still runs after this time.
+fn wait(child: &mut Child, time: Duration) -> io::Result<Option<ExitStatus>> {
+    let start = Instant::now();
+    let mut pause = Duration::from_micros(500);
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        let left = time.saturating_sub(start.elapsed());
+        if left.is_zero() {
+            return Ok(None);
+        }
+        std::thread::sleep(pause.min(left));
+        pause = (2 * pause).min(Duration::from_millis(10));
+    }
+}
+
+/// Kills the child, if it still runs, and what it has started. Failures mean that there is nothing
+/// left to kill.
+fn kill_group(child: &mut Child) {
+    #[cfg(unix)]
+    {
+        use rustix::process::{Pid, Signal, kill_process_group};
+        if let Some(group) = Pid::from_raw(child.id() as i32) {
+            let _ = kill_process_group(group, Signal::KILL);
+        }
+    }
+    let _ = child.kill();
+}
+
+/// Reads to the end in a thread of its own, since a full pipe would stop the child.
+fn collect(source: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        let Some(mut source) = source else { return };
+        let mut left = MOST_OUTPUT;
+        let mut chunk = [0; 4096];
+        while let Ok(n @ 1..) = source.read(&mut chunk) {
+            let kept = n.min(left);
+            left -= kept;
+            if kept > 0 && sender.send(chunk[..kept].to_vec()).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+/// All that was read.
+fn last_words(pieces: &Receiver<Vec<u8>>) -> Vec<u8> {
+    let until = Instant::now() + LAST_WORDS;
+    let mut all = Vec::new();
+    loop {
+        match pieces.recv_timeout(until.saturating_duration_since(Instant::now())) {
+            Ok(piece) => all.extend(piece),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return all,
+        }
+    }
+}
+
+#[cfg(unix)]
+fn ending(status: ExitStatus) -> Ending {
+    use std::os::unix::process::ExitStatusExt;
+    match (status.code(), status.signal()) {
+        (Some(code), _) => Ending::Exited(code),
+        (None, signal) => Ending::Signal(signal.unwrap_or(0)),
+    }
+}
+
+#[cfg(not(unix))]
+fn ending(status: ExitStatus) -> Ending {
+    Ending::Exited(status.code().unwrap_or(-1))
+}
+
+/// The first thing a hidden command does: keeps the limits it was started with, leaves no core
+/// file, and dies with its parent.
+///
+/// # Errors
+/// A limit cannot be set.
+pub fn enter() -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        use rustix::process::{Resource, Rlimit, setrlimit};
+        let limit = |bytes| Rlimit {
+            current: Some(bytes),
+            maximum: Some(bytes),
+        };
+        setrlimit(Resource::Core, limit(0))?;
+        let memory = std::env::var(MEMORY)
+            .ok()
+            .and_then(|text| text.parse().ok());
+        if let Some(bytes) = memory {
+            setrlimit(Resource::As, limit(bytes))?;
+        }
+    }
+    #[cfg(target_os = "linux")]
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs one of the tests below that is left out unless it is asked for by name.
+    fn run_test(name: &str, seconds: u64, memory: Option<u64>) -> Outcome {
+        let name = format!("child::tests::{name}");
+        run(&Work {
+            arguments: [&name, "--exact", "--ignored", "--nocapture"]
+                .map(OsString::from)
+                .to_vec(),
+            folder: None,
+            time: Duration::from_secs(seconds),
+            memory,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn an_end_by_itself_has_a_code_and_outputs() {
+        let outcome = run_test("prints", 60, None);
+        assert_eq!(outcome.ending, Ending::Exited(0));
+        let stdout = String::from_utf8(outcome.stdout).unwrap();
+        assert!(stdout.contains("to the output"), "{stdout}");
+        assert_eq!(outcome.stderr, b"to the error stream\n");
+    }
+
+    #[test]
+    #[ignore = "work for a child"]
+    fn prints() {
+        println!("to the output");
+        eprintln!("to the error stream");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn an_abort_is_a_signal() {
+        let ending = run_test("aborts", 60, None).ending;
+        assert_eq!(ending, Ending::Signal(6));
+        assert_eq!(ending.to_string(), "signal 6 (aborted)");
+    }
+
+    #[test]
+    #[ignore = "work for a child"]
+    fn aborts() {
+        std::process::abort();
+    }
+
+    /// What the child has started holds its output open; it must not keep the parent.
+    #[test]
+    #[cfg(unix)]
+    fn a_hanging_child_is_killed_with_what_it_started() {
+        let start = Instant::now();
+        let outcome = run_test("hangs", 1, None);
+        assert_eq!(outcome.ending, Ending::TimedOut);
+        assert!(start.elapsed() < Duration::from_secs(10));
+        let stdout = String::from_utf8(outcome.stdout).unwrap();
+        let grandchild = stdout
+            .lines()
+            .find_map(|line| line.strip_prefix("started "))
+            .unwrap();
+        let grandchild = rustix::process::Pid::from_raw(grandchild.parse().unwrap()).unwrap();
+        // Whoever inherits it may take a moment to reap it.
+        let gone = (0..100).any(|_| {
+            std::thread::sleep(Duration::from_millis(20));
+            let stat = std::fs::read_to_string(format!("/proc/{grandchild}/stat"));
+            rustix::process::test_kill_process(grandchild).is_err()
+                || stat.is_ok_and(|stat| stat.contains(") Z "))
+        });
+        assert!(gone, "process {grandchild} still runs");
+    }
+
+    #[test]
+    #[ignore = "work for a child"]
+    fn hangs() {
+        let mut sleeps = Command::new("sleep").arg("600").spawn().unwrap();
+        println!("\nstarted {}", sleeps.id());
+        sleeps.wait().unwrap();
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_limit_of_memory_is_kept() {
+        let limited = run_test("allocates", 60, Some(1 << 29));
+        assert!(String::from_utf8_lossy(&limited.stdout).contains("reserved: false"));
+        let free = run_test("allocates", 60, None);
+        assert!(String::from_utf8_lossy(&free.stdout).contains("reserved: true"));
+    }
+
+    #[test]
+    #[ignore = "work for a child"]
+    fn allocates() {
+        enter().unwrap();
+        let reserved = Vec::<u8>::new().try_reserve(1 << 30).is_ok();
+        println!("reserved: {reserved}");
+    }
+
+    #[test]
+    fn outputs_are_kept_up_to_a_bound() {
+        let outcome = run_test("prints_a_lot", 60, None);
+        assert_eq!(outcome.ending, Ending::Exited(0));
+        assert_eq!(outcome.stdout.len(), MOST_OUTPUT);
+    }
+
+    #[test]
+    #[ignore = "work for a child"]
+    fn prints_a_lot() {
+        println!("{}", "x".repeat(2 * MOST_OUTPUT));
+    }
+}
