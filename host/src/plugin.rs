@@ -1,50 +1,99 @@
 //! Laws from shared libraries: finding, opening, building and calling them.
 
 mod description;
+mod image;
 mod library;
 mod search;
+mod trust;
 
 pub use description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };
 pub use library::Strided;
 pub use search::SearchPath;
+pub use trust::Trust;
 
 use crate::error::Error;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use abi::status::Outcome;
+use image::Image;
 use library::{Call, LawHandle, OwnedInstance};
 use sha2::{Digest, Sha256};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
 
 /// An opened library. It is never unloaded.
 #[derive(Debug)]
 pub struct Library {
     path: PathBuf,
     sha256: String,
+    warnings: Vec<String>,
+    stamp: Option<Stamp>,
     laws: Vec<(LawDescription, LawHandle)>,
 }
 
+/// What changes with a file's contents. Within one process a file with an equal stamp is not
+/// hashed again.
+type Stamp = (u64, SystemTime);
+
+fn stamp(path: &Path) -> Option<Stamp> {
+    let metadata = path.metadata().ok()?;
+    Some((metadata.len(), metadata.modified().ok()?))
+}
+
+/// Libraries opened by this process so far. Equal bytes are opened once, wherever they lie.
+static OPENED: Mutex<Vec<Arc<Library>>> = Mutex::new(Vec::new());
+
 impl Library {
-    /// Opens a library: hash, handshake, description, in this order.
+    /// Opens a library: permissions, hash, handshake, description, in this order.
     ///
     /// # Errors
     /// [`Error::Plugin`] with the path and what is wrong.
     pub fn open(path: &Path) -> Result<Arc<Self>, Error> {
-        let bytes = std::fs::read(path).map_err(|why| {
-            Error::plugin(format!("library {} cannot be read: {why}", path.display()))
-        })?;
-        let sha256 = hexadecimal_sha256(&bytes);
-        let open = library::open(path)
-            .map_err(|why| Error::plugin(format!("library {}: {why}", path.display())))?;
-        Ok(Arc::new(Self {
+        Self::open_if(path, |_| Ok(()))
+    }
+
+    /// Opens a library whose SHA-256 is approved; nothing of it runs before.
+    ///
+    /// # Errors
+    /// As [`Library::open`], and those of `approve`.
+    pub fn open_if(
+        path: &Path,
+        approve: impl Fn(&str) -> Result<(), Error>,
+    ) -> Result<Arc<Self>, Error> {
+        let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+        let stamp = stamp(path);
+        let known = |library: &&Arc<Self>| library.path == path && library.stamp == stamp;
+        if let Some(library) = opened.iter().find(known).filter(|_| stamp.is_some()) {
+            approve(&library.sha256)?;
+            return Ok(Arc::clone(library));
+        }
+        let fault = |why| Error::plugin(format!("library {} {why}", path.display()));
+        let mut image = Image::read(path).map_err(fault)?;
+        approve(&image.sha256)?;
+        let sha256 = image.sha256.clone();
+        let warnings = std::mem::take(&mut image.warnings);
+        let same = opened.iter().find(|library| library.sha256 == sha256);
+        let laws = match same {
+            Some(library) => library.laws.clone(),
+            None => {
+                library::open(path, image)
+                    .map_err(|why| Error::plugin(format!("library {}: {why}", path.display())))?
+                    .laws
+            }
+        };
+        let library = Arc::new(Self {
             path: path.to_owned(),
             sha256,
-            laws: open.laws,
-        }))
+            warnings,
+            stamp,
+            laws,
+        });
+        opened.push(Arc::clone(&library));
+        Ok(library)
     }
 
     /// Where the library was found.
@@ -55,6 +104,11 @@ impl Library {
     /// SHA-256 of the file, in hexadecimal digits.
     pub fn sha256(&self) -> &str {
         &self.sha256
+    }
+
+    /// What the user should know about the file.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Descriptions of its laws.
@@ -77,7 +131,11 @@ impl Library {
 
 /// SHA-256 of some bytes, in hexadecimal digits.
 pub fn hexadecimal_sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes)
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(digest: &[u8]) -> String {
+    digest
         .iter()
         .fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }

@@ -12,6 +12,7 @@
 use super::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };
+use super::image::Image;
 use abi::Hypothesis;
 use abi::raw::{self, Batch, Formulation, Host, Instance, Law, MagicBlock, Parameter, Plugin};
 use abi::raw::{Status, Variable, View, ViewMut};
@@ -47,7 +48,7 @@ struct HostBlock(Host);
 unsafe impl Sync for HostBlock {}
 
 /// The laws of one opened library.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct OpenLibrary {
     pub(super) laws: Vec<(LawDescription, LawHandle)>,
 }
@@ -65,11 +66,12 @@ unsafe impl Send for LawHandle {}
 // SAFETY: as above.
 unsafe impl Sync for LawHandle {}
 
-/// Opens a library, shakes hands and copies its description.
+/// Opens a library, shakes hands and copies its description. It is opened from the bytes that were
+/// hashed where the system allows it.
 ///
 /// # Errors
 /// What is wrong with the library, in words.
-pub(super) fn open(path: &Path) -> Result<OpenLibrary, String> {
+pub(super) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     // `dlerror` is not safe in threads everywhere, so libraries are opened one at a time.
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME
@@ -78,11 +80,7 @@ pub(super) fn open(path: &Path) -> Result<OpenLibrary, String> {
 
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =
-        Box::leak(Box::new(unsafe { load(path) }.map_err(|error| {
-            let why =
-                std::error::Error::source(&error).map_or(String::new(), |why| format!(": {why}"));
-            format!("it cannot be loaded: {error}{why}")
-        })?));
+        Box::leak(Box::new(unsafe { load_image(path, image) }?));
     // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
     let magic = unsafe { library.get::<*const MagicBlock>(b"pilum_magic\0") }
         .map_err(|_| "it has no symbol `pilum_magic`: this is no Pilum law library".to_owned())?;
@@ -105,6 +103,30 @@ pub(super) fn open(path: &Path) -> Result<OpenLibrary, String> {
     let plugin = unsafe { known(plugin, PLUGIN_SIZE_1_0) }
         .ok_or_else(|| "`pilum_plugin` is truncated".to_owned())?;
     describe(&plugin)
+}
+
+/// Loads the hashed bytes. Where that fails (a library that looks for others beside itself, a
+/// system that executes nothing from memory), the file is loaded, if it is still the same: the
+/// loader runs nothing of a library it cannot load.
+///
+/// # Safety
+/// The library's initialisers may be run.
+unsafe fn load_image(path: &Path, image: Image) -> Result<libloading::Library, String> {
+    if let Some(sealed) = image.sealed_path() {
+        // SAFETY: passed on to the caller.
+        if let Ok(library) = unsafe { load(&sealed) } {
+            image.keep();
+            return Ok(library);
+        }
+        if !image.is_current() {
+            return Err("it was changed while it was opened".to_owned());
+        }
+    }
+    // SAFETY: passed on to the caller.
+    unsafe { load(path) }.map_err(|error| {
+        let why = std::error::Error::source(&error).map_or(String::new(), |why| format!(": {why}"));
+        format!("it cannot be loaded: {error}{why}")
+    })
 }
 
 #[cfg(unix)]

@@ -1,0 +1,116 @@
+//! The bytes of a library, read once: what is hashed is what is opened.
+//!
+//! On Linux they are copied into a sealed file in memory while they are hashed, so that nobody can
+//! change them in between. Elsewhere, and with `PILUM_LOAD_IN_PLACE=1` (for debuggers and
+//! profilers, which look for the file), the file itself is opened after it was hashed.
+
+use super::trust;
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Bytes that are read, hashed and copied at a time: they stay in the processor's cache.
+const PIECE: usize = 1 << 17;
+
+/// A library's bytes.
+#[derive(Debug)]
+pub(super) struct Image {
+    /// SHA-256 in hexadecimal digits.
+    pub(super) sha256: String,
+    /// What the user should know about the file's permissions.
+    pub(super) warnings: Vec<String>,
+    path: PathBuf,
+    #[cfg(target_os = "linux")]
+    sealed: Option<std::os::fd::OwnedFd>,
+}
+
+impl Image {
+    /// Reads and hashes a file that not everybody may change.
+    ///
+    /// # Errors
+    /// What is wrong with the file, in words.
+    pub(super) fn read(path: &Path) -> Result<Self, String> {
+        let unreadable = |why: io::Error| format!("cannot be read: {why}");
+        let warnings = trust::check_permissions(path)?;
+        let mut file = File::open(path).map_err(unreadable)?;
+        #[cfg(target_os = "linux")]
+        let mut memory = memory_file();
+        #[cfg(not(target_os = "linux"))]
+        let mut memory: Option<File> = None;
+        let mut hash = Sha256::new();
+        let mut piece = vec![0; PIECE];
+        loop {
+            let n = match file.read(&mut piece) {
+                Ok(0) => break,
+                Ok(n) => n,
+                Err(why) if why.kind() == io::ErrorKind::Interrupted => continue,
+                Err(why) => return Err(unreadable(why)),
+            };
+            hash.update(&piece[..n]);
+            if memory
+                .as_mut()
+                .is_some_and(|memory| memory.write_all(&piece[..n]).is_err())
+            {
+                memory = None;
+            }
+        }
+        Ok(Self {
+            sha256: super::hexadecimal(&hash.finalize()),
+            warnings,
+            path: path.to_owned(),
+            #[cfg(target_os = "linux")]
+            sealed: memory.and_then(seal),
+        })
+    }
+
+    /// The path that stands for the very bytes that were hashed. The image must not be dropped
+    /// while the path is in use.
+    pub(super) fn sealed_path(&self) -> Option<PathBuf> {
+        #[cfg(target_os = "linux")]
+        {
+            use std::os::fd::AsRawFd;
+            self.sealed
+                .as_ref()
+                .map(|file| PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd())))
+        }
+        #[cfg(not(target_os = "linux"))]
+        None
+    }
+
+    /// Whether the file still has the bytes that were hashed.
+    pub(super) fn is_current(&self) -> bool {
+        Self::read(&self.path).is_ok_and(|again| again.sha256 == self.sha256)
+    }
+
+    /// Keeps the memory for as long as the process lives: a library opened from it is never
+    /// unloaded, and the loader knows it by the path of its descriptor, which must not become
+    /// another file's.
+    pub(super) fn keep(self) {
+        #[cfg(target_os = "linux")]
+        std::mem::forget(self.sealed);
+    }
+}
+
+/// An empty file in memory that may be sealed and executed; `None` where the system has none.
+#[cfg(target_os = "linux")]
+fn memory_file() -> Option<File> {
+    use rustix::fs::{MemfdFlags, memfd_create};
+    if std::env::var_os("PILUM_LOAD_IN_PLACE").is_some_and(|value| value != "0") {
+        return None;
+    }
+    let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
+    // Kernels before 6.3 do not know the flag, and need none.
+    memfd_create("pilum_law", flags | MemfdFlags::EXEC)
+        .or_else(|_| memfd_create("pilum_law", flags))
+        .ok()
+        .map(File::from)
+}
+
+#[cfg(target_os = "linux")]
+fn seal(memory: File) -> Option<std::os::fd::OwnedFd> {
+    use rustix::fs::{SealFlags, fcntl_add_seals};
+    let seals = SealFlags::SEAL | SealFlags::SHRINK | SealFlags::GROW | SealFlags::WRITE;
+    fcntl_add_seals(&memory, seals).ok()?;
+    Some(memory.into())
+}
