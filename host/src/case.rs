@@ -243,6 +243,8 @@ pub enum Coordinate {
 pub struct LawInput {
     /// Id of the law.
     pub law: Spanned<String>,
+    /// SHA-256 that its library must have, in hexadecimal digits.
+    pub sha256: Option<Spanned<String>>,
     /// Its parameters.
     #[serde(default)]
     pub parameters: ParameterTable,

@@ -141,7 +141,7 @@ pub fn build_law(
             .into());
     }
     let mut used = Vec::new();
-    let mut warnings = Vec::new();
+    let mut warnings = loaded.library().warnings().to_vec();
     refuse_unknown(source, description, parameters)?;
     for declared in &description.parameters {
         let given = parameters
@@ -219,7 +219,7 @@ pub fn build_law(
 }
 
 /// Finds a law; a missing one is reported with its place in the file.
-fn find_law(
+pub(crate) fn find_law(
     source: &Source,
     search: &SearchPath,
     id: &Spanned<String>,

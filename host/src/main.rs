@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand};
 use host::case::Case;
 use host::error::{Error, Place, suggestion};
 use host::output::{Figures, remove_comparison};
-use host::plugin::SearchPath;
+use host::plugin::{SearchPath, Trust, vetting};
 use host::run::{Observer, check, run_reusing};
 use host::solver::Reuse;
 use host::trade_off;
@@ -22,6 +22,9 @@ use std::process::ExitCode;
 #[derive(Parser)]
 #[command(name = "pilum", version, max_term_width = 100)]
 struct Arguments {
+    /// Open libraries that are not known yet without trying them in a child process first.
+    #[arg(long, global = true)]
+    no_probe: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -87,6 +90,22 @@ enum Command {
         /// Id of a law.
         id: Option<String>,
     },
+    /// Read what a library is and needs, without executing it.
+    Inspect {
+        /// A library.
+        library: PathBuf,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write the libraries that a case or driver uses, with their SHA-256, to a lock file beside it.
+    Lock {
+        /// A case file, a folder with `case.toml`, or a driver file.
+        input: PathBuf,
+    },
+    /// Try a library: what a child process does.
+    #[command(name = vetting::COMMAND, hide = true)]
+    ProbeLibrary { library: PathBuf, sha256: String },
 }
 
 fn main() -> ExitCode {
@@ -98,6 +117,12 @@ fn main() -> ExitCode {
             return ExitCode::from(u8::from(error.use_stderr()));
         }
     };
+    let is_child = matches!(arguments.command, Command::ProbeLibrary { .. });
+    let trust = Trust {
+        probe: !arguments.no_probe && !is_child,
+        isolate: None,
+    };
+    trust.set();
     let run = || execute(arguments.command);
     // A panic has printed itself; it is a defect of the program, not of the input.
     let outcome =
@@ -161,6 +186,22 @@ fn execute(command: Command) -> Result<(), Error> {
             )
         }
         Command::Laws { id } => show_laws(id.as_deref()),
+        Command::Inspect { library, json } => {
+            let inspection = host::inspect::inspect(&library)?;
+            if json {
+                print!("{}", host::inspect::json(&inspection)?);
+            } else {
+                println!("{inspection}");
+            }
+            Ok(())
+        }
+        Command::Lock { input } => {
+            println!("lock in {}", host::lock::write(&input)?.display());
+            Ok(())
+        }
+        Command::ProbeLibrary { library, sha256 } => {
+            vetting::probe(&library, &sha256, &mut std::io::stdout().lock())
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use crate::element::{Axes, Joint6, Kinematics, Quad8, depth, gauss, line_shape};
 use crate::error::{Error, Source, suggestion};
 use crate::group::{Group, GroupLaw, PointFailure};
 use crate::input::{BuiltLaw, build_law};
+use crate::lock::Pins;
 use crate::mesh::{Mesh, Quad};
 use crate::plugin::{End, Operator, SearchPath, Start, Strided};
 use abi::Hypothesis;
@@ -43,7 +44,9 @@ impl Model {
     pub fn build(case: &Case) -> Result<Self, Error> {
         let Case { source, file, .. } = case;
         let mesh = Mesh::build(source, file)?;
-        let search = SearchPath::new(&case.law_folders()?);
+        let pins = file.laws.values().map(Spanned::get_ref);
+        let pins = Pins::of(source, pins.map(|law| (&law.law, law.sha256.as_ref())))?;
+        let search = SearchPath::new(&case.law_folders()?).pinned(pins);
         let mut library = LawShelf {
             source,
             file,

@@ -5,6 +5,7 @@ mod image;
 mod library;
 mod search;
 mod trust;
+pub mod vetting;
 
 pub use description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
@@ -77,13 +78,15 @@ impl Library {
         let sha256 = image.sha256.clone();
         let warnings = std::mem::take(&mut image.warnings);
         let same = opened.iter().find(|library| library.sha256 == sha256);
-        let laws = match same {
-            Some(library) => library.laws.clone(),
-            None => {
-                library::open(path, image)
-                    .map_err(|why| Error::plugin(format!("library {}: {why}", path.display())))?
-                    .laws
+        let laws = if let Some(library) = same {
+            library.laws.clone()
+        } else {
+            if Trust::current().probe {
+                vetting::vet(path, &sha256)?;
             }
+            library::open(path, image)
+                .map_err(|why| Error::plugin(format!("library {}: {why}", path.display())))?
+                .laws
         };
         let library = Arc::new(Self {
             path: path.to_owned(),
@@ -298,6 +301,11 @@ impl Law {
     /// Library it comes from.
     pub fn library(&self) -> &Library {
         self.loaded.library()
+    }
+
+    /// The law without its parameters.
+    pub fn loaded(&self) -> &LoadedLaw {
+        &self.loaded
     }
 
     /// Number of components of gradient and flux.

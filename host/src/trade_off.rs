@@ -77,7 +77,7 @@ pub fn run(
 }
 
 /// A driver has a path of segments.
-fn is_driver(path: &Path) -> Result<bool, Error> {
+pub(crate) fn is_driver(path: &Path) -> Result<bool, Error> {
     let (_, files) = base::read::<toml::Table>(Source::read(path)?)?;
     let mut tables = files.iter().map(|(_, table)| table);
     Ok(tables.any(|table| table.contains_key("hypothesis") || table.contains_key("segment")))

@@ -164,6 +164,7 @@ impl Place {
             .args(arguments)
             .current_dir(self.folder.path())
             .env("PILUM_LAW_PATH", deps)
+            .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
             .env("NO_COLOR", "1")
             .env_remove("RUST_BACKTRACE");
         command

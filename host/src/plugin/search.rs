@@ -2,7 +2,8 @@
 
 use super::{Library, LoadedLaw};
 use crate::error::{Error, suggestion};
-use object::{Object, ObjectSection};
+use crate::inspect;
+use crate::lock::Pins;
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
@@ -12,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Debug)]
 pub struct SearchPath {
     folders: Vec<PathBuf>,
+    pins: Pins,
     opened: Mutex<BTreeMap<PathBuf, Arc<Library>>>,
 }
 
@@ -37,8 +39,15 @@ impl SearchPath {
         }
         Self {
             folders,
+            pins: Pins::default(),
             opened: Mutex::default(),
         }
+    }
+
+    /// Only libraries that these pins allow.
+    #[must_use]
+    pub fn pinned(self, pins: Pins) -> Self {
+        Self { pins, ..self }
     }
 
     /// The folders, in order.
@@ -73,7 +82,7 @@ impl SearchPath {
                     }
                 }
             };
-            let library = self.open(&path)?;
+            let library = self.open_for(&path, Some(id))?;
             return library.law(id).ok_or_else(|| Error::Plugin {
                 message: format!("library {} has no law `{id}`", path.display()),
                 hint: Some(suggestion(
@@ -112,11 +121,17 @@ impl SearchPath {
     /// # Errors
     /// As [`Library::open`].
     pub fn open(&self, path: &Path) -> Result<Arc<Library>, Error> {
+        self.open_for(path, None)
+    }
+
+    fn open_for(&self, path: &Path, law: Option<&str>) -> Result<Arc<Library>, Error> {
+        let approve = |sha256: &str| law.map_or(Ok(()), |id| self.pins.check(id, path, sha256));
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(library) = opened.get(path) {
+            approve(library.sha256())?;
             return Ok(Arc::clone(library));
         }
-        let library = Library::open(path)?;
+        let library = Library::open_if(path, approve)?;
         opened.insert(path.to_owned(), Arc::clone(&library));
         Ok(library)
     }
@@ -151,19 +166,11 @@ fn manifests(folder: &Path) -> Vec<(PathBuf, Vec<String>)> {
         .collect()
 }
 
-/// Ids in the manifest section of a library.
+/// Ids in the manifest section of a library. Only the parts of the file that are needed are read.
 fn manifest(path: &Path) -> Option<Vec<String>> {
-    let bytes = std::fs::read(path).ok()?;
-    let file = object::File::parse(&*bytes).ok()?;
-    let section = file
-        .section_by_name(".pilum")
-        .or_else(|| file.section_by_name("__pilum"))?;
-    let text = std::str::from_utf8(section.data().ok()?).ok()?;
-    let mut lines = text.trim_end_matches('\0').lines();
-    (lines.next()? == "pilum 1").then(|| {
-        lines
-            .filter_map(|line| line.split_whitespace().next())
-            .map(str::to_owned)
-            .collect()
-    })
+    let file = std::fs::File::open(path).ok()?;
+    let cache = object::ReadCache::new(file);
+    let file = object::File::parse(&cache).ok()?;
+    let laws = inspect::manifest(&file)?;
+    Some(laws.into_iter().map(|law| law.id).collect())
 }

@@ -4,6 +4,7 @@ use super::{N_MAX, Vector};
 use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
 use crate::input::{self, Named, ParameterTable, ParameterValue};
+use crate::lock::Pins;
 use crate::plugin::{Law, SearchPath, Strided};
 use abi::Hypothesis;
 use abi::status::Outcome;
@@ -20,6 +21,7 @@ const MAX_INCREMENTS: usize = 100_000_000;
 #[serde(deny_unknown_fields)]
 struct File {
     law: Spanned<String>,
+    sha256: Option<Spanned<String>>,
     #[serde(default)]
     title: String,
     #[serde(default)]
@@ -112,7 +114,12 @@ impl Driver {
     /// # Errors
     /// [`Error::Unreadable`], and those of [`Driver::from_source`].
     pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
-        Self::variants(Source::read(path)?)
+        Self::variants(Source::read(path)?, true)
+    }
+
+    /// As [`Driver::read`], whatever the lock beside the file says.
+    pub(crate) fn read_unlocked(path: &Path) -> Result<Vec<Self>, Error> {
+        Self::variants(Source::read(path)?, false)
     }
 
     /// Takes the text of a driver file without variants and builds its law.
@@ -121,20 +128,25 @@ impl Driver {
     /// [`Error::Input`] at the place that does not fit; [`Error::Plugin`] if the law is not found
     /// or its library is defective; [`Error::Usage`] if the file has variants.
     pub fn from_source(source: &Source) -> Result<Self, Error> {
-        let mut drivers = Self::variants(source.clone())?;
+        let mut drivers = Self::variants(source.clone(), true)?;
         match (drivers.pop(), drivers.is_empty()) {
             (Some(driver), true) => Ok(driver),
             _ => Err(Error::Usage("the driver has several variants".to_owned())),
         }
     }
 
-    fn variants(source: Source) -> Result<Vec<Self>, Error> {
+    fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
         let (source, files) = base::read(source)?;
-        let driver = |(variant, file)| Self::build(&source, variant, file);
+        let driver = |(variant, file)| Self::build(&source, variant, file, locked);
         files.into_iter().map(driver).collect()
     }
 
-    fn build(source: &Source, variant: Option<String>, file: File) -> Result<Self, Error> {
+    fn build(
+        source: &Source,
+        variant: Option<String>,
+        file: File,
+        locked: bool,
+    ) -> Result<Self, Error> {
         let given = file.clone();
         let hypothesis = hypothesis(source, &file.hypothesis)?;
         let segments = segments(source, &file, hypothesis)?;
@@ -153,7 +165,13 @@ impl Driver {
                 .join(written.get_ref())
         };
         let folders: Vec<PathBuf> = file.law_path.iter().map(folder).collect();
-        let search = SearchPath::new(&folders);
+        let law = std::iter::once((&file.law, file.sha256.as_ref()));
+        let pins = if locked {
+            Pins::of(source, law)?
+        } else {
+            Pins::given(source, law)?
+        };
+        let search = SearchPath::new(&folders).pinned(pins);
         let built = input::build_law(source, &search, &file.law, hypothesis, &file.parameters)?;
         let mut driver = Self {
             law: built.law,
@@ -226,7 +244,7 @@ impl Driver {
     pub fn with_parameters(&self, values: &[(String, ParameterValue)]) -> Result<Self, Error> {
         let mut file = self.file.clone();
         input::set_parameters(&mut file.parameters, values);
-        let mut driver = Self::build(&self.source, self.variant.clone(), file)?;
+        let mut driver = Self::build(&self.source, self.variant.clone(), file, true)?;
         driver.set_increments(&self.segment_increments());
         Ok(driver)
     }

@@ -1,0 +1,244 @@
+//! Which libraries a case was meant for: `sha256` beside a law in the file, and a lock file beside
+//! the case.
+//!
+//! A lock lists every law that the case uses. It is honoured wherever it stands: a case with
+//! `case.lock` runs with those libraries or not at all.
+
+use crate::case::Case;
+use crate::error::{Error, Source};
+use crate::input;
+use crate::plugin::{LoadedLaw, SearchPath};
+use crate::point::Driver;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// Digits of a SHA-256.
+const DIGITS: usize = 64;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LockFile {
+    version: Spanned<u32>,
+    #[serde(default)]
+    law: Vec<LockedLaw>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LockedLaw {
+    id: String,
+    version: String,
+    library: String,
+    sha256: Spanned<String>,
+}
+
+/// A law as it is written to a lock.
+#[derive(Debug, Serialize)]
+struct Entry<'a> {
+    id: &'a str,
+    version: &'a str,
+    library: String,
+    sha256: &'a str,
+}
+
+/// A demand on the library of a law.
+#[derive(Clone, Debug)]
+struct Pin {
+    law: String,
+    sha256: String,
+    /// Where it is written, and what to do if it does not hold.
+    place: String,
+    hint: String,
+}
+
+/// What a file and its lock demand of the libraries.
+#[derive(Clone, Debug, Default)]
+pub struct Pins {
+    demands: Vec<Pin>,
+    lock: Option<PathBuf>,
+    /// Laws in the lock.
+    locked: Vec<String>,
+}
+
+impl Pins {
+    /// Those of a file: of each law its id and its `sha256`, if it has one; and the lock beside the
+    /// file.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for what is no SHA-256, or a lock that cannot be read.
+    pub fn of<'a>(
+        source: &Source,
+        laws: impl Iterator<Item = (&'a Spanned<String>, Option<&'a Spanned<String>>)>,
+    ) -> Result<Self, Error> {
+        let mut pins = Self::given(source, laws)?;
+        let path = lock_path(source.path());
+        if path.is_file() {
+            pins.add_lock(&path)?;
+        }
+        Ok(pins)
+    }
+
+    /// As [`Pins::of`], without the lock.
+    pub(crate) fn given<'a>(
+        source: &Source,
+        laws: impl Iterator<Item = (&'a Spanned<String>, Option<&'a Spanned<String>>)>,
+    ) -> Result<Self, Error> {
+        let mut pins = Self::default();
+        for (law, sha256) in laws {
+            let Some(sha256) = sha256 else { continue };
+            pins.demands.push(Pin {
+                law: law.get_ref().clone(),
+                sha256: digits(source, sha256)?,
+                place: format!("`sha256` at {}", source.place(&sha256.span())),
+                hint: "if the other library is the right one, write its SHA-256 there".to_owned(),
+            });
+        }
+        Ok(pins)
+    }
+
+    fn add_lock(&mut self, path: &Path) -> Result<(), Error> {
+        let source = Source::read(path)?;
+        let lock: LockFile = input::parse(&source)?;
+        if *lock.version.get_ref() != 1 {
+            let message = format!("this is a lock of version {}", lock.version.get_ref());
+            return Err(source
+                .error(lock.version.span(), message)
+                .hint("this program writes and reads version 1")
+                .into());
+        }
+        for law in lock.law {
+            self.demands.push(Pin {
+                sha256: digits(&source, &law.sha256)?,
+                place: format!(
+                    "`sha256` at {}, for {} {} of {}",
+                    source.place(&law.sha256.span()),
+                    law.id,
+                    law.version,
+                    law.library
+                ),
+                hint: "if the other library is the right one, `pilum lock` writes the lock anew; \
+                       without the file any library will do"
+                    .to_owned(),
+                law: law.id.clone(),
+            });
+            self.locked.push(law.id);
+        }
+        self.lock = Some(path.to_owned());
+        Ok(())
+    }
+
+    /// Whether the library with this SHA-256 may provide the law.
+    ///
+    /// # Errors
+    /// [`Error::Plugin`] with what was expected, where that is written, and what was found.
+    pub fn check(&self, law: &str, library: &Path, sha256: &str) -> Result<(), Error> {
+        let wrong = |pin: &&Pin| pin.law == law && pin.sha256 != sha256;
+        if let Some(pin) = self.demands.iter().find(wrong) {
+            return Err(Error::Plugin {
+                message: format!(
+                    "law `{law}`: library {} is not the one asked for\n  found SHA-256 {sha256}\n  \
+                     expected {}\n  by {}",
+                    library.display(),
+                    pin.sha256,
+                    pin.place
+                ),
+                hint: Some(pin.hint.clone()),
+            });
+        }
+        match &self.lock {
+            Some(lock) if !self.locked.iter().any(|id| id == law) => Err(Error::Plugin {
+                message: format!("law `{law}` is not in {}", lock.display()),
+                hint: Some("`pilum lock` writes the lock anew".to_owned()),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A SHA-256 in lower case.
+fn digits(source: &Source, written: &Spanned<String>) -> Result<String, Error> {
+    let text = written.get_ref().to_ascii_lowercase();
+    if text.len() == DIGITS && text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+        return Ok(text);
+    }
+    let message = format!("`sha256`: expected {DIGITS} hexadecimal digits");
+    Err(source
+        .error(written.span(), message)
+        .hint("`pilum inspect LIBRARY` and `pilum laws ID` show it")
+        .into())
+}
+
+/// `case.toml` to `case.lock`.
+fn lock_path(file: &Path) -> PathBuf {
+    file.with_extension("lock")
+}
+
+/// Writes the lock of a case (a file, or a folder with `case.toml`) or of a driver: all laws it uses
+/// and their libraries. Returns its path.
+///
+/// # Errors
+/// The file or a library cannot be used, or the lock cannot be written.
+pub fn write(path: &Path) -> Result<PathBuf, Error> {
+    let path = if path.is_dir() {
+        path.join("case.toml")
+    } else {
+        path.to_owned()
+    };
+    let laws = if crate::trade_off::is_driver(&path)? {
+        let drivers = Driver::read_unlocked(&path)?;
+        let laws = drivers.iter().map(|driver| driver.law().loaded().clone());
+        laws.collect()
+    } else {
+        laws_of_case(&path)?
+    };
+    let mut entries = BTreeMap::new();
+    for law in &laws {
+        let library = law.library();
+        let name = library.path().file_name().unwrap_or_default();
+        let description = law.description();
+        let entry = Entry {
+            id: &description.id,
+            version: &description.version,
+            library: name.to_string_lossy().into_owned(),
+            sha256: library.sha256(),
+        };
+        entries.insert(&description.id, entry);
+    }
+    let table = BTreeMap::from([("law", entries.into_values().collect::<Vec<_>>())]);
+    let laws = toml::to_string(&table).map_err(|why| Error::Internal(why.to_string()))?;
+    let text = format!(
+        "# Written by `pilum lock`: the libraries that {} runs with.\nversion = 1\n\n{laws}",
+        path.file_name().unwrap_or_default().to_string_lossy(),
+    );
+    let lock = lock_path(&path);
+    std::fs::write(&lock, text).map_err(|source| Error::Unwritable {
+        path: lock.clone(),
+        source,
+    })?;
+    Ok(lock)
+}
+
+/// The laws that groups use, in any phase of any variant.
+fn laws_of_case(path: &Path) -> Result<Vec<LoadedLaw>, Error> {
+    let mut laws = Vec::new();
+    for case in Case::load(path)? {
+        let file = &case.file;
+        let declared = file.laws.values().map(Spanned::get_ref);
+        let pins = declared.map(|law| (&law.law, law.sha256.as_ref()));
+        let search = SearchPath::new(&case.law_folders()?).pinned(Pins::given(&case.source, pins)?);
+        let groups = file
+            .groups
+            .values()
+            .map(|group| group.get_ref().law.get_ref());
+        let swaps = file.phases.iter().flat_map(|phase| phase.laws.values());
+        for name in groups.chain(swaps.map(Spanned::get_ref)) {
+            let entry = file.laws.iter().find(|(key, _)| key.get_ref() == name);
+            if let Some((_, law)) = entry {
+                laws.push(input::find_law(&case.source, &search, &law.get_ref().law)?);
+            }
+        }
+    }
+    Ok(laws)
+}
