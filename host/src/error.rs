@@ -271,6 +271,26 @@ impl Error {
         }
     }
 
+    /// Adds what the user could do to an error of a run.
+    #[must_use]
+    pub fn with_hint(self, more: &str) -> Self {
+        let add = |hint: Option<String>| match hint {
+            Some(hint) => Some(format!("{hint}; {more}")),
+            None => Some(more.to_owned()),
+        };
+        match self {
+            Self::Plugin { message, hint } => Self::Plugin {
+                message,
+                hint: add(hint),
+            },
+            Self::NoEquilibrium { message, hint } => Self::NoEquilibrium {
+                message,
+                hint: add(hint),
+            },
+            other => other,
+        }
+    }
+
     /// The program's exit code: 1 bad input (places that cannot be read or written included), 2 no equilibrium, 3 plugin trouble, 4 internal.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -8,6 +8,7 @@
 //! crash or hang runs in a [`child`] process.
 
 pub mod assembly;
+pub mod capsule;
 pub mod case;
 pub mod child;
 pub mod element;

@@ -103,6 +103,11 @@ enum Command {
         /// A case file, a folder with `case.toml`, or a driver file.
         input: PathBuf,
     },
+    /// Repeat the call of a law that failed, from the file that a run left in its results.
+    Replay {
+        /// A `failure.toml`.
+        capsule: PathBuf,
+    },
     /// Try a library: what a child process does.
     #[command(name = vetting::COMMAND, hide = true)]
     ProbeLibrary { library: PathBuf, sha256: String },
@@ -198,6 +203,9 @@ fn execute(command: Command) -> Result<(), Error> {
         Command::Lock { input } => {
             println!("lock in {}", host::lock::write(&input)?.display());
             Ok(())
+        }
+        Command::Replay { capsule } => {
+            host::capsule::replay(&capsule, &mut |line| println!("{line}"))
         }
         Command::ProbeLibrary { library, sha256 } => {
             vetting::probe(&library, &sha256, &mut std::io::stdout().lock())

@@ -300,6 +300,11 @@ impl Results {
         &self.figures
     }
 
+    /// Folder of the results.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Warnings about results that laws call inaccurate, one for each phase that has any.
     pub fn unreliable(&self) -> Vec<String> {
         self.summary.unreliable()

@@ -207,6 +207,7 @@ impl LoadedLaw {
             loaded: self.clone(),
             hypothesis,
             formulation,
+            parameters: parameters.to_vec(),
             instance,
         })
     }
@@ -218,6 +219,7 @@ pub struct Law {
     loaded: LoadedLaw,
     hypothesis: Hypothesis,
     formulation: FormulationDescription,
+    parameters: Vec<f64>,
     instance: OwnedInstance,
 }
 
@@ -273,6 +275,46 @@ pub struct BatchFailure {
     pub message: String,
     /// The smallest step factor asked for, if only smaller steps are asked for.
     pub factor: Option<f64>,
+    /// What the law was asked at the point.
+    pub call: Option<Box<PointCall>>,
+}
+
+/// What a call asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// An update, with an operator or none.
+    Update(Operator),
+    /// Initial internal variables.
+    InitialState,
+}
+
+/// A call of a law for one point: all that the answer depends on, beside the law and its
+/// parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointCall {
+    /// What is asked for.
+    pub request: Request,
+    /// Time at the start.
+    pub time: f64,
+    /// Time increment.
+    pub time_increment: f64,
+    /// Gradient at the start.
+    pub gradient: Vec<f64>,
+    /// Gradient at the end.
+    pub gradient_end: Vec<f64>,
+    /// Flux at the start.
+    pub flux: Vec<f64>,
+    /// Internal variables at the start.
+    pub state: Vec<f64>,
+}
+
+impl BatchFailure {
+    fn of_call(self, call: PointCall) -> Self {
+        Self {
+            call: Some(Box::new(call)),
+            ..self
+        }
+    }
 }
 
 /// A batch that can be used.
@@ -306,6 +348,11 @@ impl Law {
     /// The law without its parameters.
     pub fn loaded(&self) -> &LoadedLaw {
         &self.loaded
+    }
+
+    /// Values of its parameters, in declared order.
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
     }
 
     /// Number of components of gradient and flux.
@@ -356,8 +403,21 @@ impl Law {
         match result {
             None => Ok(state),
             Some((worst, message)) => {
-                judge(worst, &status, &factor, message)?;
-                finite(&[(&state, Strided::rows(n_states), n_states)], n_points)?;
+                let outputs = [(&*state, Strided::rows(n_states), n_states)];
+                judge(worst, &status, &factor, message)
+                    .and_then(|_| finite(&outputs, n_points))
+                    .map_err(|failure| {
+                        let call = PointCall {
+                            request: Request::InitialState,
+                            time: 0.0,
+                            time_increment: 0.0,
+                            gradient: Vec::new(),
+                            gradient_end: Vec::new(),
+                            flux: flux.1.of_point(flux.0, failure.point, self.n_components()),
+                            state: Vec::new(),
+                        };
+                        failure.of_call(call)
+                    })?;
                 Ok(state)
             }
         }
@@ -374,7 +434,24 @@ impl Law {
         operator: Operator,
         end: End<'_>,
     ) -> Result<BatchSuccess, BatchFailure> {
-        OUTCOMES.with_borrow_mut(|outcomes| self.integrate_with(outcomes, start, operator, end))
+        OUTCOMES
+            .with_borrow_mut(|outcomes| self.integrate_with(outcomes, start, operator, end))
+            .map_err(|failure| {
+                let (point, n) = (failure.point, self.n_components());
+                let of_point =
+                    |(values, place): (&[f64], Strided)| place.of_point(values, point, n);
+                let rows = Strided::rows(self.n_states());
+                let call = PointCall {
+                    request: Request::Update(operator),
+                    time: start.time,
+                    time_increment: start.time_increment,
+                    gradient: of_point(start.gradient),
+                    gradient_end: of_point(start.gradient_end),
+                    flux: of_point(start.flux),
+                    state: rows.of_point(start.state, point, self.n_states()),
+                };
+                failure.of_call(call)
+            })
     }
 
     fn integrate_with(
@@ -482,6 +559,7 @@ fn judge(
                 outcome: Outcome::CutStep,
                 message,
                 factor: Some(factor),
+                call: None,
             })
         }
         outcome => Err(BatchFailure {
@@ -489,6 +567,7 @@ fn judge(
             outcome,
             message,
             factor: None,
+            call: None,
         }),
     }
 }
@@ -511,6 +590,7 @@ fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), B
                     outcome: Outcome::Numeric,
                     message: "the law claims success with a result that is not finite".to_owned(),
                     factor: None,
+                    call: None,
                 });
             }
         }

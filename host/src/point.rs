@@ -12,11 +12,13 @@ mod table;
 pub use file::Driver;
 pub use table::{Row, Table};
 
+use crate::capsule::{self, Capsule};
 use crate::error::{Error, suggestion};
 use crate::output::Figures;
 use abi::status::Outcome;
 use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
-use file::{Control, Segment, words};
+pub(crate) use file::words;
+use file::{Control, Segment};
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Write};
@@ -159,6 +161,8 @@ pub fn run_file_variants(
     let mut drawn = Vec::new();
     let outcome = drivers.iter().try_for_each(|driver| {
         let csv = target(driver);
+        // A capsule of an earlier run must not be mistaken for one of this.
+        let _ = std::fs::remove_file(csv.with_extension(capsule::FILE_NAME));
         let file = File::create(&csv).map_err(|source| Error::Unwritable {
             path: csv.clone(),
             source,
@@ -232,14 +236,28 @@ impl Driver {
             source,
         };
         let mut table = Table::new(out, self);
-        let result = self.run(|row| {
+        let mut failed = None;
+        let sink = |row: &Row<'_>| {
             self.draw_row(figures, row);
             table.write(row).map_err(unwritable)
-        });
+        };
+        let result = self.run_keeping(sink, &mut failed);
         if !matches!(result, Err(Error::Unwritable { .. })) {
             table.flush().map_err(unwritable)?;
         }
-        result
+        // A table on the standard output has no place beside it.
+        match (result, failed) {
+            (Err(error), Some(capsule)) if name.is_file() => {
+                let file = name.with_extension(capsule::FILE_NAME);
+                capsule.write(&file)?;
+                let hint = format!(
+                    "`pilum replay {}` repeats the call that failed",
+                    file.display()
+                );
+                Err(error.with_hint(&hint))
+            }
+            (result, _) => result,
+        }
     }
 
     /// Follows the path and hands out its rows, the initial state first.
@@ -249,7 +267,16 @@ impl Driver {
     /// follow; [`Error::Plugin`] if the library breaks down; whatever `sink` fails with.
     pub fn run(
         &self,
+        sink: impl FnMut(&Row<'_>) -> Result<(), Error>,
+    ) -> Result<PointReport, Error> {
+        self.run_keeping(sink, &mut None)
+    }
+
+    /// As [`Driver::run`]; also hands out the call of the law that failed for good.
+    fn run_keeping(
+        &self,
         mut sink: impl FnMut(&Row<'_>) -> Result<(), Error>,
+        failed: &mut Option<Capsule>,
     ) -> Result<PointReport, Error> {
         let (point, search, mut warnings) = self.start()?;
         let mut walk = Walk {
@@ -286,6 +313,7 @@ impl Driver {
                             segment.increments,
                             increment + 1
                         );
+                        *failed = self.capsule(&stop, &place);
                         self.explain(stop, &place, &warnings)
                     })?;
                 increment += 1;
@@ -367,6 +395,18 @@ impl Driver {
             ));
         }
         Ok((point, search, warnings))
+    }
+
+    /// The call of the law behind a stop.
+    fn capsule(&self, stop: &Stop, place: &str) -> Option<Capsule> {
+        let failure = match stop {
+            Stop::Fatal(failure) => failure,
+            Stop::Shortfall(shortfall) => shortfall.obstacle.refusal.as_ref()?,
+        };
+        let mut origin = vec![("driver", self.path().display().to_string().into())];
+        origin.extend(self.variant.iter().map(|v| ("variant", v.as_str().into())));
+        origin.push(("place", place.into()));
+        Capsule::of(&self.law, failure, origin)
     }
 
     /// The error that a stop stands for.

@@ -1,6 +1,7 @@
 //! Running a case: phases, increments, cut-back and regrowth, results.
 
 use crate::assembly::{System, fold};
+use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Equations, PhaseInput};
 use crate::error::{Error, Place};
 use crate::group::Group;
@@ -346,10 +347,15 @@ impl<'a> Run<'a> {
                         results.cut_back(&place, end, step, &failure.reason)?;
                         observer.cut_back(&place, &failure.reason);
                         if let Some(defect) = &failure.defect {
-                            return Err(Error::plugin(format!("{place}: {defect}")));
+                            let kept = self.keep_capsule(&place, &failure, results)?;
+                            return Err(Error::Plugin {
+                                message: format!("{place}: {defect}"),
+                                hint: kept,
+                            });
                         }
                         if step < smallest {
-                            return Err(Self::no_equilibrium(&place, lambda, n, &failure));
+                            let kept = self.keep_capsule(&place, &failure, results)?;
+                            return Err(Self::no_equilibrium(&place, lambda, n, &failure, kept));
                         }
                     }
                 }
@@ -357,7 +363,7 @@ impl<'a> Run<'a> {
             let reaction = self
                 .whole(equations, loads, lambda, record)
                 .map_err(|why| {
-                    Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why))
+                    Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why), None)
                 })?;
             let snapshot = Snapshot {
                 groups: &self.groups,
@@ -609,7 +615,53 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn no_equilibrium(place: &Place, lambda: f64, n: usize, failure: &StepFailure) -> Error {
+    /// Writes the call of a law that failed for good. Returns what the user can do with it.
+    fn keep_capsule(
+        &self,
+        place: &Place,
+        failure: &StepFailure,
+        results: &Results,
+    ) -> Result<Option<String>, Error> {
+        let Some(point) = &failure.failed else {
+            return Ok(None);
+        };
+        let group = self.groups.iter().find(|group| group.name == point.group);
+        let number = |n: usize| toml::Value::from(n as i64);
+        let mut origin = vec![("case", self.case.source.path().display().to_string().into())];
+        origin.extend(
+            self.case
+                .variant
+                .iter()
+                .map(|v| ("variant", v.as_str().into())),
+        );
+        origin.extend([
+            ("phase", place.phase.as_str().into()),
+            ("increment", number(place.increment)),
+            ("group", point.group.as_str().into()),
+            ("element", number(point.element)),
+            ("point", number(point.point)),
+            ("position", point.position.to_vec().into()),
+        ]);
+        let capsule =
+            group.and_then(|group| Capsule::of(&group.law.built.law, &point.failure, origin));
+        let Some(capsule) = capsule else {
+            return Ok(None);
+        };
+        let file = results.folder().join(capsule::FILE_NAME);
+        capsule.write(&file)?;
+        Ok(Some(format!(
+            "`pilum replay {}` repeats the call that failed",
+            file.display()
+        )))
+    }
+
+    fn no_equilibrium(
+        place: &Place,
+        lambda: f64,
+        n: usize,
+        failure: &StepFailure,
+        kept: Option<String>,
+    ) -> Error {
         let reached = lambda * n as f64;
         let culprit = failure
             .culprit
@@ -625,7 +677,8 @@ impl<'a> Run<'a> {
             hint: Some(
                 "results up to the last whole increment in equilibrium are written; \
                  log.jsonl lists the iterations"
-                    .to_owned(),
+                    .to_owned()
+                    + &kept.map_or(String::new(), |kept| format!("; {kept}")),
             ),
         }
     }

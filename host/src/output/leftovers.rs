@@ -8,7 +8,8 @@ use std::path::Path;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
 /// are begun anew by each.
-const NAMES: [&str; 6] = [
+const NAMES: [&str; 7] = [
+    crate::capsule::FILE_NAME,
     "profile.csv",
     "points.csv",
     "fields.pvd",

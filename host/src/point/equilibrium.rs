@@ -102,6 +102,8 @@ pub(super) struct Obstacle {
     pub(super) factor: Option<f64>,
     /// The law's last words, if it refused an update.
     pub(super) law: Option<String>,
+    /// That refusal.
+    pub(super) refusal: Option<Box<BatchFailure>>,
     /// How near the best attempt came.
     pub(super) miss: Option<Miss>,
     norm: f64,
@@ -274,7 +276,8 @@ impl<'a> Search<'a> {
                         .factor
                         .map(|f| f.min(smallest))
                         .or(self.obstacle.factor);
-                    self.obstacle.law = Some(failure.message);
+                    self.obstacle.law = Some(failure.message.clone());
+                    self.obstacle.refusal = Some(Box::new(failure));
                     Ok(false)
                 }
                 Outcome::Unsupported if self.do_without(operator) => {

@@ -83,7 +83,7 @@ pub(super) struct Segment {
 }
 
 /// Names of gradient and flux of a hypothesis.
-pub(super) fn words(hypothesis: Hypothesis) -> (&'static str, &'static str) {
+pub(crate) fn words(hypothesis: Hypothesis) -> (&'static str, &'static str) {
     match hypothesis {
         Hypothesis::Interface2d => ("jump", "traction"),
         Hypothesis::PlaneStrain | Hypothesis::Axisymmetric | Hypothesis::ThreeD => {
@@ -189,6 +189,11 @@ impl Driver {
         driver.internal = driver.initial_internal(&initial.internal)?;
         driver.check_figures(source)?;
         Ok(driver)
+    }
+
+    /// Path of the file.
+    pub(super) fn path(&self) -> &Path {
+        self.source.path()
     }
 
     /// The law.

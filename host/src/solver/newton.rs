@@ -127,6 +127,8 @@ pub struct StepFailure {
     pub factor: Option<f64>,
     /// A law that no smaller step will help.
     pub defect: Option<PointFailure>,
+    /// The point whose law failed, if one did.
+    pub failed: Option<Box<PointFailure>>,
     /// What keeps the iterations from settling, if that could be found out.
     pub culprit: Option<String>,
 }
@@ -139,6 +141,7 @@ impl StepFailure {
             reason,
             factor: None,
             defect: None,
+            failed: None,
             culprit: None,
         }
     }
@@ -603,6 +606,7 @@ fn failed_law(failure: PointFailure) -> StepFailure {
         iterations: Vec::new(),
         reason: failure.to_string(),
         factor: failure.failure.factor,
+        failed: Some(Box::new(failure.clone())),
         defect: defective.then_some(failure),
         culprit: None,
     }
