@@ -182,7 +182,7 @@ fn last_words(pieces: &Receiver<Vec<u8>>) -> Vec<u8> {
 }
 
 #[cfg(unix)]
-fn ending(status: ExitStatus) -> Ending {
+pub(crate) fn ending(status: ExitStatus) -> Ending {
     use std::os::unix::process::ExitStatusExt;
     match (status.code(), status.signal()) {
         (Some(code), _) => Ending::Exited(code),
@@ -191,7 +191,7 @@ fn ending(status: ExitStatus) -> Ending {
 }
 
 #[cfg(not(unix))]
-fn ending(status: ExitStatus) -> Ending {
+pub(crate) fn ending(status: ExitStatus) -> Ending {
     Ending::Exited(status.code().unwrap_or(-1))
 }
 

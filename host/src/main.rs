@@ -17,6 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// Finite elements for soil-structure interfaces, with constitutive laws as plugins.
 #[derive(Parser)]
@@ -25,6 +26,18 @@ struct Arguments {
     /// Open libraries that are not known yet without trying them in a child process first.
     #[arg(long, global = true)]
     no_probe: bool,
+    /// Call laws in processes of their own, so that one that crashes ends the increment and not the
+    /// program; a call may take this many seconds.
+    #[arg(
+        long,
+        global = true,
+        value_name = "SECONDS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "10",
+        value_parser = seconds
+    )]
+    isolate: Option<f64>,
     #[command(subcommand)]
     command: Command,
 }
@@ -107,10 +120,24 @@ enum Command {
     Replay {
         /// A `failure.toml`.
         capsule: PathBuf,
+        /// Call the law in this process, for a debugger, and not in one of its own.
+        #[arg(long, conflicts_with = "isolate")]
+        in_process: bool,
     },
     /// Try a library: what a child process does.
     #[command(name = vetting::COMMAND, hide = true)]
     ProbeLibrary { library: PathBuf, sha256: String },
+    /// Call a law for another process.
+    #[command(name = "law-worker", hide = true)]
+    LawWorker,
+}
+
+impl Command {
+    /// A replay outlives a law that crashes again.
+    fn isolates_anyway(&self) -> Option<f64> {
+        let replays = matches!(self, Self::Replay { in_process, .. } if !in_process);
+        (replays && cfg!(unix)).then_some(10.0)
+    }
 }
 
 fn main() -> ExitCode {
@@ -122,13 +149,25 @@ fn main() -> ExitCode {
             return ExitCode::from(u8::from(error.use_stderr()));
         }
     };
-    let is_child = matches!(arguments.command, Command::ProbeLibrary { .. });
+    let is_child = matches!(
+        arguments.command,
+        Command::ProbeLibrary { .. } | Command::LawWorker
+    );
     let trust = Trust {
         probe: !arguments.no_probe && !is_child,
-        isolate: None,
+        isolate: arguments
+            .isolate
+            .or_else(|| arguments.command.isolates_anyway())
+            .map(Duration::from_secs_f64),
     };
     trust.set();
-    let run = || execute(arguments.command);
+    let run = || {
+        if cfg!(not(unix)) && trust.isolate.is_some() {
+            let message = "--isolate needs a Unix system";
+            return Err(Error::Usage(message.to_owned()));
+        }
+        execute(arguments.command)
+    };
     // A panic has printed itself; it is a defect of the program, not of the input.
     let outcome =
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or_else(|_| {
@@ -204,12 +243,26 @@ fn execute(command: Command) -> Result<(), Error> {
             println!("lock in {}", host::lock::write(&input)?.display());
             Ok(())
         }
-        Command::Replay { capsule } => {
+        Command::Replay { capsule, .. } => {
             host::capsule::replay(&capsule, &mut |line| println!("{line}"))
         }
+        #[cfg(unix)]
+        Command::LawWorker => host::plugin::isolate::work(),
+        #[cfg(not(unix))]
+        Command::LawWorker => Err(Error::Usage("there are no workers here".to_owned())),
         Command::ProbeLibrary { library, sha256 } => {
             vetting::probe(&library, &sha256, &mut std::io::stdout().lock())
         }
+    }
+}
+
+/// A time limit in seconds.
+fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number of seconds")?;
+    if value > 0.0 && value <= 1e6 {
+        Ok(value)
+    } else {
+        Err("expected more than 0 and at most 1e6 seconds".to_owned())
     }
 }
 

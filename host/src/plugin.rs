@@ -2,6 +2,8 @@
 
 mod description;
 mod image;
+#[cfg(unix)]
+pub mod isolate;
 mod library;
 mod search;
 mod trust;
@@ -33,7 +35,17 @@ pub struct Library {
     sha256: String,
     warnings: Vec<String>,
     stamp: Option<Stamp>,
-    laws: Vec<(LawDescription, LawHandle)>,
+    laws: Vec<(LawDescription, Origin)>,
+}
+
+/// Where a law is called.
+#[derive(Clone, Copy, Debug)]
+enum Origin {
+    /// In this process.
+    Here(LawHandle),
+    /// In worker processes.
+    #[cfg(unix)]
+    Apart,
 }
 
 /// What changes with a file's contents. Within one process a file with an equal stamp is not
@@ -81,12 +93,7 @@ impl Library {
         let laws = if let Some(library) = same {
             library.laws.clone()
         } else {
-            if Trust::current().probe {
-                vetting::vet(path, &sha256)?;
-            }
-            library::open(path, image)
-                .map_err(|why| Error::plugin(format!("library {}: {why}", path.display())))?
-                .laws
+            Self::laws_of(path, image)?
         };
         let library = Arc::new(Self {
             path: path.to_owned(),
@@ -97,6 +104,22 @@ impl Library {
         });
         opened.push(Arc::clone(&library));
         Ok(library)
+    }
+
+    /// Opens the library in this process, after it was tried in another, or asks a worker.
+    fn laws_of(path: &Path, image: Image) -> Result<Vec<(LawDescription, Origin)>, Error> {
+        let unusable = |why| Error::plugin(format!("library {}: {why}", path.display()));
+        let trust = Trust::current();
+        #[cfg(unix)]
+        if trust.isolate.is_some() {
+            return isolate::describe(path, &image.sha256).map_err(unusable);
+        }
+        if trust.probe {
+            vetting::vet(path, &image.sha256)?;
+        }
+        let laws = library::open(path, image).map_err(unusable)?.laws;
+        let here = |(law, handle)| (law, Origin::Here(handle));
+        Ok(laws.into_iter().map(here).collect())
     }
 
     /// Where the library was found.
@@ -177,7 +200,7 @@ impl LoadedLaw {
     /// # Errors
     /// The law's refusal, or a defect of the library.
     pub fn build(&self, hypothesis: Hypothesis, parameters: &[f64]) -> Result<Law, CreateFailure> {
-        let (description, handle) = &self.library.laws[self.number];
+        let (description, origin) = &self.library.laws[self.number];
         let defect = |reason: &str| CreateFailure {
             parameter: None,
             reason: reason.to_owned(),
@@ -187,22 +210,29 @@ impl LoadedLaw {
             .formulation(hypothesis)
             .ok_or_else(|| defect("the hypothesis is not offered"))?
             .clone();
-        let instance =
-            handle
-                .create(formulation.index, parameters)
-                .map_err(|(status, message)| {
-                    let parameter = message
-                        .split_once(':')
-                        .map(|(id, _)| id.trim())
-                        .filter(|id| description.parameters.iter().any(|p| p.id == *id))
-                        .map(str::to_owned);
-                    CreateFailure {
-                        parameter,
-                        reason: message,
-                        library_at_fault: status != raw::PILUM_E_PARAMETER
-                            && status != raw::PILUM_E_DOMAIN,
-                    }
-                })?;
+        let index = formulation.index;
+        let created = match origin {
+            Origin::Here(handle) => handle.create(index, parameters).map(LawInstance::Here),
+            #[cfg(unix)]
+            Origin::Apart => {
+                let limit = Trust::current().isolate.unwrap_or_default();
+                let (library, number) = (&self.library, self.number);
+                isolate::IsolatedInstance::create(library, number, index, parameters, limit)
+                    .map(LawInstance::Apart)
+            }
+        };
+        let instance = created.map_err(|(status, message)| {
+            let parameter = message
+                .split_once(':')
+                .map(|(id, _)| id.trim())
+                .filter(|id| description.parameters.iter().any(|p| p.id == *id))
+                .map(str::to_owned);
+            CreateFailure {
+                parameter,
+                reason: message,
+                library_at_fault: status != raw::PILUM_E_PARAMETER && status != raw::PILUM_E_DOMAIN,
+            }
+        })?;
         Ok(Law {
             loaded: self.clone(),
             hypothesis,
@@ -220,7 +250,35 @@ pub struct Law {
     hypothesis: Hypothesis,
     formulation: FormulationDescription,
     parameters: Vec<f64>,
-    instance: OwnedInstance,
+    instance: LawInstance,
+}
+
+/// What a library made of the parameters, in this process or in workers.
+#[derive(Debug)]
+enum LawInstance {
+    Here(OwnedInstance),
+    #[cfg(unix)]
+    Apart(isolate::IsolatedInstance),
+}
+
+impl LawInstance {
+    /// Asks for initial internal variables. `None` if the law has no `init_state`.
+    fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
+        match self {
+            Self::Here(instance) => instance.init_state(call),
+            #[cfg(unix)]
+            Self::Apart(instance) => instance.init_state(call),
+        }
+    }
+
+    /// Carries the points over the increment. Returns the most severe status and a message.
+    fn integrate(&self, call: Call<'_>) -> (Status, String) {
+        match self {
+            Self::Here(instance) => instance.integrate(call),
+            #[cfg(unix)]
+            Self::Apart(instance) => instance.integrate(call),
+        }
+    }
 }
 
 /// Which operator a call computes beside the fluxes.

@@ -1,10 +1,10 @@
 //! What a library says about its laws, copied out of it and validated.
 
 use abi::Hypothesis;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize, de};
 
 /// A law as described by its library.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LawDescription {
     /// Identifier.
     pub id: String,
@@ -42,7 +42,7 @@ impl LawDescription {
 }
 
 /// A parameter as described by its library.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterDescription {
     /// Identifier.
     pub id: String,
@@ -65,7 +65,7 @@ pub struct ParameterDescription {
 }
 
 /// An interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Lower end; may be −∞ (null in JSON).
     pub lower: f64,
@@ -115,11 +115,15 @@ impl std::fmt::Display for Bounds {
     }
 }
 
+/// By this name it is not taken for a text to borrow from the input.
+type HypothesisName = &'static str;
+
 /// What a law offers under one hypothesis.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FormulationDescription {
     /// Name of the hypothesis.
-    pub hypothesis: &'static str,
+    #[serde(deserialize_with = "hypothesis")]
+    pub hypothesis: HypothesisName,
     /// Number of the formulation in its library.
     #[serde(skip)]
     pub(super) index: u32,
@@ -133,8 +137,16 @@ pub struct FormulationDescription {
     pub internal_variables: Vec<InternalVariable>,
 }
 
+fn hypothesis<'de, D: Deserializer<'de>>(input: D) -> Result<&'static str, D::Error> {
+    let name = String::deserialize(input)?;
+    let mut known = Hypothesis::ALL.into_iter().map(Hypothesis::name);
+    known
+        .find(|known| *known == name)
+        .ok_or_else(|| de::Error::custom(format!("there is no hypothesis `{name}`")))
+}
+
 /// An internal variable (one component of it, if it has several).
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct InternalVariable {
     /// Identifier; with `_<component>` if there are several components.
     pub id: String,

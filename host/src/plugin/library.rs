@@ -9,6 +9,12 @@
     reason = "the host's side of the C boundary; offset and access are one operation"
 )]
 
+#[cfg(unix)]
+mod shared;
+
+#[cfg(unix)]
+pub(super) use shared::SharedMemory;
+
 use super::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };

@@ -1,0 +1,72 @@
+//! Memory that two processes share, seen as numbers.
+
+use memmap2::MmapRaw;
+use std::fs::File;
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A mapped file of 64-bit words. The other process may write to it at any time, whatever was
+/// agreed, so words are only copied, one by one, and any bits are a valid word.
+#[derive(Debug)]
+pub(in crate::plugin) struct SharedMemory {
+    file: File,
+    map: MmapRaw,
+}
+
+impl SharedMemory {
+    /// Maps a file, which must not shrink: it is a sealed one, or nobody else knows its name.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(in crate::plugin) fn new(file: File) -> io::Result<Self> {
+        let map = MmapRaw::map_raw(&file)?;
+        Ok(Self { file, map })
+    }
+
+    /// Number of words.
+    pub(in crate::plugin) fn len(&self) -> usize {
+        self.map.len() / size_of::<u64>()
+    }
+
+    /// Makes room for so many words.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(in crate::plugin) fn grow(&mut self, n: usize) -> io::Result<()> {
+        self.file.set_len((n * size_of::<u64>()) as u64)?;
+        self.map = MmapRaw::map_raw(&self.file)?;
+        Ok(())
+    }
+
+    /// Maps what the other process has made room for.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(in crate::plugin) fn follow(&mut self) -> io::Result<()> {
+        self.map = MmapRaw::map_raw(&self.file)?;
+        Ok(())
+    }
+
+    #[expect(clippy::cast_ptr_alignment, reason = "a mapping starts at a page")]
+    fn word(&self, i: usize) -> &AtomicU64 {
+        assert!(i < self.len(), "word {i} of {} is shared", self.len());
+        // SAFETY: the word lies inside the mapping, which starts at a page, is never unmapped while
+        // it is borrowed, and is only accessed by such atomics.
+        unsafe { AtomicU64::from_ptr(self.map.as_mut_ptr().cast::<u64>().add(i)) }
+    }
+
+    /// Writes words from place `i` on; returns the place after them.
+    pub(in crate::plugin) fn write(&self, i: usize, words: impl Iterator<Item = u64>) -> usize {
+        let mut at = i;
+        for word in words {
+            self.word(at).store(word, Ordering::Relaxed);
+            at += 1;
+        }
+        at
+    }
+
+    /// `n` words from place `i` on.
+    pub(in crate::plugin) fn read(&self, i: usize, n: usize) -> impl Iterator<Item = u64> {
+        (i..i + n).map(|at| self.word(at).load(Ordering::Relaxed))
+    }
+}
