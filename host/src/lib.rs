@@ -4,8 +4,9 @@
 //! ([`plugin`], built by [`input`]), both joined in a [`model`] of [`group`]s of [`element`]s;
 //! [`run`] leads it through phases and increments with [`assembly`] and [`solver`]; [`probe`]s and
 //! [`output`] write what comes out. Beside them: [`point`], one law at one integration point, and
-//! [`laws`], what there is to know about a law, and [`trade_off`], what accuracy costs. What may
-//! crash or hang runs in a [`child`] process.
+//! [`laws`], what there is to know about a law, and [`trade_off`], what accuracy costs. [`inspect`]
+//! and [`lock`] say what a library is and hold a case to it, a [`capsule`] repeats a call that failed,
+//! and what may crash or hang runs in a [`child`] process.
 
 pub mod assembly;
 pub mod capsule;

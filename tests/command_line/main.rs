@@ -2,6 +2,8 @@
 
 mod arguments;
 mod bases;
+mod capsule;
+mod isolate;
 mod libraries;
 mod loading;
 mod mesh;
@@ -12,3 +14,5 @@ mod program;
 mod results;
 mod syntax;
 mod trade_off;
+mod troubled;
+mod trust;

@@ -137,6 +137,8 @@ impl Worker {
         ) {
             return format!("the law did not return within {} s", limit.as_secs_f64());
         }
+        // It is gone already, or it has closed the socket and will never answer.
+        let _ = self.child.kill();
         match self.child.wait().map(child::ending) {
             Ok(Ending::Signal(number)) => {
                 format!("the law crashed: {}", Ending::Signal(number))
@@ -463,6 +465,9 @@ impl IsolatedInstance {
     fn blame(&self, initial: bool, call: &mut Call<'_>, silence: &str) -> String {
         let n = call.n_points;
         call.status[..n].fill(raw::PILUM_E_INTERNAL);
+        if n <= 1 {
+            return silence.to_owned();
+        }
         let Ok(mut worker) = self.worker() else {
             return format!("{silence}; another worker process cannot be started");
         };

@@ -1,5 +1,6 @@
-//! Opening libraries and calling them. This is one of the two files of the project that hold
-//! `unsafe` code; each block names the clause of the contract (`abi/README.md`) it relies on.
+//! Opening libraries and calling them. This file with its modules is one of the two places of the
+//! project that hold `unsafe` code; each block names the clause of the contract (`abi/README.md`) it
+//! relies on.
 //!
 //! Libraries are opened with `RTLD_NOW | RTLD_LOCAL`, one at a time, and never unloaded, so that
 //! everything a description points to stays valid for the life of the process.

@@ -1,0 +1,109 @@
+//! `--isolate`: a law that crashes, ends its process or never returns ends an increment, and not
+//! the program.
+
+use crate::program::{CASE, DONE, NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place};
+use crate::troubled;
+
+const WAYS: [(&str, &str); 4] = [
+    ("segfault", "crashed: signal 11"),
+    ("abort", "crashed: signal 6"),
+    ("exit", "ended its process: exit code 0"),
+    ("loop", "did not return within 0.5 s"),
+];
+
+#[test]
+fn a_run_ends_with_what_had_converged() {
+    for (how, says) in WAYS {
+        let Some(place) = troubled::place("") else {
+            return;
+        };
+        place.write("case.toml", troubled::case(how));
+        let arguments = ["run", "case.toml", "--out", "out", "--isolate=0.5"];
+        let outcome = place.run(&arguments);
+        assert_eq!(
+            outcome.code,
+            Some(PLUGIN_TROUBLE),
+            "{how}: {}",
+            outcome.stderr
+        );
+        for text in [
+            "phase `push`, increment 1: law `troubled`, group `layer`, element",
+            says,
+            "failure.toml",
+        ] {
+            assert!(outcome.says(text), "{how}: {text:?}\n{}", outcome.stderr);
+        }
+        let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+        assert_eq!(history.lines().count(), 3, "{how}: {history}");
+        let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+        assert!(summary.contains("\"plugin trouble\""), "{how}: {summary}");
+    }
+}
+
+#[test]
+fn a_driver_ends_with_its_rows() {
+    for (how, says) in WAYS {
+        let Some(place) = troubled::place("") else {
+            return;
+        };
+        place.write("driver.toml", troubled::driver(how));
+        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate=0.5"]);
+        assert_eq!(
+            outcome.code,
+            Some(PLUGIN_TROUBLE),
+            "{how}: {}",
+            outcome.stderr
+        );
+        assert!(outcome.says(says), "{how}: {}", outcome.stderr);
+        assert!(
+            outcome.says("segment 1, increment 3 of 4"),
+            "{}",
+            outcome.stderr
+        );
+        let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+        assert_eq!(rows.lines().count(), 4, "{how}: {rows}");
+    }
+}
+
+#[test]
+fn results_are_the_same_as_in_the_process() {
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    for (out, isolate) in [("here", ""), ("apart", "--isolate")] {
+        let mut arguments = vec!["run", "case.toml", "--out", out];
+        arguments.extend(Some(isolate).filter(|argument| !argument.is_empty()));
+        let outcome = place.run(&arguments);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    }
+    for file in ["history.csv", "profile.csv"] {
+        let read = |out| std::fs::read(place.path(&format!("{out}/{file}"))).unwrap();
+        assert_eq!(read("here"), read("apart"), "{file}");
+    }
+}
+
+#[test]
+fn refusals_of_laws_are_those_of_the_process() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("driver.toml", troubled::driver("domain"));
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"]);
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert!(outcome.says("the limit is exceeded"), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_library_that_crashes_when_it_is_opened_is_refused() {
+    let Some(place) = troubled::place("TROUBLE_AT_ENTRY") else {
+        return;
+    };
+    place.write("driver.toml", troubled::driver("cut"));
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    assert!(outcome.says("crashed: signal 11"), "{}", outcome.stderr);
+    assert!(
+        outcome.says("needed by driver.toml:1:7"),
+        "{}",
+        outcome.stderr
+    );
+}

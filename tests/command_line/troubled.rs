@@ -1,0 +1,78 @@
+//! A law that misbehaves on request, compiled once for each way of compiling it.
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "part of the tests"
+)]
+
+use crate::program::{CASE, Place, edited};
+use std::collections::BTreeMap;
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::path::Path;
+use std::process::Command;
+use std::sync::{Mutex, PoisonError};
+use tempfile::TempDir;
+
+/// Where a [`Place`] has its library.
+pub(crate) fn library() -> String {
+    format!("laws/{DLL_PREFIX}troubled{DLL_SUFFIX}")
+}
+
+/// A folder with the law, compiled with this definition if it is not empty. `None`, with a remark,
+/// where there is no compiler; that is an error where tests must not be skipped.
+pub(crate) fn place(define: &'static str) -> Option<Place> {
+    static COMPILED: Mutex<BTreeMap<&str, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    if !compiled.contains_key(define) {
+        compiled.insert(define, compile(define)?);
+    }
+    let place = Place::new();
+    place.write(&library(), &compiled[define]);
+    Some(place)
+}
+
+fn compile(define: &str) -> Option<Vec<u8>> {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("library");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let output = Command::new("cc")
+        .args(["-shared", "-fPIC", "-fvisibility=hidden", "-o"])
+        .arg(&out)
+        .args((!define.is_empty()).then(|| format!("-D{define}")))
+        .arg("-I")
+        .arg(here.join("../abi/include"))
+        .arg(here.join("command_line/fixtures/troubled.c"))
+        .output();
+    let Ok(output) = output else {
+        assert!(std::env::var_os("CI").is_none(), "there is no C compiler");
+        println!("skipped: there is no C compiler");
+        return None;
+    };
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    Some(std::fs::read(out).unwrap())
+}
+
+/// A driver that leads the law beyond a limit of 1 mm in the third of four increments.
+pub(crate) fn driver(how: &str) -> String {
+    format!(
+        "law = \"troubled\"\nlaw_path = [\"laws\"]\nhypothesis = \"interface_2d\"\n\
+         [parameters]\nlimit = 1.0e-3\nhow = \"{how}\"\n\
+         [initial]\ntraction = {{ n = -100.0 }}\n\
+         [[segment]]\nincrements = 4\ncontrol = {{ t = {{ jump = 2.0e-3 }}, n = {{ jump = 0.0 }} }}\n"
+    )
+}
+
+/// The case with this law in its layer; the limit is exceeded in the second phase.
+pub(crate) fn case(how: &str) -> String {
+    let start = CASE.find("[laws.joint.parameters]").unwrap();
+    let end = CASE.find("[groups.soil]").unwrap();
+    let text = edited(&[
+        ("law = \"coulomb_joint\"", "law = \"troubled\""),
+        ("title", "law_path = [\"laws\"]\ntitle"),
+    ]);
+    let parameters = &CASE[start..end];
+    let own = format!("parameters = {{ limit = 1.0e-6, how = \"{how}\" }}\n\n");
+    text.replacen(parameters, &own, 1)
+        .replacen("x = 1e-5 }", "x = 1e-3 }", 1)
+}
