@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::io::{self, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -195,12 +196,20 @@ pub(crate) fn ending(status: ExitStatus) -> Ending {
     Ending::Exited(status.code().unwrap_or(-1))
 }
 
+static IS_CHILD: AtomicBool = AtomicBool::new(false);
+
+/// Whether this process is a child: [`enter`] was called.
+pub fn is_child() -> bool {
+    IS_CHILD.load(Ordering::Relaxed)
+}
+
 /// The first thing a hidden command does: keeps the limits it was started with, leaves no core
 /// file, and dies with its parent.
 ///
 /// # Errors
 /// A limit cannot be set.
 pub fn enter() -> io::Result<()> {
+    IS_CHILD.store(true, Ordering::Relaxed);
     #[cfg(unix)]
     {
         use rustix::process::{Resource, Rlimit, setrlimit};

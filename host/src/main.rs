@@ -149,12 +149,8 @@ fn main() -> ExitCode {
             return ExitCode::from(u8::from(error.use_stderr()));
         }
     };
-    let is_child = matches!(
-        arguments.command,
-        Command::ProbeLibrary { .. } | Command::LawWorker
-    );
     let trust = Trust {
-        probe: !arguments.no_probe && !is_child,
+        probe: !arguments.no_probe,
         isolate: arguments
             .isolate
             .or_else(|| arguments.command.isolates_anyway())

@@ -26,7 +26,7 @@ fn refused(arguments: &[&str], says: &[&str]) {
 
 #[test]
 fn refuses_arguments_it_does_not_know() {
-    refused(&[], &["Usage: pilum <COMMAND>"]);
+    refused(&[], &["Usage: pilum [OPTIONS] <COMMAND>"]);
     refused(&["rnu", "file"], &["unrecognized subcommand 'rnu'"]);
     refused(&["run"], &["<CASE>", "Usage: pilum run"]);
     refused(
@@ -53,7 +53,7 @@ fn names_the_file_it_cannot_read() {
 #[test]
 fn help_and_version_are_no_errors() {
     for (arguments, says) in [
-        (vec!["--help"], "Usage: pilum <COMMAND>"),
+        (vec!["--help"], "Usage: pilum [OPTIONS] <COMMAND>"),
         (vec!["run", "--help"], "Usage: pilum run"),
         (vec!["help", "run"], "Usage: pilum run"),
         (

@@ -37,7 +37,7 @@ fn a_case_runs_only_with_the_library_it_names() {
         "law `elastic`: library",
         &format!("found SHA-256 {right}"),
         &format!("expected {wrong}"),
-        "`sha256` at case.toml:30:10",
+        "`sha256` at case.toml:29:10",
     ] {
         assert!(outcome.says(text), "{text:?}\n{}", outcome.stderr);
     }
@@ -46,7 +46,7 @@ fn a_case_runs_only_with_the_library_it_names() {
     let outcome = Place::new().run_case(pinned("0123"));
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(outcome.says("expected 64 hexadecimal digits"));
-    assert!(outcome.says("case.toml:30:10"), "{}", outcome.stderr);
+    assert!(outcome.says("case.toml:29:10"), "{}", outcome.stderr);
 }
 
 #[test]
@@ -74,7 +74,7 @@ fn a_lock_beside_a_case_is_honoured() {
     assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
     assert!(outcome.says("`sha256` at case.lock:"), "{}", outcome.stderr);
     assert!(
-        outcome.says("needed by case.toml:29:7"),
+        outcome.says("needed by case.toml:28:7"),
         "{}",
         outcome.stderr
     );

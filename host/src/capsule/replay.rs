@@ -11,11 +11,14 @@ use crate::point::words;
 use abi::status::Outcome;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// Smallest fraction of the increment that is tried.
 const SMALLEST: f64 = 1.0 / (1 << 20) as f64;
 /// Bisections between a fraction that succeeds and one that fails.
 const BISECTIONS: usize = 40;
+/// How long halving may go on: a law may hang at each fraction.
+const PATIENCE: Duration = Duration::from_secs(30);
 /// Sizes of differences relative to the increment; the better agreement counts.
 const DIFFERENCES: [f64; 3] = [1e-3, 1e-5, 1e-7];
 
@@ -220,12 +223,13 @@ fn outcome(
 /// The largest fraction of the increment that succeeds, found by halving.
 fn bisect(law: &Law, call: &PointCall, say: &mut dyn FnMut(&str)) -> Option<f64> {
     let succeeds = |fraction| update(law, call, call.request, fraction).is_ok();
+    let started = Instant::now();
     let mut good = 0.5;
     let mut bad = 1.0;
     while !succeeds(good) {
         bad = good;
         good *= 0.5;
-        if good < SMALLEST {
+        if good < SMALLEST || started.elapsed() > PATIENCE {
             say(&format!(
                 "every fraction of the increment fails that was tried, down to {bad:.1e}"
             ));
@@ -233,6 +237,9 @@ fn bisect(law: &Law, call: &PointCall, say: &mut dyn FnMut(&str)) -> Option<f64>
         }
     }
     for _ in 0..BISECTIONS {
+        if started.elapsed() > PATIENCE {
+            break;
+        }
         let middle = 0.5 * (good + bad);
         if succeeds(middle) {
             good = middle;

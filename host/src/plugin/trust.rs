@@ -1,6 +1,7 @@
 //! Whom this process trusts. A library has all rights of the user once it is opened; these rules
 //! prevent accidents and surprises, not attacks by the user's own programs.
 
+use crate::child;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -24,8 +25,11 @@ impl Trust {
         TRUST.set(self).is_ok()
     }
 
-    /// That of this process.
+    /// That of this process. A child is where libraries are tried and called, so it does neither.
     pub(super) fn current() -> Self {
+        if child::is_child() {
+            return Self::default();
+        }
         TRUST.get().copied().unwrap_or_default()
     }
 }
