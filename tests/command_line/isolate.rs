@@ -1,7 +1,7 @@
 //! `--isolate`: a law that crashes, ends its process or never returns ends an increment, and not
 //! the program.
 
-use crate::program::{CASE, DONE, NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place};
+use crate::program::{DONE, NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place, edited};
 use crate::troubled;
 
 const WAYS: [(&str, &str); 4] = [
@@ -65,10 +65,14 @@ fn a_driver_ends_with_its_rows() {
     }
 }
 
+/// The layer has more points than one worker is given at a time.
 #[test]
 fn results_are_the_same_as_in_the_process() {
     let place = Place::new();
-    place.write("case.toml", CASE);
+    place.write(
+        "case.toml",
+        edited(&[("n = 2, to = 1.0", "n = 130, to = 1.0")]),
+    );
     for (out, isolate) in [("here", ""), ("apart", "--isolate")] {
         let mut arguments = vec!["run", "case.toml", "--out", out];
         arguments.extend(Some(isolate).filter(|argument| !argument.is_empty()));
