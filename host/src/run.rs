@@ -273,6 +273,15 @@ impl<'a> Run<'a> {
             .domain
             .as_ref()
             .is_some_and(|domain| domain.factorised);
+        let round_off = equations.domain.as_ref().map_or(0.0, |d| d.round_off);
+        if round_off > 0.0 {
+            observer.warning(&format!(
+                "phase `{name}`: `force_tolerance` {:.1e} is below round-off: the linear groups \
+                 are left with a residual of {round_off:.1e}, which is the last bit of their \
+                 displacements",
+                self.file().solver.force_tolerance
+            ));
+        }
         record.factorisations = equations.solver.factorisations + u64::from(factorised);
         record.fallbacks = equations.solver.fallbacks;
         self.time += 1.0;
