@@ -1,6 +1,7 @@
 //! What can go wrong, sorted by who has to act; the program's exit code follows.
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode, SourceSpan};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -191,7 +192,7 @@ impl InputError {
 }
 
 /// Where in a run something happened.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
     /// Phase.
     pub phase: String,
@@ -251,6 +252,13 @@ pub enum Error {
         #[help]
         hint: Option<String>,
     },
+    /// The user stopped the run after a whole increment.
+    #[error("{place}: stopped as asked; everything up to here is written")]
+    #[diagnostic(help("go on with --resume"))]
+    Interrupted {
+        /// The last increment.
+        place: Place,
+    },
     /// A defect of the program.
     #[error("internal error: {0}")]
     Internal(String),
@@ -291,7 +299,7 @@ impl Error {
         }
     }
 
-    /// The program's exit code: 1 bad input (places that cannot be read or written included), 2 no equilibrium, 3 plugin trouble, 4 internal.
+    /// The program's exit code: 1 bad input (places that cannot be read or written included), 2 no equilibrium, 3 plugin trouble, 4 internal, 130 stopped as asked (as shells say it of Ctrl-C).
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Input(_) | Self::Unreadable { .. } | Self::Unwritable { .. } | Self::Usage(_) => {
@@ -300,6 +308,7 @@ impl Error {
             Self::NoEquilibrium { .. } => 2,
             Self::Plugin { .. } => 3,
             Self::Internal(_) => 4,
+            Self::Interrupted { .. } => 130,
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::input::BuiltLaw;
 use crate::plugin::{BatchFailure, BatchSuccess, End, Operator, Start, Strided};
 use layer::Layer;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Points that one thread takes at a time.
@@ -54,7 +54,7 @@ pub struct GroupLaw {
 }
 
 /// How often a group has called a law, calls included that came to nothing.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LawCalls {
     /// Id of the law.
     pub law: String,
@@ -117,6 +117,20 @@ impl std::fmt::Display for PointFailure {
             }
         )
     }
+}
+
+/// What a group carries from one increment to the next.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct GroupState {
+    /// Name of the law in the case file.
+    law: String,
+    strain: Vec<f64>,
+    stress: Vec<f64>,
+    internal: Vec<f64>,
+    jump: Vec<f64>,
+    law_calls: Vec<LawCalls>,
+    /// Tangents, where a matrix made of them is still in use.
+    tangent: Option<Vec<f64>>,
 }
 
 /// A group of elements.
@@ -189,6 +203,61 @@ impl Group {
         let same = law.built.law.description().id == self.law.built.law.description().id;
         let kept = same.then(|| std::mem::take(&mut self.internal.committed));
         self.start_law(law, kept)
+    }
+
+    /// The committed state; with the tangents of the last evaluation if they are wanted.
+    pub fn state(&self, with_tangents: bool) -> GroupState {
+        let jump = self.layer.as_ref().map(|layer| &layer.jump.committed);
+        GroupState {
+            law: self.law.name.clone(),
+            strain: self.strain.committed.clone(),
+            stress: self.stress.committed.clone(),
+            internal: self.internal.committed.clone(),
+            jump: jump.cloned().unwrap_or_default(),
+            law_calls: self.law_calls.clone(),
+            tangent: with_tangents.then(|| self.tangent.clone()),
+        }
+    }
+
+    /// Takes over a state that [`Self::state`] gave, with the law it names (`laws`: those that the
+    /// group carries in the course of the case).
+    ///
+    /// # Errors
+    /// The state is not that of this group, or its law has no elastic operator.
+    pub fn restore(&mut self, state: GroupState, laws: &[GroupLaw]) -> Result<(), String> {
+        let wrong = || format!("the state is not that of group `{}`", self.name);
+        let known = laws.iter().chain([&self.law]);
+        let law = known.into_iter().find(|law| law.name == state.law);
+        let law = law.cloned().ok_or_else(wrong)?;
+        let n_internal = self.kinematics.n_points() * law.built.law.n_states();
+        let n_jump = self
+            .layer
+            .as_ref()
+            .map_or(0, |layer| layer.jump.committed.len());
+        if state.strain.len() != self.strain.committed.len()
+            || state.stress.len() != self.stress.committed.len()
+            || state.internal.len() != n_internal
+            || state.jump.len() != n_jump
+        {
+            return Err(wrong());
+        }
+        self.stress = Field::new(state.stress);
+        self.start_law(law, Some(state.internal.clone()))
+            .map_err(|failure| failure.to_string())?;
+        // Initial values that the case file gives held at the start of the law only.
+        self.internal = Field::new(state.internal);
+        self.strain = Field::new(state.strain);
+        if let Some(layer) = &mut self.layer {
+            layer.jump = Field::new(state.jump);
+        }
+        if let Some(tangent) = state.tangent {
+            if tangent.len() != self.tangent.len() {
+                return Err(format!("the state is not that of group `{}`", self.name));
+            }
+            self.tangent = tangent;
+        }
+        self.law_calls = state.law_calls;
+        Ok(())
     }
 
     fn start_law(&mut self, law: GroupLaw, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {

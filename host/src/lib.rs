@@ -11,6 +11,7 @@
 pub mod assembly;
 pub mod capsule;
 pub mod case;
+pub mod checkpoint;
 pub mod child;
 pub mod element;
 pub mod error;

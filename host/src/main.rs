@@ -10,13 +10,14 @@ use host::case::Case;
 use host::error::{Error, Place, suggestion};
 use host::output::{Figures, remove_comparison};
 use host::plugin::{SearchPath, Trust, vetting};
-use host::run::{Observer, check, run_reusing};
+use host::run::{Observer, Options, check, run_reusing};
 use host::solver::Reuse;
 use host::trade_off;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Finite elements for soil-structure interfaces, with constitutive laws as plugins.
@@ -54,6 +55,12 @@ enum Command {
         /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Go on from where an earlier run into the same folder was stopped, or start if none was.
+        #[arg(long)]
+        resume: bool,
+        /// Seconds between checkpoints, from which a run can be resumed; 0: after every increment.
+        #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
+        checkpoint: f64,
         /// Threads; the results do not depend on it [default: all processors].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,
@@ -187,6 +194,8 @@ fn execute(command: Command) -> Result<(), Error> {
             case,
             variant,
             out,
+            resume,
+            checkpoint,
             threads,
         } => {
             if let Some(n) = threads {
@@ -195,7 +204,12 @@ fn execute(command: Command) -> Result<(), Error> {
                     .build_global()
                     .map_err(|error| Error::Internal(error.to_string()))?;
             }
-            run_cases(&case, variant.as_deref(), out.as_deref())
+            stop_on_signals()?;
+            let options = Options {
+                resume,
+                checkpoints: Some(Duration::from_secs_f64(checkpoint)),
+            };
+            run_cases(&case, variant.as_deref(), out.as_deref(), options)
         }
         Command::Point {
             driver,
@@ -252,6 +266,30 @@ fn execute(command: Command) -> Result<(), Error> {
     }
 }
 
+/// The user wants the run to stop after the present increment.
+static STOPS: AtomicBool = AtomicBool::new(false);
+
+/// Ctrl-C and its like end a run after the present increment; a second one ends it at once.
+fn stop_on_signals() -> Result<(), Error> {
+    let stop = || {
+        if STOPS.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        eprintln!("stopping after this increment; once more to stop at once");
+    };
+    ctrlc::set_handler(stop).map_err(|error| Error::Internal(error.to_string()))
+}
+
+/// A time in seconds.
+fn not_negative(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number of seconds")?;
+    if (0.0..=1e6).contains(&value) {
+        Ok(value)
+    } else {
+        Err("expected 0 to 1e6 seconds".to_owned())
+    }
+}
+
 /// A time limit in seconds.
 fn seconds(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "expected a number of seconds")?;
@@ -264,7 +302,12 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 /// Runs a case, or all variants of one, and writes the report of each, and their comparison. A
 /// variant that fails does not stop the others; the last failure is the outcome.
-fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(), Error> {
+fn run_cases(
+    path: &Path,
+    variant: Option<&str>,
+    out: Option<&Path>,
+    options: Options,
+) -> Result<(), Error> {
     let mut cases = Case::load(path)?;
     if let Some(wanted) = variant {
         let names: Vec<String> = cases
@@ -306,7 +349,7 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
             eprintln!("variant {name}");
         }
         let mut progress = Progress::new();
-        let run = run_accurately(case, &folder, &mut progress, &mut reuse);
+        let run = run_accurately(case, &folder, &mut progress, &mut reuse, options);
         progress.finish();
         let has_results = progress.has_begun;
         match run {
@@ -316,11 +359,15 @@ fn run_cases(path: &Path, variant: Option<&str>, out: Option<&Path>) -> Result<(
             }
             Err(error) => keep_last(&mut outcome, error),
         }
+        let is_stopped = matches!(outcome, Err(Error::Interrupted { .. }));
         if has_results {
             if let Err(error) = write_report(std::slice::from_ref(&folder), None) {
                 keep_last(&mut reports, error);
             }
             folders.push(folder);
+        }
+        if is_stopped {
+            break;
         }
     }
     if drawn.len() > 1
@@ -349,6 +396,7 @@ fn run_accurately(
     folder: &Path,
     progress: &mut Progress,
     reuse: &mut Reuse,
+    options: Options,
 ) -> Result<Figures, Error> {
     let studied = trade_off::reach(case, folder)?;
     let case = studied.as_ref().unwrap_or(case);
@@ -375,7 +423,7 @@ fn run_accurately(
             ));
         }
     }
-    run_reusing(case, folder, progress, reuse)
+    run_reusing(case, folder, progress, reuse, options)
 }
 
 /// Keeps the last failure for the caller to report, and reports the one before it.
@@ -483,5 +531,17 @@ impl Observer for Progress {
 
     fn warning(&mut self, message: &str) {
         self.say(&format!("warning: {message}"));
+    }
+
+    fn resumed(&mut self, from: Option<&Place>) {
+        self.has_begun = true;
+        match from {
+            Some(place) => self.say(&format!("resumed after {place}")),
+            None => self.say("done already"),
+        }
+    }
+
+    fn wants_to_stop(&self) -> bool {
+        STOPS.load(Ordering::Relaxed)
     }
 }

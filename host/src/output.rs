@@ -1,6 +1,7 @@
 //! Results in a folder: `history.csv`, `profile.csv`, `points.csv`, `fields.pvd` with `*.vtu`,
 //! `summary.json`, `log.jsonl`. Rows are flushed as increments converge, so whatever was reported
-//! is on disk. What an earlier run left in the folder is removed first.
+//! is in its file. What an earlier run left in the folder is removed first, unless it is resumed:
+//! then the files go on from where its last checkpoint saw them.
 
 mod fields;
 mod figure;
@@ -21,14 +22,16 @@ use crate::model::Model;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::Iteration;
 use fields::Fields;
+use figure::Curve;
 use points::Points;
 use profile::Profile;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::fs::File;
-use std::io::Write;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use summary::Summary;
+use summary::{Course, Summary};
 
 /// A number with 17 significant digits: reading it back gives the same bits.
 pub fn number(value: f64) -> String {
@@ -70,46 +73,124 @@ pub struct Results {
     seconds: Duration,
 }
 
+/// How far the results of a run had come at a checkpoint.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ResultsState {
+    history: u64,
+    profile: Option<u64>,
+    points: Option<u64>,
+    log: u64,
+    times: Option<Vec<f64>>,
+    course: Course,
+    curves: Vec<Vec<Curve>>,
+    seconds: Duration,
+}
+
+impl ResultsState {
+    /// The figures of the run.
+    pub fn figures(self, case: &Case, probes: &Probes) -> Figures {
+        let mut figures = empty_figures(case, probes);
+        figures.restore(self.curves);
+        figures
+    }
+}
+
+fn empty_figures(case: &Case, probes: &Probes) -> Figures {
+    let names = probes.names().map(str::to_owned).collect();
+    Figures::new(&case.file.title, &case.file.figures, names)
+}
+
 /// A CSV file.
 #[derive(Debug)]
 struct Table {
     path: PathBuf,
-    writer: csv::Writer<File>,
+    file: File,
+    /// Rows that are not in the file yet.
+    rows: csv::Writer<Vec<u8>>,
+    /// Bytes of whole rows in the file.
+    length: u64,
 }
 
 impl Table {
-    fn create<'a>(
+    /// Begins a file with a head; or, `from` a length, goes on after that of an earlier run's.
+    fn begin<'a>(
         path: PathBuf,
         columns: impl IntoIterator<Item = &'a str>,
+        from: Option<u64>,
     ) -> Result<Self, Error> {
-        let file = create(&path)?;
+        let file = match from {
+            None => create(&path)?,
+            Some(length) => OpenOptions::new()
+                .write(true)
+                .open(&path)
+                .and_then(|file| cut(&file, length).map(|()| file))
+                .map_err(|error| unwritable(&path, error))?,
+        };
         let mut table = Self {
             path,
-            writer: csv::Writer::from_writer(file),
+            file,
+            rows: csv::Writer::from_writer(Vec::new()),
+            length: from.unwrap_or(0),
         };
-        table.row(columns)?;
-        table.flush()?;
+        if from.is_none() {
+            table.row(columns)?;
+            table.flush()?;
+        }
         Ok(table)
     }
 
     fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(&mut self, cells: I) -> Result<(), Error> {
-        self.writer
+        self.rows
             .write_record(cells)
             .map_err(|error| unwritable(&self.path, std::io::Error::other(error)))
     }
 
+    /// Writes the rows that are waiting, all of them or none.
     fn flush(&mut self) -> Result<(), Error> {
-        self.writer
-            .flush()
+        let rows = std::mem::replace(&mut self.rows, csv::Writer::from_writer(Vec::new()));
+        let rows = rows
+            .into_inner()
+            .map_err(|error| Error::Internal(error.to_string()))?;
+        append(&mut self.file, &mut self.length, &rows)
             .map_err(|error| unwritable(&self.path, error))
     }
+
+    /// Waits until everything is on the disk.
+    fn sync(&self) -> Result<u64, Error> {
+        let synced = self.file.sync_data();
+        synced.map_err(|error| unwritable(&self.path, error))?;
+        Ok(self.length)
+    }
+}
+
+/// Appends to a file of this length. What fits of a text that does not fit as a whole is taken
+/// back: it would pass for more than it is.
+fn append(file: &mut File, length: &mut u64, text: &[u8]) -> std::io::Result<()> {
+    if let Err(error) = file.write_all(text) {
+        let _ = file.set_len(*length);
+        return Err(error);
+    }
+    *length += text.len() as u64;
+    Ok(())
+}
+
+/// Forgets what a file holds after `length` bytes and goes on there.
+fn cut(mut file: &File, length: u64) -> std::io::Result<()> {
+    if file.metadata()?.len() < length {
+        return Err(std::io::Error::other(
+            "it is shorter than it was at the last checkpoint: it was changed since",
+        ));
+    }
+    file.set_len(length)?;
+    file.seek(SeekFrom::Start(length))?;
+    Ok(())
 }
 
 fn create(path: &Path) -> Result<File, Error> {
     File::create(path).map_err(|error| unwritable(path, error))
 }
 
-fn unwritable(path: &Path, source: std::io::Error) -> Error {
+pub(crate) fn unwritable(path: &Path, source: std::io::Error) -> Error {
     Error::Unwritable {
         path: path.to_owned(),
         source,
@@ -132,15 +213,42 @@ fn internal_variables(model: &Model, of: impl Fn(&Group) -> bool) -> Vec<String>
     ids
 }
 
+/// One JSON object a line. As long as it is open, no other run writes into the folder.
 #[derive(Debug)]
 struct LogFile {
     path: PathBuf,
     file: File,
+    /// Bytes of whole lines.
+    length: u64,
 }
 
 impl LogFile {
+    /// Opens and locks the file, and goes on after its first `length` bytes.
+    fn begin(path: PathBuf, length: u64) -> Result<Self, Error> {
+        let mut options = OpenOptions::new();
+        let options = options.read(true).write(true).create(true).truncate(false);
+        let file = options
+            .open(&path)
+            .map_err(|error| unwritable(&path, error))?;
+        // Some file systems know no locks: an error says nothing of another run.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            let busy = std::io::Error::other("another run is writing into this folder");
+            return Err(unwritable(&path, busy));
+        }
+        cut(&file, length).map_err(|error| unwritable(&path, error))?;
+        Ok(Self { path, file, length })
+    }
+
     fn line(&mut self, value: &Value) -> Result<(), Error> {
-        writeln!(self.file, "{value}").map_err(|error| unwritable(&self.path, error))
+        let line = format!("{value}\n");
+        append(&mut self.file, &mut self.length, line.as_bytes())
+            .map_err(|error| unwritable(&self.path, error))
+    }
+
+    fn sync(&self) -> Result<u64, Error> {
+        let synced = self.file.sync_data();
+        synced.map_err(|error| unwritable(&self.path, error))?;
+        Ok(self.length)
     }
 }
 
@@ -156,33 +264,82 @@ impl Results {
         probes: &Probes,
     ) -> Result<Self, Error> {
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
+        let log = LogFile::begin(folder.join("log.jsonl"), 0)?;
         leftovers::remove(folder)?;
+        Self::begin(folder, case, model, probes, log, None)
+    }
+
+    /// Takes over the results that an interrupted run of the same case left in the folder, as
+    /// they were at its last checkpoint; what it wrote after that is forgotten.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn resume(
+        folder: &Path,
+        case: &Case,
+        model: &Model,
+        probes: &Probes,
+        state: ResultsState,
+    ) -> Result<Self, Error> {
+        let log = LogFile::begin(folder.join("log.jsonl"), state.log)?;
+        Self::begin(folder, case, model, probes, log, Some(state))
+    }
+
+    fn begin(
+        folder: &Path,
+        case: &Case,
+        model: &Model,
+        probes: &Probes,
+        log: LogFile,
+        state: Option<ResultsState>,
+    ) -> Result<Self, Error> {
         let settings = case.file.output;
         let columns = ["phase", "increment", "time"]
             .into_iter()
             .chain(probes.names())
             .chain(["iterations"]);
-        let log_path = folder.join("log.jsonl");
-        let summary = Summary::new(case, model, probes);
-        write_summary(folder, &summary.running())?;
-        Ok(Self {
-            history: Table::create(folder.join("history.csv"), columns)?,
-            profile: Profile::create(folder, settings.profile, model)?,
-            points: Points::create(folder, settings.points, model)?,
+        let at = state.as_ref();
+        let history_from = at.map(|state| state.history);
+        let mut results = Self {
+            history: Table::begin(folder.join("history.csv"), columns, history_from)?,
+            profile: Profile::begin(folder, settings.profile, model, at.and_then(|s| s.profile))?,
+            points: Points::begin(folder, settings.points, model, at.and_then(|s| s.points))?,
             fields: Fields::create(folder, settings.fields, model),
-            log: LogFile {
-                file: create(&log_path)?,
-                path: log_path,
-            },
-            summary,
-            figures: Figures::new(
-                &case.file.title,
-                &case.file.figures,
-                probes.names().map(str::to_owned).collect(),
-            ),
+            log,
+            summary: Summary::new(case, model, probes),
+            figures: empty_figures(case, probes),
             folder: folder.to_owned(),
             settings,
             seconds: Duration::ZERO,
+        };
+        if let Some(state) = state {
+            results.summary.course = state.course;
+            results.figures.restore(state.curves);
+            results.seconds = state.seconds;
+            if let (Some(fields), Some(times)) = (&mut results.fields, state.times) {
+                fields.times = times;
+            }
+        }
+        write_summary(folder, &results.summary.running())?;
+        Ok(results)
+    }
+
+    /// How far the results have come, after waiting until they are on the disk.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn state(&self) -> Result<ResultsState, Error> {
+        let profile = self.profile.as_ref().map(|profile| profile.table.sync());
+        let points = self.points.as_ref().map(|points| points.table.sync());
+        Ok(ResultsState {
+            history: self.history.sync()?,
+            profile: profile.transpose()?,
+            points: points.transpose()?,
+            log: self.log.sync()?,
+            times: self.fields.as_ref().map(|fields| fields.times.clone()),
+            course: self.summary.course.clone(),
+            curves: self.figures.curves(),
+            seconds: self.seconds,
         })
     }
 

@@ -3,19 +3,20 @@
 use crate::assembly::{System, fold};
 use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Equations, PhaseInput};
+use crate::checkpoint::{Checkpoint, PhaseCourse, RunState, identity};
 use crate::error::{Error, Place};
-use crate::group::Group;
+use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
 use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    LinearDomain, LinearSolver, Loads, Matrix, Newton, Reuse, Singular, StepFailure, StepSuccess,
-    mesh_lines,
+    Costs, LinearDomain, LinearSolver, Loads, Matrix, Newton, Reuse, Singular, StepFailure,
+    StepSuccess, mesh_lines,
 };
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::time::Instant;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Progress of a run, for whoever shows it.
 pub trait Observer {
@@ -27,6 +28,21 @@ pub trait Observer {
     fn cut_back(&mut self, place: &Place, reason: &str);
     /// Something the user should know.
     fn warning(&mut self, message: &str);
+    /// An earlier run is gone on with after this increment; `None`: it had come to its end.
+    fn resumed(&mut self, _from: Option<&Place>) {}
+    /// Whether the run is to stop after the increment that has just been written.
+    fn wants_to_stop(&self) -> bool {
+        false
+    }
+}
+
+/// How a run begins, and what it keeps to go on from.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// Go on from the checkpoint in the folder, if there is one.
+    pub resume: bool,
+    /// Time between checkpoints; `None`: there are none.
+    pub checkpoints: Option<Duration>,
 }
 
 /// Fastest growth of steps after a cut-back.
@@ -53,18 +69,21 @@ pub fn check(case: &Case) -> Result<(), Error> {
 /// Bad input before anything is written; no equilibrium or plugin trouble after the last state
 /// of equilibrium has been written.
 pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Figures, Error> {
-    run_reusing(case, folder, observer, &mut Reuse::default())
+    let options = Options::default();
+    run_reusing(case, folder, observer, &mut Reuse::default(), options)
 }
 
-/// As [`run`], with what earlier runs have factorised.
+/// As [`run`], with what earlier runs have factorised, and with checkpoints.
 ///
 /// # Errors
-/// As [`run`].
+/// As [`run`]; a checkpoint to go on from that is damaged or belongs to another run;
+/// [`Error::Interrupted`].
 pub fn run_reusing(
     case: &Case,
     folder: &Path,
     observer: &mut dyn Observer,
     reuse: &mut Reuse,
+    options: Options,
 ) -> Result<Figures, Error> {
     let started = Instant::now();
     let model = Model::build(case)?;
@@ -74,21 +93,81 @@ pub fn run_reusing(
         observer,
         warnings: Vec::new(),
     };
-    for law in model.laws.values() {
-        for warning in &law.warnings {
-            observer.warning(warning);
+    let mut keeper = Keeper {
+        identity: identity(case, &model),
+        folder: folder.to_owned(),
+        every: options.checkpoints,
+        last: started,
+    };
+    let found = if options.resume {
+        Checkpoint::read(folder, &keeper.identity)?
+    } else {
+        None
+    };
+    let (mut results, state) = if let Some(checkpoint) = found {
+        let from = checkpoint.place(case);
+        let Some(state) = checkpoint.run else {
+            observer.resumed(None);
+            return Ok(checkpoint.results.figures(case, &probes));
+        };
+        observer.resumed(from.as_ref());
+        observer.warnings = checkpoint.warnings;
+        let results = Results::resume(folder, case, &model, &probes, checkpoint.results)?;
+        (results, Some(state))
+    } else {
+        for law in model.laws.values() {
+            for warning in &law.warnings {
+                observer.warning(warning);
+            }
         }
-    }
-    let mut results = Results::create(folder, case, &model, &probes)?;
+        (Results::create(folder, case, &model, &probes)?, None)
+    };
     let mut run = Run::new(case, model, probes, reuse);
-    let outcome = run.phases(&mut results, &mut observer);
+    let outcome = run.phases(state, &mut results, &mut observer, &mut keeper);
     for warning in results.unreliable() {
         observer.warning(&warning);
     }
     let error = outcome.as_ref().err();
     let finished = results.finish(&run.groups, started.elapsed(), &observer.warnings, error);
+    let is_done = outcome.is_ok();
     outcome.and(finished)?;
+    if is_done {
+        keeper.end(&results, &observer.warnings)?;
+    }
     Ok(results.figures().clone())
+}
+
+/// Writes the checkpoints of a run.
+struct Keeper {
+    identity: String,
+    folder: PathBuf,
+    every: Option<Duration>,
+    last: Instant,
+}
+
+impl Keeper {
+    /// Whether it is time for another checkpoint.
+    fn is_due(&self) -> bool {
+        self.every.is_some_and(|every| self.last.elapsed() >= every)
+    }
+
+    fn keep(&mut self, run: RunState, results: &Results, warnings: &[String]) -> Result<(), Error> {
+        if self.every.is_some() {
+            let state = results.state()?;
+            Checkpoint::new(&self.identity, state, warnings, Some(run)).write(&self.folder)?;
+            self.last = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// The last checkpoint: there is nothing left to do.
+    fn end(&self, results: &Results, warnings: &[String]) -> Result<(), Error> {
+        if self.every.is_some() {
+            let state = results.state()?;
+            Checkpoint::new(&self.identity, state, warnings, None).write(&self.folder)?;
+        }
+        Ok(())
+    }
 }
 
 /// An observer that also keeps the warnings, for the summary.
@@ -113,6 +192,14 @@ impl Observer for Noting<'_> {
     fn warning(&mut self, message: &str) {
         self.warnings.push(message.to_owned());
         self.observer.warning(message);
+    }
+
+    fn resumed(&mut self, from: Option<&Place>) {
+        self.observer.resumed(from);
+    }
+
+    fn wants_to_stop(&self) -> bool {
+        self.observer.wants_to_stop()
     }
 }
 
@@ -153,18 +240,37 @@ struct PhaseEquations {
     n_unknowns: usize,
     /// Displacements when the domain's groups were last brought up to date.
     at_last: Vec<f64>,
+    /// Factorisations and fallbacks in the phase that the solver does not count, modulo 2⁶⁴.
+    counted: [u64; 2],
 }
 
 impl PhaseEquations {
     fn n(&self) -> usize {
         self.n_unknowns
     }
+
+    /// Factorisations and fallbacks since the equations were set up.
+    fn counts(&self) -> [u64; 2] {
+        let domain = self.domain.as_ref().is_some_and(|domain| domain.factorised);
+        let factorisations = self.solver.factorisations + u64::from(domain);
+        [factorisations, self.solver.fallbacks]
+    }
+
+    /// The record of the phase with all that has been counted.
+    fn counted_in(&self, record: &PhaseRecord) -> PhaseRecord {
+        let [factorisations, fallbacks] = self.counts();
+        PhaseRecord {
+            factorisations: self.counted[0].wrapping_add(factorisations),
+            fallbacks: self.counted[1].wrapping_add(fallbacks),
+            ..record.clone()
+        }
+    }
 }
 
 /// What is left of a model once mesh and groups are taken out.
 struct ModelRest {
     ties: Vec<crate::assembly::Tie>,
-    swaps: Vec<Vec<(usize, crate::group::GroupLaw)>>,
+    swaps: Vec<Vec<(usize, GroupLaw)>>,
 }
 
 impl<'a> Run<'a> {
@@ -217,62 +323,118 @@ impl<'a> Run<'a> {
             .collect()
     }
 
-    fn phases(&mut self, results: &mut Results, observer: &mut dyn Observer) -> Result<(), Error> {
+    fn phases(
+        &mut self,
+        state: Option<RunState>,
+        results: &mut Results,
+        observer: &mut Noting<'_>,
+        keeper: &mut Keeper,
+    ) -> Result<(), Error> {
         let file = self.file();
-        for (number, phase) in file.phases.iter().enumerate() {
+        let first = state.as_ref().map_or(0, |state| state.phase);
+        let mut course = match state {
+            Some(state) => Some(self.restore(state)?),
+            None => None,
+        };
+        for (number, phase) in file.phases.iter().enumerate().skip(first) {
             observer.phase(phase.name.get_ref(), *phase.increments.get_ref());
-            self.phase(number, phase, results, observer)?;
+            self.phase(number, course.take(), results, observer, keeper)?;
         }
         Ok(())
+    }
+
+    /// The state after a whole increment of a phase.
+    fn state(&self, phase: usize, course: PhaseCourse) -> RunState {
+        let state = |group: &Group| group.state(course.has_matrix);
+        RunState {
+            phase,
+            groups: self.groups.iter().map(state).collect(),
+            displacement: self.displacement.clone(),
+            prescribed: self.prescribed.clone(),
+            pressure: self.pressure.clone(),
+            force: self.force.clone(),
+            time: self.time,
+            largest_force: self.largest_force,
+            course,
+        }
+    }
+
+    /// Takes over a state that [`Self::state`] gave. Returns where its phase stands.
+    fn restore(&mut self, state: RunState) -> Result<PhaseCourse, Error> {
+        let n_dofs = self.displacement.len();
+        let course = &state.course;
+        let sizes = [&state.displacement, &state.force, &course.loads.force_start];
+        if state.groups.len() != self.groups.len() || sizes.iter().any(|v| v.len() != n_dofs) {
+            let message = "the checkpoint is not that of this mesh; run without --resume";
+            return Err(Error::Usage(message.to_owned()));
+        }
+        let groups = self.groups.iter_mut().zip(state.groups).enumerate();
+        for (number, (group, state)) in groups {
+            let swaps = self.model.swaps.iter().flatten();
+            let laws = swaps.filter(|(g, _)| *g == number);
+            let laws: Vec<GroupLaw> = laws.map(|(_, law)| law.clone()).collect();
+            group.restore(state, &laws).map_err(Error::Internal)?;
+        }
+        self.displacement = state.displacement;
+        self.prescribed = state.prescribed;
+        self.pressure = state.pressure;
+        self.force = state.force;
+        self.time = state.time;
+        self.largest_force = state.largest_force;
+        Ok(state.course)
     }
 
     fn phase(
         &mut self,
         number: usize,
-        phase: &PhaseInput,
+        course: Option<PhaseCourse>,
         results: &mut Results,
-        observer: &mut dyn Observer,
+        observer: &mut Noting<'_>,
+        keeper: &mut Keeper,
     ) -> Result<(), Error> {
+        let phase = &self.file().phases[number];
         let name = phase.name.get_ref();
-        for (group, law) in self.model.swaps[number].clone() {
-            self.groups[group]
-                .set_law(law)
-                .map_err(|failure| cannot_start(&self.case.source, self.file(), &failure))?;
-        }
-        Model::check_layers(self.case, &self.groups)?;
-        let mut loads = self.loads(phase);
+        let loads = match &course {
+            Some(course) => course.loads.clone(),
+            None => self.begin(number, phase)?,
+        };
         let is_prescribed: Vec<bool> = (0..self.displacement.len())
             .map(|dof| self.prescribed.contains_key(&dof))
             .collect();
-        fold(&self.model.ties, &mut loads.force_start);
-        fold(&self.model.ties, &mut loads.force_end);
-        let mut equations = self
-            .equations(&is_prescribed, &mut loads)
+        let (mut equations, loads) = self
+            .equations(&is_prescribed, loads, course.as_ref())
             .map_err(|Singular| Error::NoEquilibrium {
                 message: format!("phase `{name}`: the equations are singular"),
                 hint: Some("a part of the model is not supported".to_owned()),
             })?;
-        let imbalance = equations.out_of_balance;
-        let mut record = PhaseRecord::new(name, equations.n(), imbalance);
-        if imbalance > 1e-6 {
-            observer.warning(&format!(
-                "phase `{name}` starts out of balance: {:.2} % of the forces in play, carried to \
-                 equilibrium in its course",
-                100.0 * imbalance
-            ));
-        }
+        let course = course.unwrap_or_else(|| {
+            let imbalance = equations.out_of_balance;
+            if imbalance > 1e-6 {
+                observer.warning(&format!(
+                    "phase `{name}` starts out of balance: {:.2} % of the forces in play, carried \
+                     to equilibrium in its course",
+                    100.0 * imbalance
+                ));
+            }
+            PhaseCourse {
+                loads,
+                increment: 0,
+                lambda: 0.0,
+                step: 1.0 / *phase.increments.get_ref() as f64,
+                last: None,
+                has_matrix: false,
+                record: PhaseRecord::new(name, equations.n(), imbalance),
+            }
+        });
+        let mut record = course.record.clone();
         let outcome = self.increments(
-            phase,
-            &loads,
+            number,
+            course,
             &mut equations,
             &mut record,
             results,
-            observer,
+            (observer, keeper),
         );
-        let factorised = equations
-            .domain
-            .as_ref()
-            .is_some_and(|domain| domain.factorised);
         let round_off = equations.domain.as_ref().map_or(0.0, |d| d.round_off);
         if round_off > 0.0 {
             observer.warning(&format!(
@@ -282,30 +444,49 @@ impl<'a> Run<'a> {
                 self.file().solver.force_tolerance
             ));
         }
-        record.factorisations = equations.solver.factorisations + u64::from(factorised);
-        record.fallbacks = equations.solver.fallbacks;
         self.time += 1.0;
-        results.phase(record);
+        results.phase(equations.counted_in(&record));
         outcome
+    }
+
+    /// Begins a phase: its laws and its loads.
+    fn begin(&mut self, number: usize, phase: &PhaseInput) -> Result<Loads, Error> {
+        for (group, law) in self.model.swaps[number].clone() {
+            self.groups[group]
+                .set_law(law)
+                .map_err(|failure| cannot_start(&self.case.source, self.file(), &failure))?;
+        }
+        Model::check_layers(self.case, &self.groups)?;
+        let mut loads = self.loads(phase);
+        fold(&self.model.ties, &mut loads.force_start);
+        fold(&self.model.ties, &mut loads.force_end);
+        Ok(loads)
     }
 
     fn increments(
         &mut self,
-        phase: &PhaseInput,
-        loads: &Loads,
+        number: usize,
+        course: PhaseCourse,
         equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
         results: &mut Results,
-        observer: &mut dyn Observer,
+        (observer, keeper): (&mut Noting<'_>, &mut Keeper),
     ) -> Result<(), Error> {
+        let phase = &self.file().phases[number];
         let n = *phase.increments.get_ref();
-        let mut step = 1.0 / n as f64;
         let easy = EASY * self.file().solver.method.max_iterations() as f64;
-        let smallest = step / f64::powi(2.0, self.file().solver.max_halvings as i32);
-        // The last step of this phase: its length and displacement increments.
-        let mut last: Option<(f64, Vec<f64>)> = None;
-        let mut lambda = 0.0;
-        for increment in 1..=n {
+        let smallest = 1.0 / n as f64 / f64::powi(2.0, self.file().solver.max_halvings as i32);
+        let PhaseCourse {
+            loads,
+            increment: done_before,
+            mut lambda,
+            mut step,
+            // The last step of this phase: its length and displacement increments.
+            mut last,
+            ..
+        } = course;
+        let loads = &loads;
+        for increment in done_before + 1..=n {
             let place = Place {
                 phase: phase.name.get_ref().clone(),
                 increment,
@@ -386,6 +567,23 @@ impl<'a> Run<'a> {
             record.increments += 1;
             results.increment(&place, n, &done, &snapshot, &self.mesh)?;
             observer.increment(&place, n, done.iterations);
+            let stops = observer.wants_to_stop();
+            if stops || keeper.is_due() {
+                let method = self.file().solver.method;
+                let course = PhaseCourse {
+                    loads: loads.clone(),
+                    increment,
+                    lambda,
+                    step,
+                    last: last.clone(),
+                    has_matrix: equations.matrix.is_kept(method),
+                    record: equations.counted_in(record),
+                };
+                keeper.keep(self.state(number, course), results, &observer.warnings)?;
+            }
+            if stops {
+                return Err(Error::Interrupted { place });
+            }
         }
         Ok(())
     }
@@ -537,12 +735,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The equations of a phase, and what is out of balance at its start.
+    /// The equations of a phase, at its start or where it stands; the loads with what is out of
+    /// balance at its start.
     fn equations(
         &mut self,
         is_prescribed: &[bool],
-        loads: &mut Loads,
-    ) -> Result<PhaseEquations, Singular> {
+        mut loads: Loads,
+        course: Option<&PhaseCourse>,
+    ) -> Result<(PhaseEquations, Loads), Singular> {
         let (case, groups, ties) = (self.case, &self.groups, &self.model.ties);
         let lines = mesh_lines(&self.mesh.nodes);
         let wanted = self.file().solver.equations;
@@ -574,11 +774,17 @@ impl<'a> Run<'a> {
         unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
         unknowns.sort_unstable();
         unknowns.dedup();
-        let out_of_balance = self.out_of_balance(&unknowns, loads);
+        let out_of_balance = match course {
+            Some(course) => course.record.out_of_balance,
+            None => self.out_of_balance(&unknowns, &mut loads),
+        };
         if let Some(domain) = &mut domain {
-            domain.start(&self.groups, loads);
+            match course {
+                Some(course) => domain.restart(&self.groups, &loads, course.lambda),
+                None => domain.start(&self.groups, &loads),
+            }
         }
-        Ok(PhaseEquations {
+        let mut equations = PhaseEquations {
             system,
             domain,
             solver,
@@ -586,7 +792,29 @@ impl<'a> Run<'a> {
             out_of_balance,
             n_unknowns: unknowns.len(),
             at_last: self.displacement.clone(),
-        })
+            counted: [0; 2],
+        };
+        if let Some(course) = course {
+            if course.has_matrix {
+                let restored = Newton::new(
+                    &equations.system,
+                    equations.domain.as_ref(),
+                    (&mut equations.solver, &mut equations.matrix),
+                    &mut self.groups,
+                    &self.case.file.solver,
+                    &mut Costs::default(),
+                )
+                .restore_matrix();
+                restored.map_err(|_| Singular)?;
+            }
+            // What was counted before counts on, without what it took to get here again.
+            let [factorisations, fallbacks] = equations.counts();
+            equations.counted = [
+                course.record.factorisations.wrapping_sub(factorisations),
+                course.record.fallbacks.wrapping_sub(fallbacks),
+            ];
+        }
+        Ok((equations, loads))
     }
 
     /// Internal less external forces at the start of a phase where nothing holds them (after a

@@ -12,6 +12,8 @@ mod parameters;
 mod point;
 mod program;
 mod results;
+#[cfg(unix)]
+mod resume;
 mod syntax;
 mod trade_off;
 mod troubled;

@@ -187,6 +187,28 @@ impl Place {
         }
     }
 
+    /// Runs the program from a shell that has set limits to itself.
+    #[cfg(unix)]
+    pub(crate) fn run_limited(&self, limits: &str, arguments: &[&str]) -> Outcome {
+        let inner = self.command(arguments);
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("{limits}; exec \"$0\" \"$@\"")]);
+        command.arg(inner.get_program()).args(inner.get_args());
+        command.current_dir(self.folder.path());
+        for (name, value) in inner.get_envs() {
+            match value {
+                Some(value) => command.env(name, value),
+                None => command.env_remove(name),
+            };
+        }
+        let output = command.output().unwrap();
+        Outcome {
+            code: output.status.code(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
     /// Runs a case given as the bytes of its file; results go to `out`.
     pub(crate) fn run_case(&self, text: impl AsRef<[u8]>) -> Outcome {
         self.write("case.toml", text);

@@ -8,7 +8,7 @@
 //!             from `summary.json`
 
 use host::case::Case;
-use host::run::run_reusing;
+use host::run::{Options, run_reusing};
 use host::solver::Reuse;
 use serde_json::Value;
 use std::path::Path;
@@ -52,7 +52,14 @@ fn condensing_the_ground_changes_no_answer() {
             .map(|case| {
                 let folder = tempfile::tempdir().unwrap();
                 let mut observer = Silent::default();
-                run_reusing(case, folder.path(), &mut observer, &mut Reuse::default()).unwrap();
+                run_reusing(
+                    case,
+                    folder.path(),
+                    &mut observer,
+                    &mut Reuse::default(),
+                    Options::default(),
+                )
+                .unwrap();
                 (
                     table(&folder.path().join("history.csv")),
                     factorisations(folder.path()),
@@ -101,7 +108,14 @@ fn variants_on_one_mesh_share_the_factors_of_the_ground() {
             (&mut Reuse::default(), &mut alone),
         ] {
             let folder = tempfile::tempdir().unwrap();
-            run_reusing(case, folder.path(), &mut Silent::default(), reuse).unwrap();
+            run_reusing(
+                case,
+                folder.path(),
+                &mut Silent::default(),
+                reuse,
+                Options::default(),
+            )
+            .unwrap();
             rows.push(table(&folder.path().join("history.csv")));
             factorised.push(factorisations(folder.path())[1]);
         }

@@ -18,7 +18,7 @@ const QUADRATIC_EDGE: u8 = 21;
 pub(super) struct Fields {
     folder: PathBuf,
     /// Times written so far.
-    times: Vec<f64>,
+    pub(super) times: Vec<f64>,
 }
 
 impl Fields {

@@ -6,6 +6,7 @@ use crate::error::{Error, Place, Source, suggestion};
 use crate::group::Group;
 use crate::probe::Probes;
 use plotters::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Size of a figure in points.
@@ -25,8 +26,8 @@ pub(crate) const COLOURS: [RGBColor; 10] = [
 ];
 
 /// A curve with its name.
-#[derive(Clone, Debug, Default)]
-struct Curve {
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Curve {
     /// Name, for the legend.
     name: String,
     /// Points in order.
@@ -191,6 +192,21 @@ impl Figures {
             title: title.to_owned(),
             drawn: figures.iter().map(|f| (f.clone(), curves(f))).collect(),
             names,
+        }
+    }
+
+    /// The curves so far, figure by figure.
+    pub(super) fn curves(&self) -> Vec<Vec<Curve>> {
+        self.drawn
+            .iter()
+            .map(|(_, curves)| curves.clone())
+            .collect()
+    }
+
+    /// Takes the curves of the same figures of an interrupted run.
+    pub(super) fn restore(&mut self, all: Vec<Vec<Curve>>) {
+        for ((_, curves), restored) in self.drawn.iter_mut().zip(all) {
+            *curves = restored;
         }
     }
 

@@ -8,8 +8,9 @@ use std::path::Path;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
 /// are begun anew by each.
-const NAMES: [&str; 7] = [
+const NAMES: [&str; 8] = [
     crate::capsule::FILE_NAME,
+    crate::checkpoint::FILE_NAME,
     "profile.csv",
     "points.csv",
     "fields.pvd",

@@ -10,14 +10,19 @@ use std::path::Path;
 /// `points.csv`: one row per integration point of every group that has a stress.
 #[derive(Debug)]
 pub(super) struct Points {
-    table: Table,
+    pub(super) table: Table,
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,
 }
 
 impl Points {
-    /// `None` if it is not asked for.
-    pub(super) fn create(folder: &Path, when: When, model: &Model) -> Result<Option<Self>, Error> {
+    /// As [`Table::begin`]. `None` if it is not asked for.
+    pub(super) fn begin(
+        folder: &Path,
+        when: When,
+        model: &Model,
+        from: Option<u64>,
+    ) -> Result<Option<Self>, Error> {
         if when == When::Never {
             return Ok(None);
         }
@@ -38,7 +43,7 @@ impl Points {
         let columns = columns
             .into_iter()
             .chain(variables.iter().map(String::as_str));
-        let table = Table::create(folder.join("points.csv"), columns)?;
+        let table = Table::begin(folder.join("points.csv"), columns, from)?;
         Ok(Some(Self { table, variables }))
     }
 

@@ -10,14 +10,19 @@ use std::path::Path;
 /// `profile.csv`: one row per integration point of every thin layer and zero-thickness group.
 #[derive(Debug)]
 pub(super) struct Profile {
-    table: Table,
+    pub(super) table: Table,
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,
 }
 
 impl Profile {
-    /// `None` if it is not asked for or there is no interface.
-    pub(super) fn create(folder: &Path, when: When, model: &Model) -> Result<Option<Self>, Error> {
+    /// As [`Table::begin`]. `None` if it is not asked for or there is no interface.
+    pub(super) fn begin(
+        folder: &Path,
+        when: When,
+        model: &Model,
+        from: Option<u64>,
+    ) -> Result<Option<Self>, Error> {
         let is_interface = |group: &Group| group.jump_and_traction(0).is_some();
         if when == When::Never || !model.groups.iter().any(is_interface) {
             return Ok(None);
@@ -40,7 +45,7 @@ impl Profile {
         let columns = columns
             .into_iter()
             .chain(variables.iter().map(String::as_str));
-        let table = Table::create(folder.join("profile.csv"), columns)?;
+        let table = Table::begin(folder.join("profile.csv"), columns, from)?;
         Ok(Some(Self { table, variables }))
     }
 

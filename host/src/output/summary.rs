@@ -9,13 +9,14 @@ use crate::model::Model;
 use crate::plugin::hexadecimal_sha256;
 use crate::probe::Probes;
 use crate::solver::Costs;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::time::Duration;
 use toml::Spanned;
 
 /// A phase, for the record.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhaseRecord {
     /// Name.
     pub name: String,
@@ -68,6 +69,12 @@ impl PhaseRecord {
 pub(super) struct Summary {
     head: Map<String, Value>,
     probe_names: Vec<String>,
+    pub(super) course: Course,
+}
+
+/// What has happened so far.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Course {
     phases: Vec<PhaseRecord>,
     last: Option<(Place, Vec<Option<f64>>)>,
     /// By phase, the first increment with a result that a law calls inaccurate, and why.
@@ -124,9 +131,7 @@ impl Summary {
         Self {
             head,
             probe_names: probes.names().map(str::to_owned).collect(),
-            phases: Vec::new(),
-            last: None,
-            unreliable: Vec::new(),
+            course: Course::default(),
         }
     }
 
@@ -138,21 +143,30 @@ impl Summary {
     }
 
     pub(super) fn last_increment(&mut self, place: &Place, record: &IncrementRecord) {
-        self.last = Some((place.clone(), record.probes.clone()));
+        self.course.last = Some((place.clone(), record.probes.clone()));
         let is_first = self
+            .course
             .unreliable
             .last()
             .is_none_or(|(p, _)| p.phase != place.phase);
         if let Some(why) = record.warning.as_ref().filter(|_| is_first) {
-            self.unreliable.push((place.clone(), why.clone()));
+            self.course.unreliable.push((place.clone(), why.clone()));
         }
     }
 
     /// Warnings about results that laws call inaccurate, one for each phase that has any.
     pub(super) fn unreliable(&self) -> Vec<String> {
-        let phases = self.phases.iter().filter(|phase| phase.unreliable > 0);
+        let phases = self
+            .course
+            .phases
+            .iter()
+            .filter(|phase| phase.unreliable > 0);
         let warning = |phase: &PhaseRecord| {
-            let first = self.unreliable.iter().find(|(p, _)| p.phase == phase.name);
+            let first = self
+                .course
+                .unreliable
+                .iter()
+                .find(|(p, _)| p.phase == phase.name);
             let first =
                 first.map(|(p, why)| format!("; first in increment {}: {why}", p.increment));
             format!(
@@ -168,11 +182,12 @@ impl Summary {
 
     pub(super) fn phase(&mut self, record: PhaseRecord) {
         let last = self
+            .course
             .last
             .as_ref()
             .filter(|(place, _)| place.phase == record.name);
         let probes = last.map(|(_, probes)| probes.clone()).unwrap_or_default();
-        self.phases.push(PhaseRecord { probes, ..record });
+        self.course.phases.push(PhaseRecord { probes, ..record });
     }
 
     fn probes(&self, values: &[Option<f64>]) -> Value {
@@ -198,12 +213,14 @@ impl Summary {
                 None => "done",
                 Some(Error::NoEquilibrium { .. }) => "no equilibrium",
                 Some(Error::Plugin { .. }) => "plugin trouble",
+                Some(Error::Interrupted { .. }) => "interrupted",
                 Some(_) => "stopped",
             }),
         );
         summary.insert("error".to_owned(), json!(error.map(ToString::to_string)));
         summary.insert("warnings".to_owned(), json!(warnings));
         let phases: Vec<Value> = self
+            .course
             .phases
             .iter()
             .map(|p| {
@@ -242,7 +259,7 @@ impl Summary {
         summary.insert("law_calls_by_group".to_owned(), work(points));
         summary.insert("operators_by_group".to_owned(), work(operators));
         summary.insert("state_bytes".to_owned(), work(|group| json!(group.bytes())));
-        let last = self.last.as_ref();
+        let last = self.course.last.as_ref();
         summary.insert(
             "last_equilibrium".to_owned(),
             json!(last.map(|(place, _)| json!({
@@ -495,9 +512,7 @@ mod tests {
         let mut summary = Summary {
             head: Map::new(),
             probe_names: Vec::new(),
-            phases: Vec::new(),
-            last: None,
-            unreliable: Vec::new(),
+            course: Course::default(),
         };
         for (phase, increment, warning) in [
             ("a", 1, None),

@@ -229,6 +229,12 @@ impl LinearDomain {
         self.complete(0.0, &internal);
     }
 
+    /// As [`Self::start`], at a complete state within the phase: the groups' committed one.
+    pub fn restart(&mut self, groups: &[Group], loads: &Loads, lambda: f64) {
+        self.start(groups, loads);
+        self.lambda = lambda;
+    }
+
     /// Internal forces of the domain's groups under a stress of theirs, by degree of freedom.
     fn internal(&self, groups: &[Group], stress: impl Fn(&Group) -> &[f64]) -> Vec<f64> {
         let mut internal = vec![0.0; self.system.n_dofs()];

@@ -16,7 +16,7 @@ use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
 use acceleration::Acceleration;
 use relaxation::Relaxation;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
 /// Lengths of a correction that the line search tries, in order.
@@ -32,7 +32,7 @@ const PROGRESS: f64 = 0.1;
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 /// Loads over a phase, as functions of the load factor λ from 0 to 1.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Loads {
     /// External forces at λ = 0, by degree of freedom.
     pub force_start: Vec<f64>,
@@ -89,7 +89,7 @@ pub struct Iteration {
 }
 
 /// Seconds by part, and counts.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Costs {
     /// Laws, with the strains before and the forces after them.
     pub laws: Duration,
@@ -165,8 +165,6 @@ pub struct Newton<'a> {
     /// Costs so far.
     costs: &'a mut Costs,
     scale: f64,
-    /// All groups are linear: there is one matrix only.
-    is_constant: bool,
     /// What the last evaluation asked the laws for.
     tangents: Operator,
     /// The matrix has been renewed in this step.
@@ -208,7 +206,7 @@ impl<'a> Newton<'a> {
             .iter()
             .enumerate()
             .filter(|(i, _)| system.includes(*i));
-        let is_constant = included.all(|(_, group)| group.is_linear());
+        matrix.is_constant = included.all(|(_, group)| group.is_linear());
         Self {
             system,
             domain,
@@ -218,12 +216,22 @@ impl<'a> Newton<'a> {
             settings,
             costs,
             scale: 0.0,
-            is_constant,
             tangents: Operator::None,
             renewed: false,
             stalls: false,
             domain_forces: Vec::new(),
         }
+    }
+
+    /// Factorises the matrix from the tangents that the groups hold, as an interrupted run had it.
+    ///
+    /// # Errors
+    /// It is singular.
+    pub fn restore_matrix(&mut self) -> Result<(), StepFailure> {
+        let values = self.stiffness();
+        self.factorise(&values)?;
+        self.matrix.hold();
+        Ok(())
     }
 
     /// Seeks equilibrium at the end of a step, starting from a guess of the displacement

@@ -10,15 +10,29 @@ use std::time::Instant;
 #[derive(Debug, Default)]
 pub struct Matrix {
     held: bool,
+    /// There is only one: all groups are linear.
+    pub(super) is_constant: bool,
     /// Largest entry.
     pub(super) largest: f64,
+}
+
+impl Matrix {
+    pub(super) fn hold(&mut self) {
+        self.held = true;
+    }
+
+    /// Whether this matrix outlives the step under this method.
+    pub fn is_kept(&self, method: Method) -> bool {
+        let outlives = matches!(method, Method::InitialStress | Method::QuasiNewton);
+        self.held && (self.is_constant || outlives)
+    }
 }
 
 impl Newton<'_> {
     /// Whether the next correction needs another matrix.
     fn renews(&self) -> bool {
         !self.matrix.held
-            || !self.is_constant
+            || !self.matrix.is_constant
                 && match self.settings.method {
                     Method::Newton => true,
                     Method::ModifiedNewton => !self.renewed,
@@ -39,7 +53,7 @@ impl Newton<'_> {
     /// Notes that laws are about to compute this operator.
     pub(super) fn will_compute(&mut self, operator: Operator) {
         self.tangents = Operator::None;
-        if operator != Operator::None && !self.is_constant {
+        if operator != Operator::None && !self.matrix.is_constant {
             self.matrix.held = false;
         }
     }

@@ -1,0 +1,304 @@
+//! Runs that are stopped, killed or run out of disk, and go on; runs that must not differ.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, CASE, DONE, Place, edited};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Increments of each of the two phases.
+const INCREMENTS: usize = 60;
+
+/// The block beside a layer in many increments, the layer's strength reached, the law's
+/// parameters swapped between the phases, everything written that can be.
+fn long_case(solver: &str) -> String {
+    let swapped = "[laws.weak]\nlaw = \"coulomb_joint\"\n[laws.weak.parameters]\n\
+                   normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 1.0\n\
+                   friction_angle = 10.0\ndilatancy_angle = 2.0\n\n[groups.soil]";
+    let figures = "[[figure]]\nname = \"push\"\nx = \"settlement\"\ny = [\"tau\"]\n\n\
+                   [[figure]]\nname = \"cut\"\nx = \"x\"\ny = [\"stress_11\"]\n\
+                   points = { group = \"soil\", increments = [3, 50] }\n\n[output]";
+    edited(&[
+        ("increments = 2", "increments = 60"),
+        (
+            "increments = 2\ndis",
+            "increments = 60\nlaws = { layer = \"weak\" }\ndis",
+        ),
+        ("x = 1e-5", "x = 1e-3"),
+        (
+            "profile = \"phases\"",
+            "profile = \"increments\"\npoints = \"increments\"\nfields = \"increments\"",
+        ),
+    ])
+    .replacen("[groups.soil]", swapped, 1)
+    .replacen("[output]", figures, 1)
+    .replacen("[solver]\n", &format!("[solver]\n{solver}\n"), 1)
+}
+
+/// All files of a folder but the report and the checkpoint; the summary without its times.
+fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        let bytes = std::fs::read(entry.path()).unwrap();
+        let bytes = match name.as_str() {
+            "report.html" | "checkpoint.bin" => continue,
+            "summary.json" => {
+                let mut summary = serde_json::from_slice(&bytes).unwrap();
+                forget_times(&mut summary);
+                serde_json::to_vec(&summary).unwrap()
+            }
+            _ => bytes,
+        };
+        files.insert(name, bytes);
+    }
+    files
+}
+
+fn forget_times(summary: &mut serde_json::Value) {
+    match summary {
+        serde_json::Value::Object(map) => {
+            map.remove("seconds");
+            map.values_mut().for_each(forget_times);
+        }
+        serde_json::Value::Array(items) => items.iter_mut().for_each(forget_times),
+        _ => {}
+    }
+}
+
+/// Results that must be those of `expected`, to the bit.
+fn assert_same(found: &Path, expected: &BTreeMap<String, Vec<u8>>, what: &str) {
+    let found = results(found);
+    let names = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&found), names(expected), "{what}");
+    for (name, bytes) in expected {
+        let (a, b) = (&found[name], bytes);
+        let at = a.iter().zip(b).position(|(a, b)| a != b);
+        let near = |text: &[u8]| {
+            let at = at.unwrap_or(0);
+            let part = &text[at.saturating_sub(80).min(text.len())..(at + 80).min(text.len())];
+            String::from_utf8_lossy(part).into_owned()
+        };
+        assert!(a == b, "{what}: {name} differs:\n{}\n{}", near(a), near(b));
+    }
+}
+
+/// Rows of `history.csv`, each of which must be whole.
+fn whole_rows(place: &Place) -> usize {
+    let Ok(text) = std::fs::read_to_string(place.path("out/history.csv")) else {
+        return 0;
+    };
+    let mut rows = text.split_inclusive('\n');
+    let Some(head) = rows.next() else { return 0 };
+    let cells = head.matches(',').count();
+    let whole = |row: &&str| row.ends_with('\n') && row.matches(',').count() == cells;
+    let rows: Vec<&str> = rows.collect();
+    // The one row that was being written when the process was killed may be cut short.
+    assert!(rows.iter().rev().skip(1).all(|row| whole(&row)), "{text}");
+    rows.iter().filter(|row| whole(row)).count()
+}
+
+/// Kills the run at this many different moments, resumes it, and compares.
+fn killed_and_resumed(solver: &str, kills: u32) {
+    let undisturbed = Place::new();
+    undisturbed.write("case.toml", long_case(solver));
+    let started = Instant::now();
+    let outcome = undisturbed.run(&["run", "case.toml", "--out", "out", "--checkpoint", "0"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let length = started.elapsed();
+    let expected = results(&undisturbed.path("out"));
+
+    let place = Place::new();
+    place.write("case.toml", long_case(solver));
+    let run = [
+        "run",
+        "case.toml",
+        "--out",
+        "out",
+        "--checkpoint",
+        "0",
+        "--resume",
+    ];
+    let mut on_the_way = 0;
+    for kill in 0..kills {
+        // A scatter of moments, the same every time.
+        let share = f64::from(kill.wrapping_mul(2_654_435_769)) / f64::from(u32::MAX);
+        let mut child = place.start(&run);
+        std::thread::sleep(Duration::from_secs_f64(0.9 * share * length.as_secs_f64()));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        on_the_way += usize::from((1..2 * INCREMENTS).contains(&whole_rows(&place)));
+        if whole_rows(&place) == 2 * INCREMENTS {
+            // Resumed often enough to have come to its end: the next run starts anew.
+            std::fs::remove_dir_all(place.path("out")).unwrap();
+        }
+    }
+    assert!(
+        on_the_way * 4 > kills as usize,
+        "only {on_the_way} kills hit the run on its way"
+    );
+    let outcome = place.run(&run);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_same(&place.path("out"), &expected, solver);
+}
+
+#[test]
+fn a_killed_run_resumes_to_the_same_bits() {
+    killed_and_resumed("", 12);
+}
+
+#[test]
+fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
+    // 25 iterations are too few for the slow ones.
+    for method in ["quasi_newton", "modified_newton", "initial_stress"] {
+        let solver = format!("method = \"{method}\"\nforce_tolerance = 1e-6");
+        let text = long_case(&solver).replace("max_iterations = 20", "max_iterations = 500");
+        let undisturbed = Place::new();
+        undisturbed.write("case.toml", &text);
+        let outcome = undisturbed.run(&["run", "case.toml", "--out", "out"]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
+    }
+}
+
+/// Interrupts a run as Ctrl-C does, resumes it, and compares.
+fn stopped_and_resumed(text: &str, expected: &BTreeMap<String, Vec<u8>>, what: &str) {
+    let place = Place::new();
+    place.write("case.toml", text);
+    let run = ["run", "case.toml", "--out", "out", "--resume"];
+    let mut stops = 0;
+    loop {
+        let rows = whole_rows(&place);
+        let mut child = place.start(&run);
+        let patience = Instant::now();
+        while whole_rows(&place) < rows + 25 && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+            assert!(
+                patience.elapsed() < Duration::from_secs(60),
+                "{what}: no progress"
+            );
+        }
+        interrupt(child.id());
+        match child.wait().unwrap().code() {
+            Some(DONE) => break,
+            code => assert_eq!(code, Some(130), "{what}"),
+        }
+        stops += 1;
+        let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+        assert!(summary.contains("\"status\": \"interrupted\""), "{summary}");
+        assert!(place.path("out/report.html").is_file());
+    }
+    assert!(stops > 0, "{what}: the run was never stopped on its way");
+    // The log of a run that was stopped says so; all else is the same.
+    let mut found = results(&place.path("out"));
+    let log = String::from_utf8(found.remove("log.jsonl").unwrap()).unwrap();
+    assert!(!log.contains("interrupted"), "{log}");
+    found.insert("log.jsonl".to_owned(), log.into_bytes());
+    assert_same(&place.path("out"), expected, what);
+}
+
+#[cfg(unix)]
+fn interrupt(process: u32) {
+    let sent = std::process::Command::new("kill")
+        .args(["-INT", &process.to_string()])
+        .output();
+    // It may have ended by itself.
+    drop(sent.unwrap());
+}
+
+#[test]
+#[ignore = "200 kills take minutes: cargo test --release -p tests --test command_line -- --ignored resume"]
+fn two_hundred_kills_lose_nothing() {
+    killed_and_resumed("", 100);
+    killed_and_resumed("equations = \"sparse\"", 100);
+}
+
+#[test]
+fn the_same_case_gives_the_same_files() {
+    let text = long_case("");
+    let [first, again, elsewhere] = [(); 3].map(|()| Place::new());
+    for place in [&first, &again, &elsewhere] {
+        place.write("case.toml", &text);
+    }
+    elsewhere.write("below/here", "");
+    let outcome = first.run(&["run", "case.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let expected = results(&first.path("out"));
+    // Both at the same time, one with one thread and one with two.
+    let mut children = [(&again, "1"), (&elsewhere, "2")]
+        .map(|(place, n)| place.start(&["run", "case.toml", "--out", "out", "--threads", n]));
+    for child in &mut children {
+        assert_eq!(child.wait().unwrap().code(), Some(DONE));
+    }
+    assert_same(&again.path("out"), &expected, "one thread");
+    assert_same(&elsewhere.path("out"), &expected, "two threads");
+}
+
+#[test]
+fn a_full_disk_leaves_whole_rows() {
+    let place = Place::new();
+    place.write("case.toml", long_case(""));
+    // 16 blocks of 512 or 1024 bytes for every file; beyond that writing fails, as on a full disk.
+    let outcome = place.run_limited(
+        "trap '' XFSZ; ulimit -f 16",
+        &["run", "case.toml", "--out", "out"],
+    );
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("cannot write"), "{}", outcome.stderr);
+    for name in ["history.csv", "profile.csv", "points.csv", "log.jsonl"] {
+        let text = std::fs::read_to_string(place.path("out").join(name)).unwrap();
+        assert!(text.ends_with('\n'), "{name} ends with a row cut short");
+    }
+}
+
+#[test]
+fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    let run = [
+        "run",
+        "case.toml",
+        "--out",
+        "out",
+        "--checkpoint",
+        "0",
+        "--resume",
+    ];
+    assert_eq!(place.run(&run).code, Some(DONE));
+    let outcome = place.run(&run);
+    assert_eq!(outcome.code, Some(DONE));
+    assert!(outcome.says("done already"), "{}", outcome.stderr);
+    place.write("case.toml", CASE.replace("1e-5", "2e-5"));
+    let outcome = place.run(&run);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("it belongs to another case"),
+        "{}",
+        outcome.stderr
+    );
+    let path = place.path("out/checkpoint.bin");
+    let mut bytes = std::fs::read(&path).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    let outcome = place.run(&run);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("the file is damaged"), "{}", outcome.stderr);
+}
+
+#[test]
+fn two_runs_do_not_write_into_one_folder() {
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    place.write("out/log.jsonl", "");
+    let log = std::fs::File::open(place.path("out/log.jsonl")).unwrap();
+    log.lock().unwrap();
+    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("another run is writing into this folder"),
+        "{}",
+        outcome.stderr
+    );
+}
