@@ -276,5 +276,43 @@ pub(crate) fn families() -> Vec<Family> {
             }
         }
     }
-    vec![plain, softening]
+    vec![plain, softening, overflowing()]
+}
+
+/// Parameters whose products come close to the ends of the range of numbers. Without the paths whose
+/// increments lose contact at slips below the decades that the reference scans.
+fn overflowing() -> Family {
+    let mut family = Family::new(
+        "MEPI, parameters 10^±300",
+        "first root by scan, double-double",
+    );
+    for p in [TABLE_4, FONTAINEBLEAU] {
+        for value in [1e-300, 1e-160, 1e160, 1e300] {
+            let peak = |change: fn(&mut Peak, f64)| {
+                let mut q = p.peak;
+                if let Some(q) = &mut q {
+                    change(q, value);
+                }
+                Mepi { peak: q, ..p }
+            };
+            let changed = [
+                ("k_n", Mepi { k_n: value, ..p }),
+                ("k_t", Mepi { k_t: value, ..p }),
+                ("A", Mepi { a: value, ..p }),
+                ("C_0", Mepi { c_0: value, ..p }),
+                ("t", Mepi { t: value, ..p }),
+                ("p_0", Mepi { p_0: value, ..p }),
+                ("A_0", peak(|q, v| q.a_0 = v)),
+                ("u_tp", peak(|q, v| q.u_tp = v)),
+            ];
+            for (what, p) in changed {
+                let slip = p.mu_p * 100.0 / p.at(100.0).k_t;
+                for (path, segments) in &PATHS[..4] {
+                    let verdict = follow(&p, 100.0, segments, 2.0 * slip, 2);
+                    family.add(format!("{what} = {value:e}: {path}"), verdict);
+                }
+            }
+        }
+    }
+    family
 }
