@@ -74,7 +74,7 @@ impl InterfaceLaw for CoulombJoint {
                 format!("{psi} deg is above friction_angle = {phi} deg"),
             ));
         }
-        let (tan_phi, tan_psi) = (phi.to_radians().tan(), psi.to_radians().tan());
+        let (tan_phi, tan_psi) = (tan(phi), tan(psi));
         // Equality is legal, however the two numbers are rounded.
         if p.tensile_strength * tan_phi > p.cohesion * (1.0 + 1e-12) {
             return Err(Refusal::new(
@@ -158,6 +158,15 @@ impl CoulombJoint {
                 self.intact
             },
         })
+    }
+}
+
+/// Tangent of an angle in degrees, without cancellation near 90°.
+fn tan(degrees: f64) -> f64 {
+    if degrees > 45.0 {
+        (90.0 - degrees).to_radians().tan().recip()
+    } else {
+        degrees.to_radians().tan()
     }
 }
 

@@ -110,23 +110,30 @@ impl CoulombJoint {
         };
         // F = max over both signs of ±τ + t_n tan φ − c: the first that reaches zero yields.
         let mut yields = f64::INFINITY;
-        let mut growth = 0.0;
+        // From there: growth of F, rate of τ in the direction of slip, and t_n still to go to R_t.
+        let (mut growth, mut along, mut left) = (0.0, 0.0, 0.0);
         for sign in [1.0, -1.0] {
             let start = sign * shear + normal * tan_phi - cohesion;
             let rate = sign * shear_rate + normal_rate * tan_phi;
             let at = if start >= 0.0 { 0.0 } else { -start / rate };
             if rate > 0.0 && at < yields {
-                (yields, growth) = (at, rate);
+                (yields, growth, along) = (at, rate, sign * shear_rate);
+                // On F = 0 a steep line gives t_n from τ with more digits than its own path does.
+                let reached = if start < 0.0 && tan_phi > 1.0 {
+                    (cohesion - sign * (shear + at * shear_rate)) / tan_phi
+                } else {
+                    normal + at * normal_rate
+                };
+                left = tensile - reached;
             }
         }
         if opens_elastically <= yields {
             return 0.0;
         }
-        let slip_rate = growth / (k_t + k_n * tan_phi * tan_psi);
-        let opening_rate = normal_rate - k_n * tan_psi * slip_rate;
-        let left = tensile - normal - yields * normal_rate;
+        // The rate of t_n on F = 0 times K_t + K_n tan φ tan ψ, where terms in tan φ cancel.
+        let opening_rate = normal_rate * k_t - k_n * tan_psi * along;
         if opening_rate > 0.0 && left > 0.0 {
-            slip_rate * left / opening_rate
+            growth * left / opening_rate
         } else {
             0.0
         }

@@ -330,3 +330,20 @@ fn stays_admissible_with_an_exact_tangent_on_random_walks() {
     println!("open, elastic, sliding: {compared:?}");
     assert!(compared.iter().all(|&n| n > 1000), "{compared:?}");
 }
+
+/// tan φ and the slip until opening keep their digits where the friction line is all but vertical.
+#[test]
+fn keeps_its_digits_close_to_ninety_degrees() {
+    let (c, phi, sigma): (f64, f64, f64) = (10.0, 89.999_999_9, 90.0);
+    let tan_phi = 1.0 / (90.0 - phi).to_radians().tan();
+    let law = joint(c, phi, 0.0, 0.0);
+    let strength = c + sigma * tan_phi;
+    let mut walker = Walker::new(law, [-sigma, 0.0]);
+    walker.step([0.0, 2.0 * strength / K_T]);
+    assert_relative_eq!(walker.traction[1], strength, max_relative = 1e-14);
+    // t_n vanishes at 3/10 of the increment, where τ is down to c and would be 80 without slip.
+    let mut walker = Walker::new(law, [-sigma, 50.0]);
+    walker.step([sigma / 0.3 / K_N, 100.0 / K_T]);
+    assert_eq!(walker.traction, [0.0; 2]);
+    assert_relative_eq!(walker.state.plastic_slip, 70.0 / K_T, max_relative = 1e-12);
+}

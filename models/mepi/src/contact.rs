@@ -109,6 +109,9 @@ fn close_or_slide(
     // Elastic trial, Eq. (6).
     let sigma_trial = contact.sigma + k_n * contact.contraction;
     let tau_trial = contact.tau + k_t * contact.slip;
+    if !(sigma_trial - tau_trial).is_finite() {
+        return Err(Failure::Numeric("the elastic predictor overflows"));
+    }
     let mu = hardening.friction(hardening.branch(xi), xi).value;
     let increment = Increment {
         constants,

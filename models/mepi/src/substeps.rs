@@ -59,8 +59,9 @@ impl Path<'_> {
         let left = 1.0 - at_yield.done;
         let mut at = at_yield;
         if let Scheme::ErrorControlled { tolerance } = scheme {
+            let nearly_lost = LAST_SHARE * at.sigma;
             at = error_controlled(at, tolerance, |from, step| {
-                self.modified_euler(from, step * left)
+                self.modified_euler(from, step * left, nearly_lost)
             })?;
         }
         for _ in 0..substeps.unwrap_or(0) {
@@ -151,8 +152,14 @@ impl Path<'_> {
     }
 
     /// Eq. (E): the mean of the rates at the start and at the end of a step forward, then back to
-    /// the surface; half the difference is the error.
-    fn modified_euler(&self, from: &Sliding, fraction: f64) -> Result<Attempt<Sliding>, Failure> {
+    /// the surface; half the difference is the error. Where `σ_n` is down to `nearly_lost`, a step
+    /// may lose contact.
+    fn modified_euler(
+        &self,
+        from: &Sliding,
+        fraction: f64,
+        nearly_lost: f64,
+    ) -> Result<Attempt<Sliding>, Failure> {
         if from.loses_contact {
             return Ok(Attempt {
                 end: *from,
@@ -162,7 +169,7 @@ impl Path<'_> {
         let first = self.euler(from, &self.rates(from)?, fraction);
         if first.sigma < 0.0 {
             // Approached by ever smaller steps, then left to the implicit scheme.
-            let close = fraction < LAST_FRACTION;
+            let close = from.sigma <= nearly_lost;
             return Ok(Attempt {
                 end: Sliding {
                     loses_contact: true,
@@ -251,8 +258,8 @@ impl Path<'_> {
 /// What a step of the tolerance drifts takes two; a start far outside takes more.
 const MAX_CORRECTIONS: usize = 20;
 
-/// The part of an increment over which contact may be lost without an estimate of the error.
-const LAST_FRACTION: f64 = 1e-3;
+/// The part of the normal stress over which contact may be lost without an estimate of the error.
+const LAST_SHARE: f64 = 1e-3;
 
 impl Sliding {
     /// After plastic flow, Eq. (6) and (14).

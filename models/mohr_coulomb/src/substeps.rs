@@ -71,6 +71,7 @@ impl MohrCoulomb {
                 }
             }
             Scheme::ErrorControlled { tolerance } => {
+                end = self.brought_in(end);
                 end = error_controlled(end, tolerance, |from, fraction| {
                     Ok(self.modified_euler(from, &(left * fraction)))
                 })?;
@@ -163,6 +164,23 @@ impl MohrCoulomb {
         Attempt {
             end,
             error: off / end.stress.norm().max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// A stress carried in from outside the surface, returned at fixed strain: no step is small
+    /// enough to make little of that.
+    fn brought_in(&self, at: Step) -> Step {
+        let (s, _) = jacobi(at.stress);
+        if self.pyramid.admits(s[0], s[2]) {
+            return at;
+        }
+        let end = self.pyramid.return_stress(&s);
+        let (shear, dilation) = self.elasticity.equivalent_strains(&(s - end.stress));
+        Step {
+            shear,
+            dilation,
+            zone: Some(end.zone),
+            ..self.on_surface(at)
         }
     }
 

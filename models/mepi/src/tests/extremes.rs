@@ -195,3 +195,14 @@ fn refuses_internal_variables_that_make_no_sense() {
         assert!(matches!(end, Err(Failure::Domain(_))));
     }
 }
+
+/// μ_0 = 0 and an infinite trial stress make 0 · ∞ of the strength: no number, and no opening either.
+#[test]
+fn an_elastic_predictor_beyond_the_range_of_numbers_is_refused() {
+    let law = softening(FONTAINEBLEAU);
+    let walker = Walker::new(&law, 100.0);
+    for du in [[1e304, 0.0], [0.0, 1e304], [1e304, -1e304], [-1e304, 1e304]] {
+        let end = walker.respond(du, Tangent::Consistent);
+        assert!(matches!(end, Err(Failure::Numeric(_))), "{du:?}: {end:?}");
+    }
+}

@@ -273,3 +273,22 @@ fn stands_random_states() {
         }
     }
 }
+
+/// In a thin layer hardening takes a slip far below the increment: the first steps that do not lose
+/// contact are small, and contact is not lost.
+#[test]
+fn an_increment_far_longer_than_the_hardening_is_followed() {
+    let t = 5e-7;
+    let p = mepi_softening::Parameters {
+        k_n: FONTAINEBLEAU.k_n * FONTAINEBLEAU.t / t,
+        k_t: FONTAINEBLEAU.k_t * FONTAINEBLEAU.t / t,
+        t,
+        sigma_ni: 100.0,
+        ..FONTAINEBLEAU
+    };
+    let truth = Truth::softening(p, 100.0);
+    for u_t in [1e-6, 1e-4, 1e-3] {
+        let error = error_at_constant_volume(&softening_controlled(p, 1e-6), &truth, u_t, 1);
+        assert!(error < 1e-5, "{error:e} at {u_t:e}");
+    }
+}

@@ -194,3 +194,19 @@ fn stands_random_states() {
         }
     }
 }
+
+/// What lies outside at the start is no error of a step: however small the steps, it would stay.
+#[test]
+fn a_stress_from_outside_is_returned_before_the_steps() {
+    let outside = [-60.0, -500.0, -60.0, 0.0];
+    let law = controlled(1e-6);
+    let expected = super::from_trial(&super::law(SAND), outside);
+    let end = super::from_trial(&law, outside);
+    assert!(distance(&end.stress, &expected.stress) < 1e-12 * size(&outside));
+    let off = end.state.plastic_strain / expected.state.plastic_strain - 1.0;
+    assert!(off.abs() < 1e-12, "{off:e}");
+    let end = law
+        .update(&rested(outside, TURNING), Tangent::None)
+        .unwrap();
+    assert!(excess(&SAND, &end.stress) < 1e-12);
+}
