@@ -4,7 +4,8 @@
 //! ([`plugin`], built by [`input`]), both joined in a [`model`] of [`group`]s of [`element`]s;
 //! [`run`] leads it through phases and increments with [`assembly`] and [`solver`]; [`probe`]s and
 //! [`output`] write what comes out. Beside them: [`point`], one law at one integration point, and
-//! [`laws`], what there is to know about a law, and [`trade_off`], what accuracy costs.
+//! [`laws`], what there is to know about a law, and [`trade_off`], what accuracy costs; for authors
+//! [`new_law`], and for editors [`schema`].
 
 pub mod assembly;
 pub mod case;
@@ -15,11 +16,13 @@ pub mod input;
 pub mod laws;
 pub mod mesh;
 pub mod model;
+pub mod new_law;
 pub mod output;
 pub mod plugin;
 pub mod point;
 pub mod probe;
 pub mod report;
 pub mod run;
+pub mod schema;
 pub mod solver;
 pub mod trade_off;
