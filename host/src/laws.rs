@@ -45,7 +45,7 @@ pub fn list(search: &SearchPath) -> String {
         let line = match search.law(&id) {
             Ok(law) => {
                 let description = law.description();
-                format!("{:50}  {}", description.name, description.hypotheses())
+                format!("{:48}  {}", description.name, description.hypotheses())
             }
             Err(error) => format!("cannot be used, {}: {error}", library.display()),
         };
@@ -159,7 +159,7 @@ fn parameter_lines(text: &mut String, p: &ParameterDescription) {
     };
     let _ = writeln!(
         text,
-        "  {:22}{:10}{:10}{default}; {}",
+        "  {:21} {:9} {:11} {default}; {}",
         p.id,
         p.symbol,
         p.unit,
@@ -246,7 +246,7 @@ fn variable_lines(text: &mut String, v: &InternalVariable) {
     let output_only = if v.output_only { "; output only" } else { "" };
     let _ = writeln!(
         text,
-        "  {:22}{:10}{:10}starts at {}{output_only}",
+        "  {:21} {:9} {:11} starts at {}{output_only}",
         v.id,
         v.symbol,
         v.unit,

@@ -330,6 +330,10 @@ fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> 
 }
 
 fn show_laws(id: Option<&str>, folders: &[PathBuf], json: bool) -> Result<(), Error> {
+    if let Some(missing) = folders.iter().find(|folder| !folder.is_dir()) {
+        let message = format!("--law-path: there is no folder {}", missing.display());
+        return Err(Error::Usage(message));
+    }
     let search = SearchPath::new(folders);
     let text = match (id, json) {
         (None, false) => host::laws::list(&search),
@@ -353,6 +357,7 @@ fn manual(program: &clap::Command) -> Result<(), Error> {
     let mut page = Vec::new();
     let mut written = clap_mangen::Man::new(program.clone()).render(&mut page);
     for command in program.get_subcommands() {
+        // A command's name lives as long as the program.
         let name: &'static str = format!("pilum-{}", command.get_name()).leak();
         let command = command.clone().name(name);
         let section = clap_mangen::Man::new(command);

@@ -6,6 +6,7 @@
 
 use crate::case::CaseFile;
 use crate::point::DriverFile;
+use schemars::generate::SchemaSettings;
 use schemars::transform::{Transform, transform_subschemas};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Map, Value, json};
@@ -24,9 +25,40 @@ pub enum FileKind {
 /// The JSON Schema (2020-12) of a kind of input file.
 pub fn of(kind: FileKind) -> Value {
     match kind {
-        FileKind::Case => with_bases(schemars::schema_for!(CaseFile), "Pilum case file"),
-        FileKind::Point => with_bases(schemars::schema_for!(DriverFile), "Pilum driver file"),
+        FileKind::Case => with_bases(complete::<CaseFile>(), "Pilum case file"),
+        FileKind::Point => with_bases(complete::<DriverFile>(), "Pilum driver file"),
     }
+}
+
+/// The schema of a file without base or variants.
+fn complete<T: JsonSchema>() -> Schema {
+    let settings = SchemaSettings::draft2020_12().with_transform(without_null);
+    settings.into_generator().into_root_schema_for::<T>()
+}
+
+/// TOML has no null: what is optional is left out.
+fn without_null(schema: &mut Schema) {
+    if let Some(Value::Array(types)) = schema.get_mut("type") {
+        types.retain(|kind| kind != "null");
+        if let [kind] = types.as_slice() {
+            let kind = kind.clone();
+            schema.insert("type".to_owned(), kind);
+        }
+    }
+    let mut only = None;
+    if let Some(Value::Array(choices)) = schema.get_mut("anyOf") {
+        choices.retain(|choice| choice.get("type").is_none_or(|kind| kind != "null"));
+        if let [choice] = choices.as_slice() {
+            only = choice.as_object().cloned();
+        }
+    }
+    if let Some(only) = only {
+        schema.remove("anyOf");
+        for (key, value) in only {
+            schema.ensure_object().entry(key).or_insert(value);
+        }
+    }
+    transform_subschemas(&mut without_null, schema);
 }
 
 /// Names of the definitions of parts: those of complete files with this behind.

@@ -19,7 +19,7 @@ const LANGUAGES: [(&str, &[(&str, &str)]); 4] = [
 ];
 
 /// Lines of the `sh` blocks of a guide.
-fn commands(guide: &Path) -> Vec<String> {
+pub(crate) fn commands(guide: &Path) -> Vec<String> {
     let text = fs::read_to_string(guide).unwrap();
     let blocks = text.split("```sh\n").skip(1);
     blocks
