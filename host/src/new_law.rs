@@ -66,7 +66,7 @@ const HEADER: File = ("include/pilum_law.h", contract!("include/pilum_law.h"));
 const POINT_HEADER: File = ("include/pilum_point.h", contract!("include/pilum_point.h"));
 const CPP_HEADER: File = ("include/pilum_law.hpp", contract!("include/pilum_law.hpp"));
 const MODULE: File = ("include/pilum_law.f90", contract!("include/pilum_law.f90"));
-const EXPORTS: File = ("exports.map", template!("exports.map"));
+const EXPORTS: File = ("exports.map", contract!("include/exports.map"));
 const CONTRACT: File = ("CONTRACT.md", contract!("README.md"));
 
 /// The contract's crate without its optional features.

@@ -87,7 +87,6 @@ fn mistakes_do_not_follow_it() {
         // Unknown keys, at every level.
         ("title", "titel"),
         ("[mesh]\n", "[mesh]\ncolums = 1\n"),
-        ("integration", "integration"),
         (
             "formulation = \"solid\"",
             "formulation = \"solid\"\nintegretion = \"full\"",
@@ -101,9 +100,6 @@ fn mistakes_do_not_follow_it() {
         ("increments = 10", "increments = \"ten\""),
         ("fixed = [\"x\", \"y\"]", "fixed = [\"x\", \"w\"]"),
     ] {
-        if from == to {
-            continue;
-        }
         assert!(
             !case.is_valid(&changed(CASE, from, to)),
             "{from:?} to {to:?}"

@@ -109,7 +109,7 @@ static pilum_status update(const pilum_instance *joint, const pilum_point *point
     end->tangent[3] = k_t;
     end->state[PLASTIC_SLIP] = point->state[PLASTIC_SLIP];
     if (normal > 0.0) { /* (2) */
-        end->state[GAP] = normal / k_n;
+        end->state[GAP] = point->state[GAP] + point->increment[0] + point->flux[0] / k_n;
         if (consistent) {
             end->tangent[0] = end->tangent[3] = 0.0;
         }

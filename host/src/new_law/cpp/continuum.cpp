@@ -52,24 +52,27 @@ public:
     pilum_status update(const pilum_point &point, pilum_tangent tangent, pilum_response &end) const {
         const double *d_eps = point.increment;
         /* (1) */
-        double volume = d_eps[0] + d_eps[1] + d_eps[2];
-        double mean = (point.flux[0] + point.flux[1] + point.flux[2]) / 3.0;
+        double bulk = (k - 2.0 * g / 3.0) * (d_eps[0] + d_eps[1] + d_eps[2]);
+        for (uint32_t i = 0; i < point.n; i++) {
+            end.flux[i] = point.flux[i] + (i < 3 ? bulk + 2.0 * g * d_eps[i] : g * d_eps[i]);
+        }
+        double mean = (end.flux[0] + end.flux[1] + end.flux[2]) / 3.0;
         double s[PILUM_MAX_COMPONENTS];
         double square = 0.0;
         for (uint32_t i = 0; i < point.n; i++) {
-            s[i] = i < 3 ? point.flux[i] - mean + 2.0 * g * (d_eps[i] - volume / 3.0)
-                         : point.flux[i] + g * d_eps[i];
+            s[i] = i < 3 ? end.flux[i] - mean : end.flux[i];
             square += i < 3 ? s[i] * s[i] : 2.0 * s[i] * s[i];
         }
-        mean += k * volume;
         double q = std::sqrt(1.5 * square);
-        /* (2), (3) */
-        bool yields = q > yield;
+        end.state[plastic_strain] = point.state[plastic_strain];
+        /* (2), (3); what was returned before is within round-off. */
+        bool yields = q > yield * (1.0 + 1e-14);
         double scale = yields ? yield / q : 1.0;
-        end.state[plastic_strain] =
-            point.state[plastic_strain] + (yields ? (q - yield) / (3.0 * g) : 0.0);
-        for (uint32_t i = 0; i < point.n; i++) {
-            end.flux[i] = scale * s[i] + (i < 3 ? mean : 0.0);
+        if (yields) {
+            end.state[plastic_strain] += (q - yield) / (3.0 * g);
+            for (uint32_t i = 0; i < point.n; i++) {
+                end.flux[i] = scale * s[i] + (i < 3 ? mean : 0.0);
+            }
         }
         if (tangent == PILUM_TANGENT_NONE) {
             return PILUM_OK;

@@ -54,7 +54,7 @@ public:
         end.tangent[3] = k_t;
         end.state[plastic_slip] = point.state[plastic_slip];
         if (normal > 0.0) { /* (2) */
-            end.state[gap] = normal / k_n;
+            end.state[gap] = point.state[gap] + point.increment[0] + point.flux[0] / k_n;
             if (consistent) {
                 end.tangent[0] = end.tangent[3] = 0.0;
             }

@@ -51,7 +51,7 @@ contains
     integer, intent(in) :: tangent
     type(response_type), intent(inout) :: end
     integer(c_int32_t), intent(inout) :: status
-    real(dp) :: k, g, yield, volume, mean, q, scale, shear, s(MAX_COMPONENTS)
+    real(dp) :: k, g, yield, bulk, mean, q, scale, shear, s(MAX_COMPONENTS)
     logical :: yields, plastic
     integer :: n, i, j
     k = p(1)
@@ -60,22 +60,23 @@ contains
     n = point%n
     status = PILUM_OK
     ! (1)
-    volume = sum(point%increment(1:3))
-    mean = sum(point%flux(1:3))/3
-    s(1:3) = point%flux(1:3) - mean + 2*g*(point%increment(1:3) - volume/3)
-    s(4:n) = point%flux(4:n) + g*point%increment(4:n)
-    mean = mean + k*volume
+    bulk = (k - 2*g/3)*sum(point%increment(1:3))
+    end%flux(1:3) = point%flux(1:3) + bulk + 2*g*point%increment(1:3)
+    end%flux(4:n) = point%flux(4:n) + g*point%increment(4:n)
+    mean = sum(end%flux(1:3))/3
+    s(1:3) = end%flux(1:3) - mean
+    s(4:n) = end%flux(4:n)
     q = sqrt(1.5_dp*(sum(s(1:3)**2) + 2*sum(s(4:n)**2)))
-    ! (2), (3)
-    yields = q > yield
+    ! (2), (3); what was returned before is within round-off.
+    yields = q > yield*(1 + 1e-14_dp)
     scale = 1
     end%state(PLASTIC_STRAIN) = point%state(PLASTIC_STRAIN)
     if (yields) then
       scale = yield/q
       end%state(PLASTIC_STRAIN) = point%state(PLASTIC_STRAIN) + (q - yield)/(3*g)
+      end%flux(1:3) = mean + scale*s(1:3)
+      end%flux(4:n) = scale*s(4:n)
     end if
-    end%flux(1:3) = mean + scale*s(1:3)
-    end%flux(4:n) = scale*s(4:n)
     if (tangent == TANGENT_NONE) return
     plastic = yields .and. tangent == TANGENT_CONSISTENT
     shear = g

@@ -57,7 +57,7 @@ contains
     end%tangent(2, 2) = k_t
     end%state(PLASTIC_SLIP) = point%state(PLASTIC_SLIP)
     if (normal > 0) then ! (2)
-      end%state(GAP) = normal/k_n
+      end%state(GAP) = point%state(GAP) + point%increment(1) + point%flux(1)/k_n
       if (tangent == TANGENT_CONSISTENT) end%tangent = 0
       return
     end if

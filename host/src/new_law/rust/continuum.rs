@@ -70,23 +70,24 @@ impl ContinuumLaw for Solid {
         let Self { k, g, yield_stress } = *self;
         // (1)
         let d_eps = point.strain_increment;
-        let volume = d_eps[0] + d_eps[1] + d_eps[2];
-        let mean = (point.stress[0] + point.stress[1] + point.stress[2]) / 3.0;
-        let s: [f64; N] = std::array::from_fn(|i| match i {
-            0..3 => point.stress[i] - mean + 2.0 * g * (d_eps[i] - volume / 3.0),
+        let bulk = (k - 2.0 * g / 3.0) * (d_eps[0] + d_eps[1] + d_eps[2]);
+        let mut stress: [f64; N] = std::array::from_fn(|i| match i {
+            0..3 => point.stress[i] + bulk + 2.0 * g * d_eps[i],
             _ => point.stress[i] + g * d_eps[i],
         });
-        let mean = mean + k * volume;
+        let mean = (stress[0] + stress[1] + stress[2]) / 3.0;
+        let s: [f64; N] =
+            std::array::from_fn(|i| if i < 3 { stress[i] - mean } else { stress[i] });
         let weighted = |(i, s): (usize, &f64)| if i < 3 { s * s } else { 2.0 * s * s };
         let q = (1.5 * s.iter().enumerate().map(weighted).sum::<f64>()).sqrt();
-        // (2), (3)
-        let yields = q > yield_stress;
+        // (2), (3); what was returned before is within round-off.
+        let yields = q > yield_stress * (1.0 + 1e-14);
         let scale = if yields { yield_stress / q } else { 1.0 };
         let mut state = point.state;
         if yields {
             state.plastic_strain += (q - yield_stress) / (3.0 * g);
+            stress = std::array::from_fn(|i| scale * s[i] + if i < 3 { mean } else { 0.0 });
         }
-        let stress = std::array::from_fn(|i| scale * s[i] + if i < 3 { mean } else { 0.0 });
         let mut matrix = [[0.0; N]; N];
         if tangent != Tangent::None {
             let plastic = yields && tangent == Tangent::Consistent;

@@ -82,7 +82,7 @@ impl InterfaceLaw for Joint {
         if normal > 0.0 {
             // (2)
             end.traction = [0.0; 2];
-            end.state.gap = normal / k_n;
+            end.state.gap = point.state.gap + point.jump_increment[0] + point.traction[0] / k_n;
             if consistent {
                 end.tangent = [[0.0; 2]; 2];
             }
