@@ -167,22 +167,9 @@ fn fortran_and_rust_agree_on_every_field() -> Outcome {
     let module = Path::new(ABI).join("include/pilum_law.f90");
     // Every number of the header that the module has too.
     let text = fs::read_to_string(&module)?;
-    for line in header()?.lines() {
-        let mut words = line.split_whitespace();
-        let (Some("#define"), Some(name), Some(value)) = (words.next(), words.next(), words.next())
-        else {
-            continue;
-        };
-        let value = match (value, words.next(), words.next()) {
-            ("(1u", Some("<<"), Some(bit)) => 1 << bit.trim_end_matches(')').parse::<u32>()?,
-            (value, None, None) => match value.trim_matches(['(', ')']).parse() {
-                Ok(value) => value,
-                Err(_) => continue,
-            },
-            _ => continue,
-        };
+    for (name, value) in numbers(&header()?)? {
         if text.contains(&format!(":: {name} =")) {
-            ask(name.to_owned(), value, name.to_owned())?;
+            ask(name.clone(), value, name)?;
         }
     }
     let numbers = expected
@@ -221,6 +208,28 @@ fn fortran_and_rust_agree_on_every_field() -> Outcome {
         );
     }
     Ok(())
+}
+
+/// Names and values of the whole numbers that a header defines.
+fn numbers(header: &str) -> Outcome<Vec<(String, i64)>> {
+    let mut found = Vec::new();
+    for line in header.lines() {
+        let mut words = line.split_whitespace();
+        let (Some("#define"), Some(name), Some(value)) = (words.next(), words.next(), words.next())
+        else {
+            continue;
+        };
+        let value = match (value, words.next(), words.next()) {
+            ("(1u", Some("<<"), Some(bit)) => 1 << bit.trim_end_matches(')').parse::<u32>()?,
+            (value, None, None) => match value.trim_matches(['(', ')']).parse() {
+                Ok(value) => value,
+                Err(_) => continue,
+            },
+            _ => continue,
+        };
+        found.push((name.to_owned(), value));
+    }
+    Ok(found)
 }
 
 /// The headers for authors, in the strictest form of both languages.
