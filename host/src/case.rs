@@ -4,8 +4,11 @@
 pub(crate) mod base;
 
 use crate::error::{Error, Source};
-use crate::input::{Named, ParameterTable};
+use crate::input::{Named, ParameterTable, ParameterValue};
+use crate::schema;
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -86,7 +89,7 @@ impl Case {
 }
 
 /// The keys of a case file. Units: kN, m, kPa; angles in degrees.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaseFile {
     /// What the case is.
@@ -96,12 +99,15 @@ pub struct CaseFile {
     pub analysis: Analysis,
     /// Folders with law libraries, relative to the case file.
     #[serde(default)]
+    #[schemars(with = "Vec<PathBuf>")]
     pub law_path: Vec<Spanned<PathBuf>>,
     /// The mesh.
     pub mesh: MeshInput,
     /// Laws with their parameters, by a name that groups refer to.
+    #[schemars(with = "BTreeMap<String, LawInput>")]
     pub laws: Named<LawInput>,
     /// Element groups, by a name that regions refer to.
+    #[schemars(with = "BTreeMap<String, GroupInput>")]
     pub groups: Named<GroupInput>,
     /// Displacements held at zero throughout.
     #[serde(default)]
@@ -111,6 +117,7 @@ pub struct CaseFile {
     pub phases: Vec<PhaseInput>,
     /// Quantities written for every increment.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ProbeInput>")]
     pub probes: Named<ProbeInput>,
     /// Curves of probes, drawn when the run ends.
     #[serde(default, rename = "figure")]
@@ -124,6 +131,7 @@ pub struct CaseFile {
     /// Relative error of the probes that the run may have; settings that reach it are then found
     /// by a study before the run.
     #[serde(default, deserialize_with = "accuracy")]
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
     pub accuracy: Option<Spanned<f64>>,
     /// The settings that such a study chose.
     #[serde(skip)]
@@ -154,7 +162,7 @@ pub struct Chosen {
 }
 
 /// Kinematics of the plane.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Analysis {
     /// x is the radius r, y the axis z; integrals over the whole turn.
@@ -164,25 +172,29 @@ pub enum Analysis {
 }
 
 /// A structured mesh of 8-node quads.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
     /// Where columns and rows start; (0, 0) if left out.
+    #[schemars(with = "Option<[f64; 2]>")]
     pub origin: Option<Spanned<[f64; 2]>>,
     /// Columns, in the direction of x (r).
+    #[schemars(with = "Vec<PartInput>")]
     pub columns: Spanned<Vec<Spanned<PartInput>>>,
     /// Rows, in the direction of y (z).
+    #[schemars(with = "Vec<PartInput>")]
     pub rows: Spanned<Vec<Spanned<PartInput>>>,
     /// Which group an element belongs to; later regions override earlier ones.
     #[serde(rename = "region")]
     pub regions: Vec<RegionInput>,
     /// Named lines.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, LineInput>")]
     pub lines: Named<LineInput>,
 }
 
 /// Some columns or rows, following the previous ones.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartInput {
     /// How many.
@@ -199,21 +211,26 @@ fn one() -> f64 {
 }
 
 /// A rectangle of elements.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct RegionInput {
     /// The group its elements belong to.
+    #[schemars(with = "String")]
     pub group: Spanned<String>,
     /// Extent in x (r); everything if left out.
     #[serde(alias = "r")]
+    #[schemars(with = "Option<[f64; 2]>")]
     pub x: Option<Spanned<[f64; 2]>>,
     /// Extent in y (z); everything if left out.
     #[serde(alias = "z")]
+    #[schemars(with = "Option<[f64; 2]>")]
     pub y: Option<Spanned<[f64; 2]>>,
 }
 
 /// A line along a coordinate, or a point.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct LineInput {
     /// Position or extent in x (r).
@@ -225,7 +242,7 @@ pub struct LineInput {
 }
 
 /// A position or an extent.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(
     untagged,
     expecting = "expected a number, or an extent such as `[0.0, 1.0]`"
@@ -238,43 +255,52 @@ pub enum Coordinate {
 }
 
 /// A law with its parameters.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LawInput {
     /// Id of the law.
+    #[schemars(with = "String")]
     pub law: Spanned<String>,
     /// SHA-256 that its library must have, in hexadecimal digits.
+    #[schemars(with = "Option<String>")]
     pub sha256: Option<Spanned<String>>,
     /// Its parameters.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: ParameterTable,
     /// Initial values of internal variables, overriding those of the law.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
     pub initial: Named<f64>,
 }
 
 /// A group of elements.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupInput {
     /// What the elements do.
     pub formulation: Formulation,
     /// The law, by its name under `laws`; phases may swap it.
+    #[schemars(with = "String")]
     pub law: Spanned<String>,
     /// Where the law is evaluated; the default depends on the formulation.
+    #[schemars(with = "Option<Integration>")]
     pub integration: Option<Spanned<Integration>>,
     /// Zero thickness: the line along which the elements are inserted.
+    #[schemars(with = "Option<String>")]
     pub line: Option<Spanned<String>>,
     /// Thin layer: direction across the layer; the shorter side if left out.
+    #[schemars(with = "Option<Axis>")]
     pub normal: Option<Spanned<Axis>>,
     /// Thin layer with an interface law: elasticity along the layer.
+    #[schemars(with = "Option<InPlane>")]
     pub in_plane: Option<Spanned<InPlane>>,
     /// Stress before the first phase, components 11 22 33 12, tension positive.
     pub initial_stress: Option<StressInput>,
 }
 
 /// What the elements of a group do.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Formulation {
     /// 8-node quads with a continuum law in global axes.
@@ -297,7 +323,7 @@ impl Formulation {
 }
 
 /// Where the law is evaluated.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Integration {
     /// 3 × 3 Gauss points (zero thickness: 3 Gauss points).
@@ -311,7 +337,8 @@ pub enum Integration {
 }
 
 /// A coordinate direction.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[schemars(transform = schema::radius_and_axis_names)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
     /// x, or r.
@@ -323,7 +350,7 @@ pub enum Axis {
 }
 
 /// Elasticity along a thin layer with an interface law.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum InPlane {
     /// E*, ν* of equations (18), (19).
@@ -333,7 +360,7 @@ pub enum InPlane {
 }
 
 /// A stress, tension positive.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StressInput {
     /// Along x (r).
@@ -351,25 +378,29 @@ pub struct StressInput {
 }
 
 /// Displacements of a line held at zero.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SupportInput {
     /// The line.
+    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// The components.
     pub fixed: Vec<Axis>,
 }
 
 /// A loading phase. Loads and prescribed displacements stay until a later phase changes them.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseInput {
     /// Name, used in results.
+    #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// Number of equal increments.
+    #[schemars(with = "usize")]
     pub increments: Spanned<usize>,
     /// Laws of groups from this phase on.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, String>")]
     pub laws: Named<String>,
     /// Displacements are counted from the start of this phase.
     #[serde(default)]
@@ -386,10 +417,12 @@ pub struct PhaseInput {
 }
 
 /// Prescribed displacements of a line, m.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct DisplacementInput {
     /// The line.
+    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// In x (r).
     #[serde(alias = "r")]
@@ -400,34 +433,40 @@ pub struct DisplacementInput {
 }
 
 /// Displacements of a line that become free.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FreeInput {
     /// The line.
+    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// The components.
     pub components: Vec<Axis>,
 }
 
 /// A pressure on a boundary line, kPa.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PressureInput {
     /// The line.
+    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// Towards the body positive.
     pub value: f64,
 }
 
 /// A quantity written for every increment.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeInput {
     /// Over the nodes of this line.
+    #[schemars(with = "Option<String>")]
     pub line: Option<Spanned<String>>,
     /// Over the integration points of this group; with a line, only its forces.
+    #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
     /// What.
+    #[schemars(with = "Option<String>")]
     pub quantity: Option<Spanned<String>>,
     /// How values become one; `sum` for forces, else `mean`.
     pub reduce: Option<Reduce>,
@@ -441,11 +480,12 @@ pub struct ProbeInput {
     #[serde(default = "one")]
     pub scale: f64,
     /// Instead of the above: a sum of other probes with factors.
+    #[schemars(with = "Option<BTreeMap<String, f64>>")]
     pub combine: Option<Named<f64>>,
 }
 
 /// How values become one.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduce {
     /// Arithmetic mean.
@@ -459,32 +499,38 @@ pub enum Reduce {
 }
 
 /// Curves of probes over another probe, or of a stress over the integration points of a cut.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FigureInput {
     /// Name of the file, without `.svg`.
+    #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// Title; the case's if left out.
     pub title: Option<String>,
     /// Probe (of a cut: quantity of a point) along the horizontal axis.
+    #[schemars(with = "String")]
     pub x: Spanned<String>,
     /// Text of the horizontal axis.
     pub x_label: Option<String>,
     /// Probes (quantities) along the vertical axis.
+    #[schemars(with = "Vec<String>")]
     pub y: Vec<Spanned<String>>,
     /// Text of the vertical axis.
     pub y_label: Option<String>,
     /// Only this phase; all if left out.
+    #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
     /// A cut: the integration points in it instead of probes.
     pub points: Option<CutInput>,
 }
 
 /// Integration points inside extents (ends excluded), at chosen increments.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct CutInput {
     /// Of this group; of all if left out.
+    #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
     /// Extent in x (r).
     #[serde(alias = "r")]
@@ -501,7 +547,7 @@ pub struct CutInput {
 }
 
 /// Solver settings.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverInput {
     /// Which matrix the iterations use.
@@ -535,7 +581,7 @@ impl SolverInput {
 }
 
 /// Which matrix the iterations use.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Consistent tangents at every iteration.
@@ -573,7 +619,7 @@ impl Method {
 }
 
 /// How the equations of a phase are set up.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Equations {
     /// Condensed where that is expected to be faster.
@@ -633,7 +679,7 @@ impl Default for SolverInput {
 }
 
 /// What is written.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct OutputInput {
     /// When the profile along interfaces is written.
@@ -645,7 +691,7 @@ pub struct OutputInput {
 }
 
 /// When something is written.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum When {
     /// Never.

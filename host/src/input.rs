@@ -7,6 +7,7 @@ use crate::error::{Error, Source, suggestion};
 use crate::plugin::{Law, LawDescription, LoadedLaw, ParameterDescription, SearchPath};
 use abi::Hypothesis;
 use indexmap::IndexMap;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
@@ -65,7 +66,7 @@ fn refuse_infinite(source: &Source, key: &str, value: &Spanned<DeValue<'_>>) -> 
 pub type Named<T> = IndexMap<Spanned<String>, Spanned<T>>;
 
 /// The value of a parameter as written in a file.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
 #[serde(untagged, expecting = "expected a number, or a text in quotes")]
 pub enum ParameterValue {
     /// A number.

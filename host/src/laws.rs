@@ -1,96 +1,300 @@
-//! What `pilum laws` prints: the laws found, and a page about one of them.
+//! What `pilum laws` prints: the laws found, and a page about one of them, as text or as JSON.
 
 use crate::error::Error;
-use crate::plugin::{InternalVariable, LoadedLaw, ParameterDescription, SearchPath};
+use crate::plugin::{
+    Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw,
+    ParameterDescription, SearchPath,
+};
+use abi::Hypothesis;
+use serde::Serialize;
 use std::fmt::Write;
+use std::path::Path;
 
-/// One line for every law found.
+/// Longest line of a page.
+const WIDTH: usize = 100;
+
+/// A law as `--json` gives it. Bounds that are infinite are null.
+#[derive(Debug, Serialize)]
+struct Record<'a> {
+    #[serde(flatten)]
+    description: &'a LawDescription,
+    library: &'a Path,
+    sha256: &'a str,
+}
+
+impl<'a> Record<'a> {
+    fn new(law: &'a LoadedLaw) -> Self {
+        Self {
+            description: law.description(),
+            library: law.library().path(),
+            sha256: law.library().sha256(),
+        }
+    }
+}
+
+fn json(value: &impl Serialize) -> Result<String, Error> {
+    serde_json::to_string_pretty(value)
+        .map(|text| text + "\n")
+        .map_err(|error| Error::Internal(error.to_string()))
+}
+
+/// One line for every law found; a library that claims a law and cannot be used is said to be so.
+pub fn list(search: &SearchPath) -> String {
+    let mut text = String::new();
+    for (id, library) in search.installed() {
+        let line = match search.law(&id) {
+            Ok(law) => {
+                let description = law.description();
+                format!("{:48}  {}", description.name, description.hypotheses())
+            }
+            Err(error) => format!("cannot be used, {}: {error}", library.display()),
+        };
+        let _ = writeln!(text, "{id:24}  {line}");
+    }
+    if text.is_empty() {
+        let folders: Vec<_> = search.folders().iter().map(|f| f.display()).collect();
+        text.push_str("no law library in:\n");
+        for folder in folders {
+            let _ = writeln!(text, "  {folder}");
+        }
+    }
+    text
+}
+
+/// Everything about every law found, as a JSON array.
 ///
 /// # Errors
 /// A library that claims a law cannot be used.
-pub fn list(search: &SearchPath) -> Result<String, Error> {
-    let mut text = String::new();
-    for id in search.installed().keys() {
-        let law = search.law(id)?;
-        let description = law.description();
-        let _ = writeln!(
-            text,
-            "{id:24}{:80}{}",
-            description.name,
-            description.hypotheses()
-        );
-    }
-    if text.is_empty() {
-        text.push_str("no law library is installed\n");
-    }
-    Ok(text)
+pub fn list_json(search: &SearchPath) -> Result<String, Error> {
+    let laws = search
+        .installed()
+        .keys()
+        .map(|id| search.law(id))
+        .collect::<Result<Vec<_>, _>>()?;
+    json(&laws.iter().map(Record::new).collect::<Vec<_>>())
+}
+
+/// Everything about a law, as a JSON object.
+///
+/// # Errors
+/// [`Error::Internal`] only.
+pub fn page_json(law: &LoadedLaw) -> Result<String, Error> {
+    json(&Record::new(law))
 }
 
 /// Everything a user needs to know of a law.
 pub fn page(law: &LoadedLaw) -> String {
     let description = law.description();
-    let mut text = format!(
-        "{}: {}\n\n{}\n\nfor         {}\nversion     {} ({})\nauthors     {}\nsource      {}\n\
-         library     {}\nsha256      {}\n",
-        description.id,
-        description.name,
-        description.doc,
-        description.hypotheses(),
-        description.version,
-        description.licence,
-        description.author,
-        description.references,
-        law.library().path().display(),
-        law.library().sha256(),
-    );
-    text.push_str("\nparameters\n");
-    for parameter in &description.parameters {
-        text.push_str(&parameter_lines(parameter));
+    let mut text = format!("{}: {}\n\n", description.id, description.name);
+    wrap(&mut text, "", &description.doc);
+    let facts = [
+        ("references", &description.references),
+        ("version", &description.version),
+        ("authors", &description.author),
+        ("licence", &description.licence),
+        ("library", &law.library().path().display().to_string()),
+        ("sha256", &law.library().sha256().to_owned()),
+    ];
+    text.push('\n');
+    for (name, value) in facts {
+        let _ = writeln!(text, "{name:12}{value}");
     }
+
+    text.push_str("\nHypotheses\n");
     for formulation in &description.formulations {
-        let _ = write!(text, "\ninternal variables, {}", formulation.hypothesis);
-        text.push_str(if formulation.internal_variables.is_empty() {
-            ": none\n"
-        } else {
-            "\n"
-        });
-        for variable in &formulation.internal_variables {
-            text.push_str(&variable_line(variable));
-        }
+        formulation_line(&mut text, formulation);
     }
+
+    text.push_str("\nParameters\n");
+    if description.parameters.is_empty() {
+        text.push_str("  none\n");
+    }
+    for parameter in &description.parameters {
+        parameter_lines(&mut text, parameter);
+    }
+
+    internal_variables(&mut text, &description.formulations);
+    text.push_str("\nIn a case file\n");
+    example(&mut text, description);
     text.push_str(
-        "\nSigns: tension and opening positive; shear strain γ = 2ε; angles in degrees.\n",
+        "\nUnits kN, m, kPa; angles in degrees. Tension and opening are positive, shear strains are \
+         γ = 2ε,\nthe jump is that of the plus side less that of the minus side, normal first.\n",
     );
     text
 }
 
-fn parameter_lines(p: &ParameterDescription) -> String {
-    let default = match (p.default, p.optional) {
-        (Some(value), _) if !p.choices.is_empty() => {
-            let label = p.choices.get(value as usize).map_or("", String::as_str);
-            format!("default {label}")
-        }
-        (Some(value), _) => format!("default {value}"),
+fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
+    let hypothesis = Hypothesis::ALL
+        .into_iter()
+        .find(|h| h.name() == formulation.hypothesis);
+    let components = hypothesis.map_or(String::new(), |h| h.components().join(" "));
+    let pair = if hypothesis == Some(Hypothesis::Interface2d) {
+        "jump (m) to traction (kPa)"
+    } else {
+        "strain to stress (kPa)"
+    };
+    let symmetric = if formulation.symmetric {
+        "symmetric"
+    } else {
+        "unsymmetric"
+    };
+    let linear = if formulation.linear { ", linear" } else { "" };
+    let axes = if formulation.local_axes {
+        "; axes of the layer: 1 along it, 2 across it"
+    } else {
+        ""
+    };
+    let _ = writeln!(
+        text,
+        "  {:14}{pair}, components {components}; tangent {symmetric}{linear}{axes}",
+        formulation.hypothesis
+    );
+}
+
+fn parameter_lines(text: &mut String, p: &ParameterDescription) {
+    let default = match (default_of(p), p.optional) {
+        (Some(default), _) => format!("default {default}"),
         (None, true) => "may be left out".to_owned(),
         (None, false) => "required".to_owned(),
     };
-    let range = if p.choices.is_empty() {
-        format!("in {}", p.bounds)
-    } else {
-        format!("one of {}", p.choices.join(", "))
-    };
-    let unlimited = p.usual.lower == f64::NEG_INFINITY && p.usual.upper == f64::INFINITY;
-    let usual = if unlimited {
-        String::new()
-    } else {
-        format!(", usually {}", p.usual)
-    };
-    format!(
-        "  {:18}{:8}{:14}{default}; {range}{usual}\n  {:18}{}\n",
-        p.id, p.symbol, p.unit, "", p.doc
-    )
+    let _ = writeln!(
+        text,
+        "  {:21} {:9} {:11} {default}; {}",
+        p.id,
+        p.symbol,
+        p.unit,
+        range(p)
+    );
+    wrap(text, "      ", &p.doc);
 }
 
-fn variable_line(v: &InternalVariable) -> String {
-    format!("  {:22}{:10}{:8}{}\n", v.id, v.symbol, v.unit, v.doc)
+/// The default as a file would say it.
+fn default_of(p: &ParameterDescription) -> Option<String> {
+    let value = p.default?;
+    Some(match p.choices.get(value as usize) {
+        Some(label) => format!("\"{label}\""),
+        None => number(value),
+    })
+}
+
+/// Admissible and usual values.
+fn range(p: &ParameterDescription) -> String {
+    if !p.choices.is_empty() {
+        return format!("one of \"{}\"", p.choices.join("\", \""));
+    }
+    let mut text = interval(p.bounds);
+    if p.usual.lower > f64::NEG_INFINITY || p.usual.upper < f64::INFINITY {
+        let _ = write!(text, ", usually {}", interval(p.usual));
+    }
+    text
+}
+
+/// An interval in words: `> 0`, `0 to 90`, `from 0 to below 90`.
+fn interval(bounds: Bounds) -> String {
+    let Bounds {
+        lower,
+        open_lower,
+        upper,
+        open_upper,
+    } = bounds;
+    let (least, most) = (number(lower), number(upper));
+    let from = if open_lower { ">" } else { "≥" };
+    let to = if open_upper { "<" } else { "≤" };
+    match (lower > f64::NEG_INFINITY, upper < f64::INFINITY) {
+        (false, false) => "any number".to_owned(),
+        (true, false) => format!("{from} {least}"),
+        (false, true) => format!("{to} {most}"),
+        (true, true) if open_lower || open_upper => format!("{from} {least} and {to} {most}"),
+        (true, true) => format!("{least} to {most}"),
+    }
+}
+
+/// A number as short as a file would have it.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
+/// Once if all formulations have the same.
+fn internal_variables(text: &mut String, formulations: &[FormulationDescription]) {
+    let ids = |f: &FormulationDescription| -> Vec<String> {
+        f.internal_variables.iter().map(|v| v.id.clone()).collect()
+    };
+    let alike = formulations
+        .windows(2)
+        .all(|pair| ids(&pair[0]) == ids(&pair[1]));
+    let shown = if alike { 1 } else { formulations.len() };
+    for formulation in formulations.iter().take(shown) {
+        text.push_str("\nInternal variables");
+        if !alike {
+            let _ = write!(text, ", {}", formulation.hypothesis);
+        }
+        text.push('\n');
+        if formulation.internal_variables.is_empty() {
+            text.push_str("  none\n");
+        }
+        for variable in &formulation.internal_variables {
+            variable_lines(text, variable);
+        }
+    }
+}
+
+fn variable_lines(text: &mut String, v: &InternalVariable) {
+    let output_only = if v.output_only { "; output only" } else { "" };
+    let _ = writeln!(
+        text,
+        "  {:21} {:9} {:11} starts at {}{output_only}",
+        v.id,
+        v.symbol,
+        v.unit,
+        number(v.initial_value)
+    );
+    wrap(text, "      ", &v.doc);
+}
+
+/// What to write for the law, defaults as comments.
+fn example(text: &mut String, description: &LawDescription) {
+    let id = &description.id;
+    let _ = writeln!(text, "  [laws.NAME]\n  law = \"{id}\"");
+    if !description.parameters.is_empty() {
+        text.push_str("  [laws.NAME.parameters]\n");
+    }
+    for p in &description.parameters {
+        let unit = if p.unit == "-" {
+            String::new()
+        } else {
+            format!("{}, ", p.unit)
+        };
+        let given = match default_of(p) {
+            Some(default) => format!("# {} = {default}", p.id),
+            None if p.optional => format!("# {} =", p.id),
+            None => format!("{} = ", p.id),
+        };
+        let _ = writeln!(text, "  {given:40}# {unit}{}", range(p));
+    }
+}
+
+/// Appends a text in lines of at most [`WIDTH`] characters.
+fn wrap(text: &mut String, indent: &str, words: &str) {
+    let mut length = 0;
+    for word in words.split_whitespace() {
+        let n = word.chars().count();
+        if length > 0 && length + 1 + n > WIDTH {
+            text.push('\n');
+            length = 0;
+        }
+        if length == 0 {
+            text.push_str(indent);
+            length = indent.len();
+        } else {
+            text.push(' ');
+            length += 1;
+        }
+        text.push_str(word);
+        length += n;
+    }
+    text.push('\n');
 }

@@ -6,7 +6,8 @@
 //! [`output`] write what comes out. Beside them: [`point`], one law at one integration point, and
 //! [`laws`], what there is to know about a law, and [`trade_off`], what accuracy costs. [`inspect`]
 //! and [`lock`] say what a library is and hold a case to it, a [`capsule`] repeats a call that failed,
-//! and what may crash or hang runs in a [`child`] process.
+//! and what may crash or hang runs in a [`child`] process. For authors there
+//! is [`new_law`], for editors [`schema`].
 
 pub mod assembly;
 pub mod capsule;
@@ -22,11 +23,13 @@ pub mod laws;
 pub mod lock;
 pub mod mesh;
 pub mod model;
+pub mod new_law;
 pub mod output;
 pub mod plugin;
 pub mod point;
 pub mod probe;
 pub mod report;
 pub mod run;
+pub mod schema;
 pub mod solver;
 pub mod trade_off;

@@ -5,12 +5,14 @@
     reason = "this is where the program prints"
 )]
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use host::case::Case;
 use host::error::{Error, Place, suggestion};
+use host::new_law::NewLaw;
 use host::output::{Figures, remove_comparison};
 use host::plugin::{SearchPath, Trust, vetting};
 use host::run::{Observer, Options, check, run_reusing};
+use host::schema::{self, FileKind};
 use host::solver::Reuse;
 use host::trade_off;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -109,6 +111,12 @@ enum Command {
     Laws {
         /// Id of a law.
         id: Option<String>,
+        /// A folder with law libraries, looked in first; may be repeated.
+        #[arg(long, value_name = "DIR")]
+        law_path: Vec<PathBuf>,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Read what a library is and needs, without executing it.
     Inspect {
@@ -131,6 +139,20 @@ enum Command {
         #[arg(long, conflicts_with = "isolate")]
         in_process: bool,
     },
+    /// Write a small project for a law that builds and runs.
+    NewLaw(NewLaw),
+    /// Print the JSON Schema of an input file, for editors.
+    Schema {
+        /// Which file.
+        file: FileKind,
+    },
+    /// Print completions for a shell.
+    Completions {
+        /// Which shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page.
+    Man,
     /// Try a library: what a child process does.
     #[command(name = vetting::COMMAND, hide = true)]
     ProbeLibrary { library: PathBuf, sha256: String },
@@ -239,7 +261,15 @@ fn execute(command: Command) -> Result<(), Error> {
                 &mut |doing| eprintln!("{doing}"),
             )
         }
-        Command::Laws { id } => show_laws(id.as_deref()),
+        Command::Laws { id, law_path, json } => show_laws(id.as_deref(), &law_path, json),
+        Command::NewLaw(project) => project.write().map(|text| print!("{text}")),
+        Command::Schema { file } => print_schema(file),
+        Command::Completions { shell } => {
+            let mut program = Arguments::command();
+            clap_complete::generate(shell, &mut program, "pilum", &mut std::io::stdout());
+            Ok(())
+        }
+        Command::Man => manual(&Arguments::command()),
         Command::Inspect { library, json } => {
             let inspection = host::inspect::inspect(&library)?;
             if json {
@@ -445,12 +475,42 @@ fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> 
     Ok(())
 }
 
-fn show_laws(id: Option<&str>) -> Result<(), Error> {
-    let search = SearchPath::new(&[]);
-    match id {
-        None => print!("{}", host::laws::list(&search)?),
-        Some(id) => print!("{}", host::laws::page(&search.law(id)?)),
+fn show_laws(id: Option<&str>, folders: &[PathBuf], json: bool) -> Result<(), Error> {
+    if let Some(missing) = folders.iter().find(|folder| !folder.is_dir()) {
+        let message = format!("--law-path: there is no folder {}", missing.display());
+        return Err(Error::Usage(message));
     }
+    let search = SearchPath::new(folders);
+    let text = match (id, json) {
+        (None, false) => host::laws::list(&search),
+        (None, true) => host::laws::list_json(&search)?,
+        (Some(id), false) => host::laws::page(&search.law(id)?),
+        (Some(id), true) => host::laws::page_json(&search.law(id)?)?,
+    };
+    print!("{text}");
+    Ok(())
+}
+
+fn print_schema(file: FileKind) -> Result<(), Error> {
+    let text = serde_json::to_string_pretty(&schema::of(file))
+        .map_err(|error| Error::Internal(error.to_string()))?;
+    println!("{text}");
+    Ok(())
+}
+
+/// The program's manual page, that of each command behind it.
+fn manual(program: &clap::Command) -> Result<(), Error> {
+    let mut page = Vec::new();
+    let mut written = clap_mangen::Man::new(program.clone()).render(&mut page);
+    for command in program.get_subcommands() {
+        // A command's name lives as long as the program.
+        let name: &'static str = format!("pilum-{}", command.get_name()).leak();
+        let command = command.clone().name(name);
+        let section = clap_mangen::Man::new(command);
+        written = written.and_then(|()| section.render(&mut page));
+    }
+    written.map_err(|error| Error::Internal(error.to_string()))?;
+    print!("{}", String::from_utf8_lossy(&page));
     Ok(())
 }
 

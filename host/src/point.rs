@@ -10,6 +10,7 @@ mod file;
 mod table;
 
 pub use file::Driver;
+pub(crate) use file::File as DriverFile;
 pub use table::{Row, Table};
 
 use crate::capsule::{self, Capsule};

@@ -6,10 +6,13 @@ use crate::error::{Error, Source, suggestion};
 use crate::input::{self, Named, ParameterTable, ParameterValue};
 use crate::lock::Pins;
 use crate::plugin::{Law, SearchPath, Strided};
+use crate::schema;
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
+use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -17,48 +20,88 @@ use toml::Spanned;
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 100_000_000;
 
-#[derive(Clone, Debug, Deserialize)]
+/// The keys of a driver file. Units: kPa, m; angles in degrees; tension and opening positive.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct File {
+pub(crate) struct File {
+    /// Id of the law.
+    #[schemars(with = "String")]
     law: Spanned<String>,
+    /// SHA-256 of the law's library; another one is refused.
+    #[schemars(with = "Option<String>")]
     sha256: Option<Spanned<String>>,
+    /// What the driver is.
     #[serde(default)]
     title: String,
+    /// Folders with law libraries, relative to the file.
     #[serde(default)]
+    #[schemars(with = "Vec<PathBuf>")]
     law_path: Vec<Spanned<PathBuf>>,
+    /// Hypothesis: what is led, and its components.
+    #[schemars(with = "schema::HypothesisName")]
     hypothesis: Spanned<String>,
+    /// Parameters of the law.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ParameterValue>")]
     parameters: ParameterTable,
+    /// The initial state; 0 where nothing is given.
+    #[schemars(with = "Option<Initial>")]
     initial: Option<Spanned<Initial>>,
+    /// The path, segment after segment.
     #[serde(default)]
     segment: Vec<SegmentTable>,
+    /// Curves of columns of the table.
     #[serde(default, rename = "figure")]
     figures: Vec<FigureInput>,
 }
 
-#[derive(Clone, Debug, Default, Deserialize)]
+/// The initial state.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Initial {
+    /// Traction of an interface, kPa, by component `n`, `t`.
+    #[schemars(with = "Option<schema::Components<f64>>")]
     traction: Option<Spanned<Named<f64>>>,
+    /// Stress of a solid, kPa, by component `11` to `23`.
+    #[schemars(with = "Option<schema::Components<f64>>")]
     stress: Option<Spanned<Named<f64>>>,
+    /// Internal variables of the law, by id.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
     internal: Named<f64>,
 }
 
-#[derive(Clone, Debug, Deserialize)]
+/// A stretch of the path.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SegmentTable {
+    /// Number of equal increments.
+    #[schemars(with = "i64", range(min = 1))]
     increments: Spanned<i64>,
+    /// How each component is led; one without control keeps its traction or stress.
+    #[schemars(with = "schema::Components<ControlTable>")]
     control: IndexMap<Spanned<String>, Spanned<ControlTable>>,
 }
 
-#[derive(Clone, Debug, Deserialize)]
+/// How one component is led: exactly one of these, as the total at the end of the segment.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
 struct ControlTable {
+    /// Interfaces: jump, m.
+    #[schemars(with = "Option<f64>")]
     jump: Option<Spanned<f64>>,
+    /// Interfaces: traction, kPa.
+    #[schemars(with = "Option<f64>")]
     traction: Option<Spanned<f64>>,
+    /// Interfaces: the traction changes by −stiffness × jump, kPa/m.
+    #[schemars(with = "Option<f64>")]
     stiffness: Option<Spanned<f64>>,
+    /// Solids: strain.
+    #[schemars(with = "Option<f64>")]
     strain: Option<Spanned<f64>>,
+    /// Solids: stress, kPa.
+    #[schemars(with = "Option<f64>")]
     stress: Option<Spanned<f64>>,
 }
 

@@ -1,0 +1,257 @@
+/* For authors of laws in C: one integration point at a time.
+ *
+ * pilum_law.h is the contract. This header holds what every law does alike: it refuses broken
+ * arguments and parameters outside their bounds, walks the batch, and writes outcomes and the one
+ * message. What is left to the author is a description, `create`, and a function that carries one
+ * point over one increment. Nothing here allocates, locks or prints. */
+#ifndef PILUM_POINT_H
+#define PILUM_POINT_H
+
+#include "pilum_law.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Most components of a gradient or flux, and most internal variables, that this header carries. */
+#define PILUM_MAX_COMPONENTS 6
+#define PILUM_MAX_STATES 64
+
+/* Which operator the host wants beside the update. */
+typedef enum pilum_tangent {
+    /* None. */
+    PILUM_TANGENT_NONE,
+    /* The elastic operator in the end state. */
+    PILUM_TANGENT_ELASTIC,
+    /* The derivative of the update. */
+    PILUM_TANGENT_CONSISTENT
+} pilum_tangent;
+
+/* One integration point at the start of an increment, and the increment. */
+typedef struct pilum_point {
+    /* Number of components: 2 for interfaces, 4 for solids in the plane, 6 in space. */
+    uint32_t n;
+    /* Strain or jump at the start. */
+    double gradient[PILUM_MAX_COMPONENTS];
+    /* Its increment. */
+    double increment[PILUM_MAX_COMPONENTS];
+    /* Stress or traction at the start, kPa. */
+    double flux[PILUM_MAX_COMPONENTS];
+    /* Internal variables at the start. */
+    double state[PILUM_MAX_STATES];
+    /* Time at the start, and its increment. */
+    double time, time_increment;
+} pilum_point;
+
+/* The same point at the end of the increment; all zero when the author receives it. */
+typedef struct pilum_response {
+    /* Stress or traction, kPa. */
+    double flux[PILUM_MAX_COMPONENTS];
+    /* Internal variables. */
+    double state[PILUM_MAX_STATES];
+    /* d flux / d gradient, `tangent[row * n + column]`. */
+    double tangent[PILUM_MAX_COMPONENTS * PILUM_MAX_COMPONENTS];
+    /* With any outcome but PILUM_OK: why, a static text. */
+    const char *reason;
+    /* With PILUM_CUT_STEP: the fraction of the increment, in (0, 1), that the law can follow. NaN,
+     * which it is at first, leaves the choice to the host. */
+    double step_factor;
+} pilum_response;
+
+/* Carries one point over one increment. A pure function of its arguments. */
+typedef pilum_status (*pilum_update)(const pilum_instance *instance, const pilum_point *point,
+                                     pilum_tangent tangent, pilum_response *end);
+
+/* Writes a message, cut short to the buffer, which may be null. */
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4), unused))
+#endif
+static inline void pilum_say(char *message, size_t capacity, const char *format, ...) {
+    if (message && capacity > 0) {
+        va_list values;
+        va_start(values, format);
+        vsnprintf(message, capacity, format, values);
+        va_end(values);
+    }
+}
+
+/* Refuses what `create` must refuse before it looks at the law: a wrong number of parameters, and
+ * values outside their declared bounds. PILUM_OK: everything is as declared. */
+static inline pilum_status pilum_check_parameters(const pilum_law *law, uint32_t formulation,
+                                                  const double *parameter, uint32_t n_parameters,
+                                                  pilum_instance **out, char *message,
+                                                  size_t capacity) {
+    pilum_say(message, capacity, "%s", "");
+    if (formulation >= law->n_formulations) {
+        pilum_say(message, capacity, "there is no formulation number %" PRIu32, formulation);
+        return PILUM_E_ARGUMENT;
+    }
+    if (n_parameters != law->n_parameters || (n_parameters > 0 && !parameter) || !out) {
+        pilum_say(message, capacity, "%" PRIu32 " parameters given, %" PRIu32 " expected",
+                  n_parameters, law->n_parameters);
+        return PILUM_E_ARGUMENT;
+    }
+    for (uint32_t i = 0; i < n_parameters; i++) {
+        const pilum_parameter *declared = &law->parameter[i];
+        double value = parameter[i];
+        if (isnan(value) && (declared->flags & PILUM_P_OPTIONAL)) {
+            continue;
+        }
+        int above = declared->flags & PILUM_P_OPEN_LOWER ? value > declared->lower
+                                                         : value >= declared->lower;
+        int below = declared->flags & PILUM_P_OPEN_UPPER ? value < declared->upper
+                                                         : value <= declared->upper;
+        int is_label = !declared->choices || !(value < floor(value) || value > floor(value));
+        if (!isfinite(value) || !above || !below || !is_label) {
+            pilum_say(message, capacity, "%s: %g is not admissible", declared->id, value);
+            return PILUM_E_PARAMETER;
+        }
+    }
+    return PILUM_OK;
+}
+
+/* Whether `a` is a more severe outcome than `b`: errors, the most negative first, then
+ * PILUM_CUT_STEP, then PILUM_OK_UNRELIABLE. */
+static inline int pilum_is_worse(pilum_status a, pilum_status b) {
+    return a < 0 || b < 0 ? a < b : a > b;
+}
+
+/* Does `integrate` for a law with these numbers of components and internal variables. */
+static inline pilum_status pilum_each_point(const pilum_instance *instance,
+                                            const pilum_batch *batch, uint32_t n_components,
+                                            uint32_t n_states, pilum_update update) {
+    const uint32_t known = PILUM_REQ_FLUX | PILUM_REQ_TANGENT | PILUM_REQ_ELASTIC;
+    if (!batch || !PILUM_HAS(batch, pilum_batch, message_capacity)) {
+        return PILUM_E_ARGUMENT;
+    }
+    pilum_say(batch->message, batch->message_capacity, "%s", "");
+    pilum_tangent tangent = batch->request & PILUM_REQ_ELASTIC   ? PILUM_TANGENT_ELASTIC
+                            : batch->request & PILUM_REQ_TANGENT ? PILUM_TANGENT_CONSISTENT
+                                                                 : PILUM_TANGENT_NONE;
+    if (batch->request & ~known) {
+        pilum_say(batch->message, batch->message_capacity, "an unknown request");
+        return PILUM_E_UNSUPPORTED;
+    }
+    int is_null = !batch->gradient0.p || !batch->gradient1.p || !batch->flux0.p ||
+                  !batch->flux1.p || (n_states > 0 && (!batch->state0.p || !batch->state1.p)) ||
+                  (tangent != PILUM_TANGENT_NONE && !batch->tangent.p);
+    if (!instance || (batch->n_points > 0 && is_null)) {
+        pilum_say(batch->message, batch->message_capacity, "%s",
+                  instance ? "a view that is needed is null" : "the instance is null");
+        return PILUM_E_ARGUMENT;
+    }
+    pilum_status worst = PILUM_OK;
+    for (uint64_t i = 0; i < batch->n_points; i++) {
+        pilum_point point;
+        pilum_response end;
+        int is_finite = 1;
+        point.n = n_components;
+        for (uint32_t c = 0; c < n_components; c++) {
+            point.gradient[c] = PILUM_AT(batch->gradient0, i, c);
+            point.increment[c] = PILUM_AT(batch->gradient1, i, c) - point.gradient[c];
+            point.flux[c] = PILUM_AT(batch->flux0, i, c);
+            end.flux[c] = 0.0;
+            is_finite = is_finite && isfinite(point.gradient[c]) && isfinite(point.increment[c]) &&
+                        isfinite(point.flux[c]);
+        }
+        for (uint32_t s = 0; s < n_states; s++) {
+            point.state[s] = PILUM_AT(batch->state0, i, s);
+            end.state[s] = 0.0;
+            is_finite = is_finite && isfinite(point.state[s]);
+        }
+        for (uint32_t k = 0; k < n_components * n_components; k++) {
+            end.tangent[k] = 0.0;
+        }
+        point.time = batch->time;
+        point.time_increment = batch->time_increment;
+        end.reason = is_finite ? "the law gives no reason" : "an input is not finite";
+        end.step_factor = (double)NAN;
+        pilum_status status =
+            is_finite ? update(instance, &point, tangent, &end) : PILUM_E_NUMERIC;
+        if (status == PILUM_OK || status == PILUM_OK_UNRELIABLE) {
+            for (uint32_t c = 0; c < n_components; c++) {
+                PILUM_AT(batch->flux1, i, c) = end.flux[c];
+                is_finite = is_finite && isfinite(end.flux[c]);
+            }
+            for (uint32_t s = 0; s < n_states; s++) {
+                PILUM_AT(batch->state1, i, s) = end.state[s];
+                is_finite = is_finite && isfinite(end.state[s]);
+            }
+            for (uint32_t k = 0; k < n_components * n_components; k++) {
+                if (tangent != PILUM_TANGENT_NONE) {
+                    PILUM_AT(batch->tangent, i, k) = end.tangent[k];
+                    is_finite = is_finite && isfinite(end.tangent[k]);
+                }
+            }
+            if (!is_finite) {
+                status = PILUM_E_NUMERIC;
+                end.reason = "a result is not finite";
+            }
+        }
+        if (status == PILUM_CUT_STEP && batch->step_factor) {
+            batch->step_factor[i] = end.step_factor;
+        }
+        if (pilum_is_worse(status, worst)) {
+            worst = status;
+            pilum_say(batch->message, batch->message_capacity, "point %" PRIu64 ": %s",
+                      batch->first_point + i, end.reason);
+        }
+        /* A defect of the law is the outcome of all points from there on. */
+        int is_defect = status == PILUM_E_INTERNAL;
+        for (uint64_t k = i; batch->status && k < (is_defect ? batch->n_points : i + 1); k++) {
+            batch->status[k] = status;
+        }
+        if (is_defect) {
+            break;
+        }
+    }
+    return worst;
+}
+
+/* A gradient or flux: a tensor in Voigt order, or with `PILUM_VECTOR` normal first. */
+#define PILUM_VARIABLE(name, sign, in, sentence, form, n, names)                                   \
+    { sizeof(pilum_variable), 0, name, sign, in, sentence, form, n, names, 0.0 }
+/* An internal variable that is one number, 0 at first. */
+#define PILUM_STATE(name, sign, in, sentence)                                                      \
+    PILUM_VARIABLE(name, sign, in, sentence, PILUM_SCALAR, 1, 0)
+
+#ifdef __GNUC__
+#define PILUM_UNUSED __attribute__((unused))
+#else
+#define PILUM_UNUSED
+#endif
+
+PILUM_UNUSED static const char *const pilum_names_interface[] = {"n", "t"};
+PILUM_UNUSED static const char *const pilum_names_solid[] = {"11", "22", "33", "12", "13", "23"};
+
+/* Gradient and flux of an interface in two dimensions. */
+PILUM_UNUSED static const pilum_variable pilum_jump =
+    PILUM_VARIABLE("jump", "[u]", "m", "Relative displacement across the interface, opening positive.",
+                   PILUM_VECTOR, 2, pilum_names_interface);
+PILUM_UNUSED static const pilum_variable pilum_traction =
+    PILUM_VARIABLE("traction", "t", "kPa", "Traction on the interface, tension positive.",
+                   PILUM_VECTOR, 2, pilum_names_interface);
+/* Gradient and flux of a solid: in plane strain and axisymmetry, and in three dimensions. */
+PILUM_UNUSED static const pilum_variable pilum_strain_4 =
+    PILUM_VARIABLE("strain", "eps", "-", "Strain, engineering shear.", PILUM_SYMMETRIC_TENSOR, 4,
+                   pilum_names_solid);
+PILUM_UNUSED static const pilum_variable pilum_stress_4 =
+    PILUM_VARIABLE("stress", "sigma", "kPa", "Stress, tension positive.", PILUM_SYMMETRIC_TENSOR, 4,
+                   pilum_names_solid);
+PILUM_UNUSED static const pilum_variable pilum_strain_6 =
+    PILUM_VARIABLE("strain", "eps", "-", "Strain, engineering shear.", PILUM_SYMMETRIC_TENSOR, 6,
+                   pilum_names_solid);
+PILUM_UNUSED static const pilum_variable pilum_stress_6 =
+    PILUM_VARIABLE("stress", "sigma", "kPa", "Stress, tension positive.", PILUM_SYMMETRIC_TENSOR, 6,
+                   pilum_names_solid);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* PILUM_POINT_H */

@@ -1,0 +1,170 @@
+//! The schemas of input files: every committed file follows its own, and mistakes do not.
+
+use crate::compilers::repository;
+use crate::program::pilum;
+use jsonschema::Validator;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn validator(kind: &str) -> Validator {
+    let place = TempDir::new().unwrap();
+    let outcome = pilum(place.path(), &["schema", kind]);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let schema: Value = serde_json::from_str(&outcome.stdout).unwrap();
+    jsonschema::draft202012::meta::validate(&schema).unwrap();
+    jsonschema::validator_for(&schema).unwrap()
+}
+
+fn value(text: &str) -> Value {
+    let table: toml::Table = toml::from_str(text).unwrap();
+    serde_json::to_value(table).unwrap()
+}
+
+/// All input files in the repository.
+fn inputs(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            inputs(&path, found);
+        } else if path.extension().is_some_and(|suffix| suffix == "toml") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn every_committed_file_follows_its_schema() {
+    let (case, point) = (validator("case"), validator("point"));
+    let mut files = Vec::new();
+    inputs(&repository("cases"), &mut files);
+    inputs(&repository("host/src/new_law/interface"), &mut files);
+    inputs(&repository("host/src/new_law/continuum"), &mut files);
+    let (mut cases, mut points) = (0, 0);
+    for path in files {
+        let text = fs::read_to_string(&path).unwrap();
+        let value = value(&text);
+        // A driver has a law of its own; what is based on a driver is one.
+        let is_point = |value: &Value| value.get("law").is_some() || value.get("segment").is_some();
+        let base = value.get("base").and_then(Value::as_str).map(|base| {
+            let text = fs::read_to_string(path.parent().unwrap().join(base)).unwrap();
+            self::value(&text)
+        });
+        let is_point = is_point(&value) || base.as_ref().is_some_and(is_point);
+        let (validator, count) = if is_point {
+            (&point, &mut points)
+        } else {
+            (&case, &mut cases)
+        };
+        *count += 1;
+        let errors: Vec<String> = validator
+            .iter_errors(&value)
+            .map(|error| format!("{}: {error}", error.instance_path()))
+            .collect();
+        assert!(errors.is_empty(), "{}: {errors:#?}", path.display());
+    }
+    assert!(
+        cases >= 12 && points >= 8,
+        "{cases} cases, {points} drivers"
+    );
+}
+
+const DRIVER: &str = include_str!("../../host/src/new_law/interface/point.toml");
+const CASE: &str = include_str!("../../host/src/new_law/interface/case.toml");
+
+/// The text with one place changed.
+fn changed(text: &str, from: &str, to: &str) -> Value {
+    assert!(text.contains(from), "{from:?}");
+    value(&text.replacen(from, to, 1))
+}
+
+#[test]
+fn mistakes_do_not_follow_it() {
+    let (case, point) = (validator("case"), validator("point"));
+    assert!(case.is_valid(&value(CASE)) && point.is_valid(&value(DRIVER)));
+    for (from, to) in [
+        // Unknown keys, at every level.
+        ("title", "titel"),
+        ("[mesh]\n", "[mesh]\ncolums = 1\n"),
+        (
+            "formulation = \"solid\"",
+            "formulation = \"solid\"\nintegretion = \"full\"",
+        ),
+        ("increments = 10", "increment = 10"),
+        ("value = 100.0", "valeu = 100.0"),
+        // What is missing, and what is of another kind.
+        ("analysis = \"plane_strain\"\n", ""),
+        ("formulation = \"solid\"\n", ""),
+        ("formulation = \"solid\"", "formulation = \"solids\""),
+        ("increments = 10", "increments = \"ten\""),
+        ("fixed = [\"x\", \"y\"]", "fixed = [\"x\", \"w\"]"),
+    ] {
+        assert!(
+            !case.is_valid(&changed(CASE, from, to)),
+            "{from:?} to {to:?}"
+        );
+    }
+    for (from, to) in [
+        (
+            "hypothesis = \"interface_2d\"",
+            "hypothesis = \"interface\"",
+        ),
+        ("[initial]", "[intial]"),
+        ("increments = 20", "increments = 0"),
+        ("t = { jump = 2e-3 }", "s = { jump = 2e-3 }"),
+        ("t = { jump = 2e-3 }", "t = { slip = 2e-3 }"),
+        ("t = { jump = 2e-3 }", "t = { jump = 2e-3, traction = 0 }"),
+        ("t = { jump = 2e-3 }", "t = 2e-3"),
+    ] {
+        assert!(
+            !point.is_valid(&changed(DRIVER, from, to)),
+            "{from:?} to {to:?}"
+        );
+    }
+}
+
+/// With a base or variants a file may be a part, but not any part.
+#[test]
+fn parts_follow_it_too() {
+    let case = validator("case");
+    let based = "base = \"other.toml\"\n[[phase]]\nname = \"push\"\nlaws = { joint = \"mepi\" }\n";
+    assert!(case.is_valid(&value(based)));
+    assert!(!case.is_valid(&changed(based, "laws", "law")));
+    assert!(!case.is_valid(&changed(based, "base = \"other.toml\"\n", "")));
+    let variants =
+        format!("{CASE}\n[[variant]]\nname = \"a\"\nlaws.joint.parameters.friction_angle = 20.0\n");
+    assert!(case.is_valid(&value(&variants)));
+    assert!(!case.is_valid(&changed(&variants, "name = \"a\"", "nam = \"a\"")));
+    assert!(!case.is_valid(&changed(&variants, "name = \"a\"", "name = \"../a\"")));
+}
+
+/// Every key says what it is, so that an editor can.
+#[test]
+fn every_key_has_a_description() {
+    fn look(schema: &Value, at: &str, bare: &mut Vec<String>) {
+        if let Some(properties) = schema.get("properties").and_then(Value::as_object) {
+            for (name, property) in properties {
+                let is_component = name.len() <= 2;
+                if property.get("description").is_none() && !is_component {
+                    bare.push(format!("{at}.{name}"));
+                }
+            }
+        }
+        for (name, definition) in schema
+            .get("$defs")
+            .and_then(Value::as_object)
+            .into_iter()
+            .flatten()
+        {
+            look(definition, name, bare);
+        }
+    }
+    let place = TempDir::new().unwrap();
+    for kind in ["case", "point"] {
+        let text = pilum(place.path(), &["schema", kind]).stdout;
+        let mut bare = Vec::new();
+        look(&serde_json::from_str(&text).unwrap(), kind, &mut bare);
+        assert!(bare.is_empty(), "{bare:?}");
+    }
+}
