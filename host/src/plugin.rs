@@ -7,7 +7,7 @@ mod search;
 pub use description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };
-pub use library::Strided;
+pub use library::{Strided, probe};
 pub use search::SearchPath;
 
 use crate::error::Error;
@@ -109,6 +109,19 @@ impl LoadedLaw {
     /// Its library.
     pub fn library(&self) -> &Library {
         &self.library
+    }
+
+    /// Calls `create` as a check does.
+    ///
+    /// # Errors
+    /// There is no memory.
+    pub fn probe(&self, form: &probe::CreateForm<'_>) -> std::io::Result<probe::Created> {
+        probe::create(self.library.laws[self.number].1, form)
+    }
+
+    /// Calls `destroy` with null.
+    pub fn destroy_nothing(&self) {
+        probe::destroy_nothing(self.library.laws[self.number].1);
     }
 
     /// Fixes the parameters (in declared order; NaN: left out) under a hypothesis.
