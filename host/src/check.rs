@@ -333,7 +333,7 @@ fn run_all(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
             let waits = |id: &&str| {
                 !findings.contains_key(*id) && chosen.iter().any(|other| other.id == *id)
             };
-            !check.needs.iter().any(|id| waits(&id))
+            !check.needs.iter().any(waits)
         };
         let ready: Vec<&&Check> = chosen.iter().filter(is_open).filter(is_ready).collect();
         if ready.is_empty() {

@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses};
-use super::{Check, Family, Found, Subject, failed};
+use super::{Check, Family, Found, Subject, Verdict, failed};
 use crate::plugin::LoadedLaw;
 use crate::plugin::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME};
 use abi::raw;
@@ -120,7 +120,7 @@ fn must_refuse(
     what: &str,
     created: &Created,
     expected: raw::Status,
-) -> Result<String, super::Verdict> {
+) -> Result<String, Verdict> {
     let id = &law.description().id;
     if created.status != expected {
         return Err(failed(format!(
@@ -277,7 +277,12 @@ fn integrate_works(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "integrate");
     let (mut n_successes, mut n) = (0, 0);
     for specimen in subject.specimens(2, &mut random)? {
-        let walk = specimen.walk(12, &mut random)?;
+        let walk = specimen
+            .walk(12, &mut random)
+            .map_err(|verdict| match verdict {
+                Verdict::Skipped(why) => Verdict::Failed(why),
+                other => other,
+            })?;
         for (status, text) in &walk.refusals {
             let expected = matches!(
                 Outcome::from_code(*status),

@@ -47,8 +47,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "hypotheses-agree",
         family: Family::Mathematics,
-        description: "Plane strain and axisymmetry give what 3D gives in a plane (without 3D: \
-                      plane strain what axisymmetry gives).",
+        description: "Plane strain and axisymmetry give the stresses that 3D gives in a plane \
+                      (without 3D: plane strain those of axisymmetry).",
         needs: NEEDS,
         run: hypotheses_agree,
     },
@@ -402,23 +402,12 @@ fn disagreement(step: &Step, end: &PointEnd, size: usize) -> Option<String> {
     if !is_success(end.status) {
         return Some("the update fails".to_owned());
     }
-    let n = step.end.flux.len();
+    // Not tangents: at an edge of a yield surface, round-off chooses between those of its sides.
     let bound = ITERATED * flux_scale(step);
     for c in 0..size {
         let expected = step.end.flux.get(c).copied().unwrap_or(0.0);
         if (end.flux[c] - expected).abs() > bound {
             return Some(format!("flux {:?} and {:?}", step.end.flux, end.flux));
-        }
-    }
-    for row in 0..n {
-        for column in 0..n {
-            let here = step.end.tangent[row * n + column];
-            let there = end.tangent[row * size + column];
-            // At corners of a yield surface, round-off chooses between tangents; those of
-            // neighbouring pieces differ by much, wrong ones as well, so only rounding counts.
-            if (here - there).abs() > 1e-6 * step.stiffness {
-                return Some(format!("tangent entries {here:e} and {there:e}"));
-            }
         }
     }
     None

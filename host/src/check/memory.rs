@@ -105,7 +105,7 @@ fn writes_stay_inside(subject: &Subject) -> Found {
     let mut n = 0;
     for around_outputs in [Fence::After, Fence::Before] {
         n += in_form(subject, "writes", |form| {
-            form.around_outputs = around_outputs
+            form.around_outputs = around_outputs;
         })?;
     }
     Ok(format!("{n} points"))

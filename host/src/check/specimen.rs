@@ -271,6 +271,7 @@ impl Specimen {
     /// elastic operator.
     fn origin(&self, random: &mut Random) -> Result<(PointStart, f64, f64), Verdict> {
         let n = self.probe.n_components();
+        let mut why = None;
         for attempt in 0..20 {
             let pressure = if attempt % 4 == 3 {
                 0.0
@@ -301,10 +302,13 @@ impl Specimen {
             if is_success(answer.points[0].status) && stiffness > 0.0 && stiffness.is_finite() {
                 return Ok((start, stiffness, pressure.max(10.0) / stiffness));
             }
+            // The first message, since a law that has panicked says no more why.
+            why = why.or_else(|| answer.text());
         }
         Err(skipped(format!(
-            "{}: no initial stress was accepted",
-            self.name()
+            "{}: no initial stress was accepted: {}",
+            self.name(),
+            why.unwrap_or_default()
         )))
     }
 

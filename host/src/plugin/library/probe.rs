@@ -297,13 +297,24 @@ fn longer_host(more: usize) -> io::Result<*const Host> {
     let size = size_of::<Host>() + more;
     let mut pages = Pages::new(size, Fence::After)?;
     pages.bytes_mut().fill(0xa5);
-    let at = pages.pointer().cast::<Host>();
-    // SAFETY: the pages are that long, and aligned: a host's size is a multiple of eight.
-    unsafe {
-        at.write_unaligned(Host {
+    let (before, hosts, _) = {
+        // SAFETY: these bytes may be anything, since only a host is written to them.
+        unsafe {
+            pages
+                .bytes_mut()
+                .align_to_mut::<std::mem::MaybeUninit<Host>>()
+        }
+    };
+    let at: *const Host = match (before, hosts) {
+        ([], [host, ..]) => host.write(Host {
             struct_size: size as u32,
             ..HOST.0
-        });
+        }),
+        _ => {
+            return Err(io::Error::other(
+                "the description of the host is not aligned",
+            ));
+        }
     };
     pages.lock()?;
     std::mem::forget(pages);

@@ -117,7 +117,8 @@ mod of_unix {
         fn protect(&self, from: usize, length: usize, access: MprotectFlags) -> io::Result<()> {
             assert!(from + length <= self.length);
             // SAFETY: pages of this map; no reference into it is alive, since this borrows it.
-            Ok(unsafe { mprotect(self.start.add(from).cast(), length, access)? })
+            unsafe { mprotect(self.start.add(from).cast(), length, access) }?;
+            Ok(())
         }
     }
 
