@@ -7,11 +7,12 @@
 //! [`laws`], what there is to know about a law, and [`trade_off`], what accuracy costs. [`inspect`]
 //! and [`lock`] say what a library is and hold a case to it, a [`capsule`] repeats a call that failed,
 //! and what may crash or hang runs in a [`child`] process. For authors there
-//! is [`new_law`], for editors [`schema`].
+//! is [`new_law`], and [`mod@check`] says whether a library keeps the contract; for editors [`schema`].
 
 pub mod assembly;
 pub mod capsule;
 pub mod case;
+pub mod check;
 pub mod checkpoint;
 pub mod child;
 pub mod element;

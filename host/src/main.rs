@@ -107,6 +107,8 @@ enum Command {
         #[arg(long)]
         interface_stiffness: bool,
     },
+    /// Check whether a library keeps the contract; each check runs in a process of its own.
+    Check(host::check::Arguments),
     /// List the laws found, or show all about one of them.
     Laws {
         /// Id of a law.
@@ -261,6 +263,7 @@ fn execute(command: Command) -> Result<(), Error> {
                 &mut |doing| eprintln!("{doing}"),
             )
         }
+        Command::Check(arguments) => host::check::run(&arguments, &mut |text| print!("{text}")),
         Command::Laws { id, law_path, json } => show_laws(id.as_deref(), &law_path, json),
         Command::NewLaw(project) => project.write().map(|text| print!("{text}")),
         Command::Schema { file } => print_schema(file),

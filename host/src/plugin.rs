@@ -12,7 +12,7 @@ pub mod vetting;
 pub use description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };
-pub use library::Strided;
+pub use library::{Strided, probe};
 pub use search::SearchPath;
 pub use trust::Trust;
 
@@ -193,6 +193,30 @@ impl LoadedLaw {
     /// Its library.
     pub fn library(&self) -> &Library {
         &self.library
+    }
+
+    /// Calls `create` as a check does.
+    ///
+    /// # Errors
+    /// There is no memory, or the law is in a worker process.
+    pub fn probe(&self, form: &probe::CreateForm<'_>) -> std::io::Result<probe::Created> {
+        probe::create(self.here()?, form)
+    }
+
+    /// Calls `destroy` with null.
+    pub fn destroy_nothing(&self) {
+        if let Ok(law) = self.here() {
+            probe::destroy_nothing(law);
+        }
+    }
+
+    /// The law in this process.
+    fn here(&self) -> std::io::Result<LawHandle> {
+        match self.library.laws[self.number].1 {
+            Origin::Here(law) => Ok(law),
+            #[cfg(unix)]
+            Origin::Apart => Err(std::io::Error::other("the law is in a worker process")),
+        }
     }
 
     /// Fixes the parameters (in declared order; NaN: left out) under a hypothesis.

@@ -126,7 +126,7 @@ pub struct FormulationDescription {
     pub hypothesis: HypothesisName,
     /// Number of the formulation in its library.
     #[serde(skip)]
-    pub(super) index: u32,
+    pub index: u32,
     /// The tangent is symmetric in every state.
     pub symmetric: bool,
     /// One constant tangent, no internal variables.

@@ -10,6 +10,7 @@
     reason = "the host's side of the C boundary; offset and access are one operation"
 )]
 
+pub mod probe;
 #[cfg(unix)]
 mod shared;
 
@@ -35,6 +36,8 @@ use std::sync::Mutex;
 const LONGEST_TEXT: usize = 4096;
 /// Most entries of any table that is copied out of a library.
 const LONGEST_TABLE: u32 = 256;
+/// Largest size of one entry of such a table that is plausible, in bytes.
+const LONGEST_ENTRY: usize = 4096;
 /// Size of the buffer for messages.
 const MESSAGE_CAPACITY: usize = 512;
 
@@ -222,6 +225,12 @@ fn table<T: Copy>(first: *const T, n: u32, size_1_0: usize, what: &str) -> Resul
     if stride < size_1_0 || !stride.is_multiple_of(align_of::<T>()) {
         return Err(format!(
             "the table of {what} has entries of {stride} bytes, expected at least {size_1_0}"
+        ));
+    }
+    if stride > LONGEST_ENTRY {
+        return Err(format!(
+            "the table of {what} has entries of {stride} bytes, at most {LONGEST_ENTRY} are \
+             plausible"
         ));
     }
     let entries = (0..n as usize).map(|i| {

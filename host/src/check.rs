@@ -1,0 +1,564 @@
+//! `pilum check`: does a library keep the contract?
+//!
+//! Every check runs in a [`child`] process, so that a library may crash, hang or end the
+//! process and be reported like any other fault. Checks are named, and a check is skipped when one
+//! that it builds on has not passed, so that a fault is reported by the check that names it.
+
+mod contract;
+mod description;
+mod load;
+mod mathematics;
+mod memory;
+mod purity;
+mod random;
+mod robustness;
+mod specimen;
+
+use crate::child::{self, Ending, Work};
+use crate::error::{Error, suggestion};
+use crate::plugin::{Library, LoadedLaw, SearchPath, hexadecimal_sha256};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::ffi::OsString;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Arguments of `pilum check`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Arguments {
+    /// A library, or the id of a law that is found as `pilum laws` finds it.
+    #[arg(required_unless_present = "list")]
+    library: Option<String>,
+    /// Write JSON.
+    #[arg(long)]
+    json: bool,
+    /// Run only this check, without those it builds on; may be repeated.
+    #[arg(long, value_name = "ID")]
+    only: Vec<String>,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Fix a parameter of the laws, where random ones are refused; may be repeated.
+    #[arg(long, value_name = "ID=VALUE", value_parser = setting)]
+    set: Vec<(String, f64)>,
+    /// Seconds after which a check is ended.
+    #[arg(long, default_value_t = 60.0, value_parser = positive)]
+    time_limit: f64,
+    /// List the checks.
+    #[arg(long)]
+    list: bool,
+    /// Run the one check in this process; its answer is the last line.
+    #[arg(long, hide = true, requires = "only")]
+    in_process: bool,
+}
+
+fn setting(text: &str) -> Result<(String, f64), String> {
+    let (id, value) = text.split_once('=').ok_or("expected ID=VALUE")?;
+    let value = value
+        .trim()
+        .parse()
+        .map_err(|_| format!("`{value}` is no number"))?;
+    Ok((id.trim().to_owned(), value))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
+    if value > 0.0 && value <= 1e6 {
+        Ok(value)
+    } else {
+        Err("expected seconds".to_owned())
+    }
+}
+
+/// What a check is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Family {
+    Load,
+    Description,
+    Contract,
+    Memory,
+    Purity,
+    Mathematics,
+    Robustness,
+}
+
+/// A check: its name and meaning are public and never change.
+struct Check {
+    id: &'static str,
+    family: Family,
+    description: &'static str,
+    /// Checks without which this one says nothing.
+    needs: &'static [&'static str],
+    run: fn(&Subject) -> Found,
+}
+
+/// All checks, those that others build on first.
+fn checks() -> impl Iterator<Item = &'static Check> {
+    [
+        load::CHECKS,
+        description::CHECKS,
+        contract::CHECKS,
+        memory::CHECKS,
+        purity::CHECKS,
+        robustness::CHECKS,
+        mathematics::CHECKS,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// What a check found out, if it has not passed.
+#[derive(Clone, Debug)]
+enum Verdict {
+    Skipped(String),
+    Warning(String),
+    Failed(String),
+}
+
+/// Details of what was tried, or what is wrong.
+type Found = Result<String, Verdict>;
+
+fn failed(why: impl Into<String>) -> Verdict {
+    Verdict::Failed(why.into())
+}
+
+fn skipped(why: impl Into<String>) -> Verdict {
+    Verdict::Skipped(why.into())
+}
+
+impl From<std::io::Error> for Verdict {
+    fn from(why: std::io::Error) -> Self {
+        skipped(format!("the check cannot be set up: {why}"))
+    }
+}
+
+/// What is checked.
+#[derive(Debug)]
+struct Subject {
+    path: PathBuf,
+    seed: u64,
+    settings: Vec<(String, f64)>,
+}
+
+impl Subject {
+    fn bytes(&self) -> Result<Vec<u8>, Verdict> {
+        std::fs::read(&self.path).map_err(|why| failed(format!("it cannot be read: {why}")))
+    }
+
+    /// The laws of the library.
+    fn laws(&self) -> Result<Vec<LoadedLaw>, Verdict> {
+        let library = Library::open(&self.path).map_err(|why| failed(why.to_string()))?;
+        let ids = library.laws().map(|law| law.id.as_str());
+        Ok(ids.filter_map(|id| library.law(id)).collect())
+    }
+}
+
+/// How a check ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Outcome {
+    Passed,
+    Warning,
+    Failed,
+    Crashed,
+    Skipped,
+}
+
+impl Outcome {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Warning => "warning",
+            Self::Failed => "failed",
+            Self::Crashed => "crashed",
+            Self::Skipped => "skipped",
+        }
+    }
+
+    fn is_bad(self) -> bool {
+        matches!(self, Self::Failed | Self::Crashed)
+    }
+}
+
+/// A line of the report.
+#[derive(Clone, Debug, Serialize)]
+struct Finding {
+    id: &'static str,
+    family: Family,
+    description: &'static str,
+    outcome: Outcome,
+    details: String,
+    /// The command that runs this check alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    replay: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    library: String,
+    sha256: String,
+    seed: u64,
+    checks: &'a [Finding],
+    counts: BTreeMap<&'static str, usize>,
+}
+
+/// Checks a library and prints what it found.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown check, [`Error::Plugin`] if there is no such library or a check
+/// fails or crashes.
+pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Error> {
+    let ids: Vec<&str> = checks().map(|check| check.id).collect();
+    for id in &arguments.only {
+        if !ids.contains(&id.as_str()) {
+            let known = suggestion(id, ids.iter().copied());
+            return Err(Error::Usage(format!("there is no check `{id}`: {known}")));
+        }
+    }
+    if arguments.list {
+        print(&list(arguments.json)?);
+        return Ok(());
+    }
+    let path = library_path(arguments.library.as_deref().unwrap_or_default())?;
+    if arguments.in_process {
+        let answer = in_process(arguments, path)?;
+        print(&format!("\n{ANSWER}{answer}\n"));
+        return Ok(());
+    }
+    let findings = run_all(arguments, &path)?;
+    let mut counts = BTreeMap::new();
+    for finding in &findings {
+        *counts.entry(finding.outcome.name()).or_insert(0) += 1;
+    }
+    let bytes = std::fs::read(&path).map_err(|source| Error::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let report = Report {
+        library: path.display().to_string(),
+        sha256: hexadecimal_sha256(&bytes),
+        seed: arguments.seed,
+        checks: &findings,
+        counts,
+    };
+    if arguments.json {
+        print(&format!("{}\n", json(&report)?));
+    } else {
+        print(&text(&report));
+    }
+    let bad: Vec<&str> = findings
+        .iter()
+        .filter(|finding| finding.outcome.is_bad())
+        .map(|finding| finding.id)
+        .collect();
+    if bad.is_empty() {
+        return Ok(());
+    }
+    Err(Error::plugin(format!(
+        "library {} does not keep the contract: {}",
+        path.display(),
+        bad.join(", ")
+    )))
+}
+
+fn json(value: &impl Serialize) -> Result<String, Error> {
+    serde_json::to_string_pretty(value).map_err(|error| Error::Internal(error.to_string()))
+}
+
+fn list(as_json: bool) -> Result<String, Error> {
+    #[derive(Serialize)]
+    struct Listed {
+        id: &'static str,
+        family: Family,
+        description: &'static str,
+        needs: &'static [&'static str],
+    }
+    if as_json {
+        let all: Vec<Listed> = checks()
+            .map(|check| Listed {
+                id: check.id,
+                family: check.family,
+                description: check.description,
+                needs: check.needs,
+            })
+            .collect();
+        return Ok(format!("{}\n", json(&all)?));
+    }
+    let mut text = String::new();
+    for check in checks() {
+        let _ = writeln!(text, "{}\n    {}", check.id, check.description);
+    }
+    Ok(text)
+}
+
+/// The library's file: a path as it is, a law's id where `pilum laws` finds it. Nothing is opened.
+fn library_path(name: &str) -> Result<PathBuf, Error> {
+    let path = Path::new(name);
+    let looks_like_a_path = path.components().count() > 1 || name.ends_with(DLL_SUFFIX);
+    if looks_like_a_path || path.is_file() {
+        return std::path::absolute(path)
+            .and_then(|path| std::fs::metadata(&path).map(|_| path))
+            .map_err(|why| Error::plugin(format!("library {name} cannot be read: {why}")));
+    }
+    let search = SearchPath::new(&[]);
+    let installed = search.installed();
+    let file = format!("{DLL_PREFIX}{name}{DLL_SUFFIX}");
+    let mut named = search.folders().iter().map(|folder| folder.join(&file));
+    named
+        .find(|path| path.is_file())
+        .or_else(|| installed.get(name).cloned())
+        .ok_or_else(|| Error::Plugin {
+            message: format!("there is no library or law `{name}`"),
+            hint: Some(suggestion(
+                name,
+                installed.keys().map(String::as_str).collect::<Vec<_>>(),
+            )),
+        })
+}
+
+/// Runs the checks, all that can at the same time.
+fn run_all(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
+    let chosen: Vec<&Check> = checks()
+        .filter(|check| arguments.only.is_empty() || arguments.only.iter().any(|id| id == check.id))
+        .collect();
+    let folder = ScratchFolder::new()?;
+    let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
+    loop {
+        let is_open = |check: &&&Check| !findings.contains_key(check.id);
+        let is_ready = |check: &&&Check| {
+            let waits = |id: &&str| {
+                !findings.contains_key(*id) && chosen.iter().any(|other| other.id == *id)
+            };
+            !check.needs.iter().any(waits)
+        };
+        let ready: Vec<&&Check> = chosen.iter().filter(is_open).filter(is_ready).collect();
+        if ready.is_empty() {
+            break;
+        }
+        let done: Vec<Finding> = ready
+            .par_iter()
+            .map(|check| {
+                let missing = check.needs.iter().find(|id| {
+                    findings.get(**id).is_some_and(|finding| {
+                        !matches!(finding.outcome, Outcome::Passed | Outcome::Warning)
+                    })
+                });
+                match missing {
+                    Some(id) => Ok(finding(check, Outcome::Skipped, format!("needs `{id}`"))),
+                    None => in_child(check, arguments, path, &folder),
+                }
+            })
+            .collect::<Result<_, Error>>()?;
+        findings.extend(done.into_iter().map(|finding| (finding.id, finding)));
+    }
+    Ok(chosen
+        .iter()
+        .filter_map(|check| findings.remove(check.id))
+        .collect())
+}
+
+fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
+    Finding {
+        id: check.id,
+        family: check.family,
+        description: check.description,
+        outcome,
+        details,
+        replay: None,
+    }
+}
+
+/// What starts the line with a child's answer.
+const ANSWER: &str = "pilum-check-answer ";
+/// Most memory of a check, in bytes.
+const MEMORY: u64 = 8 << 30;
+
+/// A child's answer.
+#[derive(Serialize, Deserialize)]
+struct Answer {
+    outcome: Outcome,
+    details: String,
+}
+
+/// Runs one check here. The answer as JSON.
+fn in_process(arguments: &Arguments, path: PathBuf) -> Result<String, Error> {
+    child::enter().map_err(|error| Error::Internal(error.to_string()))?;
+    let subject = Subject {
+        path,
+        seed: arguments.seed,
+        settings: arguments.set.clone(),
+    };
+    let check = checks()
+        .find(|check| arguments.only.iter().any(|id| id == check.id))
+        .ok_or_else(|| Error::Internal("there is no check to run".to_owned()))?;
+    let (outcome, details) = match (check.run)(&subject) {
+        Ok(details) => (Outcome::Passed, details),
+        Err(Verdict::Skipped(why)) => (Outcome::Skipped, why),
+        Err(Verdict::Warning(why)) => (Outcome::Warning, why),
+        Err(Verdict::Failed(why)) => (Outcome::Failed, why),
+    };
+    serde_json::to_string(&Answer { outcome, details })
+        .map_err(|error| Error::Internal(error.to_string()))
+}
+
+/// Runs one check in a child.
+fn in_child(
+    check: &Check,
+    arguments: &Arguments,
+    path: &Path,
+    scratch: &ScratchFolder,
+) -> Result<Finding, Error> {
+    let internal = |error: std::io::Error| Error::Internal(error.to_string());
+    let folder = scratch.inner(check.id).map_err(internal)?;
+    let mut own: Vec<OsString> = ["--only", check.id, "--seed", &arguments.seed.to_string()]
+        .map(OsString::from)
+        .to_vec();
+    for (id, value) in &arguments.set {
+        own.extend(["--set".into(), format!("{id}={value}").into()]);
+    }
+    let mut all: Vec<OsString> = vec!["check".into(), path.into()];
+    all.extend(own.clone());
+    all.push("--in-process".into());
+    let outcome = child::run(&Work {
+        arguments: all,
+        folder: Some(folder.clone()),
+        time: Duration::from_secs_f64(arguments.time_limit),
+        memory: Some(MEMORY),
+    })
+    .map_err(internal)?;
+    let stdout = String::from_utf8_lossy(&outcome.stdout).into_owned();
+    let stderr = String::from_utf8_lossy(&outcome.stderr).into_owned();
+    let answer = stdout
+        .lines()
+        .find_map(|line| line.strip_prefix(ANSWER))
+        .and_then(|line| serde_json::from_str::<Answer>(line).ok());
+    let (outcome, details) = match (answer, outcome.ending) {
+        (_, Ending::TimedOut) => (
+            Outcome::Crashed,
+            format!("it did not return within {} s", arguments.time_limit),
+        ),
+        (Some(answer), Ending::Exited(0)) => {
+            let Answer { outcome, details } = answer;
+            match (outcome, afterwards(check.id, &stdout, &stderr, &folder)) {
+                (Outcome::Passed, Some(why)) => (Outcome::Failed, why),
+                _ => (outcome, details),
+            }
+        }
+        (Some(_), ending) => (
+            Outcome::Crashed,
+            format!("the process ended with {ending} after the check"),
+        ),
+        // Only this check sets traps, and only allocation runs into them.
+        (None, Ending::Signal(5)) if check.id == "integrate-does-not-allocate" => (
+            Outcome::Failed,
+            "it calls malloc, calloc, realloc, free, posix_memalign, aligned_alloc or mmap"
+                .to_owned(),
+        ),
+        (None, ending) => {
+            let last = stderr.lines().rfind(|line| !line.trim().is_empty());
+            let last = last.map_or(String::new(), |line| format!(": {}", line.trim()));
+            (
+                Outcome::Crashed,
+                format!("the process ended with {ending} before it could answer{last}"),
+            )
+        }
+    };
+    let mut finding = finding(check, outcome, details);
+    if outcome.is_bad() {
+        let own: Vec<String> = own
+            .iter()
+            .map(|a| a.to_string_lossy().into_owned())
+            .collect();
+        finding.replay = Some(format!("pilum check {} {}", path.display(), own.join(" ")));
+    }
+    Ok(finding)
+}
+
+/// What only the parent can see of two of the checks.
+fn afterwards(id: &str, stdout: &str, stderr: &str, folder: &Path) -> Option<String> {
+    match id {
+        "prints-nothing" => {
+            let mut lines = stdout.lines().chain(stderr.lines());
+            let line = lines.find(|line| !line.is_empty() && !line.starts_with(ANSWER))?;
+            Some(format!("it printed: {line}"))
+        }
+        "writes-no-files" => {
+            let entry = std::fs::read_dir(folder).ok()?.next()?.ok()?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            Some(format!("it wrote `{name}` into the working directory"))
+        }
+        _ => None,
+    }
+}
+
+/// A folder for the children to work in, removed at the end.
+struct ScratchFolder(PathBuf);
+
+impl ScratchFolder {
+    fn new() -> Result<Self, Error> {
+        let name = format!("pilum-check-{}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        match std::fs::create_dir(&path) {
+            Ok(()) => Ok(Self(path)),
+            Err(source) => Err(Error::Unwritable { path, source }),
+        }
+    }
+
+    fn inner(&self, name: &str) -> std::io::Result<PathBuf> {
+        let path = self.0.join(name);
+        std::fs::create_dir(&path)?;
+        Ok(path)
+    }
+}
+
+impl Drop for ScratchFolder {
+    fn drop(&mut self) {
+        // A folder that stays behind in the system's place for such folders harms nobody.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn text(report: &Report<'_>) -> String {
+    let mut text = format!(
+        "{}\nsha256 {}, seed {}\n",
+        report.library, report.sha256, report.seed
+    );
+    let mut family = None;
+    for finding in report.checks {
+        if family != Some(finding.family) {
+            family = Some(finding.family);
+            let _ = writeln!(text, "\n{}", format!("{:?}", finding.family).to_lowercase());
+        }
+        let name = finding.outcome.name();
+        let word = if finding.outcome.is_bad() {
+            name.to_uppercase()
+        } else {
+            name.to_owned()
+        };
+        let line = format!("  {word:9}{:32}{}", finding.id, finding.details);
+        let _ = writeln!(text, "{}", line.trim_end());
+        if let Some(replay) = &finding.replay {
+            let _ = writeln!(
+                text,
+                "           {}\n           {replay}",
+                finding.description
+            );
+        }
+    }
+    let counts: Vec<String> = report
+        .counts
+        .iter()
+        .map(|(word, n)| format!("{n} {word}"))
+        .collect();
+    let _ = writeln!(
+        text,
+        "\n{} checks: {}",
+        report.checks.len(),
+        counts.join(", ")
+    );
+    text
+}

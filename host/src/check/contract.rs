@@ -1,0 +1,468 @@
+//! Do the functions answer as the contract says, to the host's mistakes too?
+
+use super::random::Random;
+use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses};
+use super::{Check, Family, Found, Subject, Verdict, failed};
+use crate::plugin::LoadedLaw;
+use crate::plugin::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME};
+use abi::raw;
+use abi::status::{Outcome, most_severe};
+
+pub(super) const CHECKS: &[Check] = &[
+    Check {
+        id: "create-works",
+        family: Family::Contract,
+        description: "`create` accepts ordinary parameters for every hypothesis, `destroy` frees \
+                      the instance and accepts null.",
+        needs: &["description-is-readable"],
+        run: create_works,
+    },
+    Check {
+        id: "wrong-arguments-are-refused",
+        family: Family::Contract,
+        description: "`create` refuses a wrong number of values, values at null and a formulation \
+                      that does not exist with PILUM_E_ARGUMENT, a message, and no instance.",
+        needs: &["create-works"],
+        run: wrong_arguments_are_refused,
+    },
+    Check {
+        id: "bounds-are-kept",
+        family: Family::Contract,
+        description: "`create` refuses values just outside each bound, NaN and infinities with \
+                      PILUM_E_PARAMETER and a message that starts with the parameter's id; at the \
+                      bounds it accepts or refuses.",
+        needs: &["create-works"],
+        run: bounds_are_kept,
+    },
+    Check {
+        id: "integrate-works",
+        family: Family::Contract,
+        description: "`integrate` and `init_state` return, in time, write an outcome for every \
+                      point, and report no defect of their own; some increments succeed.",
+        needs: &["create-works"],
+        run: integrate_works,
+    },
+    Check {
+        id: "unknown-requests-are-refused",
+        family: Family::Contract,
+        description: "A request that version 1.0 does not know is refused with \
+                      PILUM_E_UNSUPPORTED, and no outcomes are written.",
+        needs: &["integrate-works"],
+        run: unknown_requests_are_refused,
+    },
+    Check {
+        id: "empty-batch-is-accepted",
+        family: Family::Contract,
+        description: "A batch without points succeeds.",
+        needs: &["integrate-works"],
+        run: empty_batch_is_accepted,
+    },
+    Check {
+        id: "null-outcomes-are-accepted",
+        family: Family::Contract,
+        description: "Without `status`, `step_factor` and `message`, results have the same bits.",
+        needs: &["repeatable"],
+        run: null_outcomes_are_accepted,
+    },
+    Check {
+        id: "messages-fit",
+        family: Family::Contract,
+        description: "A failure writes a message that ends in NUL within its buffer, of 512, 16, \
+                      2, 1 or 0 bytes, and names the point by its number.",
+        needs: &["integrate-works"],
+        run: messages_fit,
+    },
+    Check {
+        id: "longer-structs-are-accepted",
+        family: Family::Contract,
+        description: "A batch and a host description with 64 unknown bytes at their ends change \
+                      nothing.",
+        needs: &["repeatable"],
+        run: longer_structs_are_accepted,
+    },
+    Check {
+        id: "shorter-batch-is-refused",
+        family: Family::Contract,
+        description: "A batch shorter than in version 1.0 is refused with PILUM_E_ARGUMENT; \
+                      forbidden memory stands after its last byte.",
+        needs: &["integrate-works"],
+        run: shorter_batch_is_refused,
+    },
+];
+
+fn name(status: raw::Status) -> String {
+    if status == NO_OUTCOME {
+        return "no outcome".to_owned();
+    }
+    match Outcome::from_code(status) {
+        Outcome::Unknown(code) => format!("the unknown status {code}"),
+        outcome => format!("{outcome:?} ({status})"),
+    }
+}
+
+fn create_works(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "create");
+    let specimens = subject.specimens(2, &mut random)?;
+    for law in subject.laws()? {
+        law.destroy_nothing();
+    }
+    let sets: Vec<String> = specimens
+        .iter()
+        .step_by(2)
+        .map(super::specimen::Specimen::name)
+        .collect();
+    Ok(sets.join("; "))
+}
+
+/// The answer to parameters that must be refused.
+fn must_refuse(
+    law: &LoadedLaw,
+    what: &str,
+    created: &Created,
+    expected: raw::Status,
+) -> Result<String, Verdict> {
+    let id = &law.description().id;
+    if created.status != expected {
+        return Err(failed(format!(
+            "`{id}`: {what}: `create` returned {}, expected {}",
+            name(created.status),
+            name(expected)
+        )));
+    }
+    if created.probe.is_some() {
+        return Err(failed(format!(
+            "`{id}`: {what}: `out` is written all the same"
+        )));
+    }
+    match created.text() {
+        Some(text) if !text.is_empty() => Ok(text),
+        _ => Err(failed(format!("`{id}`: {what}: there is no message"))),
+    }
+}
+
+fn wrong_arguments_are_refused(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "arguments");
+    for law in subject.laws()? {
+        for (formulation, hypothesis) in hypotheses(&law) {
+            let values = draw_all(subject, &law, &mut random, Draw::Ordinary);
+            let right = create_form(&formulation, hypothesis, &values);
+            let more: Vec<f64> = values.iter().copied().chain([1.0]).collect();
+            let mut wrong = vec![
+                (
+                    "formulation 4294967295",
+                    CreateForm {
+                        formulation: u32::MAX,
+                        ..right
+                    },
+                ),
+                (
+                    "a value too many",
+                    CreateForm {
+                        values: Some(&more),
+                        n_values: more.len(),
+                        ..right
+                    },
+                ),
+            ];
+            if let Some((_, fewer)) = values.split_last() {
+                wrong.push((
+                    "a value too few",
+                    CreateForm {
+                        values: Some(fewer),
+                        n_values: fewer.len(),
+                        ..right
+                    },
+                ));
+                wrong.push((
+                    "values at null",
+                    CreateForm {
+                        values: None,
+                        ..right
+                    },
+                ));
+            }
+            for (what, form) in wrong {
+                must_refuse(&law, what, &law.probe(&form)?, raw::PILUM_E_ARGUMENT)?;
+                let mute = law.probe(&CreateForm {
+                    message: None,
+                    ..form
+                })?;
+                if mute.status != raw::PILUM_E_ARGUMENT {
+                    return Err(failed(format!(
+                        "`{}`: {what}, without a message: `create` returned {}",
+                        law.description().id,
+                        name(mute.status)
+                    )));
+                }
+            }
+        }
+    }
+    Ok(String::new())
+}
+
+fn bounds_are_kept(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "bounds");
+    let mut n = 0;
+    for specimen in subject.specimens(1, &mut random)? {
+        let law = &specimen.law;
+        for (i, p) in law.description().parameters.iter().enumerate() {
+            let create = |value: f64| {
+                let mut values = specimen.values.clone();
+                values[i] = value;
+                law.probe(&create_form(
+                    &specimen.formulation,
+                    specimen.hypothesis,
+                    &values,
+                ))
+            };
+            let b = p.bounds;
+            let mut outside = vec![f64::INFINITY, f64::NEG_INFINITY];
+            if !p.optional {
+                outside.push(f64::NAN);
+            }
+            let mut at = Vec::new();
+            if b.lower.is_finite() {
+                outside.push(if b.open_lower {
+                    b.lower
+                } else {
+                    b.lower.next_down()
+                });
+                at.push(if b.open_lower {
+                    b.lower.next_up()
+                } else {
+                    b.lower
+                });
+            }
+            if b.upper.is_finite() {
+                outside.push(if b.open_upper {
+                    b.upper
+                } else {
+                    b.upper.next_up()
+                });
+                at.push(if b.open_upper {
+                    b.upper.next_down()
+                } else {
+                    b.upper
+                });
+            }
+            if !p.choices.is_empty() {
+                outside.extend([-1.0, 0.5, p.choices.len() as f64]);
+            }
+            for value in outside {
+                let what = format!("{} = {value:e}, bounds {b}", p.id);
+                let text = must_refuse(law, &what, &create(value)?, raw::PILUM_E_PARAMETER)?;
+                if text.split_once(':').is_none_or(|(id, _)| id.trim() != p.id) {
+                    return Err(failed(format!(
+                        "`{}`: {what}: the message `{text}` does not start with `{}:`",
+                        law.description().id,
+                        p.id
+                    )));
+                }
+                n += 1;
+            }
+            for value in at {
+                let created = create(value)?;
+                if created.status != raw::PILUM_OK {
+                    let what = format!("{} = {value:e}", p.id);
+                    must_refuse(law, &what, &created, raw::PILUM_E_PARAMETER)?;
+                }
+                n += 1;
+            }
+        }
+    }
+    Ok(format!("{n} values"))
+}
+
+fn integrate_works(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "integrate");
+    let (mut n_successes, mut n) = (0, 0);
+    for specimen in subject.specimens(2, &mut random)? {
+        let walk = specimen
+            .walk(12, &mut random)
+            .map_err(|verdict| match verdict {
+                Verdict::Skipped(why) => Verdict::Failed(why),
+                other => other,
+            })?;
+        for (status, text) in &walk.refusals {
+            let expected = matches!(
+                Outcome::from_code(*status),
+                Outcome::CutStep | Outcome::Domain | Outcome::Numeric
+            );
+            if !expected {
+                return Err(specimen.fails(format!("a small step gave {}: {text}", name(*status))));
+            }
+        }
+        if walk.successes.is_empty() {
+            let why = walk.refusals.first().map_or("", |(_, text)| text);
+            return Err(specimen.fails(format!("no step succeeded: {why}")));
+        }
+        n_successes += walk.successes.len();
+        n += walk.successes.len() + walk.refusals.len();
+        // One call that is looked at as a whole.
+        let points = specimen.points(7, &mut random)?;
+        let answer = specimen.call(&points, raw::PILUM_REQ_FLUX)?;
+        let worst = answer
+            .points
+            .iter()
+            .fold(raw::PILUM_OK, |worst, end| most_severe(worst, end.status));
+        if worst != answer.status {
+            return Err(specimen.fails(format!(
+                "the call returned {}, its most severe outcome is {}",
+                name(answer.status),
+                name(worst)
+            )));
+        }
+    }
+    Ok(format!("{n_successes} of {n} steps succeeded"))
+}
+
+fn unknown_requests_are_refused(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "requests");
+    for specimen in subject.specimens(1, &mut random)? {
+        let points = specimen.points(3, &mut random)?;
+        for bit in [3, 17, 31] {
+            let answer = specimen.call(&points, raw::PILUM_REQ_FLUX | 1 << bit)?;
+            if answer.status != raw::PILUM_E_UNSUPPORTED {
+                return Err(specimen.fails(format!(
+                    "request bit {bit}: `integrate` returned {}",
+                    name(answer.status)
+                )));
+            }
+            if answer.points.iter().any(|end| end.status != NO_OUTCOME) {
+                return Err(specimen.fails("a call that is refused as a whole wrote outcomes"));
+            }
+        }
+    }
+    Ok(String::new())
+}
+
+fn empty_batch_is_accepted(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "empty");
+    for specimen in subject.specimens(1, &mut random)? {
+        let answer = specimen.call(&[], raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT)?;
+        let init = specimen.probe.init_state(&[], &Form::of(0))?;
+        for (function, answer) in [("integrate", Some(answer)), ("init_state", init)] {
+            if let Some(Answer { status, .. }) = answer
+                && status != raw::PILUM_OK
+            {
+                return Err(specimen.fails(format!("`{function}` returned {}", name(status))));
+            }
+        }
+    }
+    Ok(String::new())
+}
+
+fn null_outcomes_are_accepted(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "null");
+    for specimen in subject.specimens(2, &mut random)? {
+        let points = specimen.points(16, &mut random)?;
+        let form = Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT);
+        let with = specimen.probe.integrate(&points, &form)?;
+        let mute = Form {
+            outcomes: false,
+            message: None,
+            ..form
+        };
+        let mut without = specimen.probe.integrate(&points, &mute)?;
+        if without.points.iter().any(|end| end.status != NO_OUTCOME) {
+            return Err(specimen.fails("an outcome was written, but not where the host said"));
+        }
+        for (end, told) in without.points.iter_mut().zip(&with.points) {
+            end.status = told.status;
+        }
+        if let Some(i) = first_difference(&with.points, &without.points) {
+            return Err(specimen.fails(format!("the results of point {i} differ")));
+        }
+    }
+    Ok(String::new())
+}
+
+fn messages_fit(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "messages");
+    for specimen in subject.specimens(1, &mut random)? {
+        let mut points = specimen.points(3, &mut random)?;
+        let good = points.clone();
+        let last = points.len() - 1;
+        points[last].gradient1[0] = f64::NAN;
+        for capacity in [512, 16, 2, 1, 0] {
+            let form = Form {
+                message: Some(capacity),
+                first_point: 40,
+                ..Form::of(raw::PILUM_REQ_FLUX)
+            };
+            let answer = specimen.probe.integrate(&points, &form)?;
+            let Some(text) = answer.text() else {
+                if capacity == 0 {
+                    continue;
+                }
+                return Err(
+                    specimen.fails(format!("a message in {capacity} bytes does not end in NUL"))
+                );
+            };
+            if capacity == 512 && text.is_empty() {
+                return Err(specimen.fails("a failing point leaves no message"));
+            }
+            let number = (40 + last).to_string();
+            if capacity == 512 && !text.contains(&number) {
+                return Err(
+                    specimen.fails(format!("the message `{text}` does not name point {number}"))
+                );
+            }
+        }
+        let quiet = specimen.call(&good, raw::PILUM_REQ_FLUX)?;
+        if quiet.text().is_none() {
+            return Err(specimen.fails("a call without failures leaves a message without NUL"));
+        }
+    }
+    Ok(String::new())
+}
+
+fn longer_structs_are_accepted(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "longer");
+    for specimen in subject.specimens(1, &mut random)? {
+        let points = specimen.points(16, &mut random)?;
+        let form = Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT);
+        let usual = specimen.probe.integrate(&points, &form)?;
+        let longer = Form {
+            batch_bytes: BATCH_BYTES + 64,
+            ..form
+        };
+        let later_host = CreateForm {
+            more_host: 64,
+            ..create_form(&specimen.formulation, specimen.hypothesis, &specimen.values)
+        };
+        let created = specimen.law.probe(&later_host)?;
+        let Some(probe) = created.probe else {
+            return Err(specimen.fails(format!(
+                "`create` returned {} to a host with a longer description",
+                name(created.status)
+            )));
+        };
+        let answer = probe.integrate(&points, &longer)?;
+        if let Some(i) = first_difference(&usual.points, &answer.points) {
+            return Err(specimen.fails(format!("the results of point {i} differ")));
+        }
+    }
+    Ok(String::new())
+}
+
+fn shorter_batch_is_refused(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "shorter");
+    for specimen in subject.specimens(1, &mut random)? {
+        let points = specimen.points(3, &mut random)?;
+        for batch_bytes in [BATCH_BYTES - 8, 64, 8] {
+            let form = Form {
+                batch_bytes,
+                ..Form::of(raw::PILUM_REQ_FLUX)
+            };
+            let answer = specimen.probe.integrate(&points, &form)?;
+            if answer.status != raw::PILUM_E_ARGUMENT {
+                return Err(specimen.fails(format!(
+                    "a batch of {batch_bytes} bytes: `integrate` returned {}",
+                    name(answer.status)
+                )));
+            }
+        }
+    }
+    Ok(String::new())
+}

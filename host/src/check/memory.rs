@@ -1,0 +1,171 @@
+//! Does a law keep to the memory it is given?
+
+use super::random::Random;
+use super::specimen::{is_finite, is_success};
+use super::{Check, Family, Found, Subject, failed, skipped};
+use crate::plugin::probe::{CAN_TRAP, Fence, Form, Order};
+use abi::raw;
+
+pub(super) const CHECKS: &[Check] = &[
+    Check {
+        id: "writes-stay-inside",
+        family: Family::Memory,
+        description: "Nothing is written beside the outputs, nor between their cells. Forbidden \
+                      memory stands right after, then right before every output; touching it \
+                      crashes the check.",
+        needs: &["integrate-works"],
+        run: writes_stay_inside,
+    },
+    Check {
+        id: "reads-stay-inside",
+        family: Family::Memory,
+        description: "Nothing is read beside the inputs. Forbidden memory stands right after, \
+                      then right before every input; touching it crashes the check.",
+        needs: &["integrate-works"],
+        run: reads_stay_inside,
+    },
+    Check {
+        id: "inputs-stay-untouched",
+        family: Family::Memory,
+        description: "Inputs are in memory that cannot be written; trying it crashes the check.",
+        needs: &["integrate-works"],
+        run: inputs_stay_untouched,
+    },
+    Check {
+        id: "results-are-finite",
+        family: Family::Memory,
+        description: "Where success is claimed, every requested component is written and finite. \
+                      Outputs are NaN before the call.",
+        needs: &["integrate-works"],
+        run: results_are_finite,
+    },
+    Check {
+        id: "integrate-does-not-allocate",
+        family: Family::Memory,
+        description: "`integrate` and `init_state` call no function of the C library's allocator, \
+                      the first call excepted. Traps stand at their entries (Linux on x86-64).",
+        needs: &["integrate-works"],
+        run: integrate_does_not_allocate,
+    },
+];
+
+const UPDATE: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT;
+/// What a host may ask for.
+const REQUESTS: [u32; 3] = [
+    raw::PILUM_REQ_FLUX,
+    UPDATE,
+    raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
+];
+
+/// Calls of both functions in a form, on points of paths. The number of points.
+fn in_form(
+    subject: &Subject,
+    name: &str,
+    change: impl Fn(&mut Form),
+) -> Result<usize, super::Verdict> {
+    let mut random = Random::new(subject.seed, name);
+    let mut n_points = 0;
+    for specimen in subject.specimens(2, &mut random)? {
+        // An odd number, so that arrays of outcomes do not fill whole words.
+        let points = specimen.points(33, &mut random)?;
+        for order in [Order::Points, Order::Components, Order::Spread] {
+            for request in REQUESTS {
+                let mut form = Form {
+                    order,
+                    ..Form::of(request)
+                };
+                change(&mut form);
+                let answer = specimen.probe.integrate(&points, &form)?;
+                if answer.stray {
+                    return Err(specimen.fails(format!(
+                        "something is written between the cells of an output ({order:?})"
+                    )));
+                }
+                n_points += points.len();
+            }
+            let fluxes: Vec<Vec<f64>> = points.iter().map(|p| p.flux0.clone()).collect();
+            let mut form = Form {
+                order,
+                ..Form::of(0)
+            };
+            change(&mut form);
+            if specimen
+                .probe
+                .init_state(&fluxes, &form)?
+                .is_some_and(|answer| answer.stray)
+            {
+                return Err(specimen.fails("`init_state` writes between the cells of `state1`"));
+            }
+        }
+    }
+    Ok(n_points)
+}
+
+fn writes_stay_inside(subject: &Subject) -> Found {
+    let mut n = 0;
+    for around_outputs in [Fence::After, Fence::Before] {
+        n += in_form(subject, "writes", |form| {
+            form.around_outputs = around_outputs;
+        })?;
+    }
+    Ok(format!("{n} points"))
+}
+
+fn reads_stay_inside(subject: &Subject) -> Found {
+    let mut n = 0;
+    for around_inputs in [Fence::After, Fence::Before] {
+        n += in_form(subject, "reads", |form| form.around_inputs = around_inputs)?;
+    }
+    Ok(format!("{n} points"))
+}
+
+fn inputs_stay_untouched(subject: &Subject) -> Found {
+    let n = in_form(subject, "inputs", |form| form.inputs_locked = true)?;
+    Ok(format!("{n} points"))
+}
+
+fn results_are_finite(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "finite");
+    let mut n_successes = 0;
+    for specimen in subject.specimens(3, &mut random)? {
+        let walk = specimen.walk(20, &mut random)?;
+        if walk.steps.len() < walk.successes.len() {
+            return Err(specimen.fails(format!(
+                "{} of {} points that are said to have succeeded have results that are not \
+                 finite, or not written",
+                walk.successes.len() - walk.steps.len(),
+                walk.successes.len()
+            )));
+        }
+        n_successes += walk.successes.len();
+        let starts = walk.successes;
+        for request in REQUESTS {
+            let answer = specimen.call(&starts, request)?;
+            let bad = answer
+                .points
+                .iter()
+                .position(|end| is_success(end.status) && !is_finite(end));
+            if let Some(i) = bad {
+                return Err(specimen.fails(format!(
+                    "with request {request}, the results at {:?} are not finite, or not written",
+                    starts[i]
+                )));
+            }
+        }
+    }
+    Ok(format!("{n_successes} points"))
+}
+
+fn integrate_does_not_allocate(subject: &Subject) -> Found {
+    if !CAN_TRAP {
+        return Err(skipped("this machine has no traps"));
+    }
+    // Once without traps: what is loaded or prepared at the first call of a thread is not the
+    // law's doing.
+    in_form(subject, "allocation", |_| ())?;
+    let n = in_form(subject, "allocation", |form| form.trapped = true)?;
+    if n == 0 {
+        return Err(failed("there was no point to try"));
+    }
+    Ok(format!("{n} points"))
+}

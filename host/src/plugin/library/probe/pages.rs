@@ -1,0 +1,175 @@
+//! Memory with chosen neighbours.
+
+use std::io;
+
+/// What lies beside an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fence {
+    /// At least a page of ordinary memory on both sides.
+    Far,
+    /// Memory that must not be touched starts right after it.
+    After,
+    /// Memory that must not be touched ends right before it.
+    Before,
+}
+
+/// Bytes in pages of their own. Without `mmap` there are no fences and no locks.
+#[derive(Debug)]
+pub(super) struct Pages {
+    map: Map,
+    offset: usize,
+    length: usize,
+}
+
+impl Pages {
+    pub(super) fn new(length: usize, fence: Fence) -> io::Result<Self> {
+        let page = page_size();
+        let inner = length.next_multiple_of(page).max(page);
+        let map = Map::new(inner + 2 * page)?;
+        match fence {
+            Fence::Far => {}
+            Fence::After => map.forbid(page + inner, page)?,
+            Fence::Before => map.forbid(0, page)?,
+        }
+        let offset = match fence {
+            Fence::After => page + inner - length,
+            Fence::Far | Fence::Before => page,
+        };
+        Ok(Self {
+            map,
+            offset,
+            length,
+        })
+    }
+
+    /// From now on writing ends the process.
+    pub(super) fn lock(&mut self) -> io::Result<()> {
+        let page = page_size();
+        let inner = self.length.next_multiple_of(page).max(page);
+        self.map.lock(page, inner)
+    }
+
+    pub(super) fn pointer(&self) -> *mut u8 {
+        self.map.start().wrapping_add(self.offset)
+    }
+
+    pub(super) fn bytes(&self) -> &[u8] {
+        // SAFETY: `length` bytes from `offset` on are mapped, readable and initialised (zero).
+        unsafe { std::slice::from_raw_parts(self.pointer(), self.length) }
+    }
+
+    pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
+        assert!(!self.map.is_locked());
+        // SAFETY: as above, and writable.
+        unsafe { std::slice::from_raw_parts_mut(self.pointer(), self.length) }
+    }
+}
+
+#[cfg(unix)]
+use of_unix::{Map, page_size};
+
+#[cfg(unix)]
+mod of_unix {
+    use rustix::mm::{MapFlags, MprotectFlags, ProtFlags, mmap_anonymous, mprotect, munmap};
+    use std::io;
+    use std::ptr::null_mut;
+
+    pub(super) fn page_size() -> usize {
+        rustix::param::page_size()
+    }
+
+    #[derive(Debug)]
+    pub(super) struct Map {
+        start: *mut u8,
+        length: usize,
+        is_locked: bool,
+    }
+
+    impl Map {
+        pub(super) fn new(length: usize) -> io::Result<Self> {
+            let access = ProtFlags::READ | ProtFlags::WRITE;
+            // SAFETY: a new private map at an address of the system's choice touches nothing else.
+            let start = unsafe { mmap_anonymous(null_mut(), length, access, MapFlags::PRIVATE)? };
+            Ok(Self {
+                start: start.cast(),
+                length,
+                is_locked: false,
+            })
+        }
+
+        pub(super) fn start(&self) -> *mut u8 {
+            self.start
+        }
+
+        pub(super) fn is_locked(&self) -> bool {
+            self.is_locked
+        }
+
+        pub(super) fn forbid(&self, from: usize, length: usize) -> io::Result<()> {
+            self.protect(from, length, MprotectFlags::empty())
+        }
+
+        pub(super) fn lock(&mut self, from: usize, length: usize) -> io::Result<()> {
+            self.is_locked = true;
+            self.protect(from, length, MprotectFlags::READ)
+        }
+
+        fn protect(&self, from: usize, length: usize, access: MprotectFlags) -> io::Result<()> {
+            assert!(from + length <= self.length);
+            // SAFETY: pages of this map; no reference into it is alive, since this borrows it.
+            unsafe { mprotect(self.start.add(from).cast(), length, access) }?;
+            Ok(())
+        }
+    }
+
+    impl Drop for Map {
+        fn drop(&mut self) {
+            // SAFETY: the whole map, which nothing refers to any more. Failure leaks it.
+            let _ = unsafe { munmap(self.start.cast(), self.length) };
+        }
+    }
+}
+
+#[cfg(not(unix))]
+use elsewhere::{Map, page_size};
+
+#[cfg(not(unix))]
+mod elsewhere {
+    use std::io;
+
+    pub(super) fn page_size() -> usize {
+        4096
+    }
+
+    #[derive(Debug)]
+    pub(super) struct Map {
+        memory: Box<[std::cell::UnsafeCell<u64>]>,
+    }
+
+    impl Map {
+        pub(super) fn new(length: usize) -> io::Result<Self> {
+            let words = length.div_ceil(8);
+            Ok(Self {
+                memory: (0..words).map(|_| std::cell::UnsafeCell::new(0)).collect(),
+            })
+        }
+
+        pub(super) fn start(&self) -> *mut u8 {
+            self.memory.as_ptr().cast::<u8>().cast_mut()
+        }
+
+        pub(super) fn is_locked(&self) -> bool {
+            false
+        }
+
+        #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as on Unix")]
+        pub(super) fn forbid(&self, _: usize, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+
+        #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as on Unix")]
+        pub(super) fn lock(&mut self, _: usize, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,336 @@
+//! Libraries that break the contract on purpose, each in one way.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{Report, check, compiled, folder, library_of, pilum};
+use std::path::Path;
+
+/// Faults that a host can see before it is too late: `pilum point` refuses the library or stops
+/// the run. Against the others only another process helps.
+#[derive(Clone, Copy, PartialEq)]
+enum Point {
+    Refuses,
+    CannotTell,
+}
+use Point::{CannotTell, Refuses};
+
+/// The fixture, the check that must fail, how, and what a run in the same process does.
+const GALLERY: [(&str, &str, &str, Point); 49] = [
+    ("bad_magic", "handshake-is-accepted", "failed", Refuses),
+    ("bad_major", "handshake-is-accepted", "failed", Refuses),
+    (
+        "bad_layout_hash",
+        "handshake-is-accepted",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_truncated_plugin",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_truncated_law",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_truncated_parameter",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_future_parameter",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_future_variable",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_count_of_laws",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_count_of_parameters",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_count_of_states",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    ("bad_ids", "description-is-readable", "failed", Refuses),
+    ("bad_manifest", "manifest-matches", "failed", CannotTell),
+    (
+        "bad_entry_abort",
+        "entry-is-idempotent",
+        "crashed",
+        CannotTell,
+    ),
+    (
+        "bad_entry_pointer",
+        "entry-is-idempotent",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_undefined_symbol", "library-opens", "failed", Refuses),
+    ("bad_create_abort", "create-works", "crashed", CannotTell),
+    ("bad_destroy_null", "create-works", "crashed", CannotTell),
+    (
+        "bad_arguments",
+        "wrong-arguments-are-refused",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_bounds", "bounds-are-kept", "failed", CannotTell),
+    ("bad_abort", "integrate-works", "crashed", CannotTell),
+    ("bad_exit", "integrate-works", "crashed", CannotTell),
+    ("bad_loop", "integrate-works", "crashed", CannotTell),
+    (
+        "bad_empty_batch",
+        "empty-batch-is-accepted",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_short_batch",
+        "shorter-batch-is-refused",
+        "crashed",
+        CannotTell,
+    ),
+    (
+        "bad_long_batch",
+        "longer-structs-are-accepted",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_request",
+        "unknown-requests-are-refused",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_null_status",
+        "null-outcomes-are-accepted",
+        "crashed",
+        CannotTell,
+    ),
+    ("bad_message", "messages-fit", "crashed", CannotTell),
+    ("bad_overrun", "writes-stay-inside", "crashed", CannotTell),
+    ("bad_overread", "reads-stay-inside", "crashed", CannotTell),
+    ("bad_input", "inputs-stay-untouched", "crashed", CannotTell),
+    ("bad_nan", "results-are-finite", "failed", Refuses),
+    ("bad_unwritten", "results-are-finite", "failed", CannotTell),
+    (
+        "bad_allocation",
+        "integrate-does-not-allocate",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_global_state", "repeatable", "failed", CannotTell),
+    (
+        "bad_global_parameters",
+        "instances-are-independent",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_thread", "independent-of-thread", "failed", CannotTell),
+    ("bad_split", "independent-of-split", "failed", CannotTell),
+    ("bad_layout", "independent-of-layout", "failed", CannotTell),
+    (
+        "bad_rounding",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_print", "prints-nothing", "failed", CannotTell),
+    ("bad_file", "writes-no-files", "failed", CannotTell),
+    (
+        "bad_input_nan",
+        "bad-numbers-are-refused",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_first_failure",
+        "failing-points-stay-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_huge_step",
+        "huge-steps-end-well",
+        "crashed",
+        CannotTell,
+    ),
+    (
+        "bad_tangent",
+        "tangent-matches-differences",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_symmetry",
+        "tangent-symmetry-as-declared",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_zero_increment",
+        "zero-increment-changes-nothing",
+        "failed",
+        CannotTell,
+    ),
+];
+
+/// The one check that fails is this one, and says how to repeat it.
+fn fails(report: &Report, library: &Path, id: &str, outcome: &str) {
+    let name = library.display();
+    assert_eq!(
+        report.with(&["failed", "crashed"]),
+        [id],
+        "{name}: {:#}",
+        report.json
+    );
+    let check = report.check(id);
+    assert_eq!(check["outcome"], outcome, "{name}: {check:#}");
+    let replay = check["replay"].as_str().unwrap();
+    assert!(
+        replay.contains(&format!("--only {id} --seed 1")),
+        "{replay}"
+    );
+    assert_eq!(report.code, Some(3), "{name}: {}", report.stderr);
+    assert!(report.stderr.contains('×'), "{}", report.stderr);
+}
+
+/// Leads the fixture along a path in the program's own process: it ends by itself, and says why.
+fn point_refuses(library: &Path, folder: &Path) {
+    let law = library.file_stem().unwrap().to_str().unwrap();
+    let id = law.trim_start_matches("lib");
+    let named = folder.join(
+        library
+            .file_name()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .replace(id, "fixture"),
+    );
+    std::fs::rename(library, &named).unwrap();
+    let driver = folder.join("driver.toml");
+    let text = format!(
+        "law = \"fixture\"\nlaw_path = [{:?}]\nhypothesis = \"interface_2d\"\n\
+         [parameters]\nnormal_stiffness = 1e6\nshear_stiffness = 1e6\n\
+         [[segment]]\nincrements = 3\ncontrol = {{ n = {{ jump = 1e-3 }}, t = {{ jump = 1e-3 }} }}\n",
+        folder.display().to_string()
+    );
+    std::fs::write(&driver, text).unwrap();
+    let output = pilum(&["point", driver.to_str().unwrap()]);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    // 2: no step succeeds. 3: the library is refused.
+    assert!(
+        matches!(output.status.code(), Some(2 | 3)),
+        "{id}: {:?}: {stderr}",
+        output.status
+    );
+    assert!(stderr.contains('×'), "{id}: {stderr}");
+}
+
+#[test]
+fn every_bad_library_fails_the_check_that_names_its_fault() {
+    for (fixture, id, outcome, point) in GALLERY {
+        let folder = folder();
+        let Some(library) = compiled(fixture, folder.path()) else {
+            return;
+        };
+        // An endless loop has to be waited for.
+        let limit = if fixture == "bad_loop" { "1" } else { "30" };
+        let report = check(&library, &["--time-limit", limit]);
+        fails(&report, &library, id, outcome);
+        if point == Refuses {
+            point_refuses(&library, folder.path());
+        }
+    }
+}
+
+/// The gallery and the folder of fixtures are the same.
+#[test]
+fn every_fixture_is_in_the_gallery() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    let mut there: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter_map(|name| name.strip_suffix(".c").map(str::to_owned))
+        .filter(|name| name.starts_with("bad_"))
+        .collect();
+    let mut listed: Vec<&str> = GALLERY.iter().map(|(fixture, ..)| *fixture).collect();
+    there.sort();
+    listed.sort_unstable();
+    assert_eq!(there, listed);
+}
+
+#[test]
+fn files_that_are_no_library_are_refused_unopened() {
+    let folder = folder();
+    let library = folder.path().join("libfixture.so");
+    let mut other = std::fs::read(library_of("elastic")).unwrap();
+    // `e_machine` of an ELF header: 183 is AArch64, 62 x86-64.
+    other[18] = if other[18] == 183 { 62 } else { 183 };
+    for bytes in [b"".as_slice(), b"int main(void) { return 0; }\n", &other] {
+        std::fs::write(&library, bytes).unwrap();
+        fails(
+            &check(&library, &[]),
+            &library,
+            "file-is-a-library",
+            "failed",
+        );
+        let driver = folder.path().join("libfixture.so");
+        point_refuses(&driver, folder.path());
+    }
+}
+
+/// The export macro catches panics; the law is defective all the same.
+#[test]
+fn panics_are_reported_by_the_function_they_happen_in() {
+    let library = library_of("bad_panic");
+    for (place, id, says) in [
+        ("place=0", "integrate-works", "panicked: in update"),
+        ("place=1", "create-works", "panicked in `new`: in new"),
+    ] {
+        let report = check(&library, &["--set", place]);
+        fails(&report, &library, id, "failed");
+        let details = report.check(id)["details"].as_str().unwrap();
+        assert!(details.contains(says), "{details}");
+    }
+}
+
+#[test]
+fn the_command_of_a_failure_repeats_it() {
+    let folder = folder();
+    let Some(library) = compiled("bad_tangent", folder.path()) else {
+        return;
+    };
+    let report = check(&library, &["--seed", "7"]);
+    let failure = report.check("tangent-matches-differences");
+    let replay = failure["replay"].as_str().unwrap();
+    let arguments: Vec<&str> = replay.split(' ').skip(1).collect();
+    let again = pilum(&arguments);
+    assert_eq!(again.status.code(), Some(3));
+    let stdout = String::from_utf8(again.stdout).unwrap();
+    assert!(
+        stdout.contains(failure["details"].as_str().unwrap()),
+        "{stdout}"
+    );
+}

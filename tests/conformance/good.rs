@@ -1,0 +1,173 @@
+//! Laws that keep the contract.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{check, compiled, folder, library_of, pilum};
+use std::path::Path;
+
+/// No check fails; those that say nothing of this law are skipped for its own reason.
+fn passes(library: &Path) {
+    let report = check(library, &[]);
+    let bad: Vec<_> = report
+        .checks()
+        .iter()
+        .filter(|check| !["passed", "skipped"].contains(&check["outcome"].as_str().unwrap()))
+        .collect();
+    assert!(bad.is_empty(), "{}: {bad:#?}", library.display());
+    assert_eq!(report.code, Some(0), "{}", report.stderr);
+    for skipped in report.with(&["skipped"]) {
+        let why = report.check(&skipped)["details"].as_str().unwrap();
+        assert!(!why.contains("needs"), "{skipped}: {why}");
+    }
+    assert!(report.with(&["passed"]).len() >= 38, "{:#?}", report.json);
+}
+
+#[test]
+fn coulomb_joint_passes() {
+    passes(&library_of("coulomb_joint"));
+}
+
+#[test]
+fn elastic_passes() {
+    passes(&library_of("elastic"));
+}
+
+#[test]
+fn mepi_passes() {
+    passes(&library_of("mepi"));
+}
+
+#[test]
+fn mohr_coulomb_passes() {
+    passes(&library_of("mohr_coulomb"));
+}
+
+#[test]
+fn oriented_mohr_coulomb_passes() {
+    passes(&library_of("oriented_mohr_coulomb"));
+}
+
+/// Structs of a later minor version are longer, and tables have another stride.
+#[test]
+fn a_library_of_a_later_minor_version_passes() {
+    let folder = folder();
+    let Some(library) = compiled("future_structs", folder.path()) else {
+        return;
+    };
+    passes(&library);
+}
+
+#[test]
+fn the_report_is_the_same_every_time() {
+    let library = library_of("elastic");
+    let first = check(&library, &[]);
+    assert_eq!(first.stdout, check(&library, &[]).stdout);
+    let keys: Vec<&String> = first.json.as_object().unwrap().keys().collect();
+    assert_eq!(keys, ["checks", "counts", "library", "seed", "sha256"]);
+    for check in first.checks() {
+        let keys: Vec<&String> = check.as_object().unwrap().keys().collect();
+        assert_eq!(keys, ["description", "details", "family", "id", "outcome"]);
+    }
+}
+
+/// Ids are public: files and scripts name them. Whoever changes one has to change it here.
+#[test]
+fn ids_are_stable() {
+    let output = pilum(&["check", "--list", "--json"]);
+    assert!(output.status.success());
+    let listed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let ids: Vec<&str> = listed
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|check| check["id"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        ids,
+        [
+            "file-is-a-library",
+            "library-opens",
+            "handshake-is-accepted",
+            "entry-is-idempotent",
+            "exports-are-hidden",
+            "manifest-matches",
+            "description-is-readable",
+            "description-is-complete",
+            "units-are-known",
+            "create-works",
+            "wrong-arguments-are-refused",
+            "bounds-are-kept",
+            "integrate-works",
+            "unknown-requests-are-refused",
+            "empty-batch-is-accepted",
+            "null-outcomes-are-accepted",
+            "messages-fit",
+            "longer-structs-are-accepted",
+            "shorter-batch-is-refused",
+            "writes-stay-inside",
+            "reads-stay-inside",
+            "inputs-stay-untouched",
+            "results-are-finite",
+            "integrate-does-not-allocate",
+            "repeatable",
+            "independent-of-split",
+            "independent-of-order",
+            "independent-of-layout",
+            "independent-of-thread",
+            "instances-are-independent",
+            "environment-is-left-alone",
+            "prints-nothing",
+            "writes-no-files",
+            "bad-numbers-are-refused",
+            "failing-points-stay-alone",
+            "huge-steps-end-well",
+            "tangent-matches-differences",
+            "tangent-symmetry-as-declared",
+            "linearity-as-declared",
+            "zero-increment-changes-nothing",
+            "hypotheses-agree",
+            "tangential-axis-is-arbitrary",
+            "plastic-work-is-not-negative",
+        ]
+    );
+}
+
+#[test]
+fn a_law_is_found_by_its_id() {
+    let output = pilum(&[
+        "check",
+        "mepi_softening",
+        "--only",
+        "description-is-readable",
+    ]);
+    let stdout = String::from_utf8(output.stdout).unwrap();
+    assert!(stdout.contains("mepi_softening 0.1.0"), "{stdout}");
+    assert!(output.status.success());
+}
+
+#[test]
+fn refuses_what_is_not_there() {
+    for (arguments, code, says) in [
+        (["check", "elastik", "--json"], 3, "did you mean `elastic`?"),
+        (
+            ["check", "no/such/library.so", "--json"],
+            3,
+            "no/such/library.so cannot be",
+        ),
+        (
+            ["check", "elastic", "--only=repeatabel"],
+            1,
+            "did you mean `repeatable`?",
+        ),
+    ] {
+        let output = pilum(&arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        let words = stderr
+            .split(['\n', '│', '×'])
+            .map(str::trim)
+            .collect::<Vec<_>>()
+            .join(" ");
+        assert!(words.contains(says), "{arguments:?}: {stderr}");
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}");
+        assert!(output.stdout.is_empty());
+    }
+}

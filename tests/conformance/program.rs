@@ -1,0 +1,120 @@
+//! The program, libraries compiled for it, and what it says of them.
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "part of the tests"
+)]
+
+use serde_json::Value;
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// Folder of this test and of the libraries of Rust laws.
+fn deps() -> PathBuf {
+    std::env::current_exe()
+        .unwrap()
+        .parent()
+        .unwrap()
+        .to_owned()
+}
+
+/// Runs the program.
+pub(crate) fn pilum(arguments: &[&str]) -> Output {
+    let program = deps().parent().unwrap().join(format!("pilum{EXE_SUFFIX}"));
+    assert!(
+        program.is_file(),
+        "{} is missing: `cargo build --release` builds it",
+        program.display()
+    );
+    Command::new(program)
+        .args(arguments)
+        .env_remove("PILUM_LAW_PATH")
+        .output()
+        .unwrap()
+}
+
+/// The library of a law in Rust.
+pub(crate) fn library_of(law: &str) -> PathBuf {
+    deps().join(format!("{DLL_PREFIX}{law}{DLL_SUFFIX}"))
+}
+
+/// A folder for libraries.
+pub(crate) fn folder() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// Compiles a fixture. `None`, with a remark, where there is no compiler; that is an error where
+/// tests must not be skipped.
+pub(crate) fn compiled(fixture: &str, folder: &Path) -> Option<PathBuf> {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let library = folder.join(format!("{DLL_PREFIX}{fixture}{DLL_SUFFIX}"));
+    let output = Command::new("cc")
+        .args(["-std=gnu11", "-O1", "-Wall", "-Werror", "-shared", "-fPIC"])
+        .args(["-fvisibility=hidden", "-I"])
+        .arg(tests.join("../abi/include"))
+        .arg(tests.join(format!("fixtures/{fixture}.c")))
+        .arg("-o")
+        .arg(&library)
+        .arg("-lm")
+        .output();
+    let Ok(output) = output else {
+        assert!(std::env::var_os("CI").is_none(), "there is no C compiler");
+        println!("skipped: there is no C compiler");
+        return None;
+    };
+    assert!(
+        output.status.success(),
+        "{fixture}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    Some(library)
+}
+
+/// What `pilum check --json` says.
+#[derive(Debug)]
+pub(crate) struct Report {
+    pub(crate) code: Option<i32>,
+    pub(crate) json: Value,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+/// Checks a library.
+pub(crate) fn check(library: &Path, more: &[&str]) -> Report {
+    let mut arguments = vec!["check", library.to_str().unwrap(), "--json"];
+    arguments.extend(more);
+    let output = pilum(&arguments);
+    let stdout = String::from_utf8(output.stdout).unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    Report {
+        code: output.status.code(),
+        json: serde_json::from_str(&stdout)
+            .unwrap_or_else(|why| panic!("{}: {why}: {stdout}{stderr}", library.display())),
+        stdout,
+        stderr,
+    }
+}
+
+impl Report {
+    /// Ids of the checks with one of these outcomes.
+    pub(crate) fn with(&self, outcomes: &[&str]) -> Vec<String> {
+        self.checks()
+            .iter()
+            .filter(|check| outcomes.contains(&check["outcome"].as_str().unwrap()))
+            .map(|check| check["id"].as_str().unwrap().to_owned())
+            .collect()
+    }
+
+    pub(crate) fn checks(&self) -> &Vec<Value> {
+        self.json["checks"].as_array().unwrap()
+    }
+
+    /// The check with this id.
+    pub(crate) fn check(&self, id: &str) -> &Value {
+        let mut checks = self.checks().iter();
+        checks.find(|check| check["id"] == id).unwrap()
+    }
+}
