@@ -505,7 +505,8 @@ fn print_schema(file: FileKind) -> Result<(), Error> {
 fn manual(program: &clap::Command) -> Result<(), Error> {
     let mut page = Vec::new();
     let mut written = clap_mangen::Man::new(program.clone()).render(&mut page);
-    for command in program.get_subcommands() {
+    let shown = |command: &&clap::Command| !command.is_hide_set();
+    for command in program.get_subcommands().filter(shown) {
         // A command's name lives as long as the program.
         let name: &'static str = format!("pilum-{}", command.get_name()).leak();
         let command = command.clone().name(name);

@@ -102,18 +102,18 @@ fn whole_rows(place: &Place) -> usize {
 /// Kills the run at this many different moments, resumes it, and compares.
 fn killed_and_resumed(solver: &str, kills: u32) {
     let undisturbed = Place::new();
-    undisturbed.write("case.toml", long_case(solver));
+    undisturbed.write("block.toml", long_case(solver));
     let started = Instant::now();
-    let outcome = undisturbed.run(&["run", "case.toml", "--out", "out", "--checkpoint", "0"]);
+    let outcome = undisturbed.run(&["run", "block.toml", "--out", "out", "--checkpoint", "0"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let length = started.elapsed();
     let expected = results(&undisturbed.path("out"));
 
     let place = Place::new();
-    place.write("case.toml", long_case(solver));
+    place.write("block.toml", long_case(solver));
     let run = [
         "run",
-        "case.toml",
+        "block.toml",
         "--out",
         "out",
         "--checkpoint",
@@ -150,13 +150,15 @@ fn a_killed_run_resumes_to_the_same_bits() {
 
 #[test]
 fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
-    // 25 iterations are too few for the slow ones.
+    // 20 iterations are too few for the slow ones, and far beyond the layer's strength even 500.
     for method in ["quasi_newton", "modified_newton", "initial_stress"] {
         let solver = format!("method = \"{method}\"\nforce_tolerance = 1e-6");
-        let text = long_case(&solver).replace("max_iterations = 20", "max_iterations = 500");
+        let text = long_case(&solver)
+            .replace("max_iterations = 20", "max_iterations = 500")
+            .replace("x = 1e-3", "x = 2e-5");
         let undisturbed = Place::new();
-        undisturbed.write("case.toml", &text);
-        let outcome = undisturbed.run(&["run", "case.toml", "--out", "out"]);
+        undisturbed.write("block.toml", &text);
+        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
         assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
         stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
     }
@@ -165,8 +167,8 @@ fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
 /// Interrupts a run as Ctrl-C does, resumes it, and compares.
 fn stopped_and_resumed(text: &str, expected: &BTreeMap<String, Vec<u8>>, what: &str) {
     let place = Place::new();
-    place.write("case.toml", text);
-    let run = ["run", "case.toml", "--out", "out", "--resume"];
+    place.write("block.toml", text);
+    let run = ["run", "block.toml", "--out", "out", "--resume"];
     let mut stops = 0;
     loop {
         let rows = whole_rows(&place);
@@ -219,15 +221,15 @@ fn the_same_case_gives_the_same_files() {
     let text = long_case("");
     let [first, again, elsewhere] = [(); 3].map(|()| Place::new());
     for place in [&first, &again, &elsewhere] {
-        place.write("case.toml", &text);
+        place.write("block.toml", &text);
     }
     elsewhere.write("below/here", "");
-    let outcome = first.run(&["run", "case.toml", "--out", "out"]);
+    let outcome = first.run(&["run", "block.toml", "--out", "out"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let expected = results(&first.path("out"));
     // Both at the same time, one with one thread and one with two.
     let mut children = [(&again, "1"), (&elsewhere, "2")]
-        .map(|(place, n)| place.start(&["run", "case.toml", "--out", "out", "--threads", n]));
+        .map(|(place, n)| place.start(&["run", "block.toml", "--out", "out", "--threads", n]));
     for child in &mut children {
         assert_eq!(child.wait().unwrap().code(), Some(DONE));
     }
@@ -238,11 +240,11 @@ fn the_same_case_gives_the_same_files() {
 #[test]
 fn a_full_disk_leaves_whole_rows() {
     let place = Place::new();
-    place.write("case.toml", long_case(""));
-    // 16 blocks of 512 or 1024 bytes for every file; beyond that writing fails, as on a full disk.
+    place.write("block.toml", long_case(""));
+    // 100 blocks of 512 or 1024 bytes for every file; beyond that writing fails, as on a full disk.
     let outcome = place.run_limited(
-        "trap '' XFSZ; ulimit -f 16",
-        &["run", "case.toml", "--out", "out"],
+        "trap '' XFSZ; ulimit -f 100",
+        &["run", "block.toml", "--out", "out"],
     );
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(outcome.says("cannot write"), "{}", outcome.stderr);
@@ -255,10 +257,10 @@ fn a_full_disk_leaves_whole_rows() {
 #[test]
 fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
     let place = Place::new();
-    place.write("case.toml", CASE);
+    place.write("block.toml", CASE);
     let run = [
         "run",
-        "case.toml",
+        "block.toml",
         "--out",
         "out",
         "--checkpoint",
@@ -269,7 +271,7 @@ fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
     let outcome = place.run(&run);
     assert_eq!(outcome.code, Some(DONE));
     assert!(outcome.says("done already"), "{}", outcome.stderr);
-    place.write("case.toml", CASE.replace("1e-5", "2e-5"));
+    place.write("block.toml", CASE.replace("1e-5", "2e-5"));
     let outcome = place.run(&run);
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(
@@ -290,11 +292,11 @@ fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
 #[test]
 fn two_runs_do_not_write_into_one_folder() {
     let place = Place::new();
-    place.write("case.toml", CASE);
+    place.write("block.toml", CASE);
     place.write("out/log.jsonl", "");
     let log = std::fs::File::open(place.path("out/log.jsonl")).unwrap();
     log.lock().unwrap();
-    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
+    let outcome = place.run(&["run", "block.toml", "--out", "out"]);
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(
         outcome.says("another run is writing into this folder"),
