@@ -267,6 +267,8 @@ impl Points {
             state: &self.state[states.clone()],
             time: 0.0,
             time_increment: 1.0,
+            moment: Moment::default(),
+            sites: &[],
         };
         let end = End {
             flux: (&mut self.flux_end[components], rows),

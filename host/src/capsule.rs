@@ -7,7 +7,8 @@ pub use replay::replay;
 
 use crate::error::{Error, Source};
 use crate::input::toml_error;
-use crate::plugin::{BatchFailure, Law, Operator, PointCall, Request};
+use crate::plugin::adapter::Adapter;
+use crate::plugin::{BatchFailure, Law, Moment, Operator, PointCall, Request, Site};
 use crate::point::words;
 use abi::Hypothesis;
 use abi::status::Outcome;
@@ -45,6 +46,8 @@ struct LawPart {
     hypothesis: String,
     library: PathBuf,
     sha256: String,
+    adapter: Option<Adapter>,
+    sidecar: Option<PathBuf>,
 }
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -61,6 +64,27 @@ struct CallPart {
     request: String,
     time: f64,
     time_increment: f64,
+    moment: Option<MomentPart>,
+    site: Option<SitePart>,
+}
+
+/// Which step it is; laws of the contract do not ask.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MomentPart {
+    step: u32,
+    increment: u32,
+    start: f64,
+}
+
+/// Where the point lies; laws of the contract do not ask.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SitePart {
+    position: [f64; 2],
+    length: f64,
+    element: u32,
+    point: u32,
 }
 
 /// Gradients, fluxes and internal variables by name.
@@ -103,6 +127,7 @@ impl Capsule {
         let variables = law.formulation().internal_variables.iter();
         let ids = description.parameters.iter().map(|p| p.id.clone());
         let request = REQUESTS.iter().find(|(_, r)| *r == call.request)?.0;
+        let foreign = law.library().foreign();
         Some(Self {
             version: 1,
             law: LawPart {
@@ -111,6 +136,8 @@ impl Capsule {
                 hypothesis: hypothesis.name().to_owned(),
                 library: std::path::absolute(law.library().path()).ok()?,
                 sha256: law.library().sha256().to_owned(),
+                adapter: foreign.map(|foreign| foreign.adapter),
+                sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
             },
             origin: origin
                 .into_iter()
@@ -122,6 +149,17 @@ impl Capsule {
                 request: request.to_owned(),
                 time: call.time,
                 time_increment: call.time_increment,
+                moment: foreign.map(|_| MomentPart {
+                    step: call.moment.step,
+                    increment: call.moment.increment,
+                    start: call.moment.step_start,
+                }),
+                site: foreign.map(|_| SitePart {
+                    position: call.site.position,
+                    length: call.site.length,
+                    element: call.site.element,
+                    point: call.site.point,
+                }),
             },
             start: Values {
                 jump: components(&call.gradient),
@@ -234,13 +272,20 @@ impl std::fmt::Display for Capsule {
         let law = &self.law;
         writeln!(
             f,
-            "[law]\nid = {}\nversion = {}\nhypothesis = {}\nlibrary = {}\nsha256 = {}\n",
+            "[law]\nid = {}\nversion = {}\nhypothesis = {}\nlibrary = {}\nsha256 = {}",
             text(&law.id),
             text(&law.version),
             text(&law.hypothesis),
             text(&law.library.to_string_lossy()),
             text(&law.sha256)
         )?;
+        if let Some(Adapter::Umat) = law.adapter {
+            writeln!(f, "adapter = \"umat\"")?;
+        }
+        if let Some(sidecar) = &law.sidecar {
+            writeln!(f, "sidecar = {}", text(&sidecar.to_string_lossy()))?;
+        }
+        writeln!(f)?;
         writeln!(f, "[where]")?;
         for (key, value) in &self.origin {
             writeln!(f, "{key} = {value}")?;
@@ -261,11 +306,29 @@ impl std::fmt::Display for Capsule {
         }
         writeln!(
             f,
-            "\n[call]\nrequest = {}\ntime = {}\ntime_increment = {}\n\n[start]",
+            "\n[call]\nrequest = {}\ntime = {}\ntime_increment = {}",
             text(&self.call.request),
             real(self.call.time),
             real(self.call.time_increment)
         )?;
+        if let Some(moment) = &self.call.moment {
+            let (step, increment, start) = (moment.step, moment.increment, real(moment.start));
+            writeln!(
+                f,
+                "moment = {{ step = {step}, increment = {increment}, start = {start} }}"
+            )?;
+        }
+        if let Some(site) = &self.call.site {
+            let [x, y] = site.position.map(real);
+            writeln!(
+                f,
+                "site = {{ position = [{x}, {y}], length = {}, element = {}, point = {} }}",
+                real(site.length),
+                site.element,
+                site.point
+            )?;
+        }
+        writeln!(f, "\n[start]")?;
         let mut lines = String::new();
         for (name, values) in [
             (gradient, &self.start.jump),
@@ -332,6 +395,20 @@ impl Capsule {
             gradient_end: components(&self.end.jump, gradient)?,
             flux: components(&self.start.traction, flux)?,
             state,
+            moment: self
+                .call
+                .moment
+                .map_or_else(Moment::default, |moment| Moment {
+                    step: moment.step,
+                    increment: moment.increment,
+                    step_start: moment.start,
+                }),
+            site: self.call.site.map_or_else(Site::default, |site| Site {
+                position: site.position,
+                length: site.length,
+                element: site.element,
+                point: site.point,
+            }),
         })
     }
 }

@@ -4,7 +4,8 @@
 pub(crate) mod base;
 
 use crate::error::{Error, Source};
-use crate::input::{Named, ParameterTable, ParameterValue};
+use crate::input::{ForeignKeys, Named, ParameterTable, ParameterValue};
+use crate::plugin::adapter::{Adapter, Foreign};
 use crate::schema;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
@@ -264,6 +265,21 @@ pub struct LawInput {
     /// SHA-256 that its library must have, in hexadecimal digits.
     #[schemars(with = "Option<String>")]
     pub sha256: Option<Spanned<String>>,
+    /// What its library is made for, if not for the contract.
+    #[schemars(with = "Option<Adapter>")]
+    pub adapter: Option<Spanned<Adapter>>,
+    /// That library.
+    #[schemars(with = "Option<PathBuf>")]
+    pub library: Option<Spanned<PathBuf>>,
+    /// What describes it.
+    #[schemars(with = "Option<PathBuf>")]
+    pub sidecar: Option<Spanned<PathBuf>>,
+    /// Call it in this process.
+    #[schemars(with = "Option<bool>")]
+    pub in_process: Option<Spanned<bool>>,
+    /// Write the arguments of one call here.
+    #[schemars(with = "Option<PathBuf>")]
+    pub record: Option<Spanned<PathBuf>>,
     /// Its parameters.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
@@ -272,6 +288,23 @@ pub struct LawInput {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>")]
     pub initial: Named<f64>,
+}
+
+impl LawInput {
+    /// Its library, if that is made for another program.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the key that does not fit.
+    pub fn foreign(&self, source: &Source) -> Result<Option<Foreign>, Error> {
+        let keys = ForeignKeys {
+            adapter: self.adapter.as_ref(),
+            library: self.library.as_ref(),
+            sidecar: self.sidecar.as_ref(),
+            in_process: self.in_process.as_ref(),
+            record: self.record.as_ref(),
+        };
+        keys.read(source)
+    }
 }
 
 /// A group of elements.

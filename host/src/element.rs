@@ -84,6 +84,9 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn position(&self, point: usize) -> [f64; 2];
     /// Weight of an integration point: the volume (of an interface: the area) it stands for.
     fn weight(&self, point: usize) -> f64;
+    /// Characteristic length of an element: the square root of its area, of an interface its
+    /// length.
+    fn length(&self, element: usize) -> f64;
     /// Axes of an element.
     fn axes(&self, element: usize) -> Axes;
     /// Adds the strains (jumps) of all points under nodal displacements (two per node) to `out`.

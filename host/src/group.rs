@@ -8,7 +8,7 @@ mod layer;
 use crate::case::{Formulation, InPlane};
 use crate::element::Kinematics;
 use crate::input::BuiltLaw;
-use crate::plugin::{BatchFailure, BatchSuccess, End, Operator, Start, Strided};
+use crate::plugin::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided};
 use layer::Layer;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -150,9 +150,13 @@ pub struct Group {
     pub internal: Field,
     /// The law.
     pub law: GroupLaw,
+    /// Which step and increment it is, for laws that ask.
+    pub moment: Moment,
     /// Calls of the laws used so far; the last one is that of the current law.
     pub law_calls: Vec<LawCalls>,
     layer: Option<Layer>,
+    /// Where the points lie, if the law asks.
+    sites: Vec<Site>,
     /// Tangents of the element, point by point; of a linear law, those of one element only.
     tangent: Vec<f64>,
     tangents_are_constant: bool,
@@ -184,8 +188,10 @@ impl Group {
             stress: Field::new(stress),
             internal: Field::default(),
             law: law.clone(),
+            moment: Moment::default(),
             law_calls: Vec::new(),
             layer,
+            sites: Vec::new(),
             tangent: Vec::new(),
             tangents_are_constant: false,
         };
@@ -271,6 +277,11 @@ impl Group {
             });
         }
         let n_points = self.kinematics.n_points();
+        self.sites = if law.asks_for_sites() {
+            (0..n_points).map(|point| self.site(point)).collect()
+        } else {
+            Vec::new()
+        };
         let starts_anew = kept.is_none();
         let mut internal = if let Some(kept) = kept {
             kept
@@ -311,6 +322,16 @@ impl Group {
                 .copy_from_slice(&self.internal.committed);
         }
         Ok(())
+    }
+
+    fn site(&self, point: usize) -> Site {
+        let per_element = self.kinematics.points_per_element().max(1);
+        Site {
+            position: self.kinematics.position(point),
+            length: self.kinematics.length(point / per_element),
+            element: (point / per_element) as u32 + 1,
+            point: (point % per_element) as u32 + 1,
+        }
     }
 
     /// Whether stresses follow strains by one constant matrix.
@@ -435,6 +456,8 @@ impl Group {
                 state: &[],
                 time: 0.0,
                 time_increment: 0.0,
+                moment: self.moment,
+                sites: &[],
             },
             Operator::Consistent,
             End {
@@ -474,6 +497,7 @@ impl Group {
         let (n, n_states) = (law.n_components(), law.n_states());
         let rows = Strided::rows(n);
         let (committed, state) = (&self.stress.committed, &self.internal.committed);
+        let (moment, sites) = (self.moment, &self.sites);
         let batch = |(number, flux, state_end, operator_end): Batch<'_>| {
             let first = number * BATCH;
             let n_points = flux.len() / place.point;
@@ -489,6 +513,8 @@ impl Group {
                     state: &state[points(state, n_states)],
                     time,
                     time_increment,
+                    moment,
+                    sites: sites.get(first..first + n_points).unwrap_or_default(),
                 },
                 operator,
                 End {

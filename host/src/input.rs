@@ -4,12 +4,14 @@
 mod wording;
 
 use crate::error::{Error, Source, suggestion};
+use crate::plugin::adapter::{Adapter, Foreign};
 use crate::plugin::{Law, LawDescription, LoadedLaw, ParameterDescription, SearchPath};
 use abi::Hypothesis;
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -114,19 +116,18 @@ pub struct BuiltLaw {
     pub warnings: Vec<String>,
 }
 
-/// Finds a law and fixes its parameters under a hypothesis.
+/// Fixes the parameters of a law under a hypothesis.
 ///
 /// # Errors
-/// [`Error::Plugin`] if the law is not found or its library is defective; [`Error::Input`] if the
+/// [`Error::Plugin`] if the library is defective; [`Error::Input`] if the
 /// hypothesis or a parameter does not fit, at its place in the file.
 pub fn build_law(
     source: &Source,
-    search: &SearchPath,
+    loaded: LoadedLaw,
     id: &Spanned<String>,
     hypothesis: Hypothesis,
     parameters: &ParameterTable,
 ) -> Result<BuiltLaw, Error> {
-    let loaded = find_law(source, search, id)?;
     let description = loaded.description();
     if description.formulation(hypothesis).is_none() {
         return Err(source
@@ -224,8 +225,13 @@ pub(crate) fn find_law(
     source: &Source,
     search: &SearchPath,
     id: &Spanned<String>,
+    foreign: Option<&Foreign>,
 ) -> Result<LoadedLaw, Error> {
-    search.law(id.get_ref()).map_err(|error| match error {
+    let found = match foreign {
+        None => search.law(id.get_ref()),
+        Some(foreign) => search.foreign_law(id.get_ref(), foreign),
+    };
+    found.map_err(|error| match error {
         Error::Plugin { message, hint } => {
             let place = source.place(&id.span());
             Error::Plugin {
@@ -235,6 +241,81 @@ pub(crate) fn find_law(
         }
         other => other,
     })
+}
+
+/// What a file says beside `law` if the library is made for another program.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ForeignKeys<'a> {
+    /// The key `adapter`.
+    pub(crate) adapter: Option<&'a Spanned<Adapter>>,
+    /// The key `library`.
+    pub(crate) library: Option<&'a Spanned<PathBuf>>,
+    /// The key `sidecar`.
+    pub(crate) sidecar: Option<&'a Spanned<PathBuf>>,
+    /// The key `in_process`.
+    pub(crate) in_process: Option<&'a Spanned<bool>>,
+    /// The key `record`.
+    pub(crate) record: Option<&'a Spanned<PathBuf>>,
+}
+
+impl ForeignKeys<'_> {
+    /// The library; `None` if it is one of the contract. Paths are relative to the file.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at a key that misses another, or a file that is not there.
+    pub(crate) fn read(self, source: &Source) -> Result<Option<Foreign>, Error> {
+        let path = |written: &Spanned<PathBuf>| {
+            let file = source.path_at(&written.span());
+            let path = file
+                .parent()
+                .unwrap_or(Path::new(""))
+                .join(written.get_ref());
+            std::path::absolute(&path).unwrap_or(path)
+        };
+        let existing = |key: &str, written: &Spanned<PathBuf>| {
+            let path = path(written);
+            if path.is_file() {
+                return Ok(path);
+            }
+            let message = format!("`{key}`: there is no file {}", path.display());
+            Err(Error::from(source.error(written.span(), message)))
+        };
+        let Some(adapter) = self.adapter else {
+            let alone = [
+                ("library", self.library.map(Spanned::span)),
+                ("sidecar", self.sidecar.map(Spanned::span)),
+                ("in_process", self.in_process.map(Spanned::span)),
+                ("record", self.record.map(Spanned::span)),
+            ];
+            return match alone
+                .into_iter()
+                .find_map(|(key, at)| at.map(|at| (key, at)))
+            {
+                None => Ok(None),
+                Some((key, at)) => Err(source
+                    .error(at, format!("`{key}` needs an `adapter`"))
+                    .hint(
+                        "libraries of the contract are found by the law's id, more folders are \
+                         named in `law_path`; `adapter = \"umat\"` is for Abaqus user subroutines",
+                    )
+                    .into()),
+            };
+        };
+        let Some(library) = self.library else {
+            let message = "`adapter` needs the `library` that it is for";
+            return Err(source.error(adapter.span(), message).into());
+        };
+        Ok(Some(Foreign {
+            adapter: *adapter.get_ref(),
+            library: existing("library", library)?,
+            sidecar: self
+                .sidecar
+                .map(|written| existing("sidecar", written))
+                .transpose()?,
+            in_process: self.in_process.is_some_and(|written| *written.get_ref()),
+            record: self.record.map(path),
+        }))
+    }
 }
 
 fn refuse_unknown(

@@ -236,7 +236,10 @@ fn laws_of_case(path: &Path) -> Result<Vec<LoadedLaw>, Error> {
         for name in groups.chain(swaps.map(Spanned::get_ref)) {
             let entry = file.laws.iter().find(|(key, _)| key.get_ref() == name);
             if let Some((_, law)) = entry {
-                laws.push(input::find_law(&case.source, &search, &law.get_ref().law)?);
+                let law = law.get_ref();
+                let foreign = law.foreign(&case.source)?;
+                let (source, id) = (&case.source, &law.law);
+                laws.push(input::find_law(source, &search, id, foreign.as_ref())?);
             }
         }
     }

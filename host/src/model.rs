@@ -11,10 +11,10 @@ use crate::case::{
 use crate::element::{Axes, Joint6, Kinematics, Quad8, depth, gauss, line_shape};
 use crate::error::{Error, Source, suggestion};
 use crate::group::{Group, GroupLaw, PointFailure};
-use crate::input::{BuiltLaw, build_law};
+use crate::input::{BuiltLaw, build_law, find_law};
 use crate::lock::Pins;
 use crate::mesh::{Mesh, Quad};
-use crate::plugin::{End, Operator, SearchPath, Start, Strided};
+use crate::plugin::{End, LoadedLaw, Moment, Operator, SearchPath, Start, Strided};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -221,6 +221,12 @@ impl<'a> LawShelf<'a> {
         })
     }
 
+    /// The law without its parameters.
+    fn loaded(&self, entry: &LawInput) -> Result<LoadedLaw, Error> {
+        let foreign = entry.foreign(self.source)?;
+        find_law(self.source, &self.search, &entry.law, foreign.as_ref())
+    }
+
     /// The law of this name, fit for a group.
     fn group_law(
         &mut self,
@@ -237,7 +243,7 @@ impl<'a> LawShelf<'a> {
             Formulation::Solid => plane,
             Formulation::ZeroThickness => Hypothesis::Interface2d,
             Formulation::ThinLayer => {
-                let is_interface_law = self.search.law(entry.law.get_ref()).is_ok_and(|law| {
+                let is_interface_law = self.loaded(entry).is_ok_and(|law| {
                     law.description()
                         .formulation(Hypothesis::Interface2d)
                         .is_some()
@@ -254,7 +260,8 @@ impl<'a> LawShelf<'a> {
             Arc::clone(built)
         } else {
             let (source, parameters) = (self.source, &entry.parameters);
-            let built = build_law(source, &self.search, &entry.law, hypothesis, parameters)
+            let loaded = self.loaded(entry)?;
+            let built = build_law(source, loaded, &entry.law, hypothesis, parameters)
                 .map_err(|error| self.explain(error, group_name, group))?;
             let built = Arc::new(built);
             self.laws.insert(key, Arc::clone(&built));
@@ -363,6 +370,8 @@ impl<'a> LawShelf<'a> {
             state: &state,
             time: 0.0,
             time_increment: 0.0,
+            moment: Moment::default(),
+            sites: &[],
         };
         let end = End {
             flux: (&mut flux, rows),

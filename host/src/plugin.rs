@@ -1,5 +1,6 @@
 //! Laws from shared libraries: finding, opening, building and calling them.
 
+pub mod adapter;
 mod description;
 mod image;
 #[cfg(unix)]
@@ -20,6 +21,7 @@ use crate::error::Error;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use abi::status::Outcome;
+use adapter::{Foreign, ForeignInstance, ForeignLaw};
 use image::Image;
 use library::{Call, LawHandle, OwnedInstance};
 use sha2::{Digest, Sha256};
@@ -36,16 +38,22 @@ pub struct Library {
     warnings: Vec<String>,
     stamp: Option<Stamp>,
     laws: Vec<(LawDescription, Origin)>,
+    foreign: Option<Foreign>,
 }
 
 /// Where a law is called.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Origin {
     /// In this process.
     Here(LawHandle),
+    /// In this process, by an adapter.
+    Foreign(Arc<dyn ForeignLaw>),
     /// In worker processes.
     #[cfg(unix)]
-    Apart,
+    Apart {
+        /// Calls of one material must follow one another.
+        is_serial: bool,
+    },
 }
 
 /// What changes with a file's contents. Within one process a file with an equal stamp is not
@@ -101,6 +109,7 @@ impl Library {
             warnings,
             stamp,
             laws,
+            foreign: None,
         });
         opened.push(Arc::clone(&library));
         Ok(library)
@@ -120,6 +129,53 @@ impl Library {
         let laws = library::open(path, image).map_err(unusable)?.laws;
         let here = |(law, handle)| (law, Origin::Here(handle));
         Ok(laws.into_iter().map(here).collect())
+    }
+
+    /// Opens a library that is made for another program, if its SHA-256 is approved. Its code runs
+    /// in worker processes unless it is said to run in this one.
+    ///
+    /// # Errors
+    /// [`Error::Plugin`] with the path and what is wrong, and those of `approve`.
+    pub fn open_foreign(
+        foreign: &Foreign,
+        approve: impl Fn(&str) -> Result<(), Error>,
+    ) -> Result<Arc<Self>, Error> {
+        let path = &foreign.library;
+        let fault = |why: String| Error::plugin(format!("library {} {why}", path.display()));
+        let mut image = Image::read(path).map_err(fault)?;
+        approve(&image.sha256)?;
+        if cfg!(not(unix)) && !foreign.in_process {
+            return Err(fault(
+                "can only run in this process here: `in_process = true`".to_owned(),
+            ));
+        }
+        let laws = adapter::open(foreign, &image)?;
+        #[cfg(unix)]
+        let apart = !foreign.in_process || Trust::current().isolate.is_some();
+        let origin = |law: Arc<dyn ForeignLaw>| {
+            #[cfg(unix)]
+            if apart {
+                let is_serial = law.is_serial();
+                return Origin::Apart { is_serial };
+            }
+            Origin::Foreign(law)
+        };
+        Ok(Arc::new(Self {
+            path: path.clone(),
+            warnings: std::mem::take(&mut image.warnings),
+            sha256: image.sha256.clone(),
+            stamp: None,
+            laws: laws
+                .into_iter()
+                .map(|(description, law)| (description, origin(law)))
+                .collect(),
+            foreign: Some(foreign.clone()),
+        }))
+    }
+
+    /// How it is named, if it is made for another program.
+    pub fn foreign(&self) -> Option<&Foreign> {
+        self.foreign.as_ref()
     }
 
     /// Where the library was found.
@@ -237,11 +293,12 @@ impl LoadedLaw {
         let index = formulation.index;
         let created = match origin {
             Origin::Here(handle) => handle.create(index, parameters).map(LawInstance::Here),
+            Origin::Foreign(law) => law.create(hypothesis, parameters).map(LawInstance::Foreign),
             #[cfg(unix)]
-            Origin::Apart => {
-                let limit = Trust::current().isolate.unwrap_or_default();
-                let (library, number) = (&self.library, self.number);
-                isolate::IsolatedInstance::create(library, number, index, parameters, limit)
+            Origin::Apart { is_serial } => {
+                let library = &self.library;
+                let law = (self.number, index);
+                isolate::IsolatedInstance::create(library, law, parameters, *is_serial)
                     .map(LawInstance::Apart)
             }
         };
@@ -281,6 +338,7 @@ pub struct Law {
 #[derive(Debug)]
 enum LawInstance {
     Here(OwnedInstance),
+    Foreign(Box<dyn ForeignInstance>),
     #[cfg(unix)]
     Apart(isolate::IsolatedInstance),
 }
@@ -290,6 +348,7 @@ impl LawInstance {
     fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
         match self {
             Self::Here(instance) => instance.init_state(call),
+            Self::Foreign(instance) => instance.init_state(call),
             #[cfg(unix)]
             Self::Apart(instance) => instance.init_state(call),
         }
@@ -299,6 +358,7 @@ impl LawInstance {
     fn integrate(&self, call: Call<'_>) -> (Status, String) {
         match self {
             Self::Here(instance) => instance.integrate(call),
+            Self::Foreign(instance) => instance.integrate(call),
             #[cfg(unix)]
             Self::Apart(instance) => instance.integrate(call),
         }
@@ -314,6 +374,54 @@ pub enum Operator {
     Consistent,
     /// The elastic operator.
     Elastic,
+}
+
+/// Where an integration point lies. Laws of the contract do not ask; routines made for other
+/// programs do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Site {
+    /// Coordinates.
+    pub position: [f64; 2],
+    /// Characteristic length of the element.
+    pub length: f64,
+    /// Element within its group, from 1.
+    pub element: u32,
+    /// Integration point within the element, from 1.
+    pub point: u32,
+}
+
+impl Default for Site {
+    /// A point by itself.
+    fn default() -> Self {
+        Self {
+            position: [0.0; 2],
+            length: 1.0,
+            element: 1,
+            point: 1,
+        }
+    }
+}
+
+/// Which step of the loading it is, for routines that ask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Phase, or segment of a driver, from 1.
+    pub step: u32,
+    /// Increment of it, from 1.
+    pub increment: u32,
+    /// Time at which it started.
+    pub step_start: f64,
+}
+
+impl Default for Moment {
+    /// The first increment of all.
+    fn default() -> Self {
+        Self {
+            step: 1,
+            increment: 1,
+            step_start: 0.0,
+        }
+    }
 }
 
 /// Points of a batch at the start of an increment, and the gradients at its end.
@@ -333,6 +441,10 @@ pub struct Start<'a> {
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
+    /// Which step and increment it is.
+    pub moment: Moment,
+    /// Where the points lie; empty if the law does not ask ([`Law::asks_for_sites`]).
+    pub sites: &'a [Site],
 }
 
 /// Where the results of a call go.
@@ -388,6 +500,10 @@ pub struct PointCall {
     pub flux: Vec<f64>,
     /// Internal variables at the start.
     pub state: Vec<f64>,
+    /// Which step and increment it is.
+    pub moment: Moment,
+    /// Where the point lies.
+    pub site: Site,
 }
 
 impl BatchFailure {
@@ -437,6 +553,11 @@ impl Law {
         &self.parameters
     }
 
+    /// Whether the law is told where its points lie.
+    pub fn asks_for_sites(&self) -> bool {
+        self.library().foreign().is_some()
+    }
+
     /// Number of components of gradient and flux.
     pub fn n_components(&self) -> usize {
         self.hypothesis.n_components()
@@ -472,6 +593,8 @@ impl Law {
             n_states,
             time: 0.0,
             time_increment: 0.0,
+            moment: Moment::default(),
+            sites: &[],
             gradient0: None,
             gradient1: None,
             flux0: flux,
@@ -497,6 +620,8 @@ impl Law {
                             gradient_end: Vec::new(),
                             flux: flux.1.of_point(flux.0, failure.point, self.n_components()),
                             state: Vec::new(),
+                            moment: Moment::default(),
+                            site: Site::default(),
                         };
                         failure.of_call(call)
                     })?;
@@ -531,6 +656,8 @@ impl Law {
                     gradient_end: of_point(start.gradient_end),
                     flux: of_point(start.flux),
                     state: rows.of_point(start.state, point, self.n_states()),
+                    moment: start.moment,
+                    site: start.sites.get(point).copied().unwrap_or_default(),
                 };
                 failure.of_call(call)
             })
@@ -558,6 +685,8 @@ impl Law {
             n_states: self.n_states(),
             time: start.time,
             time_increment: start.time_increment,
+            moment: start.moment,
+            sites: start.sites,
             gradient0: Some(start.gradient),
             gradient1: Some(start.gradient_end),
             flux0: start.flux,

@@ -16,6 +16,7 @@ pub use table::{Row, Table};
 use crate::capsule::{self, Capsule};
 use crate::error::{Error, suggestion};
 use crate::output::Figures;
+use crate::plugin::Moment;
 use abi::status::Outcome;
 use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
 pub(crate) use file::words;
@@ -302,10 +303,16 @@ impl Driver {
         let mut held = walk.point.flux;
         for (number, segment) in self.segments.iter().enumerate() {
             let ramp = walk.enter(segment, n, &held);
+            let step_start = increment as f64;
             let mut goal = ramp.from;
             for k in 1..=segment.increments {
                 let next = ramp.goal(k, segment.increments);
                 let calls = walk.search.calls;
+                walk.search.moment = Moment {
+                    step: number as u32 + 1,
+                    increment: k as u32,
+                    step_start,
+                };
                 walk.advance(&goal, &next, increment as f64)
                     .map_err(|stop| {
                         let place = format!(

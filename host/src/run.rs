@@ -9,6 +9,7 @@ use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
 use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
+use crate::plugin::Moment;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
     Costs, LinearDomain, LinearSolver, Loads, Matrix, Newton, Reuse, Singular, StepFailure,
@@ -487,6 +488,13 @@ impl<'a> Run<'a> {
         } = course;
         let loads = &loads;
         for increment in done_before + 1..=n {
+            for group in &mut self.groups {
+                group.moment = Moment {
+                    step: self.time as u32 + 1,
+                    increment: increment as u32,
+                    step_start: self.time,
+                };
+            }
             let place = Place {
                 phase: phase.name.get_ref().clone(),
                 increment,

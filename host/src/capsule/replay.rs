@@ -3,6 +3,7 @@
 
 use super::{Capsule, OutcomePart, in_order, status};
 use crate::error::Error;
+use crate::plugin::adapter::Foreign;
 use crate::plugin::{
     BatchFailure, End, Law, Library, LoadedLaw, Operator, PointCall, Request, SearchPath, Start,
     Strided,
@@ -94,6 +95,17 @@ fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
     if !part.library.is_file() {
         return search.law(&part.id);
     }
+    if let Some(adapter) = part.adapter {
+        let foreign = Foreign {
+            adapter,
+            library: part.library.clone(),
+            sidecar: part.sidecar.clone(),
+            // `--isolate`, which is the default here, has the last word.
+            in_process: true,
+            record: None,
+        };
+        return search.foreign_law(&part.id, &foreign);
+    }
     let library = Library::open(&part.library)?;
     library.law(&part.id).ok_or_else(|| {
         Error::plugin(format!(
@@ -164,6 +176,8 @@ fn update_to(
         state: &call.state,
         time: call.time,
         time_increment,
+        moment: call.moment,
+        sites: &[call.site],
     };
     let end = End {
         flux: (&mut flux, rows),

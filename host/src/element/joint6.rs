@@ -11,6 +11,7 @@ pub struct Joint6 {
     /// Three nodes of the minus side, then the three opposite them.
     nodes: Vec<[usize; 6]>,
     axes: Vec<Axes>,
+    lengths: Vec<f64>,
     points_per_element: usize,
     points: Vec<Point>,
 }
@@ -39,9 +40,12 @@ impl Joint6 {
         };
         let mut points = Vec::new();
         let mut axes = Vec::new();
+        let mut lengths = Vec::new();
         for joint in joints {
             let at = joint.minus.map(|n| coordinates[n]);
-            axes.push(Axes::of_facet([at[1][0] - at[0][0], at[1][1] - at[0][1]]));
+            let along = [at[1][0] - at[0][0], at[1][1] - at[0][1]];
+            axes.push(Axes::of_facet(along));
+            lengths.push(along[0].hypot(along[1]));
             for (&xi, weight) in xi.iter().zip(weights) {
                 let (n, d) = line_shape(xi);
                 let sum = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * at[i][c]).sum() };
@@ -61,6 +65,7 @@ impl Joint6 {
         Self {
             nodes,
             axes,
+            lengths,
             points_per_element: xi.len(),
             points,
         }
@@ -94,6 +99,10 @@ impl Kinematics for Joint6 {
 
     fn weight(&self, point: usize) -> f64 {
         self.points[point].weight
+    }
+
+    fn length(&self, element: usize) -> f64 {
+        self.lengths[element]
     }
 
     fn axes(&self, element: usize) -> Axes {

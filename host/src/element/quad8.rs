@@ -18,6 +18,7 @@ const PIECE: usize = 256;
 pub struct Quad8 {
     nodes: Vec<[usize; 8]>,
     axes: Vec<Axes>,
+    lengths: Vec<f64>,
     points_per_element: usize,
     points: Vec<Point>,
 }
@@ -74,7 +75,9 @@ impl Quad8 {
                 }
             }
         }
+        let lengths = nodes.iter().map(|nodes| area(nodes, coordinates).sqrt());
         Ok(Self {
+            lengths: lengths.collect(),
             nodes,
             axes,
             points_per_element,
@@ -86,6 +89,12 @@ impl Quad8 {
     fn points_of(&self, element: usize) -> &[Point] {
         &self.points[element * self.points_per_element..][..self.points_per_element]
     }
+}
+
+/// Area between the corners.
+fn area(nodes: &[usize; 8], coordinates: &[[f64; 2]]) -> f64 {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|i| coordinates[nodes[i]]);
+    0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1])).abs()
 }
 
 impl Point {
@@ -154,6 +163,10 @@ impl Kinematics for Quad8 {
 
     fn weight(&self, point: usize) -> f64 {
         self.points[point].weight
+    }
+
+    fn length(&self, element: usize) -> f64 {
+        self.lengths[element]
     }
 
     fn axes(&self, element: usize) -> Axes {

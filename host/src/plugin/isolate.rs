@@ -7,12 +7,13 @@
 //!
 //! | words of the memory | |
 //! |---|---|
-//! | inputs | gradients at start and end, fluxes, internal variables, point by point |
+//! | inputs | gradients at start and end, fluxes, internal variables, point by point; places of the points |
 //! | outputs | fluxes, internal variables, operators if wanted, step factors, status codes |
 
+use super::adapter::Foreign;
 use super::description::LawDescription;
-use super::library::{Call, OwnedInstance, SharedMemory, Strided};
-use super::{Library, Origin};
+use super::library::{Call, SharedMemory, Strided};
+use super::{LawInstance, Library, Moment, Origin, Site, Trust};
 use crate::child::{self, Ending};
 use crate::error::Error;
 use abi::Hypothesis;
@@ -32,18 +33,23 @@ use std::time::Duration;
 pub const COMMAND: &str = "law-worker";
 /// How long a worker may take to open its library and build its law.
 const START: Duration = Duration::from_secs(20);
+/// How long one call may take if nothing is said of it.
+const CALL: Duration = Duration::from_secs(10);
 /// Longest message on the socket, in bytes: descriptions of laws.
 const LONGEST: u32 = 1 << 24;
 /// Words that are shared at first.
 const FIRST_WORDS: usize = 1 << 13;
 /// Words of a request on the socket.
-const REQUEST: usize = 6;
+const REQUEST: usize = 10;
+/// Words of a point's place in the memory.
+const SITE: usize = 5;
 
 /// What a worker is told first.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Start {
     path: OsString,
     sha256: String,
+    foreign: Option<Foreign>,
     build: Option<Build>,
 }
 
@@ -173,6 +179,7 @@ impl Worker {
             n_points: points.len(),
             n_components: call.n_components,
             n_states: call.n_states,
+            has_sites: !call.sites.is_empty(),
         };
         if self.memory.len() < sizes.end() {
             self.memory.grow(sizes.end().next_power_of_two())?;
@@ -187,7 +194,9 @@ impl Worker {
         }
         let states = Strided::rows(call.n_states);
         let state0 = if initial { &*call.state1 } else { call.state0 };
-        write(memory, at, state0, states, &points, call.n_states);
+        let at = write(memory, at, state0, states, &points, call.n_states);
+        let sites = call.sites.get(points.clone()).unwrap_or_default();
+        memory.write(at, sites.iter().flat_map(site_words));
         let request = [
             u64::from(initial),
             u64::from(call.request),
@@ -195,6 +204,10 @@ impl Worker {
             call.time.to_bits(),
             call.time_increment.to_bits(),
             memory.len() as u64,
+            u64::from(call.moment.step),
+            u64::from(call.moment.increment),
+            call.moment.step_start.to_bits(),
+            u64::from(sizes.has_sites),
         ];
         self.socket.set_read_timeout(Some(limit))?;
         self.socket.write_all(&bytes(&request))?;
@@ -245,6 +258,7 @@ struct Sizes {
     n_points: usize,
     n_components: usize,
     n_states: usize,
+    has_sites: bool,
 }
 
 impl Sizes {
@@ -260,13 +274,30 @@ impl Sizes {
     /// Where the outputs start.
     fn outputs(&self) -> usize {
         let gradients = if self.initial { 0 } else { 2 };
-        self.n_points * ((gradients + 1) * self.n_components + self.n_states)
+        let site = if self.has_sites { SITE } else { 0 };
+        self.n_points * ((gradients + 1) * self.n_components + self.n_states + site)
     }
 
     /// Where they end.
     fn end(&self) -> usize {
         let flux = if self.initial { 0 } else { self.n_components };
         self.outputs() + self.n_points * (flux + self.n_states + self.n_operator() + 2)
+    }
+}
+
+fn site_words(site: &Site) -> [u64; SITE] {
+    let [x, y] = site.position.map(f64::to_bits);
+    let [element, point] = [site.element, site.point].map(u64::from);
+    [x, y, site.length.to_bits(), element, point]
+}
+
+fn site_of(words: &[u64; SITE]) -> Site {
+    let [x, y, length, element, point] = *words;
+    Site {
+        position: [f64::from_bits(x), f64::from_bits(y)],
+        length: f64::from_bits(length),
+        element: element as u32,
+        point: point as u32,
     }
 }
 
@@ -348,6 +379,7 @@ pub(super) fn describe(path: &Path, sha256: &str) -> Result<Vec<(LawDescription,
     let start = Start {
         path: path.as_os_str().to_owned(),
         sha256: sha256.to_owned(),
+        foreign: None,
         build: None,
     };
     let text = match Worker::start(&start)?.1 {
@@ -363,7 +395,8 @@ pub(super) fn describe(path: &Path, sha256: &str) -> Result<Vec<(LawDescription,
             formulation.index = number;
         }
     }
-    Ok(laws.into_iter().map(|law| (law, Origin::Apart)).collect())
+    let apart = |law| (law, Origin::Apart { is_serial: false });
+    Ok(laws.into_iter().map(apart).collect())
 }
 
 /// A law with its parameters fixed, in processes of its own.
@@ -374,6 +407,8 @@ pub(super) struct IsolatedInstance {
     limit: Duration,
     /// Workers that have nothing to do.
     idle: Mutex<Vec<Worker>>,
+    /// Whose turn it is, if calls must follow one another. They then share one worker.
+    turn: Option<Mutex<()>>,
 }
 
 impl IsolatedInstance {
@@ -383,23 +418,24 @@ impl IsolatedInstance {
     /// The law's status and message, or how its process ended.
     pub(super) fn create(
         library: &Library,
-        law: usize,
-        formulation: u32,
+        (law, formulation): (usize, u32),
         parameters: &[f64],
-        limit: Duration,
+        is_serial: bool,
     ) -> Result<Self, (Status, String)> {
         let instance = Self {
             start: Start {
                 path: library.path.as_os_str().to_owned(),
                 sha256: library.sha256.clone(),
+                foreign: library.foreign.clone(),
                 build: Some(Build {
                     law,
                     formulation,
                     parameters: parameters.iter().map(|value| value.to_bits()).collect(),
                 }),
             },
-            limit,
+            limit: Trust::current().isolate.unwrap_or(CALL),
             idle: Mutex::default(),
+            turn: is_serial.then(Mutex::default),
         };
         let worker = instance.worker()?;
         instance.give_back(worker);
@@ -441,6 +477,10 @@ impl IsolatedInstance {
     }
 
     fn call(&self, initial: bool, mut call: Call<'_>) -> (Status, String) {
+        let _turn = self
+            .turn
+            .as_ref()
+            .map(|turn| turn.lock().unwrap_or_else(PoisonError::into_inner));
         let mut worker = match self.worker() {
             Ok(worker) => worker,
             Err(failure) => return failure,
@@ -510,7 +550,17 @@ fn serve() -> io::Result<()> {
             Err(Error::plugin("it was changed"))
         }
     };
-    let library = match Library::open_if(Path::new(&start.path), same) {
+    let opened = match start.foreign {
+        None => Library::open_if(Path::new(&start.path), same),
+        Some(foreign) => {
+            let here = Foreign {
+                in_process: true,
+                ..foreign
+            };
+            Library::open_foreign(&here, same)
+        }
+    };
+    let library = match opened {
         Ok(library) => library,
         Err(why) => {
             let prefix = format!("library {}: ", Path::new(&start.path).display());
@@ -532,7 +582,7 @@ fn serve() -> io::Result<()> {
 
 /// A worker's law and what it works on.
 struct Bench {
-    instance: OwnedInstance,
+    instance: LawInstance,
     n_components: usize,
     n_states: usize,
     memory: SharedMemory,
@@ -544,7 +594,7 @@ struct Bench {
 impl Bench {
     fn new(library: &Library, build: &Build, memory: SharedMemory) -> Result<Self, Started> {
         let unusable = |why: &str| Started::Unusable(why.to_owned());
-        let Some((description, Origin::Here(handle))) = library.laws.get(build.law) else {
+        let Some((description, origin)) = library.laws.get(build.law) else {
             return Err(unusable("it lacks a law"));
         };
         let mut formulations = description.formulations.iter();
@@ -553,15 +603,23 @@ impl Bench {
             .ok_or_else(|| unusable("it lacks a formulation"))?;
         let hypothesis = Hypothesis::ALL
             .into_iter()
-            .find(|h| h.name() == formulation.hypothesis);
+            .find(|h| h.name() == formulation.hypothesis)
+            .ok_or_else(|| unusable("it lacks a hypothesis"))?;
         let parameters = build.parameters.iter().map(|bits| f64::from_bits(*bits));
         let parameters: Vec<f64> = parameters.collect();
-        let instance = handle
-            .create(build.formulation, &parameters)
-            .map_err(|(status, message)| Started::Refused(status, message))?;
+        let instance = match origin {
+            Origin::Here(handle) => handle
+                .create(build.formulation, &parameters)
+                .map(LawInstance::Here),
+            Origin::Foreign(law) => law
+                .create(hypothesis, &parameters)
+                .map(LawInstance::Foreign),
+            Origin::Apart { .. } => return Err(unusable("its worker has a worker")),
+        }
+        .map_err(|(status, message)| Started::Refused(status, message))?;
         Ok(Self {
             instance,
-            n_components: hypothesis.map_or(0, Hypothesis::n_components),
+            n_components: hypothesis.n_components(),
             n_states: formulation.internal_variables.len(),
             memory,
             inputs: Vec::new(),
@@ -583,7 +641,18 @@ impl Bench {
     }
 
     fn call(&mut self, request: [u64; REQUEST]) -> io::Result<(Status, String)> {
-        let [initial, flags, n_points, time, time_increment, length] = request;
+        let [
+            initial,
+            flags,
+            n_points,
+            time,
+            time_increment,
+            length,
+            step,
+            increment,
+            start,
+            sites,
+        ] = request;
         if self.memory.len() != length as usize {
             self.memory.follow()?;
         }
@@ -594,10 +663,15 @@ impl Bench {
             n_points: n_points as usize,
             n_components,
             n_states,
+            has_sites: sites != 0,
         };
         let n = sizes.n_points;
         let first_output = sizes.outputs();
-        let inputs = self.memory.read(0, first_output).map(f64::from_bits);
+        let n_site = if sizes.has_sites { n * SITE } else { 0 };
+        let n_inputs = first_output - n_site;
+        let words: Vec<u64> = self.memory.read(n_inputs, n_site).collect();
+        let sites: Vec<Site> = words.as_chunks().0.iter().map(site_of).collect();
+        let inputs = self.memory.read(0, n_inputs).map(f64::from_bits);
         self.inputs.clear();
         self.inputs.extend(inputs);
         self.outputs.clear();
@@ -607,7 +681,7 @@ impl Bench {
         self.status.resize(n, raw::PILUM_E_INTERNAL);
 
         let rows = Strided::rows(n_components);
-        let (given, state0) = self.inputs.split_at(first_output - n * n_states);
+        let (given, state0) = self.inputs.split_at(n_inputs - n * n_states);
         let mut fields = given.chunks((n * n_components).max(1));
         let mut next = || (fields.next().unwrap_or_default(), rows);
         let (gradient0, gradient1) = if sizes.initial {
@@ -630,6 +704,12 @@ impl Bench {
             n_states,
             time: f64::from_bits(time),
             time_increment: f64::from_bits(time_increment),
+            moment: Moment {
+                step: step as u32,
+                increment: increment as u32,
+                step_start: f64::from_bits(start),
+            },
+            sites: &sites,
             gradient0,
             gradient1,
             flux0,

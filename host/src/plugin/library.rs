@@ -10,9 +10,11 @@
     reason = "the host's side of the C boundary; offset and access are one operation"
 )]
 
+mod abaqus;
 pub mod probe;
 #[cfg(unix)]
 mod shared;
+pub(super) mod umat;
 
 #[cfg(unix)]
 pub(super) use shared::SharedMemory;
@@ -21,6 +23,7 @@ use super::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };
 use super::image::Image;
+use super::{Moment, Site};
 use abi::Hypothesis;
 use abi::raw::{self, Batch, Formulation, Host, Instance, Law, MagicBlock, Parameter, Plugin};
 use abi::raw::{Status, Variable, View, ViewMut};
@@ -76,14 +79,15 @@ unsafe impl Send for LawHandle {}
 // SAFETY: as above.
 unsafe impl Sync for LawHandle {}
 
+/// `dlerror` is not safe in threads everywhere, so libraries are opened one at a time.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
 /// Opens a library, shakes hands and copies its description. It is opened from the bytes that were
 /// hashed where the system allows it.
 ///
 /// # Errors
 /// What is wrong with the library, in words.
 pub(super) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
-    // `dlerror` is not safe in threads everywhere, so libraries are opened one at a time.
-    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -648,6 +652,8 @@ pub(super) struct Call<'a> {
     pub(super) n_states: usize,
     pub(super) time: f64,
     pub(super) time_increment: f64,
+    pub(super) moment: Moment,
+    pub(super) sites: &'a [Site],
     pub(super) gradient0: Option<(&'a [f64], Strided)>,
     pub(super) gradient1: Option<(&'a [f64], Strided)>,
     pub(super) flux0: (&'a [f64], Strided),

@@ -1,5 +1,6 @@
 //! Where libraries are looked for. Only explicit folders count, never the working directory.
 
+use super::adapter::Foreign;
 use super::{Library, LoadedLaw};
 use crate::error::{Error, suggestion};
 use crate::inspect;
@@ -83,16 +84,9 @@ impl SearchPath {
                 }
             };
             let library = self.open_for(&path, Some(id))?;
-            return library.law(id).ok_or_else(|| Error::Plugin {
-                message: format!("library {} has no law `{id}`", path.display()),
-                hint: Some(suggestion(
-                    id,
-                    library
-                        .laws()
-                        .map(|law| law.id.as_str())
-                        .collect::<Vec<_>>(),
-                )),
-            });
+            return library
+                .law(id)
+                .ok_or_else(|| no_such_law(&library, &path, id));
         }
         let installed = self.installed();
         let ids: Vec<&str> = installed.keys().map(String::as_str).collect();
@@ -114,6 +108,18 @@ impl SearchPath {
                 )
             }),
         })
+    }
+
+    /// A law of a library that is made for another program.
+    ///
+    /// # Errors
+    /// As [`Library::open_foreign`]; [`Error::Plugin`] if it has no such law.
+    pub fn foreign_law(&self, id: &str, foreign: &Foreign) -> Result<LoadedLaw, Error> {
+        let approve = |sha256: &str| self.pins.check(id, &foreign.library, sha256);
+        let library = Library::open_foreign(foreign, approve)?;
+        library
+            .law(id)
+            .ok_or_else(|| no_such_law(&library, &foreign.library, id))
     }
 
     /// Opens a library, once.
@@ -147,6 +153,14 @@ impl SearchPath {
             }
         }
         found
+    }
+}
+
+fn no_such_law(library: &Library, path: &Path, id: &str) -> Error {
+    let ids: Vec<&str> = library.laws().map(|law| law.id.as_str()).collect();
+    Error::Plugin {
+        message: format!("library {} has no law `{id}`", path.display()),
+        hint: Some(suggestion(id, ids)),
     }
 }
 

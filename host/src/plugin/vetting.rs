@@ -4,7 +4,7 @@
 //! What passed is remembered by its SHA-256 and the version of this program, so that it is tried
 //! once. What did not is tried again every time.
 
-use super::{End, Law, Library, LoadedLaw, Operator, ParameterDescription, Start, Strided};
+use super::{End, Law, Library, LoadedLaw, Moment, Operator, ParameterDescription, Start, Strided};
 use crate::child::{self, Ending, Work};
 use crate::error::Error;
 use abi::Hypothesis;
@@ -186,6 +186,8 @@ fn step(law: &Law, operator: Operator, size: f64, flux: &[f64], state: &[f64]) {
         state,
         time: 0.0,
         time_increment: 1.0,
+        moment: Moment::default(),
+        sites: &[],
     };
     let end = End {
         flux: (&mut flux_end, rows),

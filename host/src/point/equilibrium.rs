@@ -15,7 +15,7 @@
 //! Anderson (type II).
 
 use super::{N_MAX, Vector};
-use crate::plugin::{BatchFailure, End, Law, Operator, Start, Strided};
+use crate::plugin::{BatchFailure, End, Law, Moment, Operator, Start, Strided};
 use abi::status::Outcome;
 use nalgebra::{SMatrix, SVector};
 use std::mem::swap;
@@ -129,6 +129,8 @@ pub(super) struct Search<'a> {
     base: Sample,
     trial: Sample,
     obstacle: Obstacle,
+    /// Which segment and increment it is.
+    pub(super) moment: Moment,
     /// Calls of the law.
     pub(super) calls: usize,
     /// Number of updates that the law called unreliable, and its first words about them.
@@ -159,6 +161,7 @@ impl<'a> Search<'a> {
             base: sample.clone(),
             trial: sample,
             obstacle: Obstacle::default(),
+            moment: Moment::default(),
             calls: 0,
             unreliable: (0, String::new()),
         }
@@ -250,6 +253,8 @@ impl<'a> Search<'a> {
             state: &step.start.internal,
             time: step.time,
             time_increment: step.time_increment,
+            moment: self.moment,
+            sites: &[],
         };
         let end = End {
             flux: (&mut self.trial.point.flux[..self.n], rows),

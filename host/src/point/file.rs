@@ -3,8 +3,9 @@
 use super::{N_MAX, Vector};
 use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
-use crate::input::{self, Named, ParameterTable, ParameterValue};
+use crate::input::{self, ForeignKeys, Named, ParameterTable, ParameterValue};
 use crate::lock::Pins;
+use crate::plugin::adapter::Adapter;
 use crate::plugin::{Law, SearchPath, Strided};
 use crate::schema;
 use abi::Hypothesis;
@@ -30,6 +31,21 @@ pub(crate) struct File {
     /// SHA-256 of the law's library; another one is refused.
     #[schemars(with = "Option<String>")]
     sha256: Option<Spanned<String>>,
+    /// What the law's library is made for, if not for the contract.
+    #[schemars(with = "Option<Adapter>")]
+    adapter: Option<Spanned<Adapter>>,
+    /// That library.
+    #[schemars(with = "Option<PathBuf>")]
+    library: Option<Spanned<PathBuf>>,
+    /// What describes it.
+    #[schemars(with = "Option<PathBuf>")]
+    sidecar: Option<Spanned<PathBuf>>,
+    /// Call it in this process.
+    #[schemars(with = "Option<bool>")]
+    in_process: Option<Spanned<bool>>,
+    /// Write the arguments of one call here.
+    #[schemars(with = "Option<PathBuf>")]
+    record: Option<Spanned<PathBuf>>,
     /// What the driver is.
     #[serde(default)]
     title: String,
@@ -215,7 +231,16 @@ impl Driver {
             Pins::given(source, law)?
         };
         let search = SearchPath::new(&folders).pinned(pins);
-        let built = input::build_law(source, &search, &file.law, hypothesis, &file.parameters)?;
+        let keys = ForeignKeys {
+            adapter: file.adapter.as_ref(),
+            library: file.library.as_ref(),
+            sidecar: file.sidecar.as_ref(),
+            in_process: file.in_process.as_ref(),
+            record: file.record.as_ref(),
+        };
+        let foreign = keys.read(source)?;
+        let loaded = input::find_law(source, &search, &file.law, foreign.as_ref())?;
+        let built = input::build_law(source, loaded, &file.law, hypothesis, &file.parameters)?;
         let mut driver = Self {
             law: built.law,
             warnings: built.warnings,

@@ -16,7 +16,7 @@ use crate::group::Group;
 use crate::input::{BuiltLaw, ParameterValue};
 use crate::mesh::Joint;
 use crate::model::Model;
-use crate::plugin::{End, Law, Operator, SearchPath, Start, Strided};
+use crate::plugin::{End, Law, Moment, Operator, Start, Strided};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -326,6 +326,8 @@ fn elastic_operator(law: &Law) -> Option<Vec<f64>> {
         state: &state,
         time: 0.0,
         time_increment: 0.0,
+        moment: Moment::default(),
+        sites: &[],
     };
     let end = End {
         flux: (&mut flux_end, rows),
@@ -346,7 +348,7 @@ fn stiffness_parameters(case: &Case, built: &BuiltLaw) -> Result<[(String, f64, 
             description.id
         ))
     };
-    let loaded = SearchPath::new(&case.law_folders()?).law(&description.id)?;
+    let loaded = built.law.loaded();
     let values: Vec<f64> = built.parameters.iter().map(|p| p.value).collect();
     let now = elastic_operator(&built.law).ok_or_else(none)?;
     let mut found = [None, None];

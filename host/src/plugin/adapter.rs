@@ -1,0 +1,212 @@
+//! Laws from libraries that are made for other programs. An adapter stands between such a library
+//! and the contract: it describes the laws, and carries one point at a time through the routine.
+//!
+//! | adapter | library | describes itself |
+//! |---|---|---|
+//! | [`Adapter::Umat`] | an Abaqus user subroutine `UMAT` | no: a sidecar file does |
+//!
+//! A further adapter is a variant of [`Adapter`], an arm of [`open`], a [`ForeignLaw`] and a
+//! [`ForeignInstance`].
+
+pub mod conventions;
+mod sidecar;
+mod umat;
+
+use super::description::LawDescription;
+use super::image::Image;
+use super::library::{Call, CallFailure, Strided};
+use super::{Moment, Site};
+use crate::error::Error;
+use abi::Hypothesis;
+use abi::raw::{self, Status};
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What a library is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Adapter {
+    /// Abaqus, `SUBROUTINE UMAT`.
+    Umat,
+}
+
+/// A library that is made for another program, as a file names it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Foreign {
+    /// What it is made for.
+    pub adapter: Adapter,
+    /// The library.
+    pub library: PathBuf,
+    /// What describes it, if that is not where the adapter looks.
+    pub sidecar: Option<PathBuf>,
+    /// Call it in this process and not in workers.
+    pub in_process: bool,
+    /// Write the arguments of one call here.
+    pub record: Option<PathBuf>,
+}
+
+/// A law of a foreign library, without parameters yet.
+pub(super) trait ForeignLaw: Debug + Send + Sync {
+    /// Whether calls of one material must follow one another.
+    fn is_serial(&self) -> bool;
+
+    /// Fixes the parameters (in declared order; NaN: left out). What the library keeps between
+    /// calls belongs to this one material.
+    ///
+    /// # Errors
+    /// Status and reason.
+    fn create(
+        &self,
+        hypothesis: Hypothesis,
+        parameters: &[f64],
+    ) -> Result<Box<dyn ForeignInstance>, CallFailure>;
+}
+
+/// A law of a foreign library with its parameters fixed.
+pub(super) trait ForeignInstance: Debug + Send + Sync {
+    /// Initial internal variables; `None` if the description says all there is to say.
+    fn init_state(&self, _call: Call<'_>) -> Option<(Status, String)> {
+        None
+    }
+
+    /// Carries the points over the increment. Returns the most severe status and a message.
+    fn integrate(&self, call: Call<'_>) -> (Status, String);
+}
+
+/// Laws with what builds them.
+pub(super) type ForeignLaws = Vec<(LawDescription, Arc<dyn ForeignLaw>)>;
+
+/// Describes the laws of a foreign library. Nothing of it runs.
+///
+/// # Errors
+/// [`Error::Plugin`] for the library; [`Error::Input`] at the place of its description.
+pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
+    match foreign.adapter {
+        Adapter::Umat => umat::open(foreign, image),
+    }
+}
+
+/// A point at the start of an increment, and the gradient at its end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PointStart<'a> {
+    /// Gradient at the start.
+    pub(super) gradient: &'a [f64],
+    /// Gradient at the end.
+    pub(super) gradient_end: &'a [f64],
+    /// Flux at the start.
+    pub(super) flux: &'a [f64],
+    /// Internal variables at the start.
+    pub(super) state: &'a [f64],
+    /// Time at the start.
+    pub(super) time: f64,
+    /// Time increment.
+    pub(super) time_increment: f64,
+    /// What is asked for: `PILUM_REQ_…`.
+    pub(super) request: u32,
+    /// Which step and increment it is.
+    pub(super) moment: Moment,
+    /// Where the point lies.
+    pub(super) site: Site,
+}
+
+/// Where the results of a point go; all zero before.
+#[derive(Debug)]
+pub(super) struct PointEnd<'a> {
+    /// Flux.
+    pub(super) flux: &'a mut [f64],
+    /// Internal variables.
+    pub(super) state: &'a mut [f64],
+    /// The operator that is asked for, row-major; empty if none is.
+    pub(super) operator: &'a mut [f64],
+}
+
+/// Why a point has no results.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Refusal {
+    /// `PILUM_CUT_STEP` or an error.
+    pub(super) status: Status,
+    /// Fraction of the increment to try next, of `PILUM_CUT_STEP`.
+    pub(super) factor: f64,
+    /// Why.
+    pub(super) message: String,
+}
+
+impl Refusal {
+    /// An error.
+    pub(super) fn error(status: Status, message: impl Into<String>) -> Self {
+        Self {
+            status,
+            factor: f64::NAN,
+            message: message.into(),
+        }
+    }
+}
+
+/// Carries the points of a batch over the increment, each by itself. A point that fails does not
+/// stop the others; the message is that of the first of the worst.
+pub(super) fn each_point(
+    call: Call<'_>,
+    mut update: impl FnMut(&PointStart<'_>, &mut PointEnd<'_>) -> Result<(), Refusal>,
+) -> (Status, String) {
+    let (n, n_states) = (call.n_components, call.n_states);
+    let wants_operator = call.request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
+    let n_operator = if wants_operator { n * n } else { 0 };
+    let (mut gradient, mut gradient_end) = (vec![0.0; n], vec![0.0; n]);
+    let (mut flux, mut flux_end) = (vec![0.0; n], vec![0.0; n]);
+    let mut flux1 = call.flux1;
+    let mut worst = (raw::PILUM_OK, String::new());
+    for point in 0..call.n_points {
+        gather(call.gradient0, point, &mut gradient);
+        gather(call.gradient1, point, &mut gradient_end);
+        gather(Some(call.flux0), point, &mut flux);
+        flux_end.fill(0.0);
+        let start = PointStart {
+            gradient: &gradient,
+            gradient_end: &gradient_end,
+            flux: &flux,
+            state: &call.state0[point * n_states..][..n_states],
+            time: call.time,
+            time_increment: call.time_increment,
+            request: call.request,
+            moment: call.moment,
+            site: call.sites.get(point).copied().unwrap_or_default(),
+        };
+        let mut end = PointEnd {
+            flux: &mut flux_end,
+            state: &mut call.state1[point * n_states..][..n_states],
+            operator: &mut call.tangent[point * n_operator..][..n_operator],
+        };
+        end.state.fill(0.0);
+        end.operator.fill(0.0);
+        let status = match update(&start, &mut end) {
+            Ok(()) => raw::PILUM_OK,
+            Err(refusal) => {
+                call.step_factor[point] = refusal.factor;
+                let status = abi::status::most_severe(worst.0, refusal.status);
+                if status != worst.0 {
+                    worst = (status, format!("point {point}: {}", refusal.message));
+                }
+                refusal.status
+            }
+        };
+        call.status[point] = status;
+        if let Some((values, place)) = &mut flux1 {
+            let first = place.offset + point * place.point;
+            for (c, value) in flux_end.iter().enumerate() {
+                values[first + c * place.component] = *value;
+            }
+        }
+    }
+    worst
+}
+
+fn gather(values: Option<(&[f64], Strided)>, point: usize, out: &mut [f64]) {
+    if let Some((values, place)) = values {
+        let first = place.offset + point * place.point;
+        for (c, value) in out.iter_mut().enumerate() {
+            *value = values[first + c * place.component];
+        }
+    }
+}
