@@ -1,6 +1,7 @@
 //! What `pilum laws` prints: the laws found, and a page about one of them, as text or as JSON.
 
 use crate::error::Error;
+use crate::plugin::adapter::conventions;
 use crate::plugin::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw,
     ParameterDescription, SearchPath,
@@ -38,7 +39,8 @@ fn json(value: &impl Serialize) -> Result<String, Error> {
         .map_err(|error| Error::Internal(error.to_string()))
 }
 
-/// One line for every law found; a library that claims a law and cannot be used is said to be so.
+/// One line for every law found, and the conventions of every route by which laws come in; a
+/// library that claims a law and cannot be used is said to be so.
 pub fn list(search: &SearchPath) -> String {
     let mut text = String::new();
     for (id, library) in search.installed() {
@@ -58,6 +60,8 @@ pub fn list(search: &SearchPath) -> String {
             let _ = writeln!(text, "  {folder}");
         }
     }
+    text.push('\n');
+    text.push_str(&conventions::text());
     text
 }
 

@@ -18,3 +18,4 @@ mod syntax;
 mod trade_off;
 mod troubled;
 mod trust;
+mod umat;

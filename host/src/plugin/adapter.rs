@@ -19,13 +19,14 @@ use super::{Moment, Site};
 use crate::error::Error;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What a library is made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Adapter {
     /// Abaqus, `SUBROUTINE UMAT`.

@@ -105,7 +105,7 @@ impl<'a> Interface<'a> {
         let law = swaps
             .rfind(|(swapped, _)| *swapped == number)
             .map_or(&group.law, |(_, law)| law);
-        let parameters = stiffness_parameters(case, &law.built)?;
+        let parameters = stiffness_parameters(&law.built)?;
         let joints = model.mesh.joints.iter().filter(|j| j.group == number);
         let mut logarithms = [0.0; 3];
         let mut n = 0.0;
@@ -340,7 +340,7 @@ fn elastic_operator(law: &Law) -> Option<Vec<f64>> {
 
 /// The parameters with the unit of a stiffness that scale the normal and the tangential entry of
 /// the elastic operator: id, value, entry.
-fn stiffness_parameters(case: &Case, built: &BuiltLaw) -> Result<[(String, f64, f64); 2], Error> {
+fn stiffness_parameters(built: &BuiltLaw) -> Result<[(String, f64, f64); 2], Error> {
     let description = built.law.description();
     let none = || {
         Error::Usage(format!(

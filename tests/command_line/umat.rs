@@ -1,0 +1,595 @@
+//! Abaqus user subroutines as laws: Fortran sources of `fixtures/umat`, compiled by gfortran.
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "part of the tests"
+)]
+
+use crate::program::{BAD_INPUT, CASE, DONE, Edit, PLUGIN_TROUBLE, Place, edited};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::{Mutex, PoisonError};
+use tempfile::TempDir;
+use tests::case::table;
+
+/// A folder with a routine and its sidecar. `None`, with a remark, where there is no compiler; that
+/// is an error where tests must not be skipped.
+fn place(name: &str) -> Option<Place> {
+    static COMPILED: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    if !compiled.contains_key(name) {
+        let folder = TempDir::new().unwrap();
+        let out = folder.path().join("library");
+        let sources = [source(&format!("{name}.f"))];
+        gfortran(&["-shared", "-fPIC"], &sources, &out)?;
+        compiled.insert(name.to_owned(), std::fs::read(out).unwrap());
+    }
+    let place = Place::new();
+    place.write(&format!("lib{name}.so"), &compiled[name]);
+    let sidecar = format!("{name}.law.toml");
+    place.write(&sidecar, std::fs::read(source(&sidecar)).unwrap());
+    Some(place)
+}
+
+fn source(name: &str) -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.join("fixtures/umat").join(name)
+}
+
+fn gfortran(arguments: &[&str], sources: &[PathBuf], out: &Path) -> Option<Output> {
+    let output = Command::new("gfortran")
+        .args(["-O1", "-o"])
+        .arg(out)
+        .args(arguments)
+        .args(sources)
+        .output();
+    let Ok(output) = output else {
+        assert!(std::env::var_os("CI").is_none(), "there is no gfortran");
+        println!("skipped: there is no gfortran");
+        return None;
+    };
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    Some(output)
+}
+
+/// A driver in plane strain, with further keys and parameters, and 10 increments.
+fn driver(name: &str, keys: &str, parameters: &str) -> String {
+    format!(
+        "law = \"umat_{name}\"\nadapter = \"umat\"\nlibrary = \"lib{name}.so\"\n{keys}\n\
+         hypothesis = \"plane_strain\"\n\
+         [parameters]\nyoung_modulus = 2e4\npoisson_ratio = 0.3\n{parameters}\n\
+         [[segment]]\nincrements = 10\ncontrol = {{ 11 = {{ strain = 1e-3 }}, \
+         22 = {{ strain = -2e-3 }}, 12 = {{ strain = 1e-3 }} }}\n"
+    )
+}
+
+/// Runs a driver; the rows of its table.
+fn rows(place: &Place, text: &str) -> Vec<BTreeMap<String, String>> {
+    place.write("driver.toml", text);
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    table(&place.path("out.csv"))
+}
+
+fn number(row: &BTreeMap<String, String>, column: &str) -> f64 {
+    row[column].parse().unwrap()
+}
+
+/// The case with its soil from a UMAT.
+fn soil(name: &str, keys: &str) -> String {
+    let law =
+        format!("law = \"umat_{name}\"\nadapter = \"umat\"\nlibrary = \"lib{name}.so\"\n{keys}");
+    CASE.replacen("law = \"elastic\"", &law, 1)
+}
+
+/// The bits of the last values of all probes.
+fn last(place: &Place) -> Vec<f64> {
+    let rows = table(&place.path("out/history.csv"));
+    let row = rows.last().unwrap();
+    ["settlement", "tau"].map(|name| number(row, name)).to_vec()
+}
+
+#[test]
+fn an_elastic_umat_is_the_elastic_law() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let outcome = place.run_case(CASE);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let ours = last(&place);
+    let mut all = Vec::new();
+    for keys in ["", "in_process = true"] {
+        let outcome = place.run_case(soil("elastic", keys));
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        all.push(last(&place));
+    }
+    for (umat, ours) in all[0].iter().zip(&ours) {
+        assert!((umat - ours).abs() <= 1e-9 * ours.abs(), "{umat} {ours}");
+    }
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&all[0]), bits(&all[1]), "worker and program");
+}
+
+#[test]
+fn the_adapter_gives_the_bits_of_a_direct_call() {
+    let Some(place) = place("drucker_prager") else {
+        return;
+    };
+    let program = place.path("direct");
+    let sources = [source("direct.f"), source("drucker_prager.f")];
+    gfortran(&[], &sources, &program).unwrap();
+    let direct = Command::new(program).output().unwrap();
+    let direct = String::from_utf8(direct.stdout).unwrap();
+    let text = driver("drucker_prager", "", "alpha = 0.4\nbeta = 0.1\nk = 10.0");
+    let start = text.find("[[segment]]").unwrap();
+    let text = text[..start].to_owned()
+        + "[[segment]]\nincrements = 40\ncontrol = { 11 = { strain = -1.1e-2 }, \
+           22 = { strain = 4e-3 }, 12 = { strain = 7e-3 } }\n";
+    let rows = rows(&place, &text);
+    assert_eq!(direct.lines().count(), 40);
+    for (line, row) in direct.lines().zip(&rows[1..]) {
+        let components = ["11", "22", "33", "12"];
+        for (value, component) in line.split_whitespace().zip(components) {
+            let ours = number(row, &format!("stress_{component}"));
+            let value: f64 = value.parse().unwrap();
+            assert_eq!(ours.to_bits(), value.to_bits(), "{ours} {value}");
+        }
+    }
+    assert!(
+        number(rows.last().unwrap(), "multiplier") > 1e-3,
+        "it flows"
+    );
+}
+
+#[test]
+fn a_cone_ends_at_its_strength_in_triaxial_compression() {
+    let Some(place) = place("drucker_prager") else {
+        return;
+    };
+    let text = driver("drucker_prager", "", "alpha = 0.4\nbeta = 0.1\nk = 10.0");
+    let start = text.find("[[segment]]").unwrap();
+    let text = text[..start].replacen("plane_strain", "axisymmetric", 1)
+        + "[initial]\nstress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 }\n\
+           [[segment]]\nincrements = 20\ncontrol = { 22 = { strain = -5e-2 } }\n";
+    let rows = rows(&place, &text);
+    let end = rows.last().unwrap();
+    // √J₂ = q/√3 and p = −100 − q/3 where 22 is loaded and the others keep −100.
+    let q = (10.0 + 40.0) / (1.0 / 3.0_f64.sqrt() - 0.4 / 3.0);
+    let found = -100.0 - number(end, "stress_22");
+    assert!((found - q).abs() < 1e-8 * q, "{found} {q}");
+    // The tangent is consistent: the driver needs few calls.
+    assert!(
+        rows[1..]
+            .iter()
+            .all(|row| number(row, "iterations") <= 12.0)
+    );
+}
+
+#[test]
+fn arguments_are_true() {
+    let Some(place) = place("echo") else {
+        return;
+    };
+    let text = driver("echo", "", "").replacen("plane_strain", "axisymmetric", 1)
+        + "[[segment]]\nincrements = 3\ncontrol = { 11 = { strain = 1e-3 }, \
+           22 = { strain = -2e-3 }, 33 = { strain = 0.0 }, 12 = { strain = 1e-3 } }\n";
+    let text = text.replacen("12 = {", "33 = { strain = 0.0 }, 12 = {", 1);
+    let rows = rows(&place, &text);
+    let said = |row: usize| -> Vec<f64> {
+        let row = &rows[row];
+        (1..=21)
+            .map(|i| number(row, &format!("said_{i}")))
+            .collect()
+    };
+    let (place_and_length, at_rest) = ([0.0, 0.0, 0.0, 1.0], 10.0);
+    let expected = |time: f64, step: f64, increment: f64, strain: f64| {
+        let sizes = [3.0, 1.0, 4.0, 21.0, 2.0];
+        let start = if step > 1.0 { at_rest } else { 0.0 };
+        let mut all = sizes.to_vec();
+        all.extend([time - start, time, 1.0]);
+        all.extend(place_and_length);
+        // NOEL, NPT, JSTEP, KINC; the identities; CMNAME; thermal and energy; LAYER, KSPT; STRAN.
+        all.extend([1.0, 1.0, step, increment, 0.0, 4.0, 0.0, 11.0, strain]);
+        all
+    };
+    assert_eq!(
+        said(3),
+        expected(2.0, 1.0, 3.0, number(&rows[2], "strain_11"))
+    );
+    assert_eq!(
+        said(12),
+        expected(11.0, 2.0, 2.0, number(&rows[11], "strain_11"))
+    );
+}
+
+#[test]
+fn elements_say_where_they_are() {
+    let Some(place) = place("echo") else {
+        return;
+    };
+    let text = soil("echo", "").replacen("profile = \"phases\"", "points = \"phases\"", 1);
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let rows = table(&place.path("out/points.csv"));
+    let rows = rows.into_iter();
+    let rows = rows.filter(|row| row["group"] == "soil" && row["phase"] == "push");
+    let rows: Vec<_> = rows.collect();
+    assert!(!rows.is_empty());
+    for (number_of_row, row) in rows.iter().enumerate() {
+        let said = |i: usize| number(row, &format!("said_{i}"));
+        assert!((said(9) - number(row, "x")).abs() < 1e-12);
+        assert!((said(10) - number(row, "y")).abs() < 1e-12);
+        // Two columns of two elements, 1 × 0.5 and 0.99 × 0.5, 9 points each.
+        let area: f64 = if said(9) < 1.0 { 0.5 } else { 0.495 };
+        assert!((said(12) - area.sqrt()).abs() < 1e-12);
+        assert_eq!(
+            (said(13), said(14)),
+            (
+                (number_of_row / 9 + 1) as f64,
+                (number_of_row % 9 + 1) as f64
+            )
+        );
+        // Second phase, second increment, whose step starts at 1 and itself at 1.5.
+        assert_eq!([said(15), said(16)], [2.0, 2.0]);
+        assert_eq!([said(6), said(7), said(8)], [0.5, 1.5, 0.5]);
+    }
+}
+
+#[test]
+fn a_routine_that_asks_for_smaller_steps_gets_them() {
+    let Some(place) = place("smaller") else {
+        return;
+    };
+    let text = driver("smaller", "", "largest = 3e-5");
+    place.write("driver.toml", &text);
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(!outcome.says(" 0 cut-backs"), "{}", outcome.stderr);
+    let rows = table(&place.path("out.csv"));
+    let end = rows.last().unwrap();
+    // σ₁₁ = (λ + 2G) ε₁₁ + λ ε₂₂.
+    let (g, lambda) = (2e4 / 2.6, 2e4 * 0.3 / (1.3 * 0.4));
+    let stress = (lambda + 2.0 * g) * 1e-3 - lambda * 2e-3;
+    assert!((number(end, "stress_11") - stress).abs() < 1e-10 * stress.abs());
+
+    // In a run the message names the point.
+    let case = soil("smaller", "").replacen(
+        "poisson_ratio = 0.3 }",
+        "poisson_ratio = 0.3, largest = 1e-9 }",
+        1,
+    );
+    let outcome = place.run_case(case);
+    for text in ["group `soil`, element", "PNEWDT = 0.5"] {
+        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn each_material_has_variables_of_its_own() {
+    let Some(place) = place("saves") else {
+        return;
+    };
+    let edits: &[Edit] = &[
+        (
+            "[groups.soil]",
+            "[laws.hard]\nlaw = \"umat_saves\"\nadapter = \"umat\"\nlibrary = \"libsaves.so\"\nKEYS\n\
+             parameters = { young_modulus = 3e4, poisson_ratio = 0.3 }\n\n[groups.soil]",
+        ),
+        (
+            "[groups.layer]\nformulation = \"thin_layer\"\nlaw = \"joint\"",
+            "[groups.layer]\nformulation = \"solid\"\nlaw = \"hard\"",
+        ),
+        (
+            "tau = { group = \"layer\", quantity = \"traction_t\" }",
+            "tau = { group = \"soil\", quantity = \"modulus\" }\nhard = { group = \"layer\", quantity = \"modulus\" }",
+        ),
+        ("profile = \"phases\"", "profile = \"never\""),
+    ];
+    let text = edited(edits).replacen(
+        "law = \"elastic\"",
+        "law = \"umat_saves\"\nadapter = \"umat\"\nlibrary = \"libsaves.so\"\nKEYS",
+        1,
+    );
+    for keys in ["", "in_process = true"] {
+        let outcome = place.run_case(text.replace("KEYS", keys));
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let rows = table(&place.path("out/history.csv"));
+        let row = rows.last().unwrap();
+        assert_eq!(number(row, "tau"), 1e4, "{keys}");
+        assert_eq!(number(row, "hard"), 3e4, "{keys}");
+    }
+}
+
+#[test]
+fn a_routine_that_ends_its_process_ends_an_increment() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    for (how, says) in [
+        (1, &["ended its process: exit code 3"][..]),
+        (
+            2,
+            &[
+                "called XIT",
+                "ended its process: exit code 70",
+                "AT POINT 1 OF UMAT_STO",
+            ],
+        ),
+        (3, &["crashed: signal 11"]),
+    ] {
+        let parameters = format!("how = {how}\nlimit = 1.1e-3");
+        place.write("driver.toml", driver("stops", "", &parameters));
+        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        for text in says {
+            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+        }
+        assert!(
+            outcome.says("segment 1, increment 6 of 10"),
+            "{}",
+            outcome.stderr
+        );
+        let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+        assert_eq!(rows.lines().count(), 7, "{rows}");
+        let outcome = place.run(&["replay", "out.failure.toml"]);
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        assert!(outcome.stdout.contains("as recorded"), "{}", outcome.stdout);
+    }
+}
+
+#[test]
+fn what_is_overwritten_is_named() {
+    let Some(place) = place("overwrites") else {
+        return;
+    };
+    for (what, says) in [
+        (1, "overwrites DSTRAN, which is an input"),
+        (2, "overwrites PROPS, which is an input"),
+        (3, "writes beyond the end of STATEV, which has 1 entries"),
+        (4, "writes between STRAN and DSTRAN"),
+        (5, "overwrites KINC, which is an input"),
+    ] {
+        place.write(
+            "driver.toml",
+            driver("overwrites", "", &format!("what = {what}")),
+        );
+        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+        assert_eq!(
+            outcome.code,
+            Some(PLUGIN_TROUBLE),
+            "{what}: {}",
+            outcome.stderr
+        );
+        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn six_components_stand_for_four_only_where_that_is_declared() {
+    let Some(place) = place("six") else {
+        return;
+    };
+    let stress = |rows: &[BTreeMap<String, String>]| {
+        ["11", "22", "33", "12"].map(|c| number(rows.last().unwrap(), &format!("stress_{c}")))
+    };
+    let six = stress(&rows(&place, &driver("six", "", "")));
+    let own = driver("elastic", "", "")
+        .replacen("umat_elastic", "elastic", 1)
+        .replacen("adapter = \"umat\"\nlibrary = \"libelastic.so\"\n", "", 1);
+    for (six, own) in six.into_iter().zip(stress(&rows(&place, &own))) {
+        assert!((six - own).abs() <= 1e-12 * own.abs(), "{six} {own}");
+    }
+
+    let sidecar = std::fs::read_to_string(place.path("six.law.toml")).unwrap();
+    place.write("driver.toml", driver("six", "", ""));
+    place.write("six.law.toml", sidecar.replacen("expand = true", "", 1));
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    for text in [
+        "six.law.toml:2",
+        "plane_strain has NTENS = 4, which `ntens` lacks",
+        "expand = true",
+    ] {
+        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+    }
+    // A sidecar that is wrong about the routine is found out.
+    place.write(
+        "six.law.toml",
+        sidecar.replacen("ntens = [6]", "ntens = [4, 6]", 1),
+    );
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    assert!(
+        outcome.says("writes beyond the end of"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn an_interface_with_two_components() {
+    let Some(place) = place("joint") else {
+        return;
+    };
+    let case = edited(&[(
+        "law = \"coulomb_joint\"\n[laws.joint.parameters]\nnormal_stiffness = 1e6\n\
+         shear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\ndilatancy_angle = 5.0",
+        "law = \"umat_joint\"\nadapter = \"umat\"\nlibrary = \"libjoint.so\"\n\
+         [laws.joint.parameters]\nnormal_stiffness = 1e6\nshear_stiffness = 4e5\nfriction = 0.5",
+    )]);
+    let outcome = place.run_case(case);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+
+    let driver = "law = \"umat_joint\"\nadapter = \"umat\"\nlibrary = \"libjoint.so\"\n\
+        hypothesis = \"interface_2d\"\n\
+        [parameters]\nnormal_stiffness = 1e6\nshear_stiffness = 4e5\nfriction = 0.5\n\
+        [initial]\ntraction = { n = -100.0 }\n\
+        [[segment]]\nincrements = 10\n\
+        control = { t = { jump = 1e-3 }, n = { traction = -80.0 } }\n";
+    let rows = rows(&place, driver);
+    let end = rows.last().unwrap();
+    assert!((number(end, "traction_t") - 40.0).abs() < 1e-9);
+    // What slips is the whole jump but its elastic part.
+    assert!((number(end, "plastic_slip") - (1e-3 - 40.0 / 4e5)).abs() < 3e-5);
+}
+
+#[test]
+fn utility_routines_are_there() {
+    let Some(place) = place("utilities") else {
+        return;
+    };
+    for keys in ["", "in_process = true"] {
+        let rows = rows(&place, &driver("utilities", keys, ""));
+        let end = rows.last().unwrap();
+        let [s_11, s_22, s_33, s_12] =
+            ["11", "22", "33", "12"].map(|c| number(end, &format!("stress_{c}")));
+        let said = |i: usize| number(end, &format!("said_{i}"));
+        let mean = (s_11 + s_22 + s_33) / 3.0;
+        let squares = (s_11 - mean).powi(2) + (s_22 - mean).powi(2) + (s_33 - mean).powi(2);
+        let mises = (1.5 * (squares + 2.0 * s_12 * s_12)).sqrt();
+        let middle = 0.5 * (s_11 + s_22);
+        let radius = (0.25 * (s_11 - s_22).powi(2) + s_12 * s_12).sqrt();
+        let least = (middle - radius).min(s_33);
+        let most = (middle + radius).max(s_33);
+        let expected = [mean, mises, least, most, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        for (i, expected) in expected.into_iter().enumerate() {
+            let found = said(i + 1);
+            assert!(
+                (found - expected).abs() < 1e-10,
+                "said_{}: {found} {expected}",
+                i + 1
+            );
+        }
+    }
+}
+
+#[test]
+fn a_call_can_be_recorded() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let rows = rows(&place, &driver("elastic", "record = \"call.toml\"", ""));
+    let text = std::fs::read_to_string(place.path("call.toml")).unwrap();
+    let call: toml::Table = toml::from_str(&text).unwrap();
+    let argument = |when: &str, name: &str| call[when][name].clone();
+    let reals = |when: &str, name: &str| -> Vec<f64> {
+        let values = argument(when, name);
+        let values = values.as_array().unwrap().iter();
+        values.map(|value| value.as_float().unwrap()).collect()
+    };
+    assert_eq!(reals("before", "STRESS"), [0.0; 4]);
+    assert_eq!(
+        reals("after", "STRESS")[1].to_bits(),
+        number(&rows[1], "stress_22").to_bits()
+    );
+    assert_eq!(reals("before", "PROPS"), [2e4, 0.3]);
+    // Column by column.
+    let tangent = reals("after", "DDSDDE");
+    assert_eq!(tangent.len(), 16);
+    assert!(tangent[4] > 0.0 && tangent[3] == 0.0 && tangent[15] > 0.0);
+    let name = argument("before", "CMNAME");
+    assert_eq!(name.as_str().unwrap(), format!("{:<80}", "UMAT_ELASTIC"));
+    assert_eq!(call["before"].as_table().unwrap().len(), 37);
+}
+
+#[test]
+fn mistakes_in_files_are_named() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let good = driver("elastic", "", "");
+    let mut complaints = String::new();
+    for (from, to, code, says) in [
+        (
+            "libelastic.so",
+            "libnone.so",
+            BAD_INPUT,
+            "`library`: there is no file",
+        ),
+        (
+            "adapter = \"umat\"\n",
+            "",
+            BAD_INPUT,
+            "`library` needs an `adapter`",
+        ),
+        (
+            "library = \"libelastic.so\"\n",
+            "",
+            BAD_INPUT,
+            "`adapter` needs the `library`",
+        ),
+        ("\"umat\"", "\"vumat\"", BAD_INPUT, "umat"),
+        (
+            "law = \"umat_elastic\"",
+            "law = \"other\"",
+            PLUGIN_TROUBLE,
+            "has no law `other`",
+        ),
+        (
+            "young_modulus",
+            "youngs_modulus",
+            BAD_INPUT,
+            "has no parameter `youngs_modulus`",
+        ),
+        ("2e4", "-2e4", BAD_INPUT, "is outside (0, ∞)"),
+        (
+            "library",
+            "sidecar = \"none.toml\"\nlibrary",
+            BAD_INPUT,
+            "`sidecar`: there is no file",
+        ),
+        (
+            "plane_strain",
+            "interface_2d",
+            BAD_INPUT,
+            "is made for plane_strain, axisymmetric, 3d",
+        ),
+    ] {
+        place.write("driver.toml", good.replacen(from, to, 1));
+        let outcome = place.run(&["point", "driver.toml"]);
+        if outcome.code != Some(code) || !outcome.says(says) {
+            complaints += &format!("{to}: {says}: {:?} {}\n", outcome.code, outcome.stderr);
+        }
+    }
+    let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
+    place.write("driver.toml", &good);
+    for (from, to, code, says) in [
+        (
+            "upper = 0.5",
+            "upper = 0.2",
+            BAD_INPUT,
+            "the default is outside its bounds",
+        ),
+        (
+            "id = \"poisson_ratio\"",
+            "id = \"Poisson\"",
+            BAD_INPUT,
+            "malformed",
+        ),
+        (
+            "ntens = [4, 6]",
+            "ntens = [4]",
+            BAD_INPUT,
+            "3d has NTENS = 6, which `ntens` lacks",
+        ),
+        ("thread_safe", "thread_save", BAD_INPUT, "thread_save"),
+        (
+            "version",
+            "symbol = \"other_\"\nversion",
+            PLUGIN_TROUBLE,
+            "it has no routine other_",
+        ),
+    ] {
+        place.write("elastic.law.toml", sidecar.replacen(from, to, 1));
+        let outcome = place.run(&["point", "driver.toml"]);
+        if outcome.code != Some(code) || !outcome.says(says) {
+            complaints += &format!("{to}: {says}: {:?} {}\n", outcome.code, outcome.stderr);
+        }
+    }
+    std::fs::remove_file(place.path("elastic.law.toml")).unwrap();
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert!(outcome.says("has no sidecar"), "{}", outcome.stderr);
+    assert!(complaints.is_empty(), "{complaints}");
+}
