@@ -279,8 +279,8 @@ impl std::fmt::Display for Capsule {
             text(&law.library.to_string_lossy()),
             text(&law.sha256)
         )?;
-        if let Some(Adapter::Umat) = law.adapter {
-            writeln!(f, "adapter = \"umat\"")?;
+        if let Some(adapter) = law.adapter {
+            writeln!(f, "adapter = {}", text(adapter.name()))?;
         }
         if let Some(sidecar) = &law.sidecar {
             writeln!(f, "sidecar = {}", text(&sidecar.to_string_lossy()))?;

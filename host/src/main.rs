@@ -69,8 +69,11 @@ enum Command {
     },
     /// Lead one law at one integration point along a path.
     Point {
-        /// A driver file.
+        /// A driver file, or with `--umat` the `test.inp` of an IncrementalDriver.
         driver: PathBuf,
+        /// Read input of the IncrementalDriver, and run it with this Abaqus user subroutine.
+        #[arg(long, value_name = "LIBRARY", conflicts_with = "variant")]
+        umat: Option<PathBuf>,
         /// Run only this variant of it.
         #[arg(long)]
         variant: Option<String>,
@@ -237,9 +240,21 @@ fn execute(command: Command) -> Result<(), Error> {
         }
         Command::Point {
             driver,
+            umat,
             variant,
             csv,
-        } => run_point(&driver, variant.as_deref(), csv.as_deref()),
+        } => match umat {
+            Some(umat) => host::point::run_incremental(&driver, &umat, csv.as_deref(), |report| {
+                eprintln!("{report}");
+            }),
+            None if driver.extension().is_some_and(|ending| ending == "inp") => {
+                Err(Error::Usage(format!(
+                    "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
+                    driver.display()
+                )))
+            }
+            None => run_point(&driver, variant.as_deref(), csv.as_deref()),
+        },
         Command::Report { folders, out } => write_report(&folders, out),
         Command::TradeOff {
             input,

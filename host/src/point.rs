@@ -7,6 +7,8 @@
 mod equilibrium;
 mod figure;
 mod file;
+mod frame;
+mod incremental_driver;
 mod table;
 
 pub use file::Driver;
@@ -21,6 +23,7 @@ use abi::status::Outcome;
 use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
 pub(crate) use file::words;
 use file::{Control, Segment};
+use frame::Frame;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Write};
@@ -121,7 +124,31 @@ pub fn run_file_variants(
     csv: Option<&Path>,
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    let mut drivers = Driver::read(path)?;
+    run_all(Driver::read(path)?, path, variant, csv, &mut report)
+}
+
+/// Runs input of the IncrementalDriver of A. Niemunis with a UMAT. Rows go to `csv`, or to the
+/// standard output.
+///
+/// # Errors
+/// As [`run_file_variants`].
+pub fn run_incremental(
+    path: &Path,
+    umat: &Path,
+    csv: Option<&Path>,
+    mut report: impl FnMut(&PointReport),
+) -> Result<(), Error> {
+    let driver = Driver::read_incremental(path, umat)?;
+    run_all(vec![driver], path, None, csv, &mut report)
+}
+
+fn run_all(
+    mut drivers: Vec<Driver>,
+    path: &Path,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+    report: &mut dyn FnMut(&PointReport),
+) -> Result<(), Error> {
     let names: Vec<String> = drivers.iter().filter_map(|d| d.variant.clone()).collect();
     if let Some(wanted) = variant {
         drivers.retain(|driver| driver.variant.as_deref() == Some(wanted));
@@ -300,20 +327,24 @@ impl Driver {
         };
         row(&walk.point, 0, 0, &mut sink)?;
         let mut increment = 0;
+        let (mut time, mut step_start) = (0.0, 0.0);
         let mut held = walk.point.flux;
         for (number, segment) in self.segments.iter().enumerate() {
+            walk.change_frame(segment.frame, &mut held);
             let ramp = walk.enter(segment, n, &held);
-            let step_start = increment as f64;
+            if segment.first == 0 {
+                step_start = time;
+            }
             let mut goal = ramp.from;
             for k in 1..=segment.increments {
                 let next = ramp.goal(k, segment.increments);
                 let calls = walk.search.calls;
                 walk.search.moment = Moment {
-                    step: number as u32 + 1,
-                    increment: k as u32,
+                    step: segment.step,
+                    increment: (segment.first + k) as u32,
                     step_start,
                 };
-                walk.advance(&goal, &next, increment as f64)
+                walk.advance(&goal, &next, (time, segment.time_increment))
                     .map_err(|stop| {
                         let place = format!(
                             "segment {}, increment {k} of {} ({} of the file)",
@@ -325,17 +356,22 @@ impl Driver {
                         self.explain(stop, &place, &warnings)
                     })?;
                 increment += 1;
-                row(&walk.point, increment, walk.search.calls - calls, &mut sink)?;
+                time += segment.time_increment;
+                let point = walk.cartesian();
+                row(&point, increment, walk.search.calls - calls, &mut sink)?;
                 goal = next;
             }
             // A flux that was led keeps its goal; what is left of its residual does not pile up.
             for i in 0..n {
                 held[i] = match segment.control[i] {
-                    Control::Keep | Control::Flux(_) => goal.flux[i],
-                    Control::Gradient(_) | Control::Stiffness(_) => walk.point.flux[i],
+                    Control::Keep | Control::Flux(_) | Control::FluxBy(_) => goal.flux[i],
+                    Control::Gradient(_) | Control::GradientBy(_) | Control::Stiffness(_) => {
+                        walk.point.flux[i]
+                    }
                 };
             }
         }
+        walk.change_frame(Frame::Cartesian, &mut held);
         let (times, words) = &walk.search.unreliable;
         if *times > 0 {
             warnings.push(format!(
@@ -440,7 +476,11 @@ impl Driver {
                 let Shortfall { reached, obstacle } = *shortfall;
                 let (gradient, flux) = words(self.law.hypothesis());
                 let (why, hint) = if let Some(miss) = obstacle.miss {
-                    let name = self.law.hypothesis().components()[miss.component];
+                    let frame = obstacle.frame.components();
+                    let name = frame.as_ref().map_or_else(
+                        || self.law.hypothesis().components()[miss.component],
+                        |names| names[miss.component],
+                    );
                     let hint = format!(
                         "a {flux} beyond strength has no equilibrium; control the {gradient} of \
                          `{name}` instead"
@@ -509,6 +549,29 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
+    /// Gives the point, and the flux that is held, in other components.
+    fn change_frame(&mut self, frame: Frame, held: &mut Vector) {
+        let old = self.search.frame();
+        if frame == old {
+            return;
+        }
+        self.search.set_frame(frame);
+        let point = &mut self.point;
+        point.gradient = frame.gradient(&old.cartesian_gradient(&point.gradient));
+        point.flux = frame.flux(&old.cartesian_flux(&point.flux));
+        *held = frame.flux(&old.cartesian_flux(held));
+    }
+
+    /// The point in the components of the law.
+    fn cartesian(&self) -> Point {
+        let frame = self.search.frame();
+        Point {
+            gradient: frame.cartesian_gradient(&self.point.gradient),
+            flux: frame.cartesian_flux(&self.point.flux),
+            internal: self.point.internal.clone(),
+        }
+    }
+
     /// Starts a segment. `held` is the flux that components without control keep.
     fn enter(&mut self, segment: &Segment, n: usize, held: &Vector) -> Ramp {
         let from = Goal {
@@ -522,10 +585,13 @@ impl Walk<'_> {
                 Control::Keep => {}
                 Control::Gradient(end) => to.gradient[i] = end,
                 Control::Flux(end) => to.flux[i] = end,
+                Control::GradientBy(change) => to.gradient[i] += change,
+                Control::FluxBy(change) => to.flux[i] += change,
                 Control::Stiffness(k) => stiffness[i] = k,
             }
         }
-        let free = (0..n).filter(|&i| !matches!(segment.control[i], Control::Gradient(_)));
+        let is_free = |control| !matches!(control, Control::Gradient(_) | Control::GradientBy(_));
+        let free = (0..n).filter(|&i| is_free(segment.control[i]));
         self.search.control(free, stiffness, from.gradient);
         self.rate = None;
         self.first_step = 1.0;
@@ -533,7 +599,9 @@ impl Walk<'_> {
     }
 
     /// Carries the point over one increment, in as many steps as it takes.
-    fn advance(&mut self, from: &Goal, to: &Goal, time: f64) -> Result<(), Stop> {
+    /// `period`: its start and its length.
+    fn advance(&mut self, from: &Goal, to: &Goal, period: (f64, f64)) -> Result<(), Stop> {
+        let (time, time_increment) = period;
         let first_call = self.search.calls;
         let mut done = 0.0;
         let mut size = self.first_step;
@@ -553,8 +621,8 @@ impl Walk<'_> {
             let step = Step {
                 start: &self.point,
                 goal: &goal,
-                time: time + done,
-                time_increment: length,
+                time: time + done * time_increment,
+                time_increment: length * time_increment,
             };
             let guess = self.rate.map(|rate| rate.map(|rate| rate * length));
             if self.search.find(&step, guess.as_ref())? {

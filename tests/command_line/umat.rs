@@ -540,12 +540,6 @@ fn mistakes_in_files_are_named() {
             BAD_INPUT,
             "`sidecar`: there is no file",
         ),
-        (
-            "plane_strain",
-            "interface_2d",
-            BAD_INPUT,
-            "is made for plane_strain, axisymmetric, 3d",
-        ),
     ] {
         place.write("driver.toml", good.replacen(from, to, 1));
         let outcome = place.run(&["point", "driver.toml"]);
@@ -567,6 +561,12 @@ fn mistakes_in_files_are_named() {
             "id = \"Poisson\"",
             BAD_INPUT,
             "malformed",
+        ),
+        (
+            "\"plane_strain\", \"axisymmetric\", ",
+            "",
+            BAD_INPUT,
+            "is made for 3d, expected plane_strain",
         ),
         (
             "ntens = [4, 6]",
@@ -592,4 +592,147 @@ fn mistakes_in_files_are_named() {
     let outcome = place.run(&["point", "driver.toml"]);
     assert!(outcome.says("has no sidecar"), "{}", outcome.stderr);
     assert!(complaints.is_empty(), "{complaints}");
+}
+
+/// Input of the IncrementalDriver for a material with E = 2e4 and ν = 0.3.
+fn incremental(place: &Place, test: &str) {
+    place.write("test.inp", format!("out.txt # a remark\n{test}"));
+    place.write(
+        "parameters.inp",
+        "elastic  # E, nu\n2\n2.0d4   E\n0.3     nu\n",
+    );
+    place.write(
+        "initialconditions.inp",
+        "6\n-100.0d0\n-100.0\n-100.0\n0\n0\n0\n0\n",
+    );
+}
+
+#[test]
+fn input_of_the_incremental_driver_is_followed() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    incremental(
+        &place,
+        "*OedometricE1\n4 100 1.0\n-1.0d-3\n*OedometricS1\n4 100 1.0\n-20.0\n\
+         *TriaxialE1\n4 100 2.0 : 2\n-1e-3\n*TriaxialS1\n4 100 1.0\n-30.\n\
+         *TriaxialUq\n4 100 1.0\n24.0\n*TriaxialUEq\n4 100 1.0\n1e-3\n\
+         *PureRelaxation\n2 100 1.0\n*PureCreep\n2 100 1.0\n*UndrainedCreep\n2 100 1.0\n\
+         *CirculatingLoad\n8 100 1.0\n*Cartesian\n0 0 0 0\n0 0 0 0\n0 0 0 0\n0 1e-3 0 0\n\
+         0 0 0 0\n0 0 0 0\n\
+         *Repetition\n2 3\n*LinearLoad\n2 100 1.0\n*Rendulic\n1 5.0\n0 0\n0 0\n0 0\n0 0\n0 0\n\
+         *PureCreep\n1 1 0.5\n*End\nwhatever follows\n",
+    );
+    let outcome = place.run(&[
+        "point",
+        "test.inp",
+        "--umat",
+        "libelastic.so",
+        "--csv",
+        "out.csv",
+    ]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let rows = table(&place.path("out.csv"));
+    assert_eq!(rows.len(), 1 + 6 * 4 + 3 * 2 + 8 + 3 * 3);
+    let (g, lambda) = (2e4 / 2.6, 2e4 * 0.3 / (1.3 * 0.4));
+    // The change of a column between two rows.
+    let close = |from: usize, to: usize, what: &str, expected: f64| {
+        let found = number(&rows[to], what) - number(&rows[from], what);
+        let scale = if what.starts_with("stress") {
+            100.0
+        } else {
+            1e-3
+        };
+        assert!(
+            (found - expected).abs() < 1e-9 * scale,
+            "{what} {from} to {to}: {found} {expected}"
+        );
+    };
+    close(0, 4, "stress_11", -(lambda + 2.0 * g) * 1e-3);
+    close(0, 4, "stress_33", -lambda * 1e-3);
+    close(4, 8, "strain_11", -20.0 / (lambda + 2.0 * g));
+    close(4, 8, "strain_22", 0.0);
+    close(8, 12, "stress_11", -2e4 * 1e-3);
+    close(8, 12, "stress_22", 0.0);
+    close(12, 16, "strain_11", -30.0 / 2e4);
+    // Undrained: q = −Δσ₁₁ + Δσ₂₂ = 3G ε_q, ε_q = −Δε₁₁.
+    close(16, 20, "strain_11", -24.0 / (3.0 * g));
+    close(16, 20, "strain_33", 12.0 / (3.0 * g));
+    close(20, 24, "strain_11", -1e-3);
+    close(20, 24, "stress_11", -2.0 * g * 1e-3);
+    for what in [
+        "stress_11",
+        "stress_22",
+        "stress_12",
+        "strain_11",
+        "strain_12",
+    ] {
+        close(24, 30, what, 0.0);
+        // A whole period.
+        close(30, 38, what, 0.0);
+    }
+    // Its rate in the middle of the first of 8 increments: 2π/8 cos(π/8).
+    let first = std::f64::consts::FRAC_PI_4 * std::f64::consts::FRAC_PI_8.cos() * 1e-3;
+    close(30, 31, "strain_12", first);
+    // Three times −σ₁₁ grows by 5, the radial strain kept.
+    close(38, 47, "stress_11", -15.0);
+    close(38, 47, "strain_22", 0.0);
+    close(38, 47, "strain_11", -15.0 / (lambda + 2.0 * g));
+}
+
+#[test]
+fn what_is_not_read_of_the_incremental_driver_is_said() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    for (test, says) in [
+        (
+            "*DeformationGradient\n1 1 1\n",
+            &["test.inp:2:1", "small strains"][..],
+        ),
+        (
+            "*PureCreep\n1 1 1\n*ObeyRestrictions\n1 1 1\n",
+            &["test.inp:4:1", "linear restrictions"],
+        ),
+        (
+            "*OedometricE1 ? s1 > 3\n1 1 1\n1\n",
+            &["test.inp:2:1", "ends a step early"],
+        ),
+        (
+            "*Oedometric\n1 1 1\n1\n",
+            &["test.inp:2:1", "no keyword", "*OedometricE1"],
+        ),
+        ("*LinearLoad\n1 1 1\n*Haigh\n", &["test.inp:4:1", "*Roscoe"]),
+        (
+            "*LinearLoad\n1 1 1\n*Roscoe\n2 1.0\n",
+            &["test.inp:5:1", "expected 0 (strain) or 1 (stress)"],
+        ),
+        (
+            "*TriaxialE1\n10 x\n",
+            &["test.inp:3:1", "number of increments"],
+        ),
+        (
+            "*TriaxialE1\n10 1 1\n",
+            &["the file ends where the change over the step is expected"],
+        ),
+        ("", &["the test has no step"]),
+    ] {
+        incremental(&place, test);
+        let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{test}: {}", outcome.stderr);
+        for text in says {
+            assert!(outcome.says(text), "{test}: {text}\n{}", outcome.stderr);
+        }
+    }
+    incremental(&place, "*PureCreep\n1 1 1\n");
+    place.write("parameters.inp", "elastic\n3\n1\n1\n1\n");
+    let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    for text in [
+        "parameters.inp:2:1",
+        "3 parameters",
+        "young_modulus, poisson_ratio",
+    ] {
+        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+    }
 }

@@ -14,6 +14,7 @@
 //! this ends too, fixed-point iterations with the elastic operator go on, accelerated after
 //! Anderson (type II).
 
+use super::frame::Frame;
 use super::{N_MAX, Vector};
 use crate::plugin::{BatchFailure, End, Law, Moment, Operator, Start, Strided};
 use abi::status::Outcome;
@@ -106,6 +107,8 @@ pub(super) struct Obstacle {
     pub(super) refusal: Option<Box<BatchFailure>>,
     /// How near the best attempt came.
     pub(super) miss: Option<Miss>,
+    /// What its components are.
+    pub(super) frame: Frame,
     norm: f64,
 }
 
@@ -123,6 +126,8 @@ pub(super) struct Search<'a> {
     origin: Vector,
     /// The elastic operator, for predictors.
     elastic: Vec<f64>,
+    /// The same in the components themselves.
+    elastic_cartesian: Vec<f64>,
     elastic_norm: f64,
     tangent: Operator,
     relaxation: Operator,
@@ -131,6 +136,7 @@ pub(super) struct Search<'a> {
     obstacle: Obstacle,
     /// Which segment and increment it is.
     pub(super) moment: Moment,
+    frame: Frame,
     /// Calls of the law.
     pub(super) calls: usize,
     /// Number of updates that the law called unreliable, and its first words about them.
@@ -155,6 +161,7 @@ impl<'a> Search<'a> {
             stiffness: [0.0; N_MAX],
             origin: [0.0; N_MAX],
             elastic: vec![0.0; n * n],
+            elastic_cartesian: vec![0.0; n * n],
             elastic_norm: 0.0,
             tangent: Operator::Consistent,
             relaxation: Operator::Elastic,
@@ -162,6 +169,7 @@ impl<'a> Search<'a> {
             trial: sample,
             obstacle: Obstacle::default(),
             moment: Moment::default(),
+            frame: Frame::Cartesian,
             calls: 0,
             unreliable: (0, String::new()),
         }
@@ -200,14 +208,31 @@ impl<'a> Search<'a> {
         if !self.evaluate(&step, start.gradient, self.relaxation)? {
             return Ok(None);
         }
-        self.elastic.copy_from_slice(&self.trial.operator);
-        self.elastic_norm = largest(&self.elastic);
+        self.elastic_cartesian.copy_from_slice(&self.trial.operator);
+        self.set_frame(Frame::Cartesian);
         Ok(Some(self.trial.point.flux))
+    }
+
+    /// What the components of points and goals are from now on.
+    pub(super) fn set_frame(&mut self, frame: Frame) {
+        self.frame = frame;
+        self.elastic.copy_from_slice(&self.elastic_cartesian);
+        frame.operator(&mut self.elastic);
+        self.elastic_norm = largest(&self.elastic);
+    }
+
+    /// What the components of points and goals are.
+    pub(super) fn frame(&self) -> Frame {
+        self.frame
     }
 
     /// Why the last step failed.
     pub(super) fn take_obstacle(&mut self) -> Obstacle {
-        std::mem::take(&mut self.obstacle)
+        let frame = self.frame;
+        Obstacle {
+            frame,
+            ..std::mem::take(&mut self.obstacle)
+        }
     }
 
     /// Finds the end of a step, from a guess of the free gradient increments if there is one.
@@ -245,11 +270,15 @@ impl<'a> Search<'a> {
         operator: Operator,
     ) -> Result<bool, Fatal> {
         let rows = Strided::rows(self.n);
+        let frame = self.frame;
+        let gradient_start = frame.cartesian_gradient(&step.start.gradient);
+        let gradient_end = frame.cartesian_gradient(&gradient);
+        let flux_start = frame.cartesian_flux(&step.start.flux);
         let start = Start {
             n_points: 1,
-            gradient: (&step.start.gradient[..self.n], rows),
-            gradient_end: (&gradient[..self.n], rows),
-            flux: (&step.start.flux[..self.n], rows),
+            gradient: (&gradient_start[..self.n], rows),
+            gradient_end: (&gradient_end[..self.n], rows),
+            flux: (&flux_start[..self.n], rows),
             state: &step.start.internal,
             time: step.time,
             time_increment: step.time_increment,
@@ -271,6 +300,10 @@ impl<'a> Search<'a> {
                     self.unreliable.0 += 1;
                 }
                 self.trial.point.gradient = gradient;
+                self.trial.point.flux = frame.flux(&self.trial.point.flux);
+                if operator != Operator::None {
+                    frame.operator(&mut self.trial.operator);
+                }
                 self.assess(step);
                 Ok(true)
             }

@@ -1,9 +1,10 @@
 //! The driver file: reading it, and checking everything that can be checked before the first call.
 
+use super::frame::Frame;
 use super::{N_MAX, Vector};
 use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
-use crate::input::{self, ForeignKeys, Named, ParameterTable, ParameterValue};
+use crate::input::{self, BuiltLaw, ForeignKeys, Named, ParameterTable, ParameterValue};
 use crate::lock::Pins;
 use crate::plugin::adapter::Adapter;
 use crate::plugin::{Law, SearchPath, Strided};
@@ -132,6 +133,10 @@ pub(super) enum Control {
     Flux(f64),
     /// The flux changes by −stiffness × jump.
     Stiffness(f64),
+    /// Change of the gradient over the segment.
+    GradientBy(f64),
+    /// Change of the flux over the segment.
+    FluxBy(f64),
 }
 
 /// A stretch of the path.
@@ -139,6 +144,14 @@ pub(super) enum Control {
 pub(super) struct Segment {
     pub(super) increments: usize,
     pub(super) control: [Control; N_MAX],
+    /// Number of the step that it is part of, from 1.
+    pub(super) step: u32,
+    /// Increments of that step before it.
+    pub(super) first: usize,
+    /// What the components are.
+    pub(super) frame: Frame,
+    /// Time of an increment.
+    pub(super) time_increment: f64,
 }
 
 /// Names of gradient and flux of a hypothesis.
@@ -256,6 +269,49 @@ impl Driver {
         };
         driver.internal = driver.initial_internal(&initial.internal)?;
         driver.check_figures(source)?;
+        Ok(driver)
+    }
+
+    /// A driver whose path is not written in a driver file.
+    pub(super) fn assembled(
+        source: &Source,
+        id: Spanned<String>,
+        built: BuiltLaw,
+        (flux, internal): (Vector, Vec<f64>),
+        segments: Vec<Segment>,
+    ) -> Result<Self, Error> {
+        let file = File {
+            hypothesis: Spanned::new(0..0, built.law.hypothesis().name().to_owned()),
+            law: id,
+            sha256: None,
+            adapter: None,
+            library: None,
+            sidecar: None,
+            in_process: None,
+            record: None,
+            title: String::new(),
+            law_path: Vec::new(),
+            parameters: ParameterTable::new(),
+            initial: None,
+            segment: Vec::new(),
+            figures: Vec::new(),
+        };
+        let mut driver = Self {
+            law: built.law,
+            warnings: built.warnings,
+            flux,
+            internal: Vec::new(),
+            segments,
+            variant: None,
+            title: String::new(),
+            figures: Vec::new(),
+            source: source.clone(),
+            place_of_initial: 0..0,
+            file,
+        };
+        // The law may refuse the stress, whatever its variables.
+        driver.initial_internal(&Named::new())?;
+        driver.internal = internal;
         Ok(driver)
     }
 
@@ -474,6 +530,7 @@ fn segments(source: &Source, file: &File, hypothesis: Hypothesis) -> Result<Vec<
             .into());
     }
     let mut total = 0_usize;
+    let mut number = 0;
     file.segment
         .iter()
         .map(|table| {
@@ -511,9 +568,14 @@ fn segments(source: &Source, file: &File, hypothesis: Hypothesis) -> Result<Vec<
                         .into());
                 }
             }
+            number += 1;
             Ok(Segment {
                 increments,
                 control,
+                step: number,
+                first: 0,
+                frame: Frame::Cartesian,
+                time_increment: 1.0,
             })
         })
         .collect()

@@ -53,7 +53,7 @@ pub(super) fn run(
     let mut text = String::new();
     let mut rows = Vec::new();
     for (number, group) in interfaces {
-        let interface = Interface::new(case, &model, number, group)?;
+        let interface = Interface::new(&model, number, group)?;
         let scratch = Scratch::new(folder)?;
         let tried = interface.try_all(case, &scratch, say);
         text += &interface.table(name, &tried);
@@ -100,7 +100,7 @@ struct Answer {
 }
 
 impl<'a> Interface<'a> {
-    fn new(case: &Case, model: &Model, number: usize, group: &'a Group) -> Result<Self, Error> {
+    fn new(model: &Model, number: usize, group: &'a Group) -> Result<Self, Error> {
         let mut swaps = model.swaps.iter().flatten();
         let law = swaps
             .rfind(|(swapped, _)| *swapped == number)

@@ -158,7 +158,7 @@ impl Sidecar {
             is_thread_safe: file.thread_safe,
             law: LawDescription {
                 name: or(file.name, &id),
-                version: or(file.version, "unknown"),
+                version: or(file.version, "unversioned"),
                 author: or(file.author, "unknown"),
                 licence: or(file.licence, "unknown licence"),
                 doc: file.doc,

@@ -1,0 +1,440 @@
+//! Input of the IncrementalDriver of A. Niemunis, which lies beside most soil models written as
+//! UMATs: `test.inp`, `parameters.inp` and `initialconditions.inp` in one folder.
+//!
+//! Lines are read as Fortran does: the numbers asked for, separated by blanks or commas, and
+//! whatever follows on the line is a remark. Components are 11 22 33 12 13 23, tension positive,
+//! γ = 2ε. What is not read is refused with its line.
+
+use super::file::{Control, Driver, Segment};
+use super::frame::Frame;
+use super::{N_MAX, Vector};
+use crate::error::{Error, Source};
+use crate::input::{self, ParameterTable, ParameterValue};
+use crate::lock::Pins;
+use crate::plugin::SearchPath;
+use crate::plugin::adapter::{Adapter, Foreign};
+use abi::Hypothesis;
+use std::f64::consts::TAU;
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+
+/// Most increments of one file; a slip of the pen beyond.
+const MAX_INCREMENTS: usize = 10_000_000;
+
+/// Lines of a file, with their places.
+struct Lines<'a> {
+    source: &'a Source,
+    rest: std::vec::IntoIter<(Range<usize>, &'a str)>,
+    end: usize,
+}
+
+impl<'a> Lines<'a> {
+    fn new(source: &'a Source) -> Self {
+        let text = source.text();
+        let mut at = 0;
+        let mut lines = Vec::new();
+        for line in text.split_inclusive('\n') {
+            let shown = line.trim_end();
+            lines.push((at..at + shown.len(), shown));
+            at += line.len();
+        }
+        Self {
+            source,
+            rest: lines.into_iter(),
+            end: text.len(),
+        }
+    }
+
+    /// The next line that is not blank.
+    fn next(&mut self) -> Option<(Range<usize>, &'a str)> {
+        self.rest.find(|(_, line)| !line.trim().is_empty())
+    }
+
+    fn expect(&mut self, what: &str) -> Result<(Range<usize>, &'a str), Error> {
+        self.next().ok_or_else(|| {
+            let message = format!("the file ends where {what} is expected");
+            self.source.error(self.end..self.end, message).into()
+        })
+    }
+
+    /// `N` numbers at the start of the next line.
+    fn numbers<const N: usize>(&mut self, what: &str) -> Result<(Range<usize>, [f64; N]), Error> {
+        let (at, line) = self.expect(what)?;
+        let mut words = line
+            .split(|c: char| c.is_whitespace() || c == ',')
+            .filter(|word| !word.is_empty());
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            *number = words.next().and_then(real).ok_or_else(|| {
+                let message = format!("expected {what}");
+                Error::from(self.source.error(at.clone(), message))
+            })?;
+        }
+        Ok((at, numbers))
+    }
+
+    fn count(&mut self, what: &str) -> Result<usize, Error> {
+        let (at, [n]) = self.numbers(what)?;
+        self.whole(&at, n, what)
+    }
+
+    fn whole(&self, at: &Range<usize>, n: f64, what: &str) -> Result<usize, Error> {
+        if n.fract() == 0.0 && (0.0..=MAX_INCREMENTS as f64).contains(&n) {
+            return Ok(n as usize);
+        }
+        let message = format!("{n} is no number for {what}");
+        Err(self.source.error(at.clone(), message).into())
+    }
+
+    fn refuse<T>(&self, at: Range<usize>, message: impl Into<String>) -> Result<T, Error> {
+        Err(self.source.error(at, message).into())
+    }
+}
+
+/// A number as Fortran writes it: `1.5d-3` too. A colon ends it.
+fn real(word: &str) -> Option<f64> {
+    let word = word.split(':').next()?.replace(['d', 'D'], "e");
+    word.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+/// A keyword with its step.
+#[derive(Clone, Debug)]
+struct Step {
+    increments: usize,
+    /// Time of the whole step.
+    time: f64,
+    frame: Frame,
+    /// Of every component whether its stress is controlled, and its change over the step.
+    linear: [(bool, f64); N_MAX],
+    /// Amplitude and phase of every component, of `*CirculatingLoad`.
+    harmonic: Option<[(f64, f64); N_MAX]>,
+}
+
+impl Driver {
+    /// Reads input of the IncrementalDriver: the test, and the two files beside it. The material is
+    /// this UMAT.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`]; [`Error::Input`] at what is not understood or cannot be done;
+    /// [`Error::Plugin`].
+    pub fn read_incremental(test: &Path, umat: &Path) -> Result<Self, Error> {
+        let source = Source::read(test)?;
+        let segments = segments(&source)?;
+        let foreign = Foreign {
+            adapter: Adapter::Umat,
+            library: std::path::absolute(umat).unwrap_or_else(|_| umat.to_owned()),
+            sidecar: None,
+            in_process: false,
+            record: None,
+        };
+        let library = crate::plugin::Library::open_foreign(&foreign, |_| Ok(()))?;
+        let id = library.laws().next().map(|law| law.id.clone());
+        let id = Spanned::new(0..0, id.unwrap_or_default());
+        let search = SearchPath::new(&[]).pinned(Pins::default());
+        let loaded = input::find_law(&source, &search, &id, Some(&foreign))?;
+        let ids: Vec<String> = loaded
+            .description()
+            .parameters
+            .iter()
+            .map(|p| p.id.clone())
+            .collect();
+
+        let parameters_file = Source::read(&test.with_file_name("parameters.inp"))?;
+        let (name, parameters) = parameters(&parameters_file, &ids)?;
+        let mut built = input::build_law(
+            &parameters_file,
+            loaded,
+            &id,
+            Hypothesis::ThreeD,
+            &parameters,
+        )?;
+        if !name.eq_ignore_ascii_case(id.get_ref()) {
+            built.warnings.push(format!(
+                "the material is called `{name}` in {}; the routine is told the name in its \
+                 sidecar",
+                parameters_file.path().display()
+            ));
+        }
+        let initial = Source::read(&test.with_file_name("initialconditions.inp"))?;
+        let (flux, internal) = initial_conditions(&initial, built.law.n_states())?;
+        Self::assembled(&source, id, built, (flux, internal), segments)
+    }
+}
+
+/// Name of the material, and the parameters in their declared order.
+fn parameters(source: &Source, ids: &[String]) -> Result<(String, ParameterTable), Error> {
+    let mut lines = Lines::new(source);
+    let (_, name) = lines.expect("the name of the material")?;
+    let name = name.split('#').next().unwrap_or_default().trim();
+    let (at, [n]) = lines.numbers("the number of parameters")?;
+    let n = lines.whole(&at, n, "the number of parameters")?;
+    if n != ids.len() {
+        let message = format!(
+            "{n} parameters, the sidecar of the library names {}: {}",
+            ids.len(),
+            ids.join(", ")
+        );
+        return lines.refuse(at, message);
+    }
+    let mut table = ParameterTable::new();
+    for id in ids {
+        let (at, [value]) = lines.numbers(&format!("the parameter `{id}`"))?;
+        table.insert(
+            Spanned::new(at.clone(), id.clone()),
+            Spanned::new(at, ParameterValue::Number(value)),
+        );
+    }
+    Ok((name.to_owned(), table))
+}
+
+/// Stress and internal variables; those that the file lacks are 0.
+fn initial_conditions(source: &Source, n_states: usize) -> Result<(Vector, Vec<f64>), Error> {
+    let mut lines = Lines::new(source);
+    let n = lines.count("the number of stress components")?;
+    if n > N_MAX {
+        return lines.refuse(
+            0..0,
+            format!("{n} stress components, at most {N_MAX} are known"),
+        );
+    }
+    let mut stress = [0.0; N_MAX];
+    for value in &mut stress[..n] {
+        [*value] = lines.numbers("a stress component")?.1;
+    }
+    let (at, [n]) = lines.numbers("the number of state variables")?;
+    let n = lines.whole(&at, n, "the number of state variables")?;
+    if n != n_states {
+        let message = format!("{n} state variables, the sidecar of the library names {n_states}");
+        return lines.refuse(at, message);
+    }
+    let mut internal = vec![0.0; n];
+    for value in &mut internal {
+        let Some((at, line)) = lines.next() else {
+            break;
+        };
+        let word = line.split(|c: char| c.is_whitespace() || c == ',');
+        let Some(number) = word
+            .into_iter()
+            .find(|word| !word.is_empty())
+            .and_then(real)
+        else {
+            return lines.refuse(at, "expected a state variable");
+        };
+        *value = number;
+    }
+    Ok((stress, internal))
+}
+
+fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
+    let mut lines = Lines::new(source);
+    // The name of the output file; `--csv` says here where rows go.
+    lines.expect("the name of the output file")?;
+    let mut steps = Vec::new();
+    let mut total = 0;
+    while let Some((at, line)) = lines.next() {
+        let keyword = keyword(&lines, &at, line)?;
+        if keyword == "*End" {
+            break;
+        }
+        let first = steps.len();
+        if keyword == "*Repetition" {
+            let (at, [n_steps, n_times]) = lines.numbers("number of steps and of repetitions")?;
+            let n_steps = lines.whole(&at, n_steps, "the number of steps")?;
+            let n_times = lines.whole(&at, n_times, "the number of repetitions")?;
+            for _ in 0..n_steps {
+                let (at, line) = lines.expect("a step that is repeated")?;
+                let name = self::keyword(&lines, &at, line)?;
+                steps.push(step(&mut lines, at, name)?);
+            }
+            let repeated = steps[first..].to_vec();
+            let each: usize = repeated.iter().map(|step: &Step| step.increments).sum();
+            if each.saturating_mul(n_times).saturating_add(total) > MAX_INCREMENTS {
+                return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
+            }
+            if n_times == 0 {
+                steps.truncate(first);
+            }
+            for _ in 1..n_times {
+                steps.extend_from_slice(&repeated);
+            }
+        } else {
+            steps.push(step(&mut lines, at.clone(), keyword)?);
+        }
+        total += steps[first..]
+            .iter()
+            .map(|step| step.increments)
+            .sum::<usize>();
+        if total > MAX_INCREMENTS {
+            return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
+        }
+    }
+    if steps.is_empty() {
+        return lines.refuse(0..0, "the test has no step");
+    }
+    let numbered = steps.iter().zip(1..);
+    Ok(numbered
+        .flat_map(|(step, number)| step.segments(number))
+        .collect())
+}
+
+/// The keyword of a line.
+fn keyword<'a>(lines: &Lines<'_>, at: &Range<usize>, line: &'a str) -> Result<&'a str, Error> {
+    if line.contains('?') {
+        return lines.refuse(
+            at.clone(),
+            "a condition that ends a step early is not understood here",
+        );
+    }
+    Ok(line.split_whitespace().next().unwrap_or_default())
+}
+
+fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, Error> {
+    let refused = match keyword {
+        "*DeformationGradient" => "laws here take small strains, no deformation gradients",
+        "*ObeyRestrictions" => {
+            "linear restrictions between stress and strain are not understood here; a \
+             segment of a driver file controls each component by itself"
+        }
+        "*PerturbationsS" | "*PerturbationsE" => {
+            "response envelopes start every increment anew, which a path here cannot"
+        }
+        "*RandomWalk" => "random paths cannot be repeated",
+        name if name.starts_with("*ImportFile") => "paths from other files are not read",
+        _ => "",
+    };
+    if !refused.is_empty() {
+        return lines.refuse(at, format!("`{keyword}`: {refused}"));
+    }
+    let known = [
+        "*LinearLoad",
+        "*CirculatingLoad",
+        "*OedometricE1",
+        "*OedometricS1",
+        "*TriaxialE1",
+        "*TriaxialS1",
+        "*TriaxialUEq",
+        "*TriaxialUq",
+        "*PureRelaxation",
+        "*PureCreep",
+        "*UndrainedCreep",
+    ];
+    if !known.contains(&keyword) {
+        let message = format!("`{keyword}` is no keyword of a step");
+        let error = lines.source.error(at, message);
+        return Err(error.hint(format!("known are {}", known.join(", "))).into());
+    }
+    let (at, [increments, _, time]) =
+        lines.numbers("number of increments, most iterations, time of the step")?;
+    let mut step = Step {
+        increments: lines.whole(&at, increments, "the number of increments")?,
+        time,
+        frame: Frame::Cartesian,
+        linear: [(false, 0.0); N_MAX],
+        harmonic: None,
+    };
+    if step.increments == 0 {
+        return lines.refuse(at, "a step has at least one increment");
+    }
+    match keyword {
+        "*LinearLoad" => {
+            step.frame = frame(lines)?;
+            for component in &mut step.linear {
+                let (at, [is_stress, change]) = lines.numbers("0 or 1, and a change")?;
+                *component = (flag(lines, &at, is_stress)?, change);
+            }
+        }
+        "*CirculatingLoad" => {
+            step.frame = frame(lines)?;
+            let mut harmonic = [(0.0, 0.0); N_MAX];
+            for (component, wave) in step.linear.iter_mut().zip(&mut harmonic) {
+                let (at, [is_stress, amplitude, phase, change]) =
+                    lines.numbers("0 or 1, amplitude, phase and change")?;
+                *component = (flag(lines, &at, is_stress)?, change);
+                *wave = (amplitude, phase);
+            }
+            step.harmonic = Some(harmonic);
+        }
+        "*PureRelaxation" => {}
+        "*PureCreep" => step.linear = [(true, 0.0); N_MAX],
+        "*UndrainedCreep" => {
+            step.frame = Frame::Roscoe;
+            step.linear[1..].fill((true, 0.0));
+        }
+        _ => {
+            let (_, [change]) = lines.numbers("the change over the step")?;
+            // Which components are under stress control, and which one changes.
+            let (frame, stress, changed) = match keyword {
+                "*OedometricE1" => (Frame::Cartesian, 0..0, 0),
+                "*OedometricS1" => (Frame::Cartesian, 0..1, 0),
+                "*TriaxialE1" => (Frame::Cartesian, 1..3, 0),
+                "*TriaxialS1" => (Frame::Cartesian, 0..3, 0),
+                "*TriaxialUEq" => (Frame::Roscoe, 0..0, 1),
+                _ => (Frame::Roscoe, 1..2, 1),
+            };
+            step.frame = frame;
+            for component in &mut step.linear[stress] {
+                component.0 = true;
+            }
+            step.linear[changed].1 = change;
+        }
+    }
+    Ok(step)
+}
+
+fn flag(lines: &Lines<'_>, at: &Range<usize>, value: f64) -> Result<bool, Error> {
+    match value {
+        0.0 => Ok(false),
+        1.0 => Ok(true),
+        _ => lines.refuse(at.clone(), "expected 0 (strain) or 1 (stress)"),
+    }
+}
+
+fn frame(lines: &mut Lines<'_>) -> Result<Frame, Error> {
+    let (at, line) = lines.expect("the coordinates")?;
+    match line.split_whitespace().next().unwrap_or_default() {
+        "*Cartesian" => Ok(Frame::Cartesian),
+        "*Roscoe" => Ok(Frame::Roscoe),
+        "*RoscoeIsomorph" => Ok(Frame::RoscoeIsomorph),
+        "*Rendulic" => Ok(Frame::Rendulic),
+        other => lines.refuse(
+            at,
+            format!("`{other}`: coordinates are *Cartesian, *Roscoe, *RoscoeIsomorph, *Rendulic"),
+        ),
+    }
+}
+
+impl Step {
+    /// One segment, or as many as there are increments where they are not equal.
+    fn segments(&self, number: u32) -> Vec<Segment> {
+        let n = self.increments;
+        let segment = |increments: usize, first: usize, change: &dyn Fn(usize) -> f64| Segment {
+            increments,
+            control: std::array::from_fn(|i| {
+                if self.linear[i].0 {
+                    Control::FluxBy(change(i))
+                } else {
+                    Control::GradientBy(change(i))
+                }
+            }),
+            step: number,
+            first,
+            frame: self.frame,
+            time_increment: self.time / n as f64,
+        };
+        let Some(harmonic) = &self.harmonic else {
+            return vec![segment(n, 0, &|i| self.linear[i].1)];
+        };
+        // One period in the step; its rate is taken in the middle of the increment.
+        let angle = TAU / n as f64;
+        (0..n)
+            .map(|k| {
+                segment(1, k, &|i| {
+                    let (amplitude, phase) = harmonic[i];
+                    let rate = f64::cos(angle * (k as f64 + 0.5) + phase);
+                    angle * amplitude * rate + self.linear[i].1 / n as f64
+                })
+            })
+            .collect()
+    }
+}
