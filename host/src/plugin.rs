@@ -271,7 +271,7 @@ impl LoadedLaw {
         match self.library.laws[self.number].1 {
             Origin::Here(law) => Ok(law),
             #[cfg(unix)]
-            Origin::Apart => Err(std::io::Error::other("the law is in a worker process")),
+            Origin::Apart { .. } => Err(std::io::Error::other("the law is in a worker process")),
         }
     }
 
