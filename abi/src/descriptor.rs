@@ -405,6 +405,11 @@ impl Variable {
         self
     }
 
+    /// The declaration as it crosses the boundary.
+    pub const fn raw(&self) -> &raw::Variable {
+        &self.0
+    }
+
     const fn with_components(mut self, shape: raw::Shape, names: &'static [*const c_char]) -> Self {
         self.0.shape = shape;
         self.0.n_components = names.len() as u32;

@@ -1,14 +1,20 @@
 //! From the C boundary to the traits of [`law`](crate::law) and back: pointers become arrays,
-//! failures become status codes and messages, panics stop here. This is one of the two files of
-//! the project that hold `unsafe` code; a law's crate forbids it and uses
-//! [`export_laws!`](crate::export_laws).
+//! failures become status codes and messages, panics stop here. This file with its modules is one of
+//! the two places of the project that hold `unsafe` code; a law's crate forbids it and uses
+//! [`export_laws!`](crate::export_laws). The modules export the same laws to other programs, with
+//! [`export_foreign!`](crate::export_foreign).
 #![expect(
     unsafe_code,
     clippy::multiple_unsafe_ops_per_block,
     reason = "the plugin's side of the C boundary; offset and access are one operation"
 )]
 
-use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameter, Parameters};
+pub mod calculix;
+pub mod foreign;
+pub mod mfront;
+pub mod umat;
+
+use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameter, Parameters, Variable};
 use crate::law::{
     ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, SolidPoint, SolidResponse, Tangent,
 };
@@ -160,6 +166,8 @@ pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
     type Parameters: Parameters;
     /// Formulations.
     const FORMULATIONS: &'static [Formulation];
+    /// Internal variables, the same in all formulations.
+    const STATE: &'static [Variable];
     /// Fixes the parameters.
     ///
     /// # Errors
@@ -184,6 +192,11 @@ pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
         i: usize,
         tangent: Tangent,
     ) -> Result<Option<&'static str>, Failure>;
+    /// Carries one point of another program over its increment.
+    ///
+    /// # Errors
+    /// Why it cannot; nothing is written then.
+    fn carry(&self, point: &foreign::Point, tangent: Tangent) -> Result<foreign::Answer, Failure>;
 }
 
 /// Adapter for laws of solids.
@@ -244,6 +257,7 @@ impl<L: ContinuumLaw> Exported for Continuum<L> {
     const FORMULATIONS: &'static [Formulation] = ContinuumFormulations::<L>::TABLE
         .split_at(L::HYPOTHESES.len())
         .0;
+    const STATE: &'static [Variable] = <L::State as InternalVariables>::TABLE;
 
     fn new(parameters: L::Parameters) -> Result<Self, String> {
         L::new(parameters)
@@ -276,6 +290,14 @@ impl<L: ContinuumLaw> Exported for Continuum<L> {
             update_solid::<L, 6, PACKED>(&self.0, access, i, tangent)
         } else {
             update_solid::<L, 4, PACKED>(&self.0, access, i, tangent)
+        }
+    }
+
+    fn carry(&self, point: &foreign::Point, tangent: Tangent) -> Result<foreign::Answer, Failure> {
+        if point.n_components == 6 {
+            foreign::carry_solid::<L, 6>(&self.0, point, tangent)
+        } else {
+            foreign::carry_solid::<L, 4>(&self.0, point, tangent)
         }
     }
 }
@@ -325,6 +347,7 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
     const DESCRIPTION: Description = L::DESCRIPTION;
     type Parameters = L::Parameters;
     const FORMULATIONS: &'static [Formulation] = &Self::TABLE;
+    const STATE: &'static [Variable] = <L::State as InternalVariables>::TABLE;
 
     fn new(parameters: L::Parameters) -> Result<Self, String> {
         L::new(parameters)
@@ -366,6 +389,10 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
             (tangent != Tangent::None).then_some(&end.tangent),
         )?;
         Ok(end.unreliable)
+    }
+
+    fn carry(&self, point: &foreign::Point, tangent: Tangent) -> Result<foreign::Answer, Failure> {
+        foreign::carry_interface(&self.0, point, tangent)
     }
 }
 

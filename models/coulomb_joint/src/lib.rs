@@ -181,3 +181,4 @@ fn open(state: State) -> InterfaceResponse<State> {
 }
 
 abi::export_laws!(interface CoulombJoint);
+abi::export_foreign!(interface CoulombJoint);

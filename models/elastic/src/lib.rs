@@ -80,3 +80,4 @@ impl ContinuumLaw for Elastic {
 }
 
 abi::export_laws!(continuum Elastic);
+abi::export_foreign!(continuum Elastic);

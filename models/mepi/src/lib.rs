@@ -18,3 +18,5 @@ pub use mepi::Mepi;
 pub use mepi_softening::MepiSoftening;
 
 abi::export_laws!(interface Mepi, interface MepiSoftening);
+abi::export_foreign!(interface Mepi);
+abi::export_foreign!(interface MepiSoftening);

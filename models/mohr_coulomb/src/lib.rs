@@ -218,3 +218,4 @@ fn check(p: &Parameters) -> Result<(), Refusal> {
 }
 
 abi::export_laws!(continuum MohrCoulomb);
+abi::export_foreign!(continuum MohrCoulomb);

@@ -203,3 +203,4 @@ fn check(p: &Parameters) -> Result<(), Refusal> {
 }
 
 abi::export_laws!(continuum OrientedMohrCoulomb);
+abi::export_umat!(OrientedMohrCoulomb);

@@ -1,0 +1,147 @@
+//! The entry of CalculiX' own material routines, which it looks up in a library for a material
+//! named `@LIBRARY_CALCULIX`. (A material named `@ABAQUS_LIBRARY_UMAT` is called as in
+//! [`umat`](super::umat).)
+//!
+//! Always three dimensions. Strains are tensor components, internal variables stand in an array of
+//! the whole model, and the tangent is symmetric: of an unsymmetric one CalculiX gets the
+//! symmetric part, as its own interface to Abaqus' routines makes it. That slows the iteration of
+//! laws with non-associated flow and does not change the stress.
+
+use super::Continuum;
+use super::foreign::{Laws, Point, complain, offers};
+use super::umat::{or, row};
+use crate::descriptor::{Hypothesis, InternalVariables};
+use crate::law::{ContinuumLaw, Tangent};
+use std::ffi::c_int;
+
+/// The arguments of CalculiX' material routine that a law needs; none is null.
+#[expect(missing_docs, reason = "the names are CalculiX'")]
+#[derive(Debug)]
+pub struct Call {
+    pub iel: *const c_int,
+    pub iint: *const c_int,
+    pub kode: *const c_int,
+    pub elconloc: *const f64,
+    pub emec: *const f64,
+    pub emec0: *const f64,
+    pub dtime: *const f64,
+    pub time: *const f64,
+    pub ttime: *const f64,
+    pub icmd: *const c_int,
+    pub ielas: *const c_int,
+    pub mi: *const c_int,
+    pub nstate: *const c_int,
+    pub xstateini: *const f64,
+    pub xstate: *mut f64,
+    pub stre: *mut f64,
+    pub stiff: *mut f64,
+    pub iorien: *const c_int,
+    pub pnewdt: *mut f64,
+}
+
+/// Answers a call. Without an answer the stress becomes NaN and `pnewdt` the step factor; with one,
+/// `pnewdt` stays, since another point may have set it.
+///
+/// # Safety
+/// The pointers are as CalculiX passes them.
+pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
+    // SAFETY: `CalculiX`' interface: `stre` has 6 components, `stiff` 21.
+    unsafe {
+        match carried(laws, call) {
+            Ok((stress, operator)) => {
+                for (i, value) in stress.into_iter().enumerate() {
+                    *call.stre.add(i) = value;
+                }
+                if or(call.icmd, 0) != ONLY_STRESS {
+                    // The upper triangle, column by column.
+                    let triangle = (0..6).flat_map(|j| (0..=j).map(move |i| (i, j)));
+                    for (place, (i, j)) in triangle.enumerate() {
+                        let mean = 0.5 * (operator[6 * i + j] + operator[6 * j + i]);
+                        *call.stiff.add(place) = mean;
+                    }
+                }
+            }
+            Err(factor) => {
+                for i in 0..6 {
+                    *call.stre.add(i) = f64::NAN;
+                }
+                if !call.pnewdt.is_null() {
+                    *call.pnewdt = factor;
+                }
+            }
+        }
+    }
+}
+
+/// `icmd` of a call that wants no stiffness.
+const ONLY_STRESS: c_int = 3;
+
+type StressAndOperator = ([f64; 6], [f64; 36]);
+
+/// # Safety
+/// As [`answer`].
+unsafe fn carried<L: ContinuumLaw>(
+    laws: &Laws<Continuum<L>>,
+    call: &Call,
+) -> Result<StressAndOperator, f64> {
+    let id = L::DESCRIPTION.id;
+    if !offers::<Continuum<L>>(Hypothesis::ThreeD) {
+        complain(id, format_args!("CalculiX needs three dimensions, which it does not offer"));
+        return Err(0.25);
+    }
+    let n_states = <L::State as InternalVariables>::TABLE.len();
+    // SAFETY: null or valid, as `CalculiX`' interface says; so are those below.
+    let (n_state, iorien, icmd, ielas) = unsafe {
+        (
+            or(call.nstate, 0),
+            or(call.iorien, 0),
+            or(call.icmd, 0),
+            or(call.ielas, 0),
+        )
+    };
+    if iorien != 0 {
+        complain(id, format_args!("it takes no *ORIENTATION by this entry"));
+        return Err(0.25);
+    }
+    if (n_state.max(0) as usize) < n_states {
+        complain(id, format_args!("*DEPVAR {n_state}, the law has {n_states} internal variables"));
+        return Err(0.25);
+    }
+    // SAFETY: there are −kode − 100 constants, and one block of `nstate` variables for each of the
+    // `mi(1)` points of each element; elements and points count from 1.
+    let (given, point) = unsafe {
+        let given = match -or(call.kode, -100) - 100 {
+            n if n > 0 => std::slice::from_raw_parts(call.elconloc, n as usize),
+            _ => &[],
+        };
+        let block = (or(call.iint, 1) - 1) as isize
+            + or(call.mi, 1) as isize * (or(call.iel, 1) - 1) as isize;
+        let place = n_state as isize * block;
+        let (begin, end) = (row(call.emec0, 6), row(call.emec, 6));
+        let gamma = |i: usize, value: f64| if i < 3 { value } else { 2.0 * value };
+        let dtime = or(call.dtime, 0.0);
+        let point = Point {
+            n_components: 6,
+            gradient: std::array::from_fn(|i| gamma(i, begin[i])),
+            increment: std::array::from_fn(|i| gamma(i, end[i] - begin[i])),
+            flux: row(call.stre, 6),
+            state0: call.xstateini.offset(place),
+            state1: call.xstate.offset(place),
+            time: or(call.ttime, 0.0) + or(call.time, 0.0) - dtime,
+            time_increment: dtime,
+        };
+        (given, point)
+    };
+    let tangent = match (icmd, ielas) {
+        (ONLY_STRESS, _) => Tangent::None,
+        (_, 1) => Tangent::Elastic,
+        _ => Tangent::Consistent,
+    };
+    let mut factor = 0.25;
+    laws.carry(given, &point, tangent, |trouble| {
+        factor = trouble.factor();
+        complain(id, format_args!("{trouble}"));
+    })
+    .map(|answer| (answer.flux, answer.operator))
+    .ok_or(factor)
+}

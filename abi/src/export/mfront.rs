@@ -1,0 +1,608 @@
+//! MFront's generic behaviours: the symbols that MGIS, and programs built on it, read, and the
+//! call for one point.
+//!
+//! The behaviour is named as the Rust type. Names of properties and variables are the ids in
+//! MFront's spelling: `young_modulus` is `YoungModulus`. Parameters that must be given are
+//! *material properties*; those with a default, and optional ones, are MFront's *parameters*, which
+//! hold for the whole process and are set with `<behaviour>_setParameter`.
+//!
+//! Gradients and fluxes are Kelvin–Mandel vectors there: shear strain γ/√2, shear stress √2 τ.
+
+use super::foreign::{Laws, MOST_PARAMETERS, Point, has_default, tell};
+use super::Exported;
+use super::umat::row;
+use crate::descriptor::{Hypothesis, Parameters};
+use crate::law::Tangent;
+use std::ffi::{CStr, c_char, c_int};
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::fmt;
+use std::ptr::null;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Exports a law as a behaviour of MFront's generic interface; see [`export_foreign!`](crate::export_foreign).
+#[macro_export]
+macro_rules! export_mfront {
+    (continuum $law:ident) => {
+        $crate::export_mfront!(continuum $law in Tridimensional PlaneStrain Axisymmetrical);
+    };
+    (continuum $law:ident in $($hypothesis:ident)+) => {
+        $crate::export_mfront!(@behaviour $law, $crate::export::Continuum<$law>,
+            [Strain Stress StandardStrainBased], [$($hypothesis)+]);
+    };
+    (interface $law:ident) => {
+        $crate::export_mfront!(@behaviour $law, $crate::export::Interface<$law>,
+            [OpeningDisplacement CohesiveForce CohesiveZone], [PlaneStrain Axisymmetrical]);
+    };
+    (@behaviour $law:ident, $exported:ty, [$gradient:ident $flux:ident $kind:ident],
+        [$($hypothesis:ident)+]) => {
+        const _: () = {
+            use $crate::export::mfront as m;
+            type Law = $exported;
+
+            static LAWS: $crate::export::foreign::Laws<Law> =
+                $crate::export::foreign::Laws::new();
+            static SETTINGS: m::Settings = m::Settings::of::<Law>();
+
+            $crate::export_mfront!(@numbers $law u16 [
+                "_mfront_mkt" = 1,
+                "_api_version" = 1,
+                "_BehaviourType" = m::Kind::$kind.behaviour_type(),
+                "_BehaviourKinematic" = m::Kind::$kind.kinematic(),
+                "_SymmetryType" = 0,
+                "_ElasticSymmetryType" = 0,
+                "_nModellingHypotheses" = [$(stringify!($hypothesis)),+].len() as u16,
+                "_nGradients" = 1,
+                "_nThermodynamicForces" = 1,
+                "_nTangentOperatorBlocks" = 2,
+                "_nMaterialProperties" = m::n_properties::<Law>() as u16,
+                "_nInternalStateVariables" = m::n_states::<Law>() as u16,
+                "_nExternalStateVariables" = 0,
+                "_TemperatureRemovedFromExternalStateVariables" = 0,
+                "_nParameters" = m::n_settings::<Law>() as u16,
+                "_requiresStiffnessTensor" = 0,
+                "_requiresThermalExpansionCoefficientTensor" = 0,
+                "_ComputesInternalEnergy" = 0,
+                "_ComputesDissipatedEnergy" = 0,
+                "_nInitializeFunctions" = 0,
+                "_nPostProcessings" = 0,
+                "_UsableInPurelyImplicitResolution" = 1,
+            ]);
+            $crate::export_mfront!(@texts $law [
+                "_mfront_ept" = stringify!($law),
+                "_mfront_interface" = "Generic",
+                "_unit_system" = "",
+                "_src" = "",
+            ]);
+            $crate::export_mfront!(@words $law [
+                "_ModellingHypotheses" = $($hypothesis)+,
+                "_Gradients" = $gradient,
+                "_ThermodynamicForces" = $flux,
+                "_TangentOperatorBlocks" = $flux $gradient,
+            ]);
+            $crate::export_mfront!(@names $law [
+                "_MaterialProperties" = property_names, n_properties,
+                "_InternalStateVariables" = state_names, n_states,
+                "_Parameters" = setting_names, n_settings,
+            ]);
+            $crate::export_mfront!(@types $law [
+                "_GradientsTypes" = [m::Kind::$kind.variable_type(), 0],
+                "_ThermodynamicForcesTypes" = [m::Kind::$kind.variable_type(), 0],
+                "_InternalStateVariablesTypes" = [0; m::n_states::<Law>() + 1],
+                "_ParametersTypes" = [0; m::n_settings::<Law>() + 1],
+            ]);
+
+            #[unsafe(export_name = concat!(stringify!($law), "_setParameter"))]
+            pub unsafe extern "C" fn set(
+                name: *const ::std::ffi::c_char,
+                value: f64,
+            ) -> ::std::ffi::c_int {
+                // SAFETY: passed on to the caller.
+                unsafe { SETTINGS.set::<Law>(name, value) }
+            }
+            #[unsafe(export_name = concat!(stringify!($law), "_setOutOfBoundsPolicy"))]
+            pub extern "C" fn policy(_: ::std::ffi::c_int) {}
+
+            $( const _: () = {
+                const HYPOTHESIS: $crate::Hypothesis =
+                    m::Kind::$kind.hypothesis(m::Modelling::$hypothesis);
+                const {
+                    assert!(
+                        $crate::export::foreign::offers::<Law>(HYPOTHESIS),
+                        "the law does not offer the hypothesis"
+                    );
+                }
+                #[unsafe(export_name = concat!(stringify!($law), "_", stringify!($hypothesis)))]
+                pub unsafe extern "C" fn integrate(data: *mut m::Data) -> ::std::ffi::c_int {
+                    // SAFETY: passed on to the caller.
+                    unsafe { m::integrate::<Law>(&LAWS, &SETTINGS, HYPOTHESIS, data) }
+                }
+            }; )+
+        };
+    };
+    (@numbers $law:ident $type:ty [$($suffix:literal = $value:expr,)+]) => { $( const _: () = {
+        #[unsafe(export_name = concat!(stringify!($law), $suffix))]
+        pub static DATUM: $type = $value;
+    }; )+ };
+    (@texts $law:ident [$($suffix:literal = $text:expr,)+]) => { $( const _: () = {
+        #[unsafe(export_name = concat!(stringify!($law), $suffix))]
+        pub static DATUM: m::Texts<1> =
+            m::Texts::new([$crate::descriptor::c_str(concat!($text, "\0"))]);
+    }; )+ };
+    (@words $law:ident [$($suffix:literal = $($word:ident)+,)+]) => { $( const _: () = {
+        const WORDS: &[&::std::ffi::CStr] =
+            &[$($crate::descriptor::c_str(concat!(stringify!($word), "\0"))),+];
+        #[unsafe(export_name = concat!(stringify!($law), $suffix))]
+        pub static DATUM: m::Texts<{ WORDS.len() }> = m::Texts::of(WORDS);
+    }; )+ };
+    (@names $law:ident [$($suffix:literal = $names:ident, $n:ident,)+]) => { $( const _: () = {
+        static NAMES: [m::Name; m::$n::<Law>()] = m::$names::<Law, { m::$n::<Law>() }>();
+        #[unsafe(export_name = concat!(stringify!($law), $suffix))]
+        pub static DATUM: m::Texts<{ m::$n::<Law>() + 1 }> = m::Texts::named(&NAMES);
+    }; )+ };
+    (@types $law:ident [$($suffix:literal = $types:expr,)+]) => { $( const _: () = {
+        const TYPES: &[::std::ffi::c_int] = &$types;
+        #[unsafe(export_name = concat!(stringify!($law), $suffix))]
+        pub static DATUM: [::std::ffi::c_int; TYPES.len()] = $types;
+    }; )+ };
+}
+
+/// What MFront's interface is told of a behaviour by numbers.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    /// Strain and stress.
+    StandardStrainBased,
+    /// Opening and traction.
+    CohesiveZone,
+}
+
+/// MFront's modelling hypotheses that a law may offer.
+#[expect(missing_docs, reason = "the names are MFront's")]
+#[derive(Clone, Copy, Debug)]
+pub enum Modelling {
+    Tridimensional,
+    PlaneStrain,
+    Axisymmetrical,
+}
+
+impl Kind {
+    /// `BehaviourType`.
+    pub const fn behaviour_type(self) -> u16 {
+        match self {
+            Self::StandardStrainBased => 1,
+            Self::CohesiveZone => 3,
+        }
+    }
+
+    /// `BehaviourKinematic`.
+    pub const fn kinematic(self) -> u16 {
+        match self {
+            Self::StandardStrainBased => 1,
+            Self::CohesiveZone => 2,
+        }
+    }
+
+    /// Type of gradient and flux: symmetric tensor or vector.
+    pub const fn variable_type(self) -> c_int {
+        match self {
+            Self::StandardStrainBased => 1,
+            Self::CohesiveZone => 2,
+        }
+    }
+
+    /// The hypothesis in our words.
+    pub const fn hypothesis(self, modelling: Modelling) -> Hypothesis {
+        match (self, modelling) {
+            (Self::CohesiveZone, _) => Hypothesis::Interface2d,
+            (_, Modelling::Tridimensional) => Hypothesis::ThreeD,
+            (_, Modelling::PlaneStrain) => Hypothesis::PlaneStrain,
+            (_, Modelling::Axisymmetrical) => Hypothesis::Axisymmetric,
+        }
+    }
+}
+
+/// Texts in static storage.
+#[repr(transparent)]
+#[derive(Debug)]
+pub struct Texts<const N: usize>([*const c_char; N]);
+
+// SAFETY: pointers to static texts that nothing changes.
+unsafe impl<const N: usize> Sync for Texts<N> {}
+
+impl<const N: usize> Texts<N> {
+    /// These texts.
+    pub const fn new(texts: [&'static CStr; N]) -> Self {
+        Self::of(&texts)
+    }
+
+    /// `N` texts.
+    pub const fn of(texts: &[&'static CStr]) -> Self {
+        let mut pointers = [null(); N];
+        let mut i = 0;
+        while i < N {
+            pointers[i] = texts[i].as_ptr();
+            i += 1;
+        }
+        Self(pointers)
+    }
+
+    /// `N` − 1 names, and null behind them: a symbol is never of size zero.
+    pub const fn named(names: &'static [Name]) -> Self {
+        let mut pointers = [null(); N];
+        let mut i = 0;
+        while i < names.len() {
+            pointers[i] = names[i].as_ptr().cast();
+            i += 1;
+        }
+        Self(pointers)
+    }
+}
+
+/// A name in MFront's spelling, padded with NUL.
+pub type Name = [u8; LONGEST_NAME];
+const LONGEST_NAME: usize = 64;
+/// Most internal variables of a behaviour.
+const MOST_STATES: usize = 64;
+
+/// `young_modulus` as `YoungModulus`.
+///
+/// # Panics
+/// If the id is too long; at compile time, where a law is exported.
+const fn spelled(id: *const c_char) -> Name {
+    // SAFETY: ids of declared parameters and variables are static strings.
+    let id = unsafe { CStr::from_ptr(id) }.to_bytes();
+    let mut name = [0; LONGEST_NAME];
+    let (mut from, mut to, mut begins) = (0, 0, true);
+    while from < id.len() {
+        if id[from] == b'_' {
+            begins = true;
+        } else {
+            assert!(to + 1 < LONGEST_NAME, "an id is too long");
+            name[to] = if begins { id[from].to_ascii_uppercase() } else { id[from] };
+            to += 1;
+            begins = false;
+        }
+        from += 1;
+    }
+    name
+}
+
+/// The parameters of a law, by whether they may be left out.
+const fn n_parameters<L: Exported>(left_out: bool) -> usize {
+    let table = <L::Parameters as Parameters>::TABLE;
+    let (mut n, mut i) = (0, 0);
+    while i < table.len() {
+        if has_default(&table[i]) == left_out {
+            n += 1;
+        }
+        i += 1;
+    }
+    n
+}
+
+const fn parameter_names<L: Exported, const N: usize>(left_out: bool) -> [Name; N] {
+    let table = <L::Parameters as Parameters>::TABLE;
+    let mut names = [[0; LONGEST_NAME]; N];
+    let (mut n, mut i) = (0, 0);
+    while i < table.len() {
+        if has_default(&table[i]) == left_out {
+            names[n] = spelled(table[i].raw().id);
+            n += 1;
+        }
+        i += 1;
+    }
+    names
+}
+
+/// Number of material properties.
+pub const fn n_properties<L: Exported>() -> usize {
+    n_parameters::<L>(false)
+}
+
+/// Their names.
+pub const fn property_names<L: Exported, const N: usize>() -> [Name; N] {
+    parameter_names::<L, N>(false)
+}
+
+/// Number of MFront's parameters.
+pub const fn n_settings<L: Exported>() -> usize {
+    n_parameters::<L>(true)
+}
+
+/// Their names.
+pub const fn setting_names<L: Exported, const N: usize>() -> [Name; N] {
+    parameter_names::<L, N>(true)
+}
+
+/// Number of internal variables.
+///
+/// # Panics
+/// If there are too many; at compile time, where a law is exported.
+pub const fn n_states<L: Exported>() -> usize {
+    assert!(L::STATE.len() <= MOST_STATES, "too many internal variables");
+    L::STATE.len()
+}
+
+/// Their names.
+pub const fn state_names<L: Exported, const N: usize>() -> [Name; N] {
+    let mut names = [[0; LONGEST_NAME]; N];
+    let mut i = 0;
+    while i < N {
+        names[i] = spelled(L::STATE[i].raw().id);
+        i += 1;
+    }
+    names
+}
+
+/// Values of MFront's parameters, in the places that the law's parameters have.
+#[derive(Debug)]
+pub struct Settings([AtomicU64; MOST_PARAMETERS]);
+
+impl Settings {
+    /// The defaults of a law.
+    pub const fn of<L: Exported>() -> Self {
+        let table = <L::Parameters as Parameters>::TABLE;
+        let mut values = [const { AtomicU64::new(0) }; MOST_PARAMETERS];
+        let mut i = 0;
+        while i < table.len() {
+            values[i] = AtomicU64::new(table[i].raw().default_value.to_bits());
+            i += 1;
+        }
+        Self(values)
+    }
+
+    /// Sets a parameter, for the whole process. 1 if there is one of this name, else 0.
+    ///
+    /// # Safety
+    /// `name` is null or a text that ends in NUL.
+    pub unsafe fn set<L: Exported>(&self, name: *const c_char, value: f64) -> c_int {
+        if name.is_null() {
+            return 0;
+        }
+        // SAFETY: see above.
+        let name = unsafe { CStr::from_ptr(name) };
+        for (declared, place) in <L::Parameters as Parameters>::TABLE.iter().zip(&self.0) {
+            let known = spelled(declared.raw().id);
+            if has_default(declared)
+                && CStr::from_bytes_until_nul(&known).is_ok_and(|known| known == name)
+            {
+                place.store(value.to_bits(), Ordering::Relaxed);
+                return 1;
+            }
+        }
+        0
+    }
+}
+
+/// A point at the start of the increment, as MFront's interface passes it.
+#[expect(missing_docs, reason = "the names are MFront's")]
+#[repr(C)]
+#[derive(Debug)]
+pub struct InitialState {
+    pub gradients: *const f64,
+    pub thermodynamic_forces: *const f64,
+    pub mass_density: *const f64,
+    pub material_properties: *const f64,
+    pub internal_state_variables: *const f64,
+    pub stored_energy: *const f64,
+    pub dissipated_energy: *const f64,
+    pub external_state_variables: *const f64,
+}
+
+/// The point at the end of the increment.
+#[expect(missing_docs, reason = "the names are MFront's")]
+#[repr(C)]
+#[derive(Debug)]
+pub struct State {
+    pub gradients: *const f64,
+    pub thermodynamic_forces: *mut f64,
+    pub mass_density: *const f64,
+    pub material_properties: *const f64,
+    pub internal_state_variables: *mut f64,
+    pub stored_energy: *mut f64,
+    pub dissipated_energy: *mut f64,
+    pub external_state_variables: *const f64,
+}
+
+/// The argument of a behaviour.
+#[repr(C)]
+#[derive(Debug)]
+pub struct Data {
+    /// Null, or room for 512 bytes.
+    pub error_message: *mut c_char,
+    /// Time increment.
+    pub dt: f64,
+    /// On entry `K[0]` is the request, on exit the operator, row by row.
+    pub k: *mut f64,
+    /// On entry the largest step factor that the caller would take, on exit the law's.
+    pub rdt: *mut f64,
+    /// Not computed.
+    pub speed_of_sound: *mut f64,
+    /// Start of the increment.
+    pub s0: InitialState,
+    /// End of the increment.
+    pub s1: State,
+}
+
+const _: () = assert!(size_of::<Data>() == 168);
+
+/// What a call is for.
+#[derive(Clone, Copy)]
+struct Request {
+    /// The operator of the start only, nothing is carried.
+    prediction: bool,
+    tangent: Tangent,
+}
+
+impl Request {
+    const NONE: Self = Self {
+        prediction: false,
+        tangent: Tangent::None,
+    };
+
+    /// From `K[0]`; with more than 50, 100 of it ask for the speed of sound too.
+    fn decoded(k: f64) -> Result<Self, &'static str> {
+        let k = if k > 50.0 { k - 100.0 } else { k };
+        let prediction = k < -0.25;
+        let tangent = match k.abs() {
+            k if k < 0.5 && !prediction => Tangent::None,
+            k if k < 1.5 => Tangent::Elastic,
+            k if k < 2.5 => return Err("a secant operator is not offered"),
+            k if k.is_finite() => Tangent::Consistent,
+            _ => return Err("K[0] is not finite"),
+        };
+        Ok(Self {
+            prediction,
+            tangent,
+        })
+    }
+}
+
+/// Carries one point, in Kelvin–Mandel components. 1: done, 0: done but inaccurate, −1: not done,
+/// with the step factor in `rdt` and the reason in `error_message`.
+///
+/// # Safety
+/// `data` is null or as MFront's interface says.
+pub unsafe fn integrate<L: Exported>(
+    laws: &Laws<L>,
+    settings: &Settings,
+    hypothesis: Hypothesis,
+    data: *mut Data,
+) -> c_int {
+    // SAFETY: see above.
+    let Some(data) = (unsafe { data.as_mut() }) else {
+        return -1;
+    };
+    let mut factor = 0.25;
+    let mut why_not = |step_factor: f64, why: fmt::Arguments<'_>| {
+        let id = L::DESCRIPTION.id.to_string_lossy();
+        factor = step_factor;
+        // SAFETY: `error_message` is null or has room for 512 bytes.
+        unsafe { tell(data.error_message, format_args!("{id}: {why}")) };
+    };
+    // SAFETY: passed on to the caller.
+    let done = unsafe { carry(laws, settings, hypothesis, data, &mut why_not) };
+    match done {
+        Some(None) => 1,
+        Some(Some(why)) => {
+            // SAFETY: as above.
+            unsafe { tell(data.error_message, format_args!("{why}")) };
+            0
+        }
+        None => {
+            if !data.rdt.is_null() {
+                // SAFETY: valid where it is not null.
+                unsafe { *data.rdt = factor.min(*data.rdt) };
+            }
+            -1
+        }
+    }
+}
+
+/// The reason why the results are inaccurate, if they are; `None` if there are none.
+///
+/// # Safety
+/// As [`integrate`].
+unsafe fn carry<L: Exported>(
+    laws: &Laws<L>,
+    settings: &Settings,
+    hypothesis: Hypothesis,
+    data: &Data,
+    why_not: &mut impl FnMut(f64, fmt::Arguments<'_>),
+) -> Option<Option<&'static str>> {
+    let mut refuse = |why: &str| why_not(0.25, format_args!("{why}"));
+    let (n, n_states) = (hypothesis.n_components(), L::STATE.len());
+    let (s0, s1) = (&data.s0, &data.s1);
+    // SAFETY: `K` is null or has one value at least.
+    let request = unsafe { data.k.as_ref() }.map_or(Ok(Request::NONE), |k| Request::decoded(*k));
+    let request = match request {
+        Ok(request) => request,
+        Err(why) => {
+            refuse(why);
+            return None;
+        }
+    };
+    let missing = s0.gradients.is_null()
+        || s1.gradients.is_null()
+        || s0.thermodynamic_forces.is_null()
+        || s1.thermodynamic_forces.is_null()
+        || (n_states > 0 && s0.internal_state_variables.is_null())
+        || (n_states > 0 && s1.internal_state_variables.is_null())
+        || (n_properties::<L>() > 0 && s1.material_properties.is_null());
+    if missing {
+        refuse("an array that is needed is null");
+        return None;
+    }
+    let mut given = [0.0; MOST_PARAMETERS];
+    let mut properties = 0..;
+    let table = <L::Parameters as Parameters>::TABLE;
+    for (v, declared) in table.iter().enumerate() {
+        given[v] = if has_default(declared) {
+            f64::from_bits(settings.0[v].load(Ordering::Relaxed))
+        } else {
+            // Some programs fill the properties of the end of the increment only.
+            // SAFETY: as many as there are names.
+            unsafe { *s1.material_properties.add(properties.next().unwrap_or_default()) }
+        };
+    }
+    let scale = Scale::of(hypothesis);
+    let mut unused = [0.0; MOST_STATES];
+    // SAFETY: `n` components.
+    let point = unsafe {
+        let begin = row(s0.gradients, n);
+        let end = if request.prediction { begin } else { row(s1.gradients, n) };
+        Point {
+            n_components: n,
+            gradient: scale.gradient(begin),
+            increment: scale.gradient(std::array::from_fn(|i| end[i] - begin[i])),
+            flux: scale.flux(row(s0.thermodynamic_forces, n)),
+            state0: s0.internal_state_variables,
+            state1: if request.prediction {
+                unused.as_mut_ptr()
+            } else {
+                s1.internal_state_variables
+            },
+            time: 0.0,
+            time_increment: data.dt,
+        }
+    };
+    let answer = laws.carry(&given[..table.len()], &point, request.tangent, |trouble| {
+        why_not(trouble.factor(), format_args!("{trouble}"));
+    })?;
+    for i in 0..n {
+        if !request.prediction {
+            // SAFETY: `n` components.
+            unsafe { *s1.thermodynamic_forces.add(i) = answer.flux[i] / scale.0[i] };
+        }
+        for j in 0..n {
+            if request.tangent != Tangent::None {
+                let value = answer.operator[i * n + j] / (scale.0[i] * scale.0[j]);
+                // SAFETY: where an operator is requested, `K` has `n` × `n` components.
+                unsafe { *data.k.add(i * n + j) = value };
+            }
+        }
+    }
+    Some(answer.unreliable)
+}
+
+/// From Kelvin–Mandel components to ours: σ = s σ_M, ε = ε_M / s, C = s C_M s.
+struct Scale([f64; 6]);
+
+impl Scale {
+    fn of(hypothesis: Hypothesis) -> Self {
+        Self(std::array::from_fn(|i| {
+            if i < 3 || hypothesis == Hypothesis::Interface2d {
+                1.0
+            } else {
+                FRAC_1_SQRT_2
+            }
+        }))
+    }
+
+    fn gradient(&self, mandel: [f64; 6]) -> [f64; 6] {
+        std::array::from_fn(|i| mandel[i] / self.0[i])
+    }
+
+    fn flux(&self, mandel: [f64; 6]) -> [f64; 6] {
+        std::array::from_fn(|i| mandel[i] * self.0[i])
+    }
+}

@@ -1,0 +1,263 @@
+//! The entry of Abaqus user materials (`UMAT`), which many programs call.
+//!
+//! `PROPS` are the parameters in declared order; those at the end that have a default, or are
+//! optional, may be left out. `STATEV` are the internal variables in declared order. With `NTENS`
+//! 6 the law is called in three dimensions, with 4 in plane strain or axisymmetry: nothing in the call
+//! tells these two apart, and no law has to, since its update depends on the number of components only.
+//! Everything but `STRESS`, `DSTRAN`, `NTENS`, `PROPS` and `NPROPS` may be null; without `STATEV`
+//! only a law without internal variables can be called. `STATEV` that are all zero stand for the
+//! law's own initial values.
+//!
+//! Where there is no answer, `STRESS` and `DDSDDE` become NaN, `STATEV` stays, and `PNEWDT` is the
+//! fraction of the increment that the law believes it can follow: a caller that ignores `PNEWDT`, or
+//! passes none, must not take the stress of the start for that of the end.
+
+use super::foreign::{Answer, Laws, Point, complain, offers};
+use super::{Continuum, Exported};
+use crate::descriptor::{Hypothesis, InternalVariables};
+use crate::law::{ContinuumLaw, Tangent};
+use std::ffi::c_int;
+
+/// Exports a law for solids as the user material of the library: `umat_` (as Fortran names it),
+/// `umat` and `UMAT` for Abaqus' convention, `CALCULIX` for CalculiX' own.
+#[macro_export]
+macro_rules! export_umat {
+    ($law:ty) => {
+        const _: () = {
+            static LAWS: $crate::export::foreign::Laws<$crate::export::Continuum<$law>> =
+                $crate::export::foreign::Laws::new();
+            $crate::export_umat!(@abaqus "umat_");
+            $crate::export_umat!(@abaqus "umat");
+            $crate::export_umat!(@abaqus "UMAT");
+            $crate::export_umat!(@calculix "CALCULIX");
+        };
+    };
+    (@abaqus $symbol:literal) => {
+        const _: () = {
+            /// See `abi::export::umat`.
+            ///
+            /// # Safety
+            /// The pointers are those of Abaqus' `UMAT`, or null where `abi::export::umat` admits it.
+            #[unsafe(export_name = $symbol)]
+            pub unsafe extern "C" fn entry(
+                stress: *mut f64, statev: *mut f64, ddsdde: *mut f64,
+                _: *mut f64, _: *mut f64, _: *mut f64, _: *mut f64, _: *mut f64, _: *mut f64,
+                _: *mut f64,
+                stran: *const f64, dstran: *const f64, time: *const f64, dtime: *const f64,
+                _: *const f64, _: *const f64, _: *const f64, _: *const f64,
+                _: *const ::std::ffi::c_char,
+                ndi: *const ::std::ffi::c_int, _: *const ::std::ffi::c_int,
+                ntens: *const ::std::ffi::c_int, nstatv: *const ::std::ffi::c_int,
+                props: *const f64, nprops: *const ::std::ffi::c_int,
+                _: *const f64, _: *const f64, pnewdt: *mut f64,
+            ) {
+                let call = $crate::export::umat::Call {
+                    stress, statev, ddsdde, stran, dstran, time, dtime, ndi, ntens, nstatv,
+                    props, nprops, pnewdt,
+                };
+                // SAFETY: passed on to the caller.
+                unsafe { $crate::export::umat::answer(&LAWS, &call) }
+            }
+        };
+    };
+    (@calculix $symbol:literal) => {
+        const _: () = {
+            /// See `abi::export::calculix`.
+            ///
+            /// # Safety
+            /// The pointers are those of CalculiX' material routine.
+            #[unsafe(export_name = $symbol)]
+            pub unsafe extern "C" fn entry(
+                _: *const ::std::ffi::c_char,
+                iel: *const ::std::ffi::c_int, iint: *const ::std::ffi::c_int,
+                kode: *const ::std::ffi::c_int, elconloc: *const f64,
+                emec: *const f64, emec0: *const f64,
+                _: *const f64, _: *const f64, _: *const f64, _: *const f64, _: *const f64,
+                _: *const ::std::ffi::c_int, _: *const f64,
+                dtime: *const f64, time: *const f64, ttime: *const f64,
+                icmd: *const ::std::ffi::c_int, ielas: *const ::std::ffi::c_int,
+                mi: *const ::std::ffi::c_int, nstate: *const ::std::ffi::c_int,
+                xstateini: *const f64, xstate: *mut f64, stre: *mut f64, stiff: *mut f64,
+                iorien: *const ::std::ffi::c_int, _: *const f64, _: *const f64,
+                pnewdt: *mut f64,
+            ) {
+                let call = $crate::export::calculix::Call {
+                    iel, iint, kode, elconloc, emec, emec0, dtime, time, ttime, icmd, ielas,
+                    mi, nstate, xstateini, xstate, stre, stiff, iorien, pnewdt,
+                };
+                // SAFETY: passed on to the caller.
+                unsafe { $crate::export::calculix::answer(&LAWS, &call) }
+            }
+        };
+    };
+}
+
+/// The arguments of a `UMAT` that a law needs.
+#[expect(missing_docs, reason = "the names are Abaqus'")]
+#[derive(Debug)]
+pub struct Call {
+    pub stress: *mut f64,
+    pub statev: *mut f64,
+    pub ddsdde: *mut f64,
+    pub stran: *const f64,
+    pub dstran: *const f64,
+    pub time: *const f64,
+    pub dtime: *const f64,
+    pub ndi: *const c_int,
+    pub ntens: *const c_int,
+    pub nstatv: *const c_int,
+    pub props: *const f64,
+    pub nprops: *const c_int,
+    pub pnewdt: *mut f64,
+}
+
+/// The value at `p`, or another one if it is null.
+///
+/// # Safety
+/// `p` is null or valid.
+pub(super) unsafe fn or<T: Copy>(p: *const T, other: T) -> T {
+    // SAFETY: passed on to the caller.
+    unsafe { p.as_ref() }.copied().unwrap_or(other)
+}
+
+/// The first `n` values at `p`, zeros behind them; all zero if it is null.
+///
+/// # Safety
+/// `p` is null or valid for `n` values, at most 6.
+pub(super) unsafe fn row(p: *const f64, n: usize) -> [f64; 6] {
+    let mut values = [0.0; 6];
+    if !p.is_null() {
+        // SAFETY: passed on to the caller.
+        values[..n].copy_from_slice(unsafe { std::slice::from_raw_parts(p, n) });
+    }
+    values
+}
+
+/// Answers a call.
+///
+/// # Safety
+/// The pointers are as the module says.
+pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
+    let id = L::DESCRIPTION.id;
+    // SAFETY: null or valid, as Abaqus' interface says; so are those below.
+    let (ntens, ndi) = unsafe { (or(call.ntens, 0), or(call.ndi, 3)) };
+    if call.stress.is_null() || call.dstran.is_null() {
+        complain(id, format_args!("STRESS or DSTRAN is null"));
+        return;
+    }
+    let n = ntens.clamp(0, 6) as usize;
+    let answer = match unusable::<Continuum<L>>(ntens, ndi) {
+        None => {
+            // SAFETY: as above.
+            unsafe { carried(laws, call, n) }
+        }
+        Some(why) => {
+            complain(id, format_args!("NTENS = {ntens} with NDI = {ndi}: {why}"));
+            Err(0.25)
+        }
+    };
+    // SAFETY: `STRESS` has `NTENS` components, `DDSDDE` their square; `DDSDDE` and `PNEWDT` may be
+    // null.
+    unsafe {
+        match answer {
+            Ok(answer) => put(call, n, &answer),
+            Err(factor) => {
+                for i in 0..n {
+                    *call.stress.add(i) = f64::NAN;
+                }
+                for i in 0..if call.ddsdde.is_null() { 0 } else { n * n } {
+                    *call.ddsdde.add(i) = f64::NAN;
+                }
+                if !call.pnewdt.is_null() {
+                    *call.pnewdt = factor;
+                }
+            }
+        }
+    }
+}
+
+/// Why the law cannot be called with so many components.
+fn unusable<L: Exported>(ntens: c_int, ndi: c_int) -> Option<&'static str> {
+    match (ntens, ndi) {
+        (6, 3) if offers::<L>(Hypothesis::ThreeD) => None,
+        (6, 3) => Some("the law is for plane strain and axisymmetry, NTENS = 4"),
+        (4, 3) => None,
+        _ => Some("expected three direct components, and one or three of shear"),
+    }
+}
+
+/// # Safety
+/// As [`answer`].
+unsafe fn carried<L: ContinuumLaw>(
+    laws: &Laws<Continuum<L>>,
+    call: &Call,
+    n: usize,
+) -> Result<Answer, f64> {
+    let id = L::DESCRIPTION.id;
+    let needed = <L::State as InternalVariables>::TABLE.len();
+    // SAFETY: as in `answer`.
+    let (n_statev, n_props) = unsafe {
+        let all = if call.statev.is_null() { 0 } else { needed };
+        (or(call.nstatv, all as c_int), or(call.nprops, 0))
+    };
+    if needed > 0 && (call.statev.is_null() || (n_statev.max(0) as usize) < needed) {
+        complain(
+            id,
+            format_args!("NSTATV = {n_statev}, the law has {needed} internal variables"),
+        );
+        return Err(0.25);
+    }
+    let given: &[f64] = if call.props.is_null() || n_props <= 0 {
+        &[]
+    } else {
+        // SAFETY: `PROPS` has `NPROPS` values.
+        unsafe { std::slice::from_raw_parts(call.props, n_props as usize) }
+    };
+    // SAFETY: as in `answer`; `TIME` has two entries.
+    let point = unsafe {
+        Point {
+            n_components: n,
+            gradient: row(call.stran, n),
+            increment: row(call.dstran, n),
+            flux: row(call.stress, n),
+            state0: call.statev,
+            state1: call.statev,
+            time: if call.time.is_null() {
+                0.0
+            } else {
+                *call.time.add(1)
+            },
+            time_increment: or(call.dtime, 0.0),
+        }
+    };
+    let tangent = if call.ddsdde.is_null() {
+        Tangent::None
+    } else {
+        Tangent::Consistent
+    };
+    let mut factor = 0.25;
+    laws.carry(given, &point, tangent, |trouble| {
+        factor = trouble.factor();
+        complain(id, format_args!("{trouble}"));
+    })
+    .ok_or(factor)
+}
+
+/// Writes stress and tangent, column by column.
+///
+/// # Safety
+/// As [`answer`].
+unsafe fn put(call: &Call, n: usize, answer: &Answer) {
+    for i in 0..n {
+        // SAFETY: `NTENS` components.
+        unsafe { *call.stress.add(i) = answer.flux[i] };
+    }
+    if !call.ddsdde.is_null() {
+        for i in 0..n {
+            for j in 0..n {
+                // SAFETY: `NTENS` × `NTENS` components.
+                unsafe { *call.ddsdde.add(j * n + i) = answer.operator[i * n + j] };
+            }
+        }
+    }
+}
