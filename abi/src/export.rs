@@ -14,7 +14,9 @@ pub mod foreign;
 pub mod mfront;
 pub mod umat;
 
-use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameter, Parameters, Variable};
+use crate::descriptor::{
+    Description, Hypothesis, InternalVariables, Parameter, Parameters, Variable,
+};
 use crate::law::{
     ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, SolidPoint, SolidResponse, Tangent,
 };

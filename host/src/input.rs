@@ -296,7 +296,8 @@ impl ForeignKeys<'_> {
                     .error(at, format!("`{key}` needs an `adapter`"))
                     .hint(
                         "libraries of the contract are found by the law's id, more folders are \
-                         named in `law_path`; `adapter = \"umat\"` is for Abaqus user subroutines",
+                         named in `law_path`; `adapter = \"umat\"` is for Abaqus user subroutines, \
+                         `adapter = \"mfront\"` for MFront behaviours",
                     )
                     .into()),
             };

@@ -270,8 +270,7 @@ impl LoadedLaw {
     fn here(&self) -> std::io::Result<LawHandle> {
         match self.library.laws[self.number].1 {
             Origin::Here(law) => Ok(law),
-            #[cfg(unix)]
-            Origin::Apart { .. } => Err(std::io::Error::other("the law is in a worker process")),
+            _ => Err(std::io::Error::other("the law is not one of this process")),
         }
     }
 

@@ -86,7 +86,10 @@ unsafe fn carried<L: ContinuumLaw>(
 ) -> Result<StressAndOperator, f64> {
     let id = L::DESCRIPTION.id;
     if !offers::<Continuum<L>>(Hypothesis::ThreeD) {
-        complain(id, format_args!("CalculiX needs three dimensions, which it does not offer"));
+        complain(
+            id,
+            format_args!("CalculiX needs three dimensions, which it does not offer"),
+        );
         return Err(0.25);
     }
     let n_states = <L::State as InternalVariables>::TABLE.len();
@@ -104,7 +107,10 @@ unsafe fn carried<L: ContinuumLaw>(
         return Err(0.25);
     }
     if (n_state.max(0) as usize) < n_states {
-        complain(id, format_args!("*DEPVAR {n_state}, the law has {n_states} internal variables"));
+        complain(
+            id,
+            format_args!("*DEPVAR {n_state}, the law has {n_states} internal variables"),
+        );
         return Err(0.25);
     }
     // SAFETY: there are −kode − 100 constants, and one block of `nstate` variables for each of the

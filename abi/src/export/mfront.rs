@@ -8,13 +8,13 @@
 //!
 //! Gradients and fluxes are Kelvin–Mandel vectors there: shear strain γ/√2, shear stress √2 τ.
 
-use super::foreign::{Laws, MOST_PARAMETERS, Point, has_default, tell};
 use super::Exported;
+use super::foreign::{Laws, MOST_PARAMETERS, Point, has_default, tell};
 use super::umat::row;
 use crate::descriptor::{Hypothesis, Parameters};
 use crate::law::Tangent;
-use std::ffi::{CStr, c_char, c_int};
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::ffi::{CStr, c_char, c_int};
 use std::fmt;
 use std::ptr::null;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -257,7 +257,11 @@ const fn spelled(id: *const c_char) -> Name {
             begins = true;
         } else {
             assert!(to + 1 < LONGEST_NAME, "an id is too long");
-            name[to] = if begins { id[from].to_ascii_uppercase() } else { id[from] };
+            name[to] = if begins {
+                id[from].to_ascii_uppercase()
+            } else {
+                id[from]
+            };
             to += 1;
             begins = false;
         }
@@ -541,7 +545,10 @@ unsafe fn carry<L: Exported>(
         } else {
             // Some programs fill the properties of the end of the increment only.
             // SAFETY: as many as there are names.
-            unsafe { *s1.material_properties.add(properties.next().unwrap_or_default()) }
+            unsafe {
+                *s1.material_properties
+                    .add(properties.next().unwrap_or_default())
+            }
         };
     }
     let scale = Scale::of(hypothesis);
@@ -549,7 +556,11 @@ unsafe fn carry<L: Exported>(
     // SAFETY: `n` components.
     let point = unsafe {
         let begin = row(s0.gradients, n);
-        let end = if request.prediction { begin } else { row(s1.gradients, n) };
+        let end = if request.prediction {
+            begin
+        } else {
+            row(s1.gradients, n)
+        };
         Point {
             n_components: n,
             gradient: scale.gradient(begin),
@@ -568,6 +579,8 @@ unsafe fn carry<L: Exported>(
     let answer = laws.carry(&given[..table.len()], &point, request.tangent, |trouble| {
         why_not(trouble.factor(), format_args!("{trouble}"));
     })?;
+    let operator =
+        loading(laws, &given[..table.len()], &point, request.tangent).unwrap_or(answer.operator);
     for i in 0..n {
         if !request.prediction {
             // SAFETY: `n` components.
@@ -575,13 +588,48 @@ unsafe fn carry<L: Exported>(
         }
         for j in 0..n {
             if request.tangent != Tangent::None {
-                let value = answer.operator[i * n + j] / (scale.0[i] * scale.0[j]);
+                let value = operator[i * n + j] / (scale.0[i] * scale.0[j]);
                 // SAFETY: where an operator is requested, `K` has `n` × `n` components.
                 unsafe { *data.k.add(i * n + j) = value };
             }
         }
     }
     Some(answer.unreliable)
+}
+
+/// The tangent of a point on its yield surface that has not moved: the one for loading. Programs of
+/// this interface begin an increment where it starts, with no strain; there the update has two
+/// tangents, and with the elastic one a full Newton iteration may cycle for ever. A point inside
+/// the surface stays elastic under the small strain along its deviatoric stress that tells the
+/// two apart.
+fn loading<L: Exported>(
+    laws: &Laws<L>,
+    given: &[f64],
+    point: &Point,
+    tangent: Tangent,
+) -> Option<[f64; 36]> {
+    const SMALL_STRAIN: f64 = 1e-9;
+    let rests = point.increment.iter().all(|strain| *strain == 0.0);
+    if !(rests && tangent == Tangent::Consistent && point.n_components > 2) {
+        return None;
+    }
+    let mean = (point.flux[0] + point.flux[1] + point.flux[2]) / 3.0;
+    let deviator: [f64; 6] = std::array::from_fn(|i| {
+        if i < 3 {
+            point.flux[i] - mean
+        } else {
+            2.0 * point.flux[i]
+        }
+    });
+    let size = deviator.iter().map(|s| s * s).sum::<f64>().sqrt();
+    let mut unused = [0.0; MOST_STATES];
+    let probe = Point {
+        increment: deviator.map(|s| SMALL_STRAIN * s / size),
+        state1: unused.as_mut_ptr(),
+        ..*point
+    };
+    laws.carry(given, &probe, tangent, |_| ())
+        .map(|answer| answer.operator)
 }
 
 /// From Kelvin–Mandel components to ours: σ = s σ_M, ε = ε_M / s, C = s C_M s.

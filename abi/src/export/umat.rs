@@ -26,10 +26,10 @@ macro_rules! export_umat {
         const _: () = {
             static LAWS: $crate::export::foreign::Laws<$crate::export::Continuum<$law>> =
                 $crate::export::foreign::Laws::new();
-            $crate::export_umat!(@abaqus "umat_");
-            $crate::export_umat!(@abaqus "umat");
-            $crate::export_umat!(@abaqus "UMAT");
-            $crate::export_umat!(@calculix "CALCULIX");
+    $crate::export_umat!(@abaqus "umat_");
+    $crate::export_umat!(@abaqus "umat");
+    $crate::export_umat!(@abaqus "UMAT");
+    $crate::export_umat!(@calculix "CALCULIX");
         };
     };
     (@abaqus $symbol:literal) => {
@@ -40,20 +40,49 @@ macro_rules! export_umat {
             /// The pointers are those of Abaqus' `UMAT`, or null where `abi::export::umat` admits it.
             #[unsafe(export_name = $symbol)]
             pub unsafe extern "C" fn entry(
-                stress: *mut f64, statev: *mut f64, ddsdde: *mut f64,
-                _: *mut f64, _: *mut f64, _: *mut f64, _: *mut f64, _: *mut f64, _: *mut f64,
+                stress: *mut f64,
+                statev: *mut f64,
+                ddsdde: *mut f64,
                 _: *mut f64,
-                stran: *const f64, dstran: *const f64, time: *const f64, dtime: *const f64,
-                _: *const f64, _: *const f64, _: *const f64, _: *const f64,
+                _: *mut f64,
+                _: *mut f64,
+                _: *mut f64,
+                _: *mut f64,
+                _: *mut f64,
+                _: *mut f64,
+                stran: *const f64,
+                dstran: *const f64,
+                time: *const f64,
+                dtime: *const f64,
+                _: *const f64,
+                _: *const f64,
+                _: *const f64,
+                _: *const f64,
                 _: *const ::std::ffi::c_char,
-                ndi: *const ::std::ffi::c_int, _: *const ::std::ffi::c_int,
-                ntens: *const ::std::ffi::c_int, nstatv: *const ::std::ffi::c_int,
-                props: *const f64, nprops: *const ::std::ffi::c_int,
-                _: *const f64, _: *const f64, pnewdt: *mut f64,
+                ndi: *const ::std::ffi::c_int,
+                _: *const ::std::ffi::c_int,
+                ntens: *const ::std::ffi::c_int,
+                nstatv: *const ::std::ffi::c_int,
+                props: *const f64,
+                nprops: *const ::std::ffi::c_int,
+                _: *const f64,
+                _: *const f64,
+                pnewdt: *mut f64,
             ) {
                 let call = $crate::export::umat::Call {
-                    stress, statev, ddsdde, stran, dstran, time, dtime, ndi, ntens, nstatv,
-                    props, nprops, pnewdt,
+                    stress,
+                    statev,
+                    ddsdde,
+                    stran,
+                    dstran,
+                    time,
+                    dtime,
+                    ndi,
+                    ntens,
+                    nstatv,
+                    props,
+                    nprops,
+                    pnewdt,
                 };
                 // SAFETY: passed on to the caller.
                 unsafe { $crate::export::umat::answer(&LAWS, &call) }
@@ -69,21 +98,55 @@ macro_rules! export_umat {
             #[unsafe(export_name = $symbol)]
             pub unsafe extern "C" fn entry(
                 _: *const ::std::ffi::c_char,
-                iel: *const ::std::ffi::c_int, iint: *const ::std::ffi::c_int,
-                kode: *const ::std::ffi::c_int, elconloc: *const f64,
-                emec: *const f64, emec0: *const f64,
-                _: *const f64, _: *const f64, _: *const f64, _: *const f64, _: *const f64,
-                _: *const ::std::ffi::c_int, _: *const f64,
-                dtime: *const f64, time: *const f64, ttime: *const f64,
-                icmd: *const ::std::ffi::c_int, ielas: *const ::std::ffi::c_int,
-                mi: *const ::std::ffi::c_int, nstate: *const ::std::ffi::c_int,
-                xstateini: *const f64, xstate: *mut f64, stre: *mut f64, stiff: *mut f64,
-                iorien: *const ::std::ffi::c_int, _: *const f64, _: *const f64,
+                iel: *const ::std::ffi::c_int,
+                iint: *const ::std::ffi::c_int,
+                kode: *const ::std::ffi::c_int,
+                elconloc: *const f64,
+                emec: *const f64,
+                emec0: *const f64,
+                _: *const f64,
+                _: *const f64,
+                _: *const f64,
+                _: *const f64,
+                _: *const f64,
+                _: *const ::std::ffi::c_int,
+                _: *const f64,
+                dtime: *const f64,
+                time: *const f64,
+                ttime: *const f64,
+                icmd: *const ::std::ffi::c_int,
+                ielas: *const ::std::ffi::c_int,
+                mi: *const ::std::ffi::c_int,
+                nstate: *const ::std::ffi::c_int,
+                xstateini: *const f64,
+                xstate: *mut f64,
+                stre: *mut f64,
+                stiff: *mut f64,
+                iorien: *const ::std::ffi::c_int,
+                _: *const f64,
+                _: *const f64,
                 pnewdt: *mut f64,
             ) {
                 let call = $crate::export::calculix::Call {
-                    iel, iint, kode, elconloc, emec, emec0, dtime, time, ttime, icmd, ielas,
-                    mi, nstate, xstateini, xstate, stre, stiff, iorien, pnewdt,
+                    iel,
+                    iint,
+                    kode,
+                    elconloc,
+                    emec,
+                    emec0,
+                    dtime,
+                    time,
+                    ttime,
+                    icmd,
+                    ielas,
+                    mi,
+                    nstate,
+                    xstateini,
+                    xstate,
+                    stre,
+                    stiff,
+                    iorien,
+                    pnewdt,
                 };
                 // SAFETY: passed on to the caller.
                 unsafe { $crate::export::calculix::answer(&LAWS, &call) }

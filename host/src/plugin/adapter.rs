@@ -4,12 +4,15 @@
 //! | adapter | library | describes itself |
 //! |---|---|---|
 //! | [`Adapter::Umat`] | an Abaqus user subroutine `UMAT` | no: a sidecar file does |
+//! | [`Adapter::Mfront`] | behaviours of MFront's generic interface | yes, by its symbols |
 //!
 //! A further adapter is a variant of [`Adapter`], an arm of [`open`], a [`ForeignLaw`] and a
 //! [`ForeignInstance`].
 
 pub mod conventions;
+mod mfront;
 mod sidecar;
+mod symbols;
 mod umat;
 
 use super::description::LawDescription;
@@ -31,6 +34,18 @@ use std::sync::Arc;
 pub enum Adapter {
     /// Abaqus, `SUBROUTINE UMAT`.
     Umat,
+    /// MFront's generic interface.
+    Mfront,
+}
+
+impl Adapter {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Umat => "umat",
+            Self::Mfront => "mfront",
+        }
+    }
 }
 
 impl Adapter {
@@ -95,6 +110,7 @@ pub(super) type ForeignLaws = Vec<(LawDescription, Arc<dyn ForeignLaw>)>;
 pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
     match foreign.adapter {
         Adapter::Umat => umat::open(foreign, image),
+        Adapter::Mfront => mfront::open(foreign, image),
     }
 }
 

@@ -11,6 +11,7 @@
 )]
 
 mod abaqus;
+pub(super) mod mfront;
 pub mod probe;
 #[cfg(unix)]
 mod shared;

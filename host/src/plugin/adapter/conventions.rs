@@ -57,6 +57,26 @@ pub const ROUTES: &[Route] = &[
             ("smaller step", "PNEWDT below 1"),
         ],
     },
+    Route {
+        name: "mfront",
+        key: "adapter = \"mfront\", library = \"PATH\", law = \"BEHAVIOUR\"",
+        conventions: &[
+            (
+                "order",
+                "11 22 33 12 (13 23); axisymmetric r z θ rz; cohesive zones n t",
+            ),
+            ("sign", "tension and opening positive"),
+            ("shear", "strain γ / √2, stress √2 τ (Kelvin–Mandel)"),
+            ("tangent", "row-major, at the end of the increment"),
+            ("strains", "totals at start and end"),
+            ("stress, state", "start is read, end is written"),
+            (
+                "parameters",
+                "material properties and external state variables, constant; its own by setParameter",
+            ),
+            ("smaller step", "return value −1, factor in rdt"),
+        ],
+    },
 ];
 
 /// The routes as `pilum laws` prints them.

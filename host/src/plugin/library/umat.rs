@@ -87,7 +87,10 @@ impl Routine {
 ///
 /// # Safety
 /// The library's initialisers may be run.
-unsafe fn load_private(path: &Path, image: Image) -> Result<libloading::Library, String> {
+pub(super) unsafe fn load_private(
+    path: &Path,
+    image: Image,
+) -> Result<libloading::Library, String> {
     static IN_PLACE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
     if let Some(sealed) = image.sealed_path() {
         // SAFETY: passed on to the caller.
