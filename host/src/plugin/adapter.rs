@@ -48,15 +48,6 @@ impl Adapter {
     }
 }
 
-impl Adapter {
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Umat => "umat",
-        }
-    }
-}
-
 /// A library that is made for another program, as a file names it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Foreign {
