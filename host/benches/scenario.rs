@@ -5,7 +5,7 @@
 //! `peers/mfront.c` gives to MFront's laws, from the same random numbers.
 
 use abi::Hypothesis;
-use host::plugin::{End, Law, Operator, SearchPath, Start, Strided};
+use host::plugin::{End, Law, Moment, Operator, SearchPath, Start, Strided};
 use std::hint::black_box;
 
 /// Soil of the comparison: E, ν, c in kPa, φ, ψ in degrees.

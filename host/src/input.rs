@@ -123,7 +123,7 @@ pub struct BuiltLaw {
 /// hypothesis or a parameter does not fit, at its place in the file.
 pub fn build_law(
     source: &Source,
-    loaded: LoadedLaw,
+    loaded: &LoadedLaw,
     id: &Spanned<String>,
     hypothesis: Hypothesis,
     parameters: &ParameterTable,

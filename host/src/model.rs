@@ -261,7 +261,7 @@ impl<'a> LawShelf<'a> {
         } else {
             let (source, parameters) = (self.source, &entry.parameters);
             let loaded = self.loaded(entry)?;
-            let built = build_law(source, loaded, &entry.law, hypothesis, parameters)
+            let built = build_law(source, &loaded, &entry.law, hypothesis, parameters)
                 .map_err(|error| self.explain(error, group_name, group))?;
             let built = Arc::new(built);
             self.laws.insert(key, Arc::clone(&built));

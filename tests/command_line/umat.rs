@@ -1,8 +1,9 @@
 //! Abaqus user subroutines as laws: Fortran sources of `fixtures/umat`, compiled by gfortran.
 #![expect(
     clippy::unwrap_used,
+    clippy::float_cmp,
     clippy::print_stdout,
-    reason = "part of the tests"
+    reason = "part of the tests; values that are compared are exact"
 )]
 
 use crate::program::{BAD_INPUT, CASE, DONE, Edit, PLUGIN_TROUBLE, Place, edited};
@@ -165,6 +166,42 @@ fn a_cone_ends_at_its_strength_in_triaxial_compression() {
             .iter()
             .all(|row| number(row, "iterations") <= 12.0)
     );
+}
+
+#[test]
+fn a_soil_that_flows_converges_with_the_tangent_of_its_routine() {
+    let Some(place) = place("drucker_prager") else {
+        return;
+    };
+    let text = soil("drucker_prager", "")
+        .replacen(
+            "parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }",
+            "parameters = { young_modulus = 1e4, alpha = 0.3, beta = 0.05, k = 4.0 }",
+            1,
+        )
+        .replacen(
+            "cohesion = 10.0\n",
+            "cohesion = 1000.0\ntensile_strength = 1000.0\n",
+            1,
+        )
+        .replacen("x = 1e-5 }", "x = 3e-3 }", 1)
+        .replacen(
+            "name = \"push\"\nincrements = 2",
+            "name = \"push\"\nincrements = 10",
+            1,
+        )
+        .replacen(
+            "[solver]",
+            "flow = { group = \"soil\", quantity = \"multiplier\" }\n\n[solver]",
+            1,
+        );
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let rows = table(&place.path("out/history.csv"));
+    assert!(number(rows.last().unwrap(), "flow") > 1e-3);
+    let most = rows.iter().map(|row| number(row, "iterations"));
+    let most = most.fold(0.0, f64::max);
+    assert!(most <= 7.0, "{most} iterations");
 }
 
 #[test]
@@ -500,7 +537,7 @@ fn mistakes_in_files_are_named() {
         return;
     };
     let good = driver("elastic", "", "");
-    let mut complaints = String::new();
+    let mut complaints = Vec::new();
     for (from, to, code, says) in [
         (
             "libelastic.so",
@@ -544,7 +581,8 @@ fn mistakes_in_files_are_named() {
         place.write("driver.toml", good.replacen(from, to, 1));
         let outcome = place.run(&["point", "driver.toml"]);
         if outcome.code != Some(code) || !outcome.says(says) {
-            complaints += &format!("{to}: {says}: {:?} {}\n", outcome.code, outcome.stderr);
+            let (code, said) = (outcome.code, outcome.stderr);
+            complaints.push(format!("{to}: {says}: {code:?} {said}"));
         }
     }
     let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
@@ -585,13 +623,14 @@ fn mistakes_in_files_are_named() {
         place.write("elastic.law.toml", sidecar.replacen(from, to, 1));
         let outcome = place.run(&["point", "driver.toml"]);
         if outcome.code != Some(code) || !outcome.says(says) {
-            complaints += &format!("{to}: {says}: {:?} {}\n", outcome.code, outcome.stderr);
+            let (code, said) = (outcome.code, outcome.stderr);
+            complaints.push(format!("{to}: {says}: {code:?} {said}"));
         }
     }
     std::fs::remove_file(place.path("elastic.law.toml")).unwrap();
     let outcome = place.run(&["point", "driver.toml"]);
     assert!(outcome.says("has no sidecar"), "{}", outcome.stderr);
-    assert!(complaints.is_empty(), "{complaints}");
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
 /// Input of the IncrementalDriver for a material with E = 2e4 and ν = 0.3.

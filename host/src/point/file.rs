@@ -253,7 +253,7 @@ impl Driver {
         };
         let foreign = keys.read(source)?;
         let loaded = input::find_law(source, &search, &file.law, foreign.as_ref())?;
-        let built = input::build_law(source, loaded, &file.law, hypothesis, &file.parameters)?;
+        let built = input::build_law(source, &loaded, &file.law, hypothesis, &file.parameters)?;
         let mut driver = Self {
             law: built.law,
             warnings: built.warnings,

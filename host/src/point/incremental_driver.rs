@@ -144,7 +144,7 @@ impl Driver {
         let (name, parameters) = parameters(&parameters_file, &ids)?;
         let mut built = input::build_law(
             &parameters_file,
-            loaded,
+            &loaded,
             &id,
             Hypothesis::ThreeD,
             &parameters,

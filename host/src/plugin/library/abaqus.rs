@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::ffi::{c_char, c_int};
+use std::fmt::Write as _;
 use std::hint::black_box;
 use std::io::Write as _;
 
@@ -68,13 +69,13 @@ unsafe extern "C" fn stdb_abqerr_(
         let rest = match piece.chars().next() {
             Some('I' | 'i') => {
                 // SAFETY: the text asks for this entry.
-                message += &unsafe { *integers.add(n_integers) }.to_string();
+                let _ = write!(message, "{}", unsafe { *integers.add(n_integers) });
                 n_integers += 1;
                 &piece[1..]
             }
             Some('R' | 'r') => {
                 // SAFETY: as above.
-                message += &format!("{:e}", unsafe { *reals.add(n_reals) });
+                let _ = write!(message, "{:e}", unsafe { *reals.add(n_reals) });
                 n_reals += 1;
                 &piece[1..]
             }
