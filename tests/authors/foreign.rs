@@ -201,6 +201,8 @@ fn tangents_agree(laws: &[&str], folder: &Path) {
                     state: &state,
                     time: 0.0,
                     time_increment: 1.0,
+                    moment: host::plugin::Moment::default(),
+                    sites: &[],
                 };
                 let to = End {
                     flux: (&mut end, Strided::rows(2)),
@@ -316,6 +318,8 @@ fn an_exception_is_a_defect_of_the_law() {
             state: &[0.0],
             time: 0.0,
             time_increment: 1.0,
+            moment: host::plugin::Moment::default(),
+            sites: &[],
         };
         let to = End {
             flux: (&mut [0.0; 2], Strided::rows(2)),

@@ -93,6 +93,8 @@ impl Point {
             state: &self.state,
             time: 0.0,
             time_increment: 1.0,
+            moment: host::plugin::Moment::default(),
+            sites: &[],
         };
         let success = self.law.integrate(
             &start,
