@@ -130,17 +130,17 @@ pub fn build_law(
 ) -> Result<BuiltLaw, Error> {
     let description = loaded.description();
     if description.formulation(hypothesis).is_none() {
-        return Err(source
-            .error(
-                id.span(),
-                format!(
-                    "law `{}` is made for {}, expected {}",
-                    description.id,
-                    description.hypotheses(),
-                    hypothesis.name()
-                ),
+        let message = if description.formulations.is_empty() {
+            format!("law `{}`: {}", description.id, description.doc)
+        } else {
+            format!(
+                "law `{}` is made for {}, expected {}",
+                description.id,
+                description.hypotheses(),
+                hypothesis.name()
             )
-            .into());
+        };
+        return Err(source.error(id.span(), message).into());
     }
     let mut used = Vec::new();
     let mut warnings = loaded.library().warnings().to_vec();

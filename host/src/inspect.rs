@@ -168,6 +168,7 @@ impl Inspection {
             .iter()
             .map(String::as_str)
             .filter(|name| !CONTRACT.contains(name) && !LINKER.contains(name))
+            .filter(|name| !self.is_for_other_programs(name))
             .collect();
         if let [first, ..] = others.as_slice() {
             remarks.push(format!(
@@ -176,6 +177,17 @@ impl Inspection {
             ));
         }
         remarks
+    }
+
+    /// Entries of other programs: user materials, and behaviours of MFront's generic interface.
+    fn is_for_other_programs(&self, name: &str) -> bool {
+        let behaviours = self.exported.iter();
+        let mut behaviours = behaviours.filter_map(|name| name.strip_suffix("_mfront_mkt"));
+        matches!(name, "umat_" | "umat" | "UMAT" | "CALCULIX")
+            || behaviours.any(|behaviour| {
+                name.strip_prefix(behaviour)
+                    .is_some_and(|rest| rest.starts_with('_'))
+            })
     }
 }
 

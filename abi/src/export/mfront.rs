@@ -13,6 +13,7 @@ use super::foreign::{Laws, MOST_PARAMETERS, Point, has_default, tell};
 use super::umat::row;
 use crate::descriptor::{Hypothesis, Parameters};
 use crate::law::Tangent;
+use crate::raw::PILUM_T_LINEAR;
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ffi::{CStr, c_char, c_int};
 use std::fmt;
@@ -473,26 +474,22 @@ pub unsafe fn integrate<L: Exported>(
     data: *mut Data,
 ) -> c_int {
     // SAFETY: see above.
-    let Some(data) = (unsafe { data.as_mut() }) else {
+    let Some(data) = (unsafe { data.as_ref() }) else {
         return -1;
     };
-    let mut factor = 0.25;
-    let mut why_not = |step_factor: f64, why: fmt::Arguments<'_>| {
+    let say = |text: fmt::Arguments<'_>| {
         let id = L::DESCRIPTION.id.to_string_lossy();
-        factor = step_factor;
         // SAFETY: `error_message` is null or has room for 512 bytes.
-        unsafe { tell(data.error_message, format_args!("{id}: {why}")) };
+        unsafe { tell(data.error_message, format_args!("{id}: {text}")) };
     };
     // SAFETY: passed on to the caller.
-    let done = unsafe { carry(laws, settings, hypothesis, data, &mut why_not) };
-    match done {
-        Some(None) => 1,
-        Some(Some(why)) => {
-            // SAFETY: as above.
-            unsafe { tell(data.error_message, format_args!("{why}")) };
+    match unsafe { carry(laws, settings, hypothesis, data, say) } {
+        Ok(None) => 1,
+        Ok(Some(why)) => {
+            say(format_args!("{why}"));
             0
         }
-        None => {
+        Err(factor) => {
             if !data.rdt.is_null() {
                 // SAFETY: valid where it is not null.
                 unsafe { *data.rdt = factor.min(*data.rdt) };
@@ -502,7 +499,10 @@ pub unsafe fn integrate<L: Exported>(
     }
 }
 
-/// The reason why the results are inaccurate, if they are; `None` if there are none.
+/// The reason why the results are inaccurate, if they are.
+///
+/// # Errors
+/// The step factor; the reason is said.
 ///
 /// # Safety
 /// As [`integrate`].
@@ -511,20 +511,17 @@ unsafe fn carry<L: Exported>(
     settings: &Settings,
     hypothesis: Hypothesis,
     data: &Data,
-    why_not: &mut impl FnMut(f64, fmt::Arguments<'_>),
-) -> Option<Option<&'static str>> {
-    let mut refuse = |why: &str| why_not(0.25, format_args!("{why}"));
+    say: impl Fn(fmt::Arguments<'_>),
+) -> Result<Option<&'static str>, f64> {
+    let refuse = |why: &str| {
+        say(format_args!("{why}"));
+        0.25
+    };
     let (n, n_states) = (hypothesis.n_components(), L::STATE.len());
     let (s0, s1) = (&data.s0, &data.s1);
     // SAFETY: `K` is null or has one value at least.
     let request = unsafe { data.k.as_ref() }.map_or(Ok(Request::NONE), |k| Request::decoded(*k));
-    let request = match request {
-        Ok(request) => request,
-        Err(why) => {
-            refuse(why);
-            return None;
-        }
-    };
+    let request = request.map_err(refuse)?;
     let missing = s0.gradients.is_null()
         || s1.gradients.is_null()
         || s0.thermodynamic_forces.is_null()
@@ -533,8 +530,7 @@ unsafe fn carry<L: Exported>(
         || (n_states > 0 && s1.internal_state_variables.is_null())
         || (n_properties::<L>() > 0 && s1.material_properties.is_null());
     if missing {
-        refuse("an array that is needed is null");
-        return None;
+        return Err(refuse("an array that is needed is null"));
     }
     let mut given = [0.0; MOST_PARAMETERS];
     let mut properties = 0..;
@@ -576,9 +572,12 @@ unsafe fn carry<L: Exported>(
             time_increment: data.dt,
         }
     };
+    let mut factor = 0.25;
     let answer = laws.carry(&given[..table.len()], &point, request.tangent, |trouble| {
-        why_not(trouble.factor(), format_args!("{trouble}"));
-    })?;
+        factor = trouble.factor();
+        say(format_args!("{trouble}"));
+    });
+    let answer = answer.ok_or(factor)?;
     let operator =
         loading(laws, &given[..table.len()], &point, request.tangent).unwrap_or(answer.operator);
     for i in 0..n {
@@ -594,7 +593,7 @@ unsafe fn carry<L: Exported>(
             }
         }
     }
-    Some(answer.unreliable)
+    Ok(answer.unreliable)
 }
 
 /// The tangent of a point on its yield surface that has not moved: the one for loading. Programs of
@@ -610,7 +609,8 @@ fn loading<L: Exported>(
 ) -> Option<[f64; 36]> {
     const SMALL_STRAIN: f64 = 1e-9;
     let rests = point.increment.iter().all(|strain| *strain == 0.0);
-    if !(rests && tangent == Tangent::Consistent && point.n_components > 2) {
+    let linear = L::FORMULATIONS[0].flags & PILUM_T_LINEAR != 0;
+    if linear || !rests || tangent != Tangent::Consistent || point.n_components == 2 {
         return None;
     }
     let mean = (point.flux[0] + point.flux[1] + point.flux[2]) / 3.0;

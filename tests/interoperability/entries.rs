@@ -1,0 +1,45 @@
+//! All entries of a law library on the same random paths: `entries.c` says what is compared.
+
+use crate::{beside, last_line, library};
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::LazyLock;
+use tempfile::TempDir;
+
+/// The program, compiled once.
+static ENTRIES: LazyLock<(TempDir, PathBuf)> = LazyLock::new(|| {
+    let folder = TempDir::new().unwrap();
+    let program = folder.path().join("entries");
+    let mut compiler = Command::new("cc");
+    compiler.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-o"]);
+    compiler.arg(&program).arg(beside("entries.c"));
+    last_line(compiler.args(["-ldl", "-lm"]));
+    (folder, program)
+});
+
+/// Panics if an entry differs from the native one.
+fn compare(law: &str, behaviour: &str, flux: f64, step: f64, parameters: &[f64]) {
+    let mut command = Command::new(&ENTRIES.1);
+    command.arg(library(law)).arg(behaviour);
+    let numbers = [flux, step].into_iter().chain(parameters.iter().copied());
+    command.args(numbers.map(|number| number.to_string()));
+    let line = last_line(&mut command);
+    assert!(line.ends_with(" 0 differences"), "{line}");
+}
+
+#[test]
+fn laws_for_solids() {
+    let plastic = [34e3, 0.3, 1.0, 36.5, 12.0];
+    compare("elastic", "Elastic", -100.0, 1e-3, &plastic[..2]);
+    compare("mohr_coulomb", "MohrCoulomb", -100.0, 1e-3, &plastic);
+    // In axes of the layer, which MFront's interface does not know.
+    compare("oriented_mohr_coulomb", "-", -100.0, 1e-3, &plastic);
+}
+
+#[test]
+fn laws_for_interfaces() {
+    let joint = [1e6, 4e5, 1.0, 30.0, 5.0];
+    compare("coulomb_joint", "CoulombJoint", -100.0, 1e-4, &joint);
+    let mepi = [1e3, 0.4e3, 0.9, 0.2, 0.62, 0.5, 8e-3, 1.5, 2e-3];
+    compare("mepi", "Mepi", -100.0, 1e-5, &mepi);
+}
