@@ -70,12 +70,25 @@ const EXPORTS: File = ("exports.map", contract!("include/exports.map"));
 const CONTRACT: File = ("CONTRACT.md", contract!("README.md"));
 
 /// The contract's crate without its optional features.
-const CRATE: [File; 10] = [
+const CRATE: [File; 14] = [
     ("abi/Cargo.toml", template!("rust/abi.toml.txt")),
     ("abi/README.md", contract!("README.md")),
     ("abi/src/lib.rs", contract!("src/lib.rs")),
     ("abi/src/descriptor.rs", contract!("src/descriptor.rs")),
     ("abi/src/export.rs", contract!("src/export.rs")),
+    (
+        "abi/src/export/calculix.rs",
+        contract!("src/export/calculix.rs"),
+    ),
+    (
+        "abi/src/export/foreign.rs",
+        contract!("src/export/foreign.rs"),
+    ),
+    (
+        "abi/src/export/mfront.rs",
+        contract!("src/export/mfront.rs"),
+    ),
+    ("abi/src/export/umat.rs", contract!("src/export/umat.rs")),
     ("abi/src/law.rs", contract!("src/law.rs")),
     ("abi/src/raw.rs", contract!("src/raw.rs")),
     ("abi/src/status.rs", contract!("src/status.rs")),

@@ -37,8 +37,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "exports-are-hidden",
         family: Family::Load,
-        description: "The library exports the symbols of the contract and no others, which could \
-                      disturb other libraries (warning).",
+        description: "The library exports the symbols of the contract, or of another one that it \
+                      keeps too (UMAT, MFront, CalculiX), and no others, which could disturb other \
+                      libraries (warning).",
         needs: &["file-is-a-library"],
         run: exports_are_hidden,
     },
@@ -124,13 +125,28 @@ fn exports_are_hidden(subject: &Subject) -> Found {
     let file = object::File::parse(&*bytes).map_err(|why| failed(why.to_string()))?;
     let exports = file.exports().map_err(|why| failed(why.to_string()))?;
     // Linkers add marks of their own; the system's laws of names reserve underscores for them.
-    let others: Vec<String> = exports
+    let names: Vec<String> = exports
         .iter()
         .map(|export| String::from_utf8_lossy(export.name()).into_owned())
-        .filter(|name| {
-            let known = ["pilum_magic", "pilum_entry", "pilum_rust_layout"];
-            !known.contains(&name.trim_start_matches('_')) && !name.starts_with('_')
-        })
+        .collect();
+    // MFront marks each behaviour by a symbol; all others of it begin with its name.
+    let behaviours: Vec<String> = names
+        .iter()
+        .filter_map(|name| Some(format!("{}_", name.strip_suffix("_mfront_ept")?)))
+        .collect();
+    let is_known = |name: &str| {
+        let ours = ["pilum_magic", "pilum_entry", "pilum_rust_layout"];
+        let theirs = ["umat", "umat_", "UMAT", "CALCULIX"];
+        ours.contains(&name.trim_start_matches('_'))
+            || theirs.contains(&name)
+            || behaviours
+                .iter()
+                .any(|behaviour| name.starts_with(behaviour))
+    };
+    let others: Vec<String> = names
+        .iter()
+        .filter(|name| !is_known(name) && !name.starts_with('_'))
+        .cloned()
         .collect();
     if others.is_empty() {
         Ok(String::new())
