@@ -13,8 +13,9 @@ use crate::plugin::hexadecimal_sha256;
 use crate::solver::Loads;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs::File;
-use std::io::Write;
+use std::io::Write as _;
 use std::path::Path;
 
 /// Name of the file in a results folder.
@@ -165,9 +166,10 @@ pub fn identity(case: &Case, model: &Model) -> String {
     text += case.variant.as_deref().unwrap_or_default();
     text += "\n";
     for ((name, hypothesis), built) in &model.laws {
-        text += &format!("{name} {hypothesis} {}\n", built.law.library().sha256());
+        let sha256 = built.law.library().sha256();
+        let _ = writeln!(text, "{name} {hypothesis} {sha256}");
     }
-    text += &format!("{:?}\n", case.file.chosen);
+    let _ = writeln!(text, "{:?}", case.file.chosen);
     text += case.source.text();
     hexadecimal_sha256(text.as_bytes())
 }

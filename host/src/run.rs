@@ -467,7 +467,7 @@ impl<'a> Run<'a> {
     fn increments(
         &mut self,
         number: usize,
-        course: PhaseCourse,
+        mut course: PhaseCourse,
         equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
         results: &mut Results,
@@ -475,19 +475,7 @@ impl<'a> Run<'a> {
     ) -> Result<(), Error> {
         let phase = &self.file().phases[number];
         let n = *phase.increments.get_ref();
-        let easy = EASY * self.file().solver.method.max_iterations() as f64;
-        let smallest = 1.0 / n as f64 / f64::powi(2.0, self.file().solver.max_halvings as i32);
-        let PhaseCourse {
-            loads,
-            increment: done_before,
-            mut lambda,
-            mut step,
-            // The last step of this phase: its length and displacement increments.
-            mut last,
-            ..
-        } = course;
-        let loads = &loads;
-        for increment in done_before + 1..=n {
+        for increment in course.increment + 1..=n {
             for group in &mut self.groups {
                 group.moment = Moment {
                     step: self.time as u32 + 1,
@@ -499,67 +487,11 @@ impl<'a> Run<'a> {
                 phase: phase.name.get_ref().clone(),
                 increment,
             };
-            let target = if increment == n {
-                1.0
-            } else {
-                increment as f64 / n as f64
-            };
-            let mut done = IncrementRecord::default();
-            while lambda < target {
-                // A remainder that is hardly longer than the step is taken at once.
-                let end = if target - lambda <= 1.0001 * step {
-                    target
-                } else {
-                    lambda + step
-                };
-                let length = end - lambda;
-                let attempt = self.attempt(loads, [lambda, end], last.as_ref(), equations, record);
-                match attempt {
-                    Ok(success) => {
-                        results.iterations(&place, end, &success.iterations)?;
-                        done.iterations += success.iterations.len();
-                        if let Some(why) = &success.unreliable {
-                            record.unreliable += 1;
-                            done.warning.get_or_insert_with(|| why.clone());
-                        }
-                        if success.relaxed {
-                            record.relaxed += 1;
-                            observer.warning(&format!(
-                                "{place}: Newton iterations came to a standstill; viscous \
-                                 relaxation led to the next equilibrium"
-                            ));
-                        }
-                        if success.iterations.len() as f64 <= easy {
-                            step = (REGROWTH * step).min(1.0 / n as f64);
-                        }
-                        self.accept(&success, loads, equations, end);
-                        last = Some((length, success.increment));
-                        lambda = end;
-                    }
-                    Err(failure) => {
-                        results.iterations(&place, end, &failure.iterations)?;
-                        done.iterations += failure.iterations.len();
-                        record.cut_backs += 1;
-                        let factor = failure.factor.unwrap_or(CUT[1]).clamp(CUT[0], CUT[1]);
-                        step = factor * length;
-                        results.cut_back(&place, end, step, &failure.reason)?;
-                        observer.cut_back(&place, &failure.reason);
-                        if let Some(defect) = &failure.defect {
-                            let kept = self.keep_capsule(&place, &failure, results)?;
-                            return Err(Error::Plugin {
-                                message: format!("{place}: {defect}"),
-                                hint: kept,
-                            });
-                        }
-                        if step < smallest {
-                            let kept = self.keep_capsule(&place, &failure, results)?;
-                            return Err(Self::no_equilibrium(&place, lambda, n, &failure, kept));
-                        }
-                    }
-                }
-            }
+            let mut done =
+                self.reach(&place, n, &mut course, equations, record, results, observer)?;
+            let lambda = course.lambda;
             let reaction = self
-                .whole(equations, loads, lambda, record)
+                .whole(equations, &course.loads, lambda, record)
                 .map_err(|why| {
                     Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why), None)
                 })?;
@@ -575,17 +507,13 @@ impl<'a> Run<'a> {
             record.increments += 1;
             results.increment(&place, n, &done, &snapshot, &self.mesh)?;
             observer.increment(&place, n, done.iterations);
+            course.increment = increment;
             let stops = observer.wants_to_stop();
             if stops || keeper.is_due() {
-                let method = self.file().solver.method;
                 let course = PhaseCourse {
-                    loads: loads.clone(),
-                    increment,
-                    lambda,
-                    step,
-                    last: last.clone(),
-                    has_matrix: equations.matrix.is_kept(method),
+                    has_matrix: equations.matrix.is_kept(self.file().solver.method),
                     record: equations.counted_in(record),
+                    ..course.clone()
                 };
                 keeper.keep(self.state(number, course), results, &observer.warnings)?;
             }
@@ -594,6 +522,84 @@ impl<'a> Run<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Steps up to the end of an increment, one of `n`; as many as it takes.
+    #[expect(clippy::too_many_arguments, reason = "what a phase works on, apart")]
+    fn reach(
+        &mut self,
+        place: &Place,
+        n: usize,
+        course: &mut PhaseCourse,
+        equations: &mut PhaseEquations,
+        record: &mut PhaseRecord,
+        results: &mut Results,
+        observer: &mut Noting<'_>,
+    ) -> Result<IncrementRecord, Error> {
+        let settings = &self.file().solver;
+        let easy = EASY * settings.method.max_iterations() as f64;
+        let smallest = 1.0 / n as f64 / f64::powi(2.0, settings.max_halvings as i32);
+        let target = if place.increment == n {
+            1.0
+        } else {
+            place.increment as f64 / n as f64
+        };
+        let mut done = IncrementRecord::default();
+        while course.lambda < target {
+            let (start, step) = (course.lambda, course.step);
+            // A remainder that is hardly longer than the step is taken at once.
+            let end = if target - start <= 1.0001 * step {
+                target
+            } else {
+                start + step
+            };
+            let length = end - start;
+            let last = course.last.as_ref();
+            match self.attempt(&course.loads, [start, end], last, equations, record) {
+                Ok(success) => {
+                    results.iterations(place, end, &success.iterations)?;
+                    done.iterations += success.iterations.len();
+                    if let Some(why) = &success.unreliable {
+                        record.unreliable += 1;
+                        done.warning.get_or_insert_with(|| why.clone());
+                    }
+                    if success.relaxed {
+                        record.relaxed += 1;
+                        observer.warning(&format!(
+                            "{place}: Newton iterations came to a standstill; viscous relaxation \
+                             led to the next equilibrium"
+                        ));
+                    }
+                    if success.iterations.len() as f64 <= easy {
+                        course.step = (REGROWTH * step).min(1.0 / n as f64);
+                    }
+                    self.accept(&success, &course.loads, equations, end);
+                    course.last = Some((length, success.increment));
+                    course.lambda = end;
+                }
+                Err(failure) => {
+                    results.iterations(place, end, &failure.iterations)?;
+                    done.iterations += failure.iterations.len();
+                    record.cut_backs += 1;
+                    let factor = failure.factor.unwrap_or(CUT[1]).clamp(CUT[0], CUT[1]);
+                    course.step = factor * length;
+                    results.cut_back(place, end, course.step, &failure.reason)?;
+                    observer.cut_back(place, &failure.reason);
+                    if let Some(defect) = &failure.defect {
+                        let kept = self.keep_capsule(place, &failure, results)?;
+                        return Err(Error::Plugin {
+                            message: format!("{place}: {defect}"),
+                            hint: kept,
+                        });
+                    }
+                    if course.step < smallest {
+                        let kept = self.keep_capsule(place, &failure, results)?;
+                        return Err(Self::no_equilibrium(place, start, n, &failure, kept));
+                    }
+                }
+            }
+        }
+        Ok(done)
     }
 
     /// One step; with a guess from the last one if there is one, else from the tangent.

@@ -172,15 +172,22 @@ fn other_behaviours_of_opengeosys_run() {
     let clay = "CriticalStateLineSlope = 1.2\nSwellingLineSlope = 6.6e-3\n\
                 VirginConsolidationLineSlope = 7.7e-2\n\
                 CharacteristicPreConsolidationPressure = 200.0\n";
-    for (law, parameters) in [
-        ("StandardElasticityBrick", elastic.to_owned()),
-        ("DruckerPrager", format!("{elastic}{pressed}")),
-        ("ModCamClay_semiExpl_constE", format!("{elastic}{clay}")),
+    // Where the behaviour has no initial values of its own, the file gives them.
+    let volume = "internal = { VolumeRatio = 1.8, PreConsolidationPressure = 200.0 }\n";
+    for (law, parameters, internal) in [
+        ("StandardElasticityBrick", elastic.to_owned(), ""),
+        ("DruckerPrager", format!("{elastic}{pressed}"), ""),
+        (
+            "ModCamClay_semiExpl_constE",
+            format!("{elastic}{clay}"),
+            volume,
+        ),
     ] {
         for hypothesis in ["axisymmetric", "plane_strain", "3d"] {
             let end = "[initial]\nstress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 }\n\
                        [[segment]]\nincrements = 10\n\
                        control = { 11 = { stress = -100.0 }, 22 = { strain = -0.001 } }\n";
+            let end = end.replacen("[initial]\n", &format!("[initial]\n{internal}"), 1);
             let text = format!("hypothesis = \"{hypothesis}\"\n[parameters]\n{parameters}{end}");
             let row = last_row(&driver(&behaviours(), law, &text));
             assert!(row["stress_22"] < -110.0, "{law}: {}", row["stress_22"]);
