@@ -171,7 +171,8 @@ fn other_behaviours_of_opengeosys_run() {
     let pressed = "Cohesion = 1.0\nFrictionParameter = 0.5\nDilatancyParameter = 0.2\n";
     let clay = "CriticalStateLineSlope = 1.2\nSwellingLineSlope = 6.6e-3\n\
                 VirginConsolidationLineSlope = 7.7e-2\n\
-                CharacteristicPreConsolidationPressure = 200.0\n";
+                CharacteristicPreConsolidationPressure = 200.0\n\
+                AmbientPressure = 0.0\n";
     // Where the behaviour has no initial values of its own, the file gives them.
     let volume = "internal = { VolumeRatio = 1.8, PreConsolidationPressure = 200.0 }\n";
     for (law, parameters, internal) in [

@@ -78,8 +78,8 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
 enum Slot {
     Property,
     External,
-    /// A parameter of MFront, with its name and default.
-    Parameter(String, f64),
+    /// A parameter of MFront, with its name and the bits of its default.
+    Parameter(String, u64),
 }
 
 /// A formulation there.
@@ -288,12 +288,18 @@ impl Reader<'_> {
         let own = self.variables(modelling, "Parameters");
         for (name, kind) in own.ok_or_else(|| unreadable("parameters"))? {
             let default = self.symbol(modelling, &format!("{name}_ParameterDefaultValue"));
-            // Whole numbers steer the algorithm; without a default there is nothing to leave as it is.
-            if kind == 0
-                && let Some(default) = self.symbols.real(&default)
-            {
-                let parameter = self.parameter(modelling, &name, Some(default));
-                push(Slot::Parameter(name, default), parameter);
+            // Whole numbers steer the algorithm.
+            if kind == 0 {
+                let default = self.symbols.real(&default);
+                let parameter = ParameterDescription {
+                    // Not given, it is left as it is.
+                    optional: default.is_none(),
+                    ..self.parameter(modelling, &name, default)
+                };
+                push(
+                    Slot::Parameter(name, default.unwrap_or(f64::NAN).to_bits()),
+                    parameter,
+                );
             }
         }
         let mut internal_variables = Vec::new();
@@ -407,7 +413,7 @@ impl ForeignLaw for Mfront {
             match slot {
                 Slot::Property => properties.push(value),
                 Slot::External => external.push(value),
-                Slot::Parameter(_, default) if value.to_bits() == default.to_bits() => {}
+                Slot::Parameter(_, default) if value.is_nan() || value.to_bits() == *default => {}
                 Slot::Parameter(name, _) => set.push((name.as_str(), value)),
             }
         }
