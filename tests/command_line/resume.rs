@@ -95,7 +95,7 @@ fn whole_rows(place: &Place) -> usize {
     let whole = |row: &&str| row.ends_with('\n') && row.matches(',').count() == cells;
     let rows: Vec<&str> = rows.collect();
     // The one row that was being written when the process was killed may be cut short.
-    assert!(rows.iter().rev().skip(1).all(|row| whole(row)), "{text}");
+    assert!(rows.iter().rev().skip(1).all(&whole), "{text}");
     rows.iter().filter(|row| whole(row)).count()
 }
 

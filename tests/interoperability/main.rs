@@ -2,6 +2,7 @@
 //!
 //! What needs other programs is left out unless asked for: `install.sh` beside this file installs
 //! them and says how to run these tests.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 mod entries;
 mod kratos;

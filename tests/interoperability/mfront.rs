@@ -40,13 +40,13 @@ fn driver(library: &Path, law: &str, rest: &str) -> String {
 }
 
 /// Triaxial compression with a lateral stress of 100 kPa.
-const COMPRESSION: &str = r#"
+const COMPRESSION: &str = r"
 [initial]
 stress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 }
 [[segment]]
 increments = 40
 control = { 11 = { stress = -100.0 }, 33 = { stress = -100.0 }, 22 = { strain = -0.02 }, 12 = { strain = 0.0 } }
-"#;
+";
 
 #[test]
 fn our_own_behaviours_come_back_as_the_native_laws() {

@@ -6,8 +6,8 @@
 //! | [`Adapter::Umat`] | an Abaqus user subroutine `UMAT` | no: a sidecar file does |
 //! | [`Adapter::Mfront`] | behaviours of MFront's generic interface | yes, by its symbols |
 //!
-//! A further adapter is a variant of [`Adapter`], an arm of [`open`], a [`ForeignLaw`] and a
-//! [`ForeignInstance`].
+//! A further adapter is a variant of [`Adapter`], an arm of `open`, a `ForeignLaw` and a
+//! `ForeignInstance`.
 
 pub mod conventions;
 mod mfront;
