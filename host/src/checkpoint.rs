@@ -159,8 +159,8 @@ fn decode(bytes: &[u8]) -> Option<Checkpoint> {
     postcard::from_bytes(body).ok()
 }
 
-/// What must be the same for a run to go on: the program, the case with its variant, and the bytes
-/// of its libraries.
+/// What must be the same for a run to go on: the program, the case with its variant, the bytes of
+/// its libraries, what describes them, and the parameters.
 pub fn identity(case: &Case, model: &Model) -> String {
     let mut text = format!("pilum {}\n", env!("CARGO_PKG_VERSION"));
     text += case.variant.as_deref().unwrap_or_default();
@@ -168,6 +168,11 @@ pub fn identity(case: &Case, model: &Model) -> String {
     for ((name, hypothesis), built) in &model.laws {
         let sha256 = built.law.library().sha256();
         let _ = writeln!(text, "{name} {hypothesis} {sha256}");
+        // What a sidecar says of a library is not part of its bytes.
+        let _ = writeln!(text, "{:?}", built.law.description());
+        for parameter in &built.parameters {
+            let _ = writeln!(text, "{} {:x}", parameter.id, parameter.value.to_bits());
+        }
     }
     let _ = writeln!(text, "{:?}", case.file.chosen);
     text += case.source.text();

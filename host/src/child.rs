@@ -15,7 +15,7 @@ const MEMORY: &str = "PILUM_CHILD_MEMORY";
 const MOST_OUTPUT: usize = 1 << 20;
 /// How long outputs are waited for once the child has ended: only what it has left behind can
 /// still hold them open.
-const LAST_WORDS: Duration = Duration::from_millis(200);
+const LAST_WORDS: Duration = Duration::from_secs(5);
 
 /// What a child is to do, and within which limits.
 #[derive(Clone, Debug)]

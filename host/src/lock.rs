@@ -74,7 +74,8 @@ impl Pins {
     ) -> Result<Self, Error> {
         let mut pins = Self::given(source, laws)?;
         let path = lock_path(source.path());
-        if path.is_file() {
+        // A link that leads nowhere is a lock that cannot be read, and not none.
+        if path.symlink_metadata().is_ok() {
             pins.add_lock(&path)?;
         }
         Ok(pins)

@@ -1,9 +1,5 @@
 //! The `pilum` program: arguments to library calls, and their outcome to messages and exit codes.
-#![expect(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "this is where the program prints"
-)]
+#![expect(clippy::print_stdout, reason = "this is where the program prints")]
 
 use clap::{CommandFactory, Parser, Subcommand};
 use host::case::Case;
@@ -16,11 +12,18 @@ use host::schema::{self, FileKind};
 use host::solver::Reuse;
 use host::trade_off;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+
+/// A line on the error stream. Nobody may be reading it: that does not end a run.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
 
 /// Finite elements for soil-structure interfaces, with constitutive laws as plugins.
 #[derive(Parser)]
@@ -209,7 +212,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();
-            eprintln!("{:?}", miette::Report::new(error));
+            say!("{:?}", miette::Report::new(error));
             ExitCode::from(code)
         }
     }
@@ -245,7 +248,7 @@ fn execute(command: Command) -> Result<(), Error> {
             csv,
         } => match umat {
             Some(umat) => host::point::run_incremental(&driver, &umat, csv.as_deref(), |report| {
-                eprintln!("{report}");
+                say!("{report}");
             }),
             None if driver.extension().is_some_and(|ending| ending == "inp") => {
                 Err(Error::Usage(format!(
@@ -275,7 +278,7 @@ fn execute(command: Command) -> Result<(), Error> {
                 &input,
                 &options,
                 &mut |text| println!("{text}"),
-                &mut |doing| eprintln!("{doing}"),
+                &mut |doing| say!("{doing}"),
             )
         }
         Command::Check(arguments) => host::check::run(&arguments, &mut |text| print!("{text}")),
@@ -323,7 +326,7 @@ fn stop_on_signals() -> Result<(), Error> {
         if STOPS.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("stopping after this increment; once more to stop at once");
+        say!("stopping after this increment; once more to stop at once");
     };
     ctrlc::set_handler(stop).map_err(|error| Error::Internal(error.to_string()))
 }
@@ -394,7 +397,7 @@ fn run_cases(
             (Some(out), _) => out.to_owned(),
         };
         if let Some(name) = &case.variant {
-            eprintln!("variant {name}");
+            say!("variant {name}");
         }
         let mut progress = Progress::new();
         let run = run_accurately(case, &folder, &mut progress, &mut reuse, options);
@@ -402,7 +405,7 @@ fn run_cases(
         let has_results = progress.has_begun;
         match run {
             Ok(figures) => {
-                println!("results in {}", folder.display());
+                let _ = writeln!(std::io::stdout(), "results in {}", folder.display());
                 drawn.extend(case.variant.clone().map(|variant| (variant, figures)));
             }
             Err(error) => keep_last(&mut outcome, error),
@@ -431,7 +434,7 @@ fn run_cases(
     match (outcome, reports) {
         // What became of the run matters more than what became of its report.
         (Err(run), Err(report)) => {
-            eprintln!("{:?}", miette::Report::new(report));
+            say!("{:?}", miette::Report::new(report));
             Err(run)
         }
         (outcome, reports) => outcome.and(reports),
@@ -477,19 +480,19 @@ fn run_accurately(
 /// Keeps the last failure for the caller to report, and reports the one before it.
 fn keep_last(outcome: &mut Result<(), Error>, error: Error) {
     if let Err(earlier) = std::mem::replace(outcome, Err(error)) {
-        eprintln!("{:?}", miette::Report::new(earlier));
+        say!("{:?}", miette::Report::new(earlier));
     }
 }
 
 /// Tables go to standard output or files, what came out of each driver to the error stream.
 fn run_point(driver: &Path, variant: Option<&str>, csv: Option<&Path>) -> Result<(), Error> {
-    host::point::run_file_variants(driver, variant, csv, |report| eprintln!("{report}"))
+    host::point::run_file_variants(driver, variant, csv, |report| say!("{report}"))
 }
 
 fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
     let out = out.unwrap_or_else(|| host::report::default_path(folders));
     let written = host::report::write(folders, &out)?;
-    println!("report in {}", written.display());
+    let _ = writeln!(std::io::stdout(), "report in {}", written.display());
     Ok(())
 }
 
@@ -553,7 +556,7 @@ impl Progress {
     fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.println(line),
-            None => eprintln!("{line}"),
+            None => say!("{line}"),
         }
     }
 
@@ -579,7 +582,7 @@ impl Observer for Progress {
             bar.tick();
             self.bar = Some(bar);
         } else {
-            eprintln!("phase {name}: {increments} increments");
+            say!("phase {name}: {increments} increments");
         }
     }
 
@@ -592,9 +595,10 @@ impl Observer for Progress {
                     self.cut_backs
                 ));
             }
-            None => eprintln!(
+            None => say!(
                 "phase {}: increment {}/{of}, {iterations} iterations",
-                place.phase, place.increment
+                place.phase,
+                place.increment
             ),
         }
     }

@@ -11,3 +11,4 @@ mod laws;
 mod names;
 mod program;
 mod schema;
+mod validator;

@@ -210,7 +210,7 @@ fn interrupt(process: u32) {
 }
 
 #[test]
-#[ignore = "200 kills take minutes: cargo test --release -p tests --test command_line -- --ignored resume"]
+#[ignore = "200 kills take minutes: cargo test --release -p tests --test command_line -- --ignored kills"]
 fn two_hundred_kills_lose_nothing() {
     killed_and_resumed("", 100);
     killed_and_resumed("equations = \"sparse\"", 100);

@@ -9,7 +9,7 @@ case "$(uname)" in
 esac
 fc=${FC:-gfortran}
 # -frecursive: no local variable is shared between threads.
-flags="-O2 -Wall -Wno-unused-dummy-argument -frecursive -fPIC -J build"
+flags="-O2 -ffree-line-length-none -Wall -Wno-unused-dummy-argument -frecursive -fPIC -J build"
 $fc $flags -c include/pilum_law.f90 -o build/pilum_law.o
 $fc $flags -c law.f90 -o build/law.o
 $fc -fPIC -I include -c manifest.c -o build/manifest.o
