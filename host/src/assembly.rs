@@ -172,6 +172,14 @@ impl System {
         !self.elements[group].is_empty()
     }
 
+    /// Degrees of freedom of a group's elements, after ties; some of them several times.
+    pub fn dofs_of(&self, group: usize) -> impl Iterator<Item = usize> {
+        self.elements[group]
+            .iter()
+            .flat_map(|map| &map.dofs)
+            .copied()
+    }
+
     /// Mesh lines of the unknowns, from those of the nodes.
     pub fn lines(&self, of_nodes: &[[u32; 2]]) -> Vec<[u32; 2]> {
         self.free.iter().map(|&dof| of_nodes[dof / 2]).collect()

@@ -10,7 +10,7 @@ use crate::group::GroupState;
 use crate::model::Model;
 use crate::output::{PhaseRecord, ResultsState, unwritable};
 use crate::plugin::hexadecimal_sha256;
-use crate::solver::Loads;
+use crate::solver::{Loads, Standing};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -22,7 +22,7 @@ use std::path::Path;
 pub const FILE_NAME: &str = "checkpoint.bin";
 
 /// First bytes of the file: the format and its version.
-const HEAD: &[u8] = b"pilum checkpoint 1\n";
+const HEAD: &[u8] = b"pilum checkpoint 2\n";
 
 /// A run after a whole increment.
 #[derive(Debug, Serialize, Deserialize)]
@@ -72,6 +72,8 @@ pub struct PhaseCourse {
     pub step: f64,
     /// Length and displacement increments of the last step.
     pub last: Option<(f64, Vec<f64>)>,
+    /// Where the linear domain stands.
+    pub domain: Option<Standing>,
     /// A matrix of the groups' tangents is in use.
     pub has_matrix: bool,
     /// The phase so far.

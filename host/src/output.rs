@@ -14,7 +14,7 @@ pub(crate) use figure::COLOURS;
 pub use figure::{Figures, check_figures, check_table_figures};
 pub use summary::PhaseRecord;
 
-use crate::case::{Case, OutputInput};
+use crate::case::{Case, OutputInput, When};
 use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::mesh::Mesh;
@@ -31,7 +31,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use summary::{Course, Summary};
+use summary::{Course, Stopped, Summary};
 
 /// A number with 17 significant digits: reading it back gives the same bits.
 pub fn number(value: f64) -> String {
@@ -388,6 +388,61 @@ impl Results {
             "next_step": step,
             "reason": reason,
         }))
+    }
+
+    /// Groups that this increment's results look at, one of `of`, beside those that its probes
+    /// look at. `None`: all of them.
+    pub fn looks_at(
+        &self,
+        place: &Place,
+        of: usize,
+        probed: &[bool],
+        groups: &[Group],
+    ) -> Option<Vec<bool>> {
+        let asks = |when: When| when.includes(place.increment, of);
+        let all = (self.fields.is_some() && asks(self.settings.fields))
+            || (self.points.is_some() && asks(self.settings.points))
+            || self.figures.cuts_at(place, of)
+            || place.increment == of;
+        if all {
+            return None;
+        }
+        let mut looked_at = probed.to_vec();
+        if self.profile.is_some() && asks(self.settings.profile) {
+            for (looked_at, group) in looked_at.iter_mut().zip(groups) {
+                *looked_at |= group.jump_and_traction(0).is_some();
+            }
+        }
+        Some(looked_at)
+    }
+
+    /// Notes the last state of equilibrium of a phase that cannot go on, and writes its fields if
+    /// there are any. `place` is the increment that it lies in.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn last_equilibrium(
+        &mut self,
+        place: &Place,
+        load_factor: f64,
+        time: f64,
+        probes: Vec<Option<f64>>,
+        snapshot: &Snapshot<'_>,
+        mesh: &Mesh,
+    ) -> Result<(), Error> {
+        self.summary.course.stopped = Some(Stopped {
+            phase: place.phase.clone(),
+            load_factor,
+            time,
+            probes,
+        });
+        if let Some(fields) = &mut self.fields {
+            let is_written = fields.times.last().is_some_and(|last| *last >= time);
+            if !is_written {
+                fields.write(time, snapshot, mesh)?;
+            }
+        }
+        Ok(())
     }
 
     /// Writes an increment that reached equilibrium.

@@ -104,6 +104,35 @@ impl Probes {
         self.probes.iter().map(|(name, _)| name.as_str())
     }
 
+    /// What the probes look at: of every group whether they do, and the degrees of freedom of
+    /// nodes whose displacements they give.
+    pub fn looks_at(&self, groups: &[Group]) -> (Vec<bool>, Vec<usize>) {
+        let mut looked = vec![false; groups.len()];
+        let mut dofs = Vec::new();
+        for (_, probe) in &self.probes {
+            match probe {
+                Probe::Points { group, .. }
+                | Probe::Force {
+                    group: Some(group), ..
+                } => looked[*group] = true,
+                Probe::Displacement {
+                    nodes, component, ..
+                } => dofs.extend(nodes.iter().map(|n| 2 * n + component)),
+                // A reaction is that of all elements at the nodes.
+                Probe::Force { nodes, .. } => {
+                    for (looked, group) in looked.iter_mut().zip(groups) {
+                        let kinematics = &group.kinematics;
+                        let mut elements = 0..kinematics.n_elements();
+                        *looked |=
+                            elements.any(|e| kinematics.nodes(e).iter().any(|n| nodes.contains(n)));
+                    }
+                }
+                Probe::Combination(_) => {}
+            }
+        }
+        (looked, dofs)
+    }
+
     /// Values, in order. `None`: the quantity does not exist now (an internal variable of another
     /// law).
     pub fn values(&self, snapshot: &Snapshot<'_>) -> Vec<Option<f64>> {

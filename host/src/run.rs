@@ -12,8 +12,8 @@ use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figure
 use crate::plugin::Moment;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    Costs, LinearDomain, LinearSolver, Loads, Matrix, Newton, Reuse, Singular, StepFailure,
-    StepSuccess, mesh_lines,
+    Costs, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
+    StepFailure, StepSuccess, mesh_lines,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -210,6 +210,8 @@ struct Run<'a> {
     groups: Vec<Group>,
     model: ModelRest,
     probes: Probes,
+    /// Groups and degrees of freedom that the probes look at.
+    looked_at: (Vec<bool>, Vec<usize>),
     /// Displacements by degree of freedom, as counted since the last reset.
     displacement: Vec<f64>,
     /// Prescribed displacements by degree of freedom.
@@ -239,8 +241,6 @@ struct PhaseEquations {
     /// Forces out of balance at the start, relative to the forces in play.
     out_of_balance: f64,
     n_unknowns: usize,
-    /// Displacements when the domain's groups were last brought up to date.
-    at_last: Vec<f64>,
     /// Factorisations and fallbacks in the phase that the solver does not count, modulo 2⁶⁴.
     counted: [u64; 2],
 }
@@ -284,12 +284,14 @@ impl<'a> Run<'a> {
             ..
         } = model;
         let n_dofs = 2 * mesh.nodes.len();
+        let looked_at = probes.looks_at(&groups);
         let mut run = Self {
             case,
             mesh,
             groups,
             model: ModelRest { ties, swaps },
             probes,
+            looked_at,
             displacement: vec![0.0; n_dofs],
             prescribed: BTreeMap::new(),
             pressure: BTreeMap::new(),
@@ -423,6 +425,7 @@ impl<'a> Run<'a> {
                 lambda: 0.0,
                 step: 1.0 / *phase.increments.get_ref() as f64,
                 last: None,
+                domain: None,
                 has_matrix: false,
                 record: PhaseRecord::new(name, equations.n(), imbalance),
             }
@@ -487,20 +490,23 @@ impl<'a> Run<'a> {
                 phase: phase.name.get_ref().clone(),
                 increment,
             };
-            let mut done =
-                self.reach(&place, n, &mut course, equations, record, results, observer)?;
+            let reached = self.reach(&place, n, &mut course, equations, record, results, observer);
             let lambda = course.lambda;
+            let mut done = match reached {
+                Ok(done) => done,
+                Err(error) => {
+                    // What led here matters more than trouble with the state before it.
+                    let _ = self.last_equilibrium(&place, equations, &course, record, results);
+                    return Err(error);
+                }
+            };
+            let looked_at = results.looks_at(&place, n, &self.looked_at.0, &self.groups);
             let reaction = self
-                .whole(equations, &course.loads, lambda, record)
+                .complete(equations, &course.loads, lambda, looked_at, record)
                 .map_err(|why| {
                     Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why), None)
                 })?;
-            let snapshot = Snapshot {
-                groups: &self.groups,
-                ties: &self.model.ties,
-                displacement: &self.displacement,
-                reaction: &reaction,
-            };
+            let snapshot = self.snapshot(&reaction);
             done.probes = self.probes.values(&snapshot);
             done.time = self.time + lambda;
             record.iterations += done.iterations;
@@ -511,6 +517,7 @@ impl<'a> Run<'a> {
             let stops = observer.wants_to_stop();
             if stops || keeper.is_due() {
                 let course = PhaseCourse {
+                    domain: equations.domain.as_ref().map(|d| d.standing().clone()),
                     has_matrix: equations.matrix.is_kept(self.file().solver.method),
                     record: equations.counted_in(record),
                     ..course.clone()
@@ -522,6 +529,41 @@ impl<'a> Run<'a> {
             }
         }
         Ok(())
+    }
+
+    /// What probes and results look at.
+    fn snapshot<'s>(&'s self, reaction: &'s [f64]) -> Snapshot<'s> {
+        Snapshot {
+            groups: &self.groups,
+            ties: &self.model.ties,
+            displacement: &self.displacement,
+            reaction,
+        }
+    }
+
+    /// Writes the last state of equilibrium of a phase that cannot go on.
+    fn last_equilibrium(
+        &mut self,
+        place: &Place,
+        equations: &mut PhaseEquations,
+        course: &PhaseCourse,
+        record: &mut PhaseRecord,
+        results: &mut Results,
+    ) -> Result<(), Error> {
+        let lambda = course.lambda;
+        let reaction = self
+            .complete(equations, &course.loads, lambda, None, record)
+            .map_err(Error::Internal)?;
+        let snapshot = self.snapshot(&reaction);
+        let probes = self.probes.values(&snapshot);
+        results.last_equilibrium(
+            place,
+            lambda,
+            self.time + lambda,
+            probes,
+            &snapshot,
+            &self.mesh,
+        )
     }
 
     /// Steps up to the end of an increment, one of `n`; as many as it takes.
@@ -659,15 +701,17 @@ impl<'a> Run<'a> {
     }
 
     /// Completes the state at load factor λ: what a linear domain left out of the iterations, and
-    /// the reactions (internal less external forces, by degree of freedom).
+    /// the reactions (internal less external forces, by degree of freedom). Where only some groups
+    /// are `looked_at`, the rest of the domain may stay where it was.
     ///
     /// # Errors
     /// Why the domain is not in equilibrium.
-    fn whole(
+    fn complete(
         &mut self,
         equations: &mut PhaseEquations,
         loads: &Loads,
         lambda: f64,
+        looked_at: Option<Vec<bool>>,
         record: &mut PhaseRecord,
     ) -> Result<Vec<f64>, String> {
         let started = Instant::now();
@@ -680,20 +724,19 @@ impl<'a> Run<'a> {
         }
         fold(&self.model.ties, &mut reaction);
         if let Some(domain) = &mut equations.domain {
-            let moved = self.displacement.iter().zip(&equations.at_last);
-            let mut increment: Vec<f64> = moved.map(|(u, last)| u - last).collect();
             let tolerance = self.case.file.solver.force_tolerance;
+            let looked_at = looked_at.as_deref().map(|groups| LookedAt {
+                groups,
+                dofs: &self.looked_at.1,
+            });
+            let (groups, displacement) = (&mut self.groups, &mut self.displacement);
             let internal =
-                domain.bring_up(&mut self.groups, loads, lambda, &mut increment, tolerance)?;
+                domain.bring_up(looked_at, groups, loads, lambda, displacement, tolerance)?;
             for (reaction, internal) in reaction.iter_mut().zip(internal) {
                 *reaction += internal;
             }
-            for &dof in domain.unknowns() {
-                self.displacement[dof] = equations.at_last[dof] + increment[dof];
-            }
         }
         equations.system.follow(&mut self.displacement);
-        equations.at_last.copy_from_slice(&self.displacement);
         for (force, external) in reaction.iter_mut().zip(&self.force) {
             *force -= external;
         }
@@ -792,10 +835,11 @@ impl<'a> Run<'a> {
             Some(course) => course.record.out_of_balance,
             None => self.out_of_balance(&unknowns, &mut loads),
         };
+        let standing = course.and_then(|course| course.domain.as_ref());
         if let Some(domain) = &mut domain {
-            match course {
-                Some(course) => domain.restart(&self.groups, &loads, course.lambda),
-                None => domain.start(&self.groups, &loads),
+            match standing {
+                Some(standing) => domain.restart(&self.groups, &loads, standing),
+                None => domain.start(&self.groups, &loads, &self.displacement),
             }
         }
         let mut equations = PhaseEquations {
@@ -805,7 +849,6 @@ impl<'a> Run<'a> {
             matrix: Matrix::default(),
             out_of_balance,
             n_unknowns: unknowns.len(),
-            at_last: self.displacement.clone(),
             counted: [0; 2],
         };
         if let Some(course) = course {

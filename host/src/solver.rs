@@ -10,5 +10,5 @@ mod newton;
 
 pub use dissection::mesh_lines;
 pub use linear::{LinearSolver, Singular};
-pub use linear_domain::{LinearDomain, Reuse};
+pub use linear_domain::{LinearDomain, LookedAt, Reuse, Standing};
 pub use newton::{Costs, Iteration, Loads, Matrix, Newton, StepFailure, StepSuccess};

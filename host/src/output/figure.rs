@@ -234,17 +234,19 @@ impl Figures {
         }
     }
 
+    /// Whether cuts are asked for after this increment, one of `of`.
+    pub(super) fn cuts_at(&self, place: &Place, of: usize) -> bool {
+        let mut figures = self.drawn.iter();
+        figures.any(|(figure, _)| cut_at(figure, place, of).is_some())
+    }
+
     /// Takes the cuts that are asked for after this increment, one of `of`.
     pub(super) fn cuts(&mut self, place: &Place, of: usize, groups: &[Group]) {
         let Place { phase, increment } = place;
         for (figure, curves) in &mut self.drawn {
-            let Some(cut) = figure.points.as_ref().filter(|_| drawn_in(figure, phase)) else {
+            let Some(cut) = cut_at(figure, place, of) else {
                 continue;
             };
-            let last = cut.increments.is_empty() && *increment == of;
-            if !(last || cut.increments.contains(increment)) {
-                continue;
-            }
             for y in &figure.y {
                 let y = y.get_ref();
                 curves.push(Curve {
@@ -300,6 +302,14 @@ impl Figures {
 
 fn drawn_in(figure: &FigureInput, phase: &str) -> bool {
     figure.phase.as_ref().is_none_or(|p| p.get_ref() == phase)
+}
+
+/// The cut that a figure takes after this increment, one of `of`.
+fn cut_at<'f>(figure: &'f FigureInput, place: &Place, of: usize) -> Option<&'f CutInput> {
+    let cut = figure.points.as_ref()?;
+    let Place { phase, increment } = place;
+    let last = cut.increments.is_empty() && *increment == of;
+    (drawn_in(figure, phase) && (last || cut.increments.contains(increment))).then_some(cut)
 }
 
 /// Two quantities at the points of a cut, by increasing first one.

@@ -72,11 +72,22 @@ pub(super) struct Summary {
     pub(super) course: Course,
 }
 
+/// The last state of equilibrium of a phase that could not go on.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Stopped {
+    pub(super) phase: String,
+    pub(super) load_factor: f64,
+    pub(super) time: f64,
+    pub(super) probes: Vec<Option<f64>>,
+}
+
 /// What has happened so far.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Course {
     phases: Vec<PhaseRecord>,
     last: Option<(Place, Vec<Option<f64>>)>,
+    /// Where a phase could not go on.
+    pub(super) stopped: Option<Stopped>,
     /// By phase, the first increment with a result that a law calls inaccurate, and why.
     unreliable: Vec<(Place, String)>,
 }
@@ -265,6 +276,16 @@ impl Summary {
             json!(last.map(|(place, _)| json!({
                 "phase": place.phase,
                 "increment": place.increment,
+            }))),
+        );
+        let stopped = self.course.stopped.as_ref();
+        summary.insert(
+            "stopped_at".to_owned(),
+            json!(stopped.map(|stopped| json!({
+                "phase": stopped.phase,
+                "load_factor": stopped.load_factor,
+                "time": stopped.time,
+                "probes": self.probes(&stopped.probes),
             }))),
         );
         let values = last

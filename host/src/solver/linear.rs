@@ -139,8 +139,8 @@ impl LinearSolver {
 
     fn solve_once(&self, right: &[f64]) -> Result<Vec<f64>, Singular> {
         if self.factorised {
-            let (y, kept) = self.multifrontal.forward(right);
-            return Ok(self.multifrontal.backward(&y, &kept));
+            let (y, kept) = self.multifrontal.forward(right, None);
+            return Ok(self.multifrontal.backward(&y, &kept, None));
         }
         let other = self
             .row_exchanges

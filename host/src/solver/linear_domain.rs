@@ -13,6 +13,8 @@
 //!
 //! which is all that the iterations see. Δu_i follows from the first of (1) when it is wanted.
 //! Everything is counted from the last state that was completed, so round-off does not add up.
+//! Where only some groups are looked at (the pile whose head force is wanted, not the sand), they
+//! alone are brought to the state in question; the others wait for the next complete one.
 
 use super::Singular;
 use super::multifrontal::{Kind, Multifrontal};
@@ -20,6 +22,7 @@ use super::newton::{Loads, norm};
 use crate::assembly::{Pattern, System, Tie};
 use crate::group::Group;
 use crate::plugin::Operator;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -83,6 +86,69 @@ impl Reuse {
     }
 }
 
+/// Some groups of a domain, with what gives their displacements.
+#[derive(Debug)]
+struct Part {
+    /// Of every group of the model, whether it belongs to the part.
+    groups: Vec<bool>,
+    /// Equations of their unknowns and of others that are wanted.
+    wanted: Vec<usize>,
+    /// Equations inside the domain of which no other group of the domain takes part.
+    inner: Vec<usize>,
+    /// Supernodes of the wanted equations, and those above them.
+    fronts: Vec<bool>,
+}
+
+/// What results look at.
+#[derive(Clone, Copy, Debug)]
+pub struct LookedAt<'l> {
+    /// Of every group of the model, whether they do.
+    pub groups: &'l [bool],
+    /// Degrees of freedom whose displacements they give.
+    pub dofs: &'l [usize],
+}
+
+/// A state that is counted from.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Origin {
+    lambda: f64,
+    /// Displacements by degree of freedom.
+    displacement: Vec<f64>,
+    /// Displacements of the boundary since then.
+    moved: Vec<f64>,
+}
+
+/// Displacement increments since both of them, by degree of freedom, as far as groups count from
+/// there.
+struct Since {
+    complete: Option<Vec<f64>>,
+    latest: Option<Vec<f64>>,
+}
+
+/// A state to be reached.
+struct Goal<'g> {
+    /// External forces, by degree of freedom.
+    external: &'g [f64],
+    lambda: f64,
+    /// The residual is measured against forces no smaller than this.
+    scale: f64,
+    tolerance: f64,
+}
+
+/// Where a domain stands.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Standing {
+    /// The last complete state.
+    complete: Origin,
+    /// The last state in which a part of the groups was looked at; theirs counts from there.
+    latest: Origin,
+    /// Internal forces on the boundary in that state.
+    forces: Vec<f64>,
+    /// Of every group of the model, whether it belongs to that part; `None` if the latest state is
+    /// the complete one.
+    part: Option<Vec<bool>>,
+}
+
 /// The linear part of a model during one phase.
 #[derive(Debug)]
 pub struct LinearDomain {
@@ -98,11 +164,11 @@ pub struct LinearDomain {
     y: Vec<f64>,
     /// r'.
     condensed: Vec<f64>,
-    /// The last complete state: its load factor, and the internal forces on the boundary.
-    lambda: f64,
-    forces: Vec<f64>,
-    /// Displacements of the boundary since then.
-    moved: Vec<f64>,
+    standing: Standing,
+    /// The part that is looked at.
+    part: Option<Part>,
+    /// All groups.
+    whole: Option<Part>,
     /// Largest relative residual that had to be taken for round-off, above the tolerance; else 0.
     pub round_off: f64,
 }
@@ -185,7 +251,9 @@ impl LinearDomain {
         let free = system.free();
         let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();
         let domain = Self {
-            moved: vec![0.0; boundary.len()],
+            standing: Standing::default(),
+            part: None,
+            whole: None,
             boundary,
             on_boundary: kept,
             factors,
@@ -193,8 +261,6 @@ impl LinearDomain {
             system,
             y: Vec::new(),
             condensed: Vec::new(),
-            lambda: 0.0,
-            forces: Vec::new(),
             round_off: 0.0,
         };
         Ok(Some((domain, rest)))
@@ -205,8 +271,8 @@ impl LinearDomain {
         self.factors.schur()
     }
 
-    /// Sets up a phase that starts from the groups' committed state.
-    pub fn start(&mut self, groups: &[Group], loads: &Loads) {
+    /// Sets up a phase that starts from the groups' committed state and these displacements.
+    pub fn start(&mut self, groups: &[Group], loads: &Loads, displacement: &[f64]) {
         let n_dofs = self.system.n_dofs();
         let mut prescribed = vec![0.0; n_dofs];
         for &(dof, start, end) in &loads.prescribed {
@@ -224,82 +290,59 @@ impl LinearDomain {
                 *right += at_end[dof] - at_start[dof];
             }
         }
-        (self.y, self.condensed) = self.factors.forward(&right);
-        let internal = self.internal(groups, |group| &group.stress.committed);
-        self.complete(0.0, &internal);
-    }
-
-    /// As [`Self::start`], at a complete state within the phase: the groups' committed one.
-    pub fn restart(&mut self, groups: &[Group], loads: &Loads, lambda: f64) {
-        self.start(groups, loads);
-        self.lambda = lambda;
-    }
-
-    /// Internal forces of the domain's groups under a stress of theirs, by degree of freedom.
-    fn internal(&self, groups: &[Group], stress: impl Fn(&Group) -> &[f64]) -> Vec<f64> {
-        let mut internal = vec![0.0; self.system.n_dofs()];
+        (self.y, self.condensed) = self.factors.forward(&right, None);
+        let mut internal = vec![0.0; n_dofs];
         for (number, group) in groups.iter().enumerate() {
             if self.system.includes(number) {
-                group.kinematics.add_forces(stress(group), &mut internal);
+                group
+                    .kinematics
+                    .add_forces(&group.stress.committed, &mut internal);
             }
         }
         self.system.fold(&mut internal);
-        internal
+        self.is_complete(0.0, displacement, &internal);
     }
 
-    /// Trial state of the domain's groups under displacement increments since the last complete
-    /// state; their internal forces, by degree of freedom.
-    fn evaluate(&self, groups: &mut [Group], increment: &[f64]) -> Result<Vec<f64>, String> {
-        for (number, group) in groups.iter_mut().enumerate() {
-            if self.system.includes(number) {
-                group
-                    .evaluate(increment, Operator::None, 0.0, 0.0)
-                    .map_err(|failure| failure.to_string())?;
-            }
-        }
-        Ok(self.internal(groups, |group| &group.stress.trial))
+    /// As [`Self::start`], within a phase.
+    pub fn restart(&mut self, groups: &[Group], loads: &Loads, standing: &Standing) {
+        self.start(groups, loads, &standing.complete.displacement);
+        self.standing = standing.clone();
     }
 
-    /// Change of the internal forces (2-norm) if every displacement increment is larger or smaller
-    /// by its last bit, as the sum over many elements scatters them. The trial state stays.
-    fn last_bit(
-        &self,
-        groups: &mut [Group],
-        increment: &[f64],
-        internal: &[f64],
-    ) -> Result<f64, String> {
-        // The top bit of a multiple of 2⁶⁴ / golden ratio: a scatter of signs, the same every time.
-        let sign = |i: usize| {
-            let top = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 63;
-            1.0 - 2.0 * top as f64
+    /// Where the domain stands.
+    pub fn standing(&self) -> &Standing {
+        &self.standing
+    }
+
+    /// Counts from this state on.
+    fn is_complete(&mut self, lambda: f64, displacement: &[f64], internal: &[f64]) {
+        let complete = Origin {
+            lambda,
+            displacement: displacement.to_vec(),
+            moved: vec![0.0; self.boundary.len()],
         };
-        let mut scattered: Vec<f64> = increment
-            .iter()
-            .enumerate()
-            .map(|(i, u)| u * (1.0 + sign(i) * f64::EPSILON))
-            .collect();
-        self.system.follow(&mut scattered);
-        let moved = self.evaluate(groups, &scattered)?;
-        self.evaluate(groups, increment)?;
-        let change = |&dof: &usize| moved[dof] - internal[dof];
-        let free = self.system.free().iter();
-        Ok(norm(&free.map(change).collect::<Vec<f64>>()))
-    }
-
-    /// Counts from this state on: a load factor, and the internal forces of the domain's groups.
-    fn complete(&mut self, lambda: f64, internal: &[f64]) {
-        self.lambda = lambda;
-        self.forces = self.boundary.iter().map(|&dof| internal[dof]).collect();
-        self.moved.fill(0.0);
+        self.standing = Standing {
+            latest: complete.clone(),
+            complete,
+            forces: self.boundary.iter().map(|&dof| internal[dof]).collect(),
+            part: None,
+        };
     }
 
     /// Internal forces on the boundary at load factor λ if it stays where it is, in the order of
     /// the system's boundary.
     pub fn forces_at(&self, lambda: f64) -> Vec<f64> {
-        let rise = lambda - self.lambda;
-        let forces = self.forces.iter().zip(&self.condensed);
+        // Since the latest state the boundary has not moved far: the forces of a stiff body that
+        // moves as a whole do not cancel.
+        let Origin {
+            lambda: latest,
+            moved,
+            ..
+        } = &self.standing.latest;
+        let rise = lambda - latest;
+        let forces = self.standing.forces.iter().zip(&self.condensed);
         let mut forces: Vec<f64> = forces.map(|(force, r)| force - rise * r).collect();
-        self.add_product(&self.moved, &mut forces);
+        self.add_product(moved, &mut forces);
         forces
     }
 
@@ -315,85 +358,286 @@ impl LinearDomain {
 
     /// The boundary has moved by these increments (by degree of freedom).
     pub fn follow(&mut self, increment: &[f64]) {
-        for (moved, &dof) in self.moved.iter_mut().zip(&self.boundary) {
-            *moved += increment[dof];
+        let Standing {
+            complete, latest, ..
+        } = &mut self.standing;
+        for origin in [complete, latest] {
+            for (moved, &dof) in origin.moved.iter_mut().zip(&self.boundary) {
+                *moved += increment[dof];
+            }
         }
     }
 
-    /// Brings the domain's groups from the last complete state to load factor λ and to where the
-    /// boundary is, and makes that the last complete state. Returns their internal forces, by
-    /// degree of freedom. `increment` holds the displacements since then, by degree of freedom;
-    /// those of the unknowns are filled in here.
+    /// Brings the domain's groups to load factor λ and to where the boundary is; only those that
+    /// are `looked_at` if there are others, and if that suffices. Returns their internal forces, by
+    /// degree of freedom. Displacements (by degree of freedom) of their unknowns are filled in.
     ///
     /// # Errors
     /// Why the groups are not in equilibrium.
     pub fn bring_up(
         &mut self,
+        looked_at: Option<LookedAt<'_>>,
         groups: &mut [Group],
         loads: &Loads,
         lambda: f64,
-        increment: &mut [f64],
+        displacement: &mut [f64],
         tolerance: f64,
     ) -> Result<Vec<f64>, String> {
-        let external = loads.external(lambda);
-        let rise = lambda - self.lambda;
-        let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
-        for (&dof, value) in self
-            .system
-            .free()
-            .iter()
-            .zip(self.factors.backward(&y, &self.moved))
-        {
-            increment[dof] = value;
-        }
-        let mut tries = 0..REFINEMENTS;
-        let mut before = f64::INFINITY;
-        let internal = loop {
-            self.system.follow(increment);
-            let internal = self.evaluate(groups, increment)?;
-            let left = |(&dof, held): (&usize, &bool)| {
-                if *held {
-                    0.0
-                } else {
-                    external[dof] - internal[dof]
-                }
-            };
-            let dofs = self.system.free().iter().zip(&self.on_boundary);
-            let residual: Vec<f64> = dofs.map(left).collect();
-            let scale = norm(&internal).max(loads.scale).max(f64::MIN_POSITIVE);
-            let relative = norm(&residual) / scale;
-            if relative <= REFINED * tolerance {
-                break internal;
-            }
-            // A residual that no longer falls has come down to round-off.
-            if relative > 0.5 * before || tries.next().is_none() {
-                if relative <= tolerance {
-                    break internal;
-                }
-                let last_bit = self.last_bit(groups, increment, &internal)? / scale;
-                if relative <= ROUND_OFF * last_bit {
-                    self.round_off = self.round_off.max(relative);
-                    break internal;
-                }
-                return Err(format!(
-                    "the linear groups are left with a residual of {relative:.1e}, tolerance \
-                     {tolerance:.1e}; the last bit of their displacements stands for {last_bit:.1e}"
-                ));
-            }
-            before = relative;
-            let (y, _) = self.factors.forward(&residual);
-            let correction = self.factors.backward(&y, &vec![0.0; self.boundary.len()]);
-            for (&dof, value) in self.system.free().iter().zip(correction) {
-                increment[dof] += value;
-            }
+        let goal = Goal {
+            external: &loads.external(lambda),
+            lambda,
+            scale: loads.scale,
+            tolerance,
         };
+        self.choose_part(looked_at);
+        if let Some(part) = self.part.take() {
+            let reached = self.settle(&part, groups, &goal, displacement);
+            let numbers = part.groups.clone();
+            self.part = Some(part);
+            // Where round-off alone keeps a part from equilibrium, that shows in the whole.
+            if let Ok(internal) = reached {
+                self.standing.forces = self.forces_at(lambda);
+                self.standing.latest = Origin {
+                    lambda,
+                    displacement: displacement.to_vec(),
+                    moved: vec![0.0; self.boundary.len()],
+                };
+                self.commit(groups, &numbers);
+                self.standing.part = Some(numbers);
+                return Ok(internal);
+            }
+        }
+        let all = vec![true; groups.len()];
+        let whole = match self.whole.take() {
+            Some(whole) => whole,
+            None => self.of_groups(&all, &[]),
+        };
+        let reached = self.settle(&whole, groups, &goal, displacement);
+        self.whole = Some(whole);
+        let internal = reached?;
+        self.commit(groups, &all);
+        self.is_complete(lambda, displacement, &internal);
+        Ok(internal)
+    }
+
+    fn commit(&self, groups: &mut [Group], which: &[bool]) {
         for (number, group) in groups.iter_mut().enumerate() {
-            if self.system.includes(number) {
+            if self.system.includes(number) && which[number] {
                 group.commit();
             }
         }
-        self.complete(lambda, &internal);
+    }
+
+    /// The part that is looked at; none if it is all of the domain, or another one than that which
+    /// the latest state is of.
+    fn choose_part(&mut self, looked_at: Option<LookedAt<'_>>) {
+        let Some(LookedAt { groups, dofs }) = looked_at else {
+            self.part = None;
+            return;
+        };
+        let of_latest = self.standing.part.as_deref();
+        if of_latest.is_some_and(|latest| latest != groups) {
+            self.part = None;
+        } else if self.part.as_ref().is_none_or(|part| part.groups != groups) {
+            let mut numbered = groups.iter().enumerate();
+            let others = numbered.any(|(number, in_part)| !in_part && self.system.includes(number));
+            self.part = others.then(|| self.of_groups(groups, dofs));
+        }
+    }
+
+    fn of_groups(&self, groups: &[bool], dofs: &[usize]) -> Part {
+        let mut wanted = vec![false; self.system.n_equations()];
+        let mut shared = vec![false; self.system.n_equations()];
+        for (number, in_part) in groups.iter().enumerate() {
+            let mark = if *in_part { &mut wanted } else { &mut shared };
+            let dofs = self.system.dofs_of(number);
+            for equation in dofs.filter_map(|dof| self.system.equation(dof)) {
+                mark[equation] = true;
+            }
+        }
+        let own = |&equation: &usize| {
+            wanted[equation] && !shared[equation] && !self.on_boundary[equation]
+        };
+        let inner = (0..wanted.len()).filter(own).collect();
+        for equation in dofs.iter().filter_map(|&dof| self.system.equation(dof)) {
+            wanted[equation] = true;
+        }
+        Part {
+            groups: groups.to_vec(),
+            inner,
+            fronts: self.factors.fronts_of(&wanted),
+            wanted: (0..wanted.len()).filter(|&e| wanted[e]).collect(),
+        }
+    }
+
+    /// Trial state of a part in equilibrium with its goal and where the boundary is; its internal
+    /// forces. Displacements are filled in.
+    fn settle(
+        &mut self,
+        part: &Part,
+        groups: &mut [Group],
+        goal: &Goal<'_>,
+        displacement: &mut [f64],
+    ) -> Result<Vec<f64>, String> {
+        let increment = |origin: &Origin| self.increment(origin, part, goal.lambda, displacement);
+        let Standing {
+            complete, latest, ..
+        } = &self.standing;
+        let is_looked_at = self.of_latest(part);
+        let mut since = Since {
+            complete: (!is_looked_at).then(|| increment(complete)),
+            latest: self.standing.part.as_ref().map(|_| increment(latest)),
+        };
+        let free = self.system.free();
+        let still = vec![0.0; self.boundary.len()];
+        let mut tries = 0..REFINEMENTS;
+        let mut before = f64::INFINITY;
+        let (relative, internal) = loop {
+            let internal = self.evaluate(groups, &since, part)?;
+            let mut residual = vec![0.0; free.len()];
+            for &equation in &part.inner {
+                residual[equation] = goal.external[free[equation]] - internal[free[equation]];
+            }
+            let scale = norm(&internal).max(goal.scale).max(f64::MIN_POSITIVE);
+            let relative = norm(&residual) / scale;
+            if relative <= REFINED * goal.tolerance {
+                break (0.0, internal);
+            }
+            // A residual that no longer falls has come down to round-off.
+            if relative > 0.5 * before || tries.next().is_none() {
+                if relative <= goal.tolerance {
+                    break (0.0, internal);
+                }
+                let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
+                if relative <= ROUND_OFF * last_bit {
+                    break (relative, internal);
+                }
+                return Err(format!(
+                    "the linear groups are left with a residual of {relative:.1e}, tolerance \
+                     {:.1e}; the last bit of their displacements stands for {last_bit:.1e}",
+                    goal.tolerance
+                ));
+            }
+            before = relative;
+            let fronts = Some(part.fronts.as_slice());
+            let (y, _) = self.factors.forward(&residual, fronts);
+            let correction = self.factors.backward(&y, &still, fronts);
+            for increment in since.complete.iter_mut().chain(&mut since.latest) {
+                for &equation in &part.wanted {
+                    increment[free[equation]] += correction[equation];
+                }
+                self.system.follow(increment);
+            }
+        };
+        let (origin, increment) = match (&since.complete, &since.latest) {
+            (None, Some(increment)) => (latest, increment),
+            (increment, _) => (
+                complete,
+                increment.as_ref().ok_or("no state to count from")?,
+            ),
+        };
+        for &equation in &part.wanted {
+            let dof = free[equation];
+            displacement[dof] = origin.displacement[dof] + increment[dof];
+        }
+        self.round_off = self.round_off.max(relative);
         Ok(internal)
+    }
+
+    /// Whether a part is the one that the latest state is of.
+    fn of_latest(&self, part: &Part) -> bool {
+        self.standing.part.as_ref() == Some(&part.groups)
+    }
+
+    /// Displacement increments since a state, by degree of freedom: given ones, and those of a
+    /// part's unknowns as they follow from the boundary and the load factor.
+    fn increment(
+        &self,
+        origin: &Origin,
+        part: &Part,
+        lambda: f64,
+        displacement: &[f64],
+    ) -> Vec<f64> {
+        let rise = lambda - origin.lambda;
+        let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
+        let fronts = Some(part.fronts.as_slice());
+        let values = self.factors.backward(&y, &origin.moved, fronts);
+        let moved = displacement.iter().zip(&origin.displacement);
+        let mut increment: Vec<f64> = moved.map(|(u, origin)| u - origin).collect();
+        for &equation in &part.wanted {
+            increment[self.system.free()[equation]] = values[equation];
+        }
+        self.system.follow(&mut increment);
+        increment
+    }
+
+    /// Trial state of a part's groups under displacement increments; their internal forces, by
+    /// degree of freedom.
+    fn evaluate(
+        &self,
+        groups: &mut [Group],
+        since: &Since,
+        part: &Part,
+    ) -> Result<Vec<f64>, String> {
+        let mut internal = vec![0.0; self.system.n_dofs()];
+        for (number, group) in groups.iter_mut().enumerate() {
+            if !self.system.includes(number) || !part.groups[number] {
+                continue;
+            }
+            let latest = self.standing.part.as_ref();
+            let increment = if latest.is_some_and(|latest| latest[number]) {
+                &since.latest
+            } else {
+                &since.complete
+            };
+            let increment = increment.as_ref().ok_or("no state to count from")?;
+            group
+                .evaluate(increment, Operator::None, 0.0, 0.0)
+                .map_err(|failure| failure.to_string())?;
+            group
+                .kinematics
+                .add_forces(&group.stress.trial, &mut internal);
+        }
+        self.system.fold(&mut internal);
+        Ok(internal)
+    }
+
+    /// Change of the internal forces (2-norm) if every displacement increment is larger or smaller
+    /// by its last bit, as the sum over many elements scatters them. The trial state stays.
+    fn last_bit(
+        &self,
+        part: &Part,
+        groups: &mut [Group],
+        since: &Since,
+        internal: &[f64],
+    ) -> Result<f64, String> {
+        // The top bit of a multiple of 2⁶⁴ / golden ratio: a scatter of signs, the same every time.
+        let sign = |i: usize| {
+            let top = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 63;
+            1.0 - 2.0 * top as f64
+        };
+        let scattered = |increment: &Vec<f64>| {
+            let numbered = increment.iter().enumerate();
+            let scattered = numbered.map(|(i, u)| u * (1.0 + sign(i) * f64::EPSILON));
+            let mut scattered: Vec<f64> = scattered.collect();
+            self.system.follow(&mut scattered);
+            scattered
+        };
+        let scattered = Since {
+            complete: since.complete.as_ref().map(scattered),
+            latest: since.latest.as_ref().map(scattered),
+        };
+        let moved = self.evaluate(groups, &scattered, part)?;
+        self.evaluate(groups, since, part)?;
+        let dofs = part
+            .inner
+            .iter()
+            .map(|&equation| self.system.free()[equation]);
+        Ok(norm(
+            &dofs
+                .map(|dof| moved[dof] - internal[dof])
+                .collect::<Vec<f64>>(),
+        ))
     }
 
     /// Degrees of freedom of the domain's unknowns, boundary included.

@@ -313,15 +313,32 @@ impl Multifrontal {
         Ok(update)
     }
 
+    /// The supernodes that give the values of some equations: theirs, and all above them.
+    pub(super) fn fronts_of(&self, wanted: &[bool]) -> Vec<bool> {
+        let analysis = &self.analysis;
+        let mut fronts: Vec<bool> = Vec::with_capacity(analysis.fronts.len());
+        // Children come before their parents.
+        for shape in &analysis.fronts {
+            let own = &analysis.order[shape.pivots.clone()];
+            fronts.push(
+                own.iter().any(|&equation| wanted[equation as usize])
+                    || shape.children.iter().any(|&child| fronts[child]),
+            );
+        }
+        fronts
+    }
+
     /// Eliminates the right-hand side (by equation): L y = b for the eliminated equations, and
-    /// what is left for the kept ones.
-    pub(super) fn forward(&self, right: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    /// what is left for the kept ones. Where it vanishes outside some supernodes, those and the
+    /// ones above them suffice.
+    pub(super) fn forward(&self, right: &[f64], fronts: Option<&[bool]>) -> (Vec<f64>, Vec<f64>) {
         let analysis = &self.analysis;
         let n_eliminated = analysis.order.len();
         let all = analysis.order.iter().chain(&analysis.kept);
         let mut y: Vec<f64> = all.map(|&equation| right[equation as usize]).collect();
         let mut own = Vec::new();
-        for (number, shape) in analysis.fronts.iter().enumerate() {
+        let numbered = analysis.fronts.iter().enumerate();
+        for (number, shape) in numbered.filter(|(number, _)| fronts.is_none_or(|f| f[*number])) {
             let front = self.front(number);
             let k = shape.pivots.len();
             let rows = &analysis.rows[shape.rows.clone()];
@@ -353,11 +370,13 @@ impl Multifrontal {
     }
 
     /// Values of all equations from `y` of [`Self::forward`] and those of the kept ones.
-    pub(super) fn backward(&self, y: &[f64], kept: &[f64]) -> Vec<f64> {
+    /// Only those of some supernodes, see [`Self::fronts_of`]; the others mean nothing.
+    pub(super) fn backward(&self, y: &[f64], kept: &[f64], fronts: Option<&[bool]>) -> Vec<f64> {
         let analysis = &self.analysis;
         let mut x = [y, kept].concat();
         let mut own = Vec::new();
-        for (number, shape) in analysis.fronts.iter().enumerate().rev() {
+        let numbered = analysis.fronts.iter().enumerate().rev();
+        for (number, shape) in numbered.filter(|(number, _)| fronts.is_none_or(|f| f[*number])) {
             let front = self.front(number);
             let k = shape.pivots.len();
             let rows = &analysis.rows[shape.rows.clone()];
@@ -858,8 +877,8 @@ mod tests {
         let mut factors = Multifrontal::new(&pattern, kind, &vec![false; n], None).unwrap();
         factors.factorise(&values).unwrap();
         let right = right_side(n);
-        let (y, kept) = factors.forward(&right);
-        let x = DVector::from_vec(factors.backward(&y, &kept));
+        let (y, kept) = factors.forward(&right, None);
+        let x = DVector::from_vec(factors.backward(&y, &kept, None));
         let residual = dense * x - DVector::from_vec(right);
         assert!(residual.amax() < 1e-12, "{}", residual.amax());
     }
@@ -890,9 +909,9 @@ mod tests {
             assert!((schur.clone() - own).amax() < 1e-12);
             // The condensed equations have the same solution.
             let right = right_side(n);
-            let (y, left) = factors.forward(&right);
+            let (y, left) = factors.forward(&right, None);
             let of_kept = schur.lu().solve(&DVector::from_vec(left)).unwrap();
-            let x = DVector::from_vec(factors.backward(&y, of_kept.as_slice()));
+            let x = DVector::from_vec(factors.backward(&y, of_kept.as_slice(), None));
             let residual = dense * x - DVector::from_vec(right);
             assert!(residual.amax() < 1e-11, "{}", residual.amax());
         }
@@ -911,8 +930,8 @@ mod tests {
                 let mut factors =
                     Multifrontal::new(&pattern, Kind::Unsymmetric, &vec![false; n], None).unwrap();
                 factors.factorise(&values).unwrap();
-                let (y, kept) = factors.forward(&right_side(n));
-                factors.backward(&y, &kept)
+                let (y, kept) = factors.forward(&right_side(n), None);
+                factors.backward(&y, &kept, None)
             })
         };
         assert_eq!(solve(1), solve(2));
@@ -939,6 +958,6 @@ mod tests {
         };
         let mut factors = Multifrontal::new(&pattern, Kind::Unsymmetric, &[], None).unwrap();
         factors.factorise(&[]).unwrap();
-        assert_eq!(factors.forward(&[]), (vec![], vec![]));
+        assert_eq!(factors.forward(&[], None), (vec![], vec![]));
     }
 }
