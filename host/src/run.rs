@@ -502,7 +502,13 @@ impl<'a> Run<'a> {
             };
             let looked_at = results.looks_at(&place, n, &self.looked_at.0, &self.groups);
             let reaction = self
-                .complete(equations, &course.loads, lambda, looked_at, record)
+                .complete(
+                    equations,
+                    &course.loads,
+                    lambda,
+                    looked_at.as_deref(),
+                    record,
+                )
                 .map_err(|why| {
                     Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why), None)
                 })?;
@@ -711,7 +717,7 @@ impl<'a> Run<'a> {
         equations: &mut PhaseEquations,
         loads: &Loads,
         lambda: f64,
-        looked_at: Option<Vec<bool>>,
+        looked_at: Option<&[bool]>,
         record: &mut PhaseRecord,
     ) -> Result<Vec<f64>, String> {
         let started = Instant::now();
@@ -725,7 +731,7 @@ impl<'a> Run<'a> {
         fold(&self.model.ties, &mut reaction);
         if let Some(domain) = &mut equations.domain {
             let tolerance = self.case.file.solver.force_tolerance;
-            let looked_at = looked_at.as_deref().map(|groups| LookedAt {
+            let looked_at = looked_at.map(|groups| LookedAt {
                 groups,
                 dofs: &self.looked_at.1,
             });
