@@ -601,6 +601,8 @@ pub struct SolverInput {
     pub line_search: bool,
     /// Whether to relax viscously where Newton iterations come to a standstill.
     pub relaxation: bool,
+    /// What leads from one equilibrium to the next where the load alone cannot.
+    pub control: Control,
     /// What becomes of linear groups.
     pub equations: Equations,
 }
@@ -649,6 +651,18 @@ impl Method {
             Self::QuasiNewton => 100,
         }
     }
+}
+
+/// What leads from one equilibrium to the next.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Control {
+    /// The load factor, increment by increment.
+    #[default]
+    Load,
+    /// The load factor; where it leads no further, the arc length of the path of equilibrium, on
+    /// which the load may fall and rise again.
+    ArcLength,
 }
 
 /// How the equations of a phase are set up.
@@ -707,6 +721,7 @@ impl Default for SolverInput {
             line_search: true,
             equations: Equations::Auto,
             relaxation: true,
+            control: Control::Load,
         }
     }
 }

@@ -610,6 +610,11 @@ impl Group {
         }
     }
 
+    /// Thickness at a point of a thin layer.
+    pub fn thickness(&self, point: usize) -> Option<f64> {
+        self.layer.as_ref().map(|layer| layer.thickness_at(point))
+    }
+
     /// Stress of a point in global axes (committed); `None` for zero-thickness elements.
     pub fn global_stress(&self, point: usize) -> Option<[f64; 4]> {
         let s = self.stress.committed.get(4 * point..4 * point + 4)?;

@@ -14,7 +14,7 @@ pub(crate) use figure::COLOURS;
 pub use figure::{Figures, check_figures, check_table_figures};
 pub use summary::PhaseRecord;
 
-use crate::case::{Case, OutputInput, When};
+use crate::case::{Case, Control, OutputInput, When};
 use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::mesh::Mesh;
@@ -64,6 +64,7 @@ pub struct Results {
     folder: PathBuf,
     settings: OutputInput,
     history: Table,
+    path: Option<Table>,
     profile: Option<Profile>,
     points: Option<Points>,
     fields: Option<Fields>,
@@ -77,6 +78,7 @@ pub struct Results {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ResultsState {
     history: u64,
+    path: Option<u64>,
     profile: Option<u64>,
     points: Option<u64>,
     log: u64,
@@ -300,8 +302,18 @@ impl Results {
             .chain(["iterations"]);
         let at = state.as_ref();
         let history_from = at.map(|state| state.history);
+        let path_columns = ["phase", "increment", "load_factor"]
+            .into_iter()
+            .chain(probes.names())
+            .chain(["iterations"]);
+        let path_from = at.and_then(|state| state.path);
+        let follows = case.file.solver.control == Control::ArcLength;
+        let path = follows
+            .then(|| Table::begin(folder.join("path.csv"), path_columns, path_from))
+            .transpose()?;
         let mut results = Self {
             history: Table::begin(folder.join("history.csv"), columns, history_from)?,
+            path,
             profile: Profile::begin(folder, settings.profile, model, at.and_then(|s| s.profile))?,
             points: Points::begin(folder, settings.points, model, at.and_then(|s| s.points))?,
             fields: Fields::create(folder, settings.fields, model),
@@ -329,10 +341,12 @@ impl Results {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn state(&self) -> Result<ResultsState, Error> {
+        let path = self.path.as_ref().map(Table::sync);
         let profile = self.profile.as_ref().map(|profile| profile.table.sync());
         let points = self.points.as_ref().map(|points| points.table.sync());
         Ok(ResultsState {
             history: self.history.sync()?,
+            path: path.transpose()?,
             profile: profile.transpose()?,
             points: points.transpose()?,
             log: self.log.sync()?,
@@ -414,6 +428,32 @@ impl Results {
             }
         }
         Some(looked_at)
+    }
+
+    /// Writes a step of a run under arc-length control, in an increment that it leads to.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn step(
+        &mut self,
+        place: &Place,
+        load_factor: f64,
+        probes: &[Option<f64>],
+        iterations: usize,
+    ) -> Result<(), Error> {
+        let Some(path) = &mut self.path else {
+            return Ok(());
+        };
+        let mut row = vec![
+            place.phase.clone(),
+            place.increment.to_string(),
+            number(load_factor),
+        ];
+        let values = probes.iter().map(|value| value.map(number));
+        row.extend(values.map(Option::unwrap_or_default));
+        row.push(iterations.to_string());
+        path.row(&row)?;
+        path.flush()
     }
 
     /// Notes the last state of equilibrium of a phase that cannot go on, and writes its fields if

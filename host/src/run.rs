@@ -1,8 +1,10 @@
 //! Running a case: phases, increments, cut-back and regrowth, results.
 
+mod path;
+
 use crate::assembly::{System, fold};
 use crate::capsule::{self, Capsule};
-use crate::case::{Axis, Case, CaseFile, Equations, PhaseInput};
+use crate::case::{Axis, Case, CaseFile, Control, Equations, PhaseInput};
 use crate::checkpoint::{Checkpoint, PhaseCourse, RunState, identity};
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
@@ -15,6 +17,7 @@ use crate::solver::{
     Costs, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
     StepFailure, StepSuccess, mesh_lines,
 };
+use path::PathEnd;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -46,6 +49,8 @@ pub struct Options {
     pub checkpoints: Option<Duration>,
 }
 
+/// Step, as a fraction of an increment, below which arc-length control takes over.
+const PATIENCE: f64 = 0.2;
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
 /// Share of the method's own limit of iterations up to which a step counts as easy, so that the
@@ -621,9 +626,13 @@ impl<'a> Run<'a> {
                     if success.iterations.len() as f64 <= easy {
                         course.step = (REGROWTH * step).min(1.0 / n as f64);
                     }
+                    let iterations = success.iterations.len();
                     self.accept(&success, &course.loads, equations, end);
                     course.last = Some((length, success.increment));
                     course.lambda = end;
+                    if settings.control == Control::ArcLength {
+                        self.step(place, course, equations, record, results, iterations)?;
+                    }
                 }
                 Err(failure) => {
                     results.iterations(place, end, &failure.iterations)?;
@@ -633,21 +642,46 @@ impl<'a> Run<'a> {
                     course.step = factor * length;
                     results.cut_back(place, end, course.step, &failure.reason)?;
                     observer.cut_back(place, &failure.reason);
-                    if let Some(defect) = &failure.defect {
-                        let kept = self.keep_capsule(place, &failure, results)?;
-                        return Err(Error::Plugin {
-                            message: format!("{place}: {defect}"),
-                            hint: kept,
-                        });
-                    }
-                    if course.step < smallest {
-                        let kept = self.keep_capsule(place, &failure, results)?;
-                        return Err(Self::no_equilibrium(place, start, n, &failure, kept));
+                    let follows = settings.control == Control::ArcLength && course.last.is_some();
+                    if failure.defect.is_some() {
+                        return Err(self.cannot_go_on(place, start, n, &failure, results)?);
+                    } else if follows && course.step < PATIENCE / n as f64 {
+                        let goal = [n as f64, target];
+                        match self
+                            .follow(place, goal, course, equations, record, results, observer)?
+                        {
+                            PathEnd::Reached(spent) => done.iterations += spent,
+                            PathEnd::Stopped(failure) => {
+                                let at = course.lambda;
+                                return Err(self.cannot_go_on(place, at, n, &failure, results)?);
+                            }
+                        }
+                    } else if course.step < smallest {
+                        return Err(self.cannot_go_on(place, start, n, &failure, results)?);
                     }
                 }
             }
         }
         Ok(done)
+    }
+
+    /// The error of a phase that ends at load factor λ, with the call of the law that failed.
+    fn cannot_go_on(
+        &self,
+        place: &Place,
+        lambda: f64,
+        n: usize,
+        failure: &StepFailure,
+        results: &Results,
+    ) -> Result<Error, Error> {
+        let kept = self.keep_capsule(place, failure, results)?;
+        Ok(match &failure.defect {
+            Some(defect) => Error::Plugin {
+                message: format!("{place}: {defect}"),
+                hint: kept,
+            },
+            None => Self::no_equilibrium(place, lambda, n, failure, kept),
+        })
     }
 
     /// One step; with a guess from the last one if there is one, else from the tangent.
@@ -975,8 +1009,8 @@ impl<'a> Run<'a> {
                 failure.reason
             ),
             hint: Some(
-                "results up to the last whole increment in equilibrium are written; \
-                 log.jsonl lists the iterations"
+                "results up to the last whole increment in equilibrium are written, the last \
+                 equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations"
                     .to_owned()
                     + &kept.map_or(String::new(), |kept| format!("; {kept}")),
             ),

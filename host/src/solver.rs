@@ -11,4 +11,4 @@ mod newton;
 pub use dissection::mesh_lines;
 pub use linear::{LinearSolver, Singular};
 pub use linear_domain::{LinearDomain, LookedAt, Reuse, Standing};
-pub use newton::{Costs, Iteration, Loads, Matrix, Newton, StepFailure, StepSuccess};
+pub use newton::{Costs, Iteration, Loads, Matrix, Measure, Newton, StepFailure, StepSuccess};

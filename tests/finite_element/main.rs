@@ -21,5 +21,6 @@ mod phases;
 mod relaxation;
 mod setup;
 mod sliding_block;
+mod snap_back;
 mod thick_cylinder;
 mod thin_layer;

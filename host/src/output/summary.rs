@@ -34,6 +34,8 @@ pub struct PhaseRecord {
     pub unreliable: usize,
     /// Steps that viscous relaxation led to equilibrium.
     pub relaxed: usize,
+    /// Steps along the path of equilibrium under arc-length control.
+    pub arc_length: usize,
     /// Matrices factorised.
     pub factorisations: u64,
     /// How many of them needed full row exchanges.
@@ -56,6 +58,7 @@ impl PhaseRecord {
             cut_backs: 0,
             unreliable: 0,
             relaxed: 0,
+            arc_length: 0,
             factorisations: 0,
             fallbacks: 0,
             costs: Costs::default(),
@@ -244,6 +247,7 @@ impl Summary {
                     "cut_backs": p.cut_backs,
                     "unreliable_steps": p.unreliable,
                     "relaxed_steps": p.relaxed,
+                    "arc_length_steps": p.arc_length,
                     "factorisations": p.factorisations,
                     "fallbacks": p.fallbacks,
                     "evaluations": p.costs.evaluations,
@@ -370,6 +374,9 @@ fn solver(case: &Case) -> Value {
         "max_iterations": solver.max_iterations(),
         "max_halvings": solver.max_halvings,
         "line_search": solver.line_search,
+        "relaxation": solver.relaxation,
+        "control": solver.control,
+        "equations": solver.equations,
     })
 }
 

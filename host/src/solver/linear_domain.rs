@@ -346,6 +346,12 @@ impl LinearDomain {
         forces
     }
 
+    /// Change of the forces that the domain takes from its boundary with λ, in the order of the
+    /// system's boundary: r' of (2).
+    pub fn load_rate(&self) -> &[f64] {
+        &self.condensed
+    }
+
     /// forces += S u.
     pub fn add_product(&self, displacement: &[f64], forces: &mut [f64]) {
         let n = self.boundary.len();

@@ -1,17 +1,19 @@
 //! Newton iterations and a line search; with consistent tangents, or with a matrix that is kept.
-//! Viscous relaxation where full Newton iterations come to a standstill.
+//! Viscous relaxation where full Newton iterations come to a standstill, or arc-length control.
 
 mod acceleration;
 mod matrix;
+mod path;
 mod relaxation;
 
 pub use matrix::Matrix;
+pub use path::Measure;
 
 use super::diagnosis::{self, Snapshot};
 use super::linear::LinearSolver;
 use super::linear_domain::LinearDomain;
 use crate::assembly::System;
-use crate::case::{Method, SolverInput};
+use crate::case::{Control, Method, SolverInput};
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
 use acceleration::Acceleration;
@@ -54,6 +56,23 @@ impl Loads {
         ends.zip(&self.out_of_balance)
             .map(|((start, end), rest)| start + lambda * (end - start) + (1.0 - lambda) * rest)
             .collect()
+    }
+
+    /// Change of the external forces with λ, by degree of freedom.
+    fn external_rate(&self) -> Vec<f64> {
+        let ends = self.force_start.iter().zip(&self.force_end);
+        ends.zip(&self.out_of_balance)
+            .map(|((start, end), rest)| end - start - rest)
+            .collect()
+    }
+
+    /// Change of prescribed displacements with λ, by degree of freedom.
+    fn prescribed_rate(&self) -> Vec<f64> {
+        let mut rate = vec![0.0; self.force_start.len()];
+        for &(dof, start, end) in &self.prescribed {
+            rate[dof] = end - start;
+        }
+        rate
     }
 
     /// Increments of prescribed displacements between two load factors, by degree of freedom.
@@ -306,7 +325,9 @@ impl<'a> Newton<'a> {
         // Where the iterations with the present matrix start.
         let mut since = 0;
         let mut relaxation: Option<Relaxation> = None;
-        let relaxes = self.settings.relaxation && self.settings.method == Method::Newton;
+        let relaxes = self.settings.relaxation
+            && self.settings.control == Control::Load
+            && self.settings.method == Method::Newton;
         let mut may_relax = relaxes;
         // Where Newton iterations first came to a standstill, and how many they were.
         let mut standstill = (Vec::new(), 0);

@@ -1,0 +1,237 @@
+//! A block pulled over a softening interface by an elastic rope.
+//!
+//! Goal        arc-length control: a snap-back under prescribed displacement, a limit load under a
+//!             prescribed force
+//! Geometry    a rigid block on a thin layer (`mean`) on a rigid base, a rope of ν = 0 beside it on
+//!             a layer that is next to nothing
+//!
+//! ```text
+//!        100 kPa
+//!     ┌───────────┐
+//!     │   block   │══════ rope ══════→ u or F      height 0.02, lengths 1 and 1
+//!     ╞═══════════╡  interface, t = 0.1 mm
+//!     │             base            │
+//!     └─────────────────────────────┘
+//! ```
+//!
+//! Boundary    base fixed; a pressure of 100 kPa on the block; the rope's end pulled
+//! Law         mepi_softening with mu_r half of mu_p
+//! Asserts     force by slip against equations (10) and (11), u = slip + F/k, the extremes of u,
+//!             the limit force; with condensed and with assembled equations
+//!
+//! The rope pulls 10 mm above the interface, so the normal stress varies by some percent along it,
+//! about 100 kPa in the mean: forces are compared to 2e-3 of the largest.
+
+use crate::setup::{Results, assert_close, fail, run};
+use std::path::Path;
+use tests::case::column;
+
+const SIGMA: f64 = 100.0;
+const K_T: f64 = 1e5;
+/// Height, and stiffness of the soft rope.
+const HEIGHT: f64 = 0.02;
+const K: f64 = 5e5 * HEIGHT;
+/// Parameters of the law.
+const T: f64 = 0.002;
+const A: f64 = 0.05;
+const A_0: f64 = 4.0;
+const PEAK: f64 = 1e-3;
+const MU_P: f64 = 0.8;
+const MU_R: f64 = 0.4;
+/// Of forces, see above.
+const UNEVEN: f64 = 2e-3;
+
+fn text(solver: &str, pull: &str) -> String {
+    let top = 1e-4 + HEIGHT;
+    format!(
+        r#"
+analysis = "plane_strain"
+[mesh]
+origin = [0.0, -0.1]
+columns = [{{ n = 1, to = 1.0 }}, {{ n = 1, to = 2.0 }}]
+rows = [{{ n = 1, to = 0.0 }}, {{ n = 1, to = 1e-4 }}, {{ n = 1, to = {top:?} }}]
+[[mesh.region]]
+group = "rigid"
+[[mesh.region]]
+group = "interface"
+x = [0.0, 1.0]
+y = [0.0, 1e-4]
+[[mesh.region]]
+group = "nothing"
+x = [1.0, 2.0]
+y = [0.0, 1e-4]
+[[mesh.region]]
+group = "rope"
+x = [1.0, 2.0]
+y = [1e-4, {top:?}]
+[mesh.lines]
+base = {{ y = -0.1 }}
+top = {{ y = {top:?}, x = [0.0, 1.0] }}
+end = {{ x = 2.0, y = [1e-4, {top:?}] }}
+[laws]
+rigid = {{ law = "elastic", parameters = {{ young_modulus = 1e10, poisson_ratio = 0.0 }} }}
+rope = {{ law = "elastic", parameters = {{ young_modulus = 5e5, poisson_ratio = 0.0 }} }}
+nothing = {{ law = "elastic", parameters = {{ young_modulus = 1e-5, poisson_ratio = 0.0 }} }}
+[laws.interface]
+law = "mepi_softening"
+[laws.interface.parameters]
+k_n = 2e5
+k_t = {K_T:e}
+n = 0.0
+mu_0 = 0.0
+mu_p = {MU_P:?}
+mu_r = {MU_R:?}
+mu_c0 = 0.67
+a = {A:?}
+a_0 = {A_0:?}
+c_0 = 0.05
+u_tp = {PEAK:?}
+t = {T:?}
+p_0 = 100.0
+sigma_ni = 100.0
+[groups]
+rigid = {{ formulation = "solid", law = "rigid" }}
+rope = {{ formulation = "solid", law = "rope" }}
+nothing = {{ formulation = "solid", law = "nothing" }}
+interface = {{ formulation = "thin_layer", integration = "mean", law = "interface" }}
+[[supports]]
+line = "base"
+fixed = ["x", "y"]
+[[phase]]
+name = "press"
+increments = 1
+pressure = [{{ line = "top", value = {SIGMA:?} }}]
+[[phase]]
+name = "pull"
+reset_displacements = true
+{pull}
+[solver]
+{solver}
+[probes]
+tau = {{ group = "interface", quantity = "traction_t" }}
+slip = {{ group = "interface", quantity = "jump_t" }}
+pull = {{ line = "end", quantity = "displacement_x" }}
+"#
+    )
+}
+
+/// Equations (10) and (11), the peak continuous.
+fn friction(xi: f64) -> f64 {
+    let hardening = |xi: f64| MU_P * xi / (A * T + xi);
+    if xi <= PEAK {
+        return hardening(xi);
+    }
+    MU_R + (hardening(PEAK) - MU_R) / (A_0 * (xi - PEAK) / T).cosh()
+}
+
+/// Slip and force at a plastic slip.
+fn truth(xi: f64) -> [f64; 2] {
+    let force = SIGMA * friction(xi);
+    [xi + force / K_T, force]
+}
+
+/// Force at a slip, the block sliding: slip grows with plastic slip.
+fn force_at(slip: f64) -> f64 {
+    let (mut from, mut to) = (0.0, slip);
+    for _ in 0..100 {
+        let middle = 0.5 * (from + to);
+        if truth(middle)[0] < slip {
+            from = middle;
+        } else {
+            to = middle;
+        }
+    }
+    truth(from)[1]
+}
+
+/// The largest displacement of the rope's end before it goes back, and the smallest after that.
+fn turning_points() -> [f64; 2] {
+    let pull = |i: u32| {
+        let [slip, force] = truth(f64::from(i) * 1e-7);
+        slip + force / K
+    };
+    let turn = (1..100_000).find(|&i| pull(i + 1) < pull(i));
+    let turn = turn.expect("the rope is soft enough");
+    let least = (turn..100_000).map(pull).fold(f64::INFINITY, f64::min);
+    [pull(turn), least]
+}
+
+/// Of every step in the phase: slip, force, displacement of the rope's end.
+fn path(folder: &Path) -> Vec<[f64; 3]> {
+    let columns = ["slip", "tau", "pull"].map(|name| column(&folder.join("path.csv"), name));
+    (1..columns[0].len())
+        .map(|i| [0, 1, 2].map(|c| columns[c][i]))
+        .collect()
+}
+
+#[test]
+fn a_snap_back_is_followed_by_its_arc_length() {
+    let [highest, lowest] = turning_points();
+    assert!(lowest < 0.85 * highest, "{highest} {lowest}");
+    let largest = SIGMA * friction(PEAK);
+    for equations in ["condensed", "sparse"] {
+        let solver = format!("control = \"arc_length\"\nequations = \"{equations}\"");
+        let pull = "increments = 40\ndisplacement = [{ line = \"end\", x = 0.02 }]";
+        let finished = run(&text(&solver, pull));
+        let path = path(finished.folder());
+        for &[slip, force, end] in &path {
+            let what = format!("{equations}, at {slip:.3e}");
+            assert_close(&what, force, force_at(slip), UNEVEN, largest);
+            assert_close(&what, end, slip + force / K, UNEVEN / 4.0, highest);
+        }
+        let pulls = || path.iter().map(|step| step[2]);
+        let back = pulls().zip(pulls().skip(1)).filter(|(a, b)| b < a).count();
+        assert!(back >= 4, "{equations}: {back} steps back");
+        let turn = pulls().zip(pulls().skip(1)).find(|(a, b)| b < a);
+        let (turn, _) = turn.expect("a step back");
+        let least = pulls().skip_while(|u| *u < turn).fold(turn, f64::min);
+        // The path's own steps are coarse: its turning points lie between them.
+        assert_close("turns back", turn, highest, 0.03, highest);
+        assert_close("turns on", least, lowest, 0.03, lowest);
+        assert!(least > 0.999 * lowest, "{least} is not beyond {lowest}");
+        // Increments are reached as if nothing had been.
+        let reached = finished.in_phase("pull", "pull");
+        assert_eq!(reached.len(), 40, "{equations}");
+        for (i, end) in reached.iter().enumerate() {
+            assert_close("increment", *end, 5e-4 * (i + 1) as f64, 1e-12, 1.0);
+        }
+        let warned = finished
+            .observer
+            .warnings
+            .iter()
+            .any(|w| w.contains("path.csv"));
+        assert!(warned, "{:?}", finished.observer.warnings);
+        let phases = &finished.summary()["phases"];
+        assert!(
+            phases[1]["arc_length_steps"].as_u64() >= Some(8),
+            "{phases}"
+        );
+    }
+}
+
+#[test]
+fn a_force_beyond_the_limit_stops_with_the_limit_in_words() {
+    let limit = SIGMA * friction(PEAK);
+    let asked = 1.1 * limit;
+    let pull = format!(
+        "increments = 20\npressure = [{{ line = \"end\", value = {:e} }}]",
+        -asked / HEIGHT
+    );
+    let failed = fail(&text("control = \"arc_length\"", &pull));
+    let message = failed.error.to_string();
+    let said = message.split("the load does not rise beyond ").nth(1);
+    let said = said.unwrap_or_else(|| panic!("{message}"));
+    let highest: f64 = said.split(' ').next().expect("a number").parse().unwrap();
+    assert_close("limit", highest, limit / asked, 5e-3, 1.0);
+    let path = path(failed.folder());
+    for &[slip, force, _] in &path {
+        assert_close("softening", force, force_at(slip), UNEVEN, limit);
+    }
+    let [_, residual, _] = path[path.len() - 1];
+    assert_close("residual force", residual, SIGMA * MU_R, UNEVEN, limit);
+    // The last equilibrium is in the summary, beyond the last whole increment.
+    let stopped = &failed.summary()["stopped_at"];
+    let load_factor = stopped["load_factor"].as_f64();
+    assert_close("load", load_factor.unwrap(), residual / asked, 1e-3, 1.0);
+    assert_eq!(stopped["probes"]["tau"].as_f64(), Some(residual));
+}
