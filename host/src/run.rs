@@ -444,12 +444,12 @@ impl<'a> Run<'a> {
             results,
             (observer, keeper),
         );
-        let round_off = equations.domain.as_ref().map_or(0.0, |d| d.round_off);
+        let of_domain = equations.domain.as_ref().map_or(0.0, |d| d.round_off);
+        let round_off = of_domain.max(record.round_off);
         if round_off > 0.0 {
             observer.warning(&format!(
-                "phase `{name}`: `force_tolerance` {:.1e} is below round-off: the linear groups \
-                 are left with a residual of {round_off:.1e}, which is the last bit of their \
-                 displacements",
+                "phase `{name}`: `force_tolerance` {:.1e} is below round-off: a residual of \
+                 {round_off:.1e} is left, which is the last bit of the displacements",
                 self.file().solver.force_tolerance
             ));
         }
@@ -616,6 +616,7 @@ impl<'a> Run<'a> {
                         record.unreliable += 1;
                         done.warning.get_or_insert_with(|| why.clone());
                     }
+                    record.round_off = record.round_off.max(success.round_off);
                     if success.relaxed {
                         record.relaxed += 1;
                         observer.warning(&format!(

@@ -5,6 +5,7 @@ mod aspect_ratio;
 mod bonded_pile;
 mod chamber;
 mod chamber_confinement;
+mod chamber_extremes;
 mod chamber_instability;
 mod chamber_interface_model;
 mod chamber_loading;

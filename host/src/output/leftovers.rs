@@ -8,9 +8,10 @@ use std::path::Path;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
 /// are begun anew by each.
-const NAMES: [&str; 8] = [
+const NAMES: [&str; 9] = [
     crate::capsule::FILE_NAME,
     crate::checkpoint::FILE_NAME,
+    "path.csv",
     "profile.csv",
     "points.csv",
     "fields.pvd",

@@ -34,6 +34,8 @@ pub struct PhaseRecord {
     pub unreliable: usize,
     /// Steps that viscous relaxation led to equilibrium.
     pub relaxed: usize,
+    /// Largest relative residual that was taken for round-off in the steps' iterations.
+    pub round_off: f64,
     /// Steps along the path of equilibrium under arc-length control.
     pub arc_length: usize,
     /// Matrices factorised.
@@ -58,6 +60,7 @@ impl PhaseRecord {
             cut_backs: 0,
             unreliable: 0,
             relaxed: 0,
+            round_off: 0.0,
             arc_length: 0,
             factorisations: 0,
             fallbacks: 0,

@@ -18,7 +18,7 @@
 
 use super::Singular;
 use super::multifrontal::{Kind, Multifrontal};
-use super::newton::{Loads, norm};
+use super::newton::{ACCEPTED_ROUND_OFF, Loads, last_bit_scattered, norm};
 use crate::assembly::{Pattern, System, Tie};
 use crate::group::Group;
 use crate::plugin::Operator;
@@ -30,10 +30,6 @@ use std::sync::Arc;
 const REFINEMENTS: usize = 3;
 /// A complete state whose residual is within this of the tolerance is left as it is.
 const REFINED: f64 = 0.1;
-/// Round-off that a complete state may have, in changes of its forces by the last bit of the
-/// displacements.
-const ROUND_OFF: f64 = 8.0;
-
 /// Matrices whose factors are remembered.
 const REMEMBERED: usize = 3;
 
@@ -515,7 +511,7 @@ impl LinearDomain {
                     break (0.0, internal);
                 }
                 let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
-                if relative <= ROUND_OFF * last_bit {
+                if relative <= ACCEPTED_ROUND_OFF * last_bit {
                     break (relative, internal);
                 }
                 return Err(format!(
@@ -617,15 +613,8 @@ impl LinearDomain {
         since: &Since,
         internal: &[f64],
     ) -> Result<f64, String> {
-        // The top bit of a multiple of 2⁶⁴ / golden ratio: a scatter of signs, the same every time.
-        let sign = |i: usize| {
-            let top = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 63;
-            1.0 - 2.0 * top as f64
-        };
         let scattered = |increment: &Vec<f64>| {
-            let numbered = increment.iter().enumerate();
-            let scattered = numbered.map(|(i, u)| u * (1.0 + sign(i) * f64::EPSILON));
-            let mut scattered: Vec<f64> = scattered.collect();
+            let mut scattered = last_bit_scattered(increment);
             self.system.follow(&mut scattered);
             scattered
         };

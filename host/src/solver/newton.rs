@@ -30,6 +30,11 @@ const EXACT: f64 = 1e-3;
 /// have not brought the residual down to this fraction.
 const PATIENCE: usize = 6;
 const PROGRESS: f64 = 0.1;
+/// Largest relative residual that may be round-off.
+const STILL_SMALL: f64 = 1e-6;
+/// Round-off that a state may have, in changes of its forces by the last bit of the displacement
+/// increments.
+pub(super) const ACCEPTED_ROUND_OFF: f64 = 8.0;
 /// Round-off of K u, relative to the forces it is the difference of.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
@@ -107,6 +112,18 @@ pub struct Iteration {
     pub viscosity: f64,
 }
 
+impl Iteration {
+    /// The state before the first correction.
+    fn first(balance: &Balance) -> Self {
+        Self {
+            residual: balance.relative,
+            correction: None,
+            step_length: 1.0,
+            viscosity: 0.0,
+        }
+    }
+}
+
 /// Seconds by part, and counts.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Costs {
@@ -133,6 +150,8 @@ pub struct StepSuccess {
     pub unreliable: Option<String>,
     /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
     pub relaxed: bool,
+    /// Relative residual that had to be taken for round-off, above the tolerance; else 0.
+    pub round_off: f64,
 }
 
 /// A step that did not. The committed state is untouched.
@@ -301,25 +320,14 @@ impl<'a> Newton<'a> {
             period: (time, lambda_end - lambda_start),
         };
         let mut increment = match guess {
-            Some(mut guess) => {
-                for &(dof, ..) in &loads.prescribed {
-                    guess[dof] = prescribed[dof];
-                }
-                self.system.follow(&mut guess);
-                guess
-            }
+            Some(guess) => self.completed(guess, loads, &prescribed),
             None => self.predict(&task)?,
         };
         let operator = self.operator();
         let mut balance = self
             .evaluate(&increment, &task, operator)
             .map_err(failed_law)?;
-        iterations.push(Iteration {
-            residual: balance.relative,
-            correction: None,
-            step_length: 1.0,
-            viscosity: 0.0,
-        });
+        iterations.push(Iteration::first(&balance));
         let quasi = self.settings.method == Method::QuasiNewton;
         let mut acceleration = quasi.then(Acceleration::default);
         // Where the iterations with the present matrix start.
@@ -335,19 +343,29 @@ impl<'a> Newton<'a> {
         let mut first = 0;
         loop {
             let last = iterations[iterations.len() - 1];
-            if self.is_equilibrium(&balance, &last) {
+            let series = &iterations[first..];
+            let stands_still = relaxation::stands_still(series);
+            let is_over = series.len() > self.settings.max_iterations();
+            let is_equilibrium = self.is_equilibrium(&balance, &last);
+            let ends = stands_still || is_over;
+            if is_equilibrium || ends && self.is_round_off(&increment, &balance, &task) {
+                let round_off = if is_equilibrium {
+                    0.0
+                } else {
+                    balance.relative
+                };
                 return Ok(StepSuccess {
                     increment,
                     iterations: std::mem::take(iterations),
                     unreliable: balance.unreliable,
                     relaxed: relaxation.is_some(),
+                    round_off,
                 });
             }
-            let series = &iterations[first..];
-            if series.len() > self.settings.max_iterations() {
+            if is_over {
                 break;
             }
-            if may_relax && relaxation::stands_still(series) {
+            if may_relax && stands_still {
                 if relaxation.is_none() {
                     standstill = (increment, series.len());
                     relaxation = self.start_relaxation(&task);
@@ -399,6 +417,15 @@ impl<'a> Newton<'a> {
         Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
     }
 
+    /// A guess with the increments of prescribed and tied degrees of freedom.
+    fn completed(&self, mut guess: Vec<f64>, loads: &Loads, prescribed: &[f64]) -> Vec<f64> {
+        for &(dof, ..) in &loads.prescribed {
+            guess[dof] = prescribed[dof];
+        }
+        self.system.follow(&mut guess);
+        guess
+    }
+
     /// Whether a correction of this relative size will probably be the last one, the residual
     /// falling quadratically: r₃ = r₂ (r₂/r₁)².
     fn probably_ends(&self, iterations: &[Iteration], correction: f64) -> bool {
@@ -421,6 +448,25 @@ impl<'a> Newton<'a> {
                 .is_some_and(|c| c <= self.settings.displacement_tolerance);
         let small_residual = balance.relative <= tolerance;
         balance.relative <= EXACT * tolerance || (small_residual && small_correction)
+    }
+
+    /// Whether a small residual is one that the last bit of the displacement increments makes, so
+    /// that no iteration can lessen it. The trial state stays.
+    fn is_round_off(&mut self, increment: &[f64], balance: &Balance, task: &Task<'_>) -> bool {
+        if balance.relative > STILL_SMALL {
+            return false;
+        }
+        let operator = self.tangents;
+        let mut scattered = last_bit_scattered(increment);
+        self.system.follow(&mut scattered);
+        let moved = self.evaluate(&scattered, task, Operator::None);
+        let again = self.evaluate(increment, task, operator);
+        let (Ok(moved), Ok(_)) = (moved, again) else {
+            return false;
+        };
+        let pairs = moved.residual.iter().zip(&balance.residual);
+        let change = norm(&pairs.map(|(a, b)| a - b).collect::<Vec<f64>>());
+        norm(&balance.residual) <= ACCEPTED_ROUND_OFF * change
     }
 
     /// What is said of iterations that have come to their end.
@@ -614,6 +660,19 @@ fn stalls(iterations: &[Iteration]) -> bool {
         return false;
     };
     last.residual > PROGRESS * before.residual
+}
+
+/// Displacement increments larger or smaller by their last bit, as the sum over many elements
+/// scatters them.
+pub(super) fn last_bit_scattered(increment: &[f64]) -> Vec<f64> {
+    // The top bit of a multiple of 2⁶⁴ / golden ratio: a scatter of signs, the same every time.
+    let sign = |i: usize| {
+        let top = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 63;
+        1.0 - 2.0 * top as f64
+    };
+    let numbered = increment.iter().enumerate();
+    let scattered = numbered.map(|(i, u)| u * (1.0 + sign(i) * f64::EPSILON));
+    scattered.collect()
 }
 
 /// 2-norm.

@@ -111,12 +111,7 @@ impl Newton<'_> {
         let rate = loads.prescribed_rate();
         let right = self.load_rate(loads);
         let mut balance = self.evaluate_along(loads, [from, time], &mut increment, rise)?;
-        iterations.push(Iteration {
-            residual: balance.relative,
-            correction: None,
-            step_length: 1.0,
-            viscosity: 0.0,
-        });
+        iterations.push(Iteration::first(&balance));
         for _ in 0..self.settings.max_iterations() {
             let external = loads.external(from + rise);
             let task = Task {
@@ -177,6 +172,7 @@ impl Newton<'_> {
                     iterations: std::mem::take(iterations),
                     unreliable: balance.unreliable,
                     relaxed: false,
+                    round_off: 0.0,
                 };
                 return Ok((success, from + rise));
             }
