@@ -164,6 +164,23 @@ fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
     }
 }
 
+#[test]
+fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
+    // The sand waits: probes look at the pile and the interface only.
+    let chamber = include_str!("../../cases/chamber_mesh1/case.toml");
+    let text = chamber.replace("increments = 50", "increments = 150");
+    for control in ["load", "arc_length"] {
+        let text = format!("{text}\n[solver]\ncontrol = \"{control}\"\n");
+        let undisturbed = Place::new();
+        undisturbed.write("block.toml", &text);
+        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let expected = results(&undisturbed.path("out"));
+        assert_eq!(expected.contains_key("path.csv"), control == "arc_length");
+        stopped_and_resumed(&text, &expected, control);
+    }
+}
+
 /// Interrupts a run as Ctrl-C does, resumes it, and compares.
 fn stopped_and_resumed(text: &str, expected: &BTreeMap<String, Vec<u8>>, what: &str) {
     let place = Place::new();
