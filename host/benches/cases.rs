@@ -6,13 +6,14 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use host::assembly::System;
-use host::case::{Axis, Case};
-use host::error::Place;
+use host::case::{Axis, Case, SolverInput};
+use host::error::{Place, Source};
 use host::group::Group;
+use host::input::parse;
 use host::model::Model;
 use host::plugin::Operator;
 use host::run::{Observer, run};
-use host::solver::{LinearSolver, mesh_lines};
+use host::solver::{Costs, LinearDomain, LinearSolver, Loads, Matrix, Newton, mesh_lines};
 use std::path::Path;
 
 fn main() {
@@ -27,6 +28,21 @@ fn case(name: &str, variant: Option<&str>) -> Case {
     cases.pop().expect("the variant is there")
 }
 
+/// Of every degree of freedom, whether it is held or the head's push prescribes it.
+fn prescribed(case: &Case, model: &Model) -> Vec<bool> {
+    let mut prescribed = vec![false; 2 * model.mesh.nodes.len()];
+    let supports = case.file.supports.iter();
+    let supports = supports.map(|s| (s.line.get_ref().as_str(), s.fixed.as_slice()));
+    for (line, fixed) in supports.chain([("pile_head", &[Axis::Y][..])]) {
+        for node in &model.mesh.lines[line].nodes {
+            for axis in fixed {
+                prescribed[2 * node + usize::from(*axis == Axis::Y)] = true;
+            }
+        }
+    }
+    prescribed
+}
+
 /// The equations of the bonded pile's phase, with the tangents of its start.
 struct Equations {
     groups: Vec<Group>,
@@ -39,18 +55,8 @@ impl Equations {
     fn new(mesh: &str) -> Self {
         let case = case("bonded_pile", Some(mesh));
         let mut model = Model::build(&case).expect("the laws are built");
-        let n_dofs = 2 * model.mesh.nodes.len();
-        let mut prescribed = vec![false; n_dofs];
-        let supports = case.file.supports.iter();
-        let supports = supports.map(|s| (s.line.get_ref().as_str(), s.fixed.as_slice()));
-        for (line, fixed) in supports.chain([("pile_head", &[Axis::Y][..])]) {
-            for node in &model.mesh.lines[line].nodes {
-                for axis in fixed {
-                    prescribed[2 * node + usize::from(*axis == Axis::Y)] = true;
-                }
-            }
-        }
-        let still = vec![0.0; n_dofs];
+        let prescribed = prescribed(&case, &model);
+        let still = vec![0.0; prescribed.len()];
         for group in &mut model.groups {
             let evaluated = group.evaluate(&still, Operator::Consistent, 0.0, 1.0);
             evaluated.expect("the law starts");
@@ -129,6 +135,105 @@ fn solution(bencher: Bencher<'_, '_>, mesh: &str) {
     bencher
         .counter(ItemsCount::new(pattern.n()))
         .bench_local(|| solver.solve(&right).expect("the matrix is regular"));
+}
+
+/// The chamber of mesh 1 under 100 kPa from all sides, its interface MEPI from the start.
+fn stressed_chamber() -> Case {
+    let text = include_str!("../../cases/chamber_mesh1/case.toml");
+    let stress = "initial_stress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 }\n";
+    let text = text
+        .replace("formulation =", &format!("{stress}formulation ="))
+        .replace("\"full\"\nlaw = \"sand\"", "\"full\"\nlaw = \"mepi\"");
+    let source = Source::new("chamber.toml", text);
+    let file = parse(&source).expect("a case");
+    Case {
+        source,
+        file,
+        variant: None,
+    }
+}
+
+/// The chamber's equations, the head pushed by 0.1 mm.
+struct Chamber {
+    model: Model,
+    prescribed: Vec<bool>,
+    loads: Loads,
+    settings: SolverInput,
+}
+
+impl Chamber {
+    fn new() -> Self {
+        let case = stressed_chamber();
+        let model = Model::build(&case).expect("the laws are built");
+        let prescribed = prescribed(&case, &model);
+        let head = &model.mesh.lines["pile_head"].nodes;
+        let n_dofs = prescribed.len();
+        let mut forces = vec![0.0; n_dofs];
+        for group in &model.groups {
+            let stress = &group.stress.committed;
+            group.kinematics.add_forces(stress, &mut forces);
+        }
+        let push = |dof: usize| -> f64 {
+            let is_head = dof % 2 == 1 && head.contains(&(dof / 2));
+            if is_head { -1e-4 } else { 0.0 }
+        };
+        let held = (0..n_dofs).filter(|&dof| prescribed[dof]);
+        let loads = Loads {
+            force_start: forces.clone(),
+            force_end: forces,
+            prescribed: held.map(|dof| (dof, 0.0, push(dof))).collect(),
+            out_of_balance: vec![0.0; n_dofs],
+            scale: 0.0,
+        };
+        Self {
+            model,
+            prescribed,
+            loads,
+            settings: case.file.solver,
+        }
+    }
+
+    fn condense(&self) -> (LinearDomain, System) {
+        let Model {
+            mesh, groups, ties, ..
+        } = &self.model;
+        let lines = mesh_lines(&mesh.nodes);
+        let condensed = LinearDomain::new(groups, &self.prescribed, ties, &lines, true, None);
+        condensed.expect("supported").expect("linear groups")
+    }
+}
+
+/// Assembly, factorisation and condensation of the chamber's linear groups.
+#[divan::bench(sample_size = 1, sample_count = 20)]
+fn condensation(bencher: Bencher<'_, '_>) {
+    let chamber = Chamber::new();
+    bencher.bench_local(|| chamber.condense());
+}
+
+/// One increment of the condensed chamber, from its first prediction to equilibrium.
+#[divan::bench(sample_size = 1, sample_count = 100)]
+fn condensed_increment(bencher: Bencher<'_, '_>) {
+    let mut chamber = Chamber::new();
+    let (mut domain, system) = chamber.condense();
+    let still = vec![0.0; chamber.prescribed.len()];
+    domain.start(&chamber.model.groups, &chamber.loads, &still);
+    let mut solver = LinearSolver::new(&system.pattern, false, None).expect("a sound pattern");
+    let mut iterations = 0;
+    bencher.bench_local(|| {
+        let mut matrix = Matrix::default();
+        let mut costs = Costs::default();
+        let mut newton = Newton::new(
+            &system,
+            Some(&domain),
+            (&mut solver, &mut matrix),
+            &mut chamber.model.groups,
+            &chamber.settings,
+            &mut costs,
+        );
+        let step = newton.step(&chamber.loads, 0.0, 1.0, 0.0, None);
+        iterations = step.expect("equilibrium").iterations.len();
+    });
+    assert!(iterations > 2, "the interface slides: {iterations}");
 }
 
 /// Counts the increments of a run.
