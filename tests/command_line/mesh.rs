@@ -251,6 +251,40 @@ fn refuses_keys_of_other_formulations() {
     );
 }
 
+/// The joint of the case in one group, and in three that go on from one another: the same answer.
+#[test]
+fn joints_may_go_on_from_one_another() {
+    let settlement = |parts: &[&str]| {
+        let more: String = parts[1..]
+            .iter()
+            .map(|line| {
+                format!(
+                    "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
+                     law = \"joint\"\n"
+                )
+            })
+            .collect();
+        let lines = "[mesh.lines]\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
+                     centre = { y = 0.5, x = [1.0, 1.01] }\neast = { y = 0.5, x = [1.01, 2.0] }";
+        let text = edited(JOINT)
+            .replace("[mesh.lines]", lines)
+            .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", parts[0]))
+            .replace("[[supports]]", &format!("{more}\n[[supports]]"))
+            .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
+            .replace("\"traction_t\"", "\"stress_12\"");
+        let place = Place::new();
+        let outcome = place.run_case(text);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        tests::case::column(&place.path("out/history.csv"), "settlement")
+    };
+    let one = settlement(&["middle"]);
+    for parts in [["west", "centre", "east"], ["centre", "east", "west"]] {
+        for (parts, one) in settlement(&parts).iter().zip(&one) {
+            approx::assert_relative_eq!(parts, one, max_relative = 1e-9);
+        }
+    }
+}
+
 /// The joint of the case and one across it, in one group or the other first: the same answer.
 #[test]
 fn joints_may_cross() {

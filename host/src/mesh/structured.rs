@@ -4,6 +4,7 @@ use super::{EDGES, Joint, Line, Mesh, Quad};
 use crate::case::{Analysis, CaseFile, Coordinate, Formulation, LineInput, MeshInput};
 use crate::case::{PartInput, RegionInput};
 use crate::error::{Error, Source, suggestion};
+use indexmap::IndexMap;
 use std::collections::HashMap;
 use toml::Spanned;
 
@@ -26,19 +27,53 @@ pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
         })?;
         mesh.lines.insert(name.get_ref().clone(), found);
     }
+    insert_joints(source, file, &mut mesh)?;
+    collect_line_nodes(&mut mesh);
+    Ok(mesh)
+}
+
+/// A line along which the elements of a group are inserted.
+struct Cut<'c> {
+    group: usize,
+    name: &'c Spanned<String>,
+    line: &'c Spanned<String>,
+}
+
+/// Inserts the elements of all zero-thickness groups. Lines that go on from one another are one
+/// line, cut once.
+fn insert_joints(source: &Source, file: &CaseFile, mesh: &mut Mesh) -> Result<(), Error> {
+    let wrong = |cut: &Cut<'_>, why: &str| {
+        let message = format!("group `{}`: {why}", cut.name.get_ref());
+        Error::from(source.error(cut.line.span(), message))
+    };
+    let mut taken: HashMap<usize, usize> = HashMap::new();
+    let mut straight: IndexMap<(usize, u64), Vec<Cut<'_>>> = IndexMap::new();
     for (number, (name, group)) in file.groups.iter().enumerate() {
         let group = group.get_ref();
         match (group.formulation, &group.line) {
             (Formulation::ZeroThickness, Some(line)) => {
-                mesh.line(source, line)?;
-                refuse_taken(&mesh, file, line.get_ref()).map_err(|why| {
-                    let message = format!("group `{}`: {why}", name.get_ref());
-                    source.error(line.span(), message)
-                })?;
-                split(&mut mesh, line.get_ref(), number).map_err(|why| {
-                    let message = format!("group `{}`: {why}", name.get_ref());
-                    source.error(line.span(), message)
-                })?;
+                let edges = &mesh.line(source, line)?.edges;
+                let cut = Cut {
+                    group: number,
+                    name,
+                    line,
+                };
+                let Some(&first) = edges.first() else {
+                    return Err(wrong(&cut, "the line is a point"));
+                };
+                for &edge in edges {
+                    let other = *taken.entry(mesh.edge(edge)[2]).or_insert(number);
+                    if other != number {
+                        let other = file.groups.get_index(other).map(|(name, _)| name);
+                        let other = other.map_or("", |name| name.get_ref().as_str());
+                        let why = format!("the line has elements of group `{other}` already");
+                        return Err(wrong(&cut, &why));
+                    }
+                }
+                let across = across(mesh, first);
+                let position = mesh.nodes[mesh.edge(first)[0]][across];
+                let cuts = straight.entry((across, position.to_bits())).or_default();
+                cuts.push(cut);
             }
             (Formulation::ZeroThickness, None) => {
                 let message = format!(
@@ -54,8 +89,16 @@ pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
             (_, None) => {}
         }
     }
-    collect_line_nodes(&mut mesh);
-    Ok(mesh)
+    for cuts in straight.values() {
+        split(mesh, cuts).map_err(|why| wrong(&cuts[0], &why))?;
+    }
+    Ok(())
+}
+
+/// The coordinate that is the same all along an edge.
+fn across(mesh: &Mesh, edge: (usize, usize)) -> usize {
+    let [a, b, _] = mesh.edge(edge).map(|node| mesh.nodes[node]);
+    usize::from((a[0] - b[0]).abs() >= (a[1] - b[1]).abs())
 }
 
 /// Coordinates of the grid lines in x and y.
@@ -363,27 +406,7 @@ fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, 
     }
 }
 
-/// Refuses a line where no elements can be inserted: a point, or edges that another group has.
-fn refuse_taken(mesh: &Mesh, file: &CaseFile, name: &str) -> Result<(), String> {
-    let line = &mesh.lines[name];
-    if line.edges.is_empty() {
-        return Err("the line is a point".to_owned());
-    }
-    let middles: Vec<usize> = line.edges.iter().map(|&edge| mesh.edge(edge)[2]).collect();
-    let taken = mesh
-        .joints
-        .iter()
-        .find(|joint| middles.contains(&joint.minus[2]) || middles.contains(&joint.plus[2]));
-    match taken.and_then(|joint| file.groups.get_index(joint.group)) {
-        Some((other, _)) => Err(format!(
-            "the line has elements of group `{}` already",
-            other.get_ref()
-        )),
-        None => Ok(()),
-    }
-}
-
-/// Refuses a line that ends on an earlier one, or on which an earlier one ends: which quads stay
+/// Refuses a line that ends on an earlier one across it, or on which an earlier one ends: which quads stay
 /// joined there would depend on the order. Lines may cross. `uses`: in how many edges of the new
 /// line its nodes are.
 fn refuse_meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Result<(), String> {
@@ -405,24 +428,34 @@ fn refuse_meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Result<(), Strin
             let [x, y] = at.map(f64::from_bits);
             return Err(format!(
                 "the line meets the line of another `zero_thickness` group at ({x}, {y}) and one \
-                 of them ends there: such lines may cross, but not end on each other"
+                 of them ends there: such lines may cross or go on from one another, but not end \
+                 on each other"
             ));
         }
     }
     Ok(())
 }
 
-/// Doubles the nodes of a line and inserts zero-thickness elements between its two sides. Where
-/// the line ends inside the mesh its last node stays single, so the two sides stay joined there.
-fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
-    let line = mesh.lines[name].clone();
+/// Doubles the nodes of lines along one straight line and inserts zero-thickness elements between
+/// the two sides. Where the lines end inside the mesh the last node stays single, so the two sides
+/// stay joined there.
+fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), String> {
+    let mut edges = Vec::new();
+    let mut group_of = HashMap::new();
+    for cut in cuts {
+        for &edge in &mesh.lines[cut.line.get_ref()].edges {
+            edges.push(edge);
+            group_of.insert(mesh.edge(edge)[2], cut.group);
+        }
+    }
+    let across = across(mesh, edges[0]);
     // Every edge of the line belongs to two quads; the one with smaller coordinates is `minus`.
     let centre = |q: usize| {
         let nodes = mesh.quads[q].nodes;
         [0, 1].map(|c| nodes[..4].iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / 4.0)
     };
     let mut sides: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
-    for &(q, e) in &line.edges {
+    for &(q, e) in &edges {
         sides.entry(mesh.edge((q, e))[2]).or_default().push((q, e));
     }
     let mut middles: Vec<usize> = sides.keys().copied().collect();
@@ -454,6 +487,7 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
     let mut joints = Vec::new();
     for &(minus, _) in &pairs {
         let mut minus = mesh.edge(minus);
+        let group = group_of[&minus[2]];
         // Ends in the order of increasing coordinates, whatever way round the quad has them.
         let [a, b] = [minus[0], minus[1]].map(|n| mesh.nodes[n]);
         if a[0] + a[1] > b[0] + b[1] {
@@ -473,11 +507,6 @@ fn split(mesh: &mut Mesh, name: &str, group: usize) -> Result<(), String> {
         joints.push(Joint { minus, plus, group });
     }
     // Quads on the far side of the line take the copies, also those that touch it in one node.
-    let vertical = {
-        let ends = [0, 1].map(|i| mesh.nodes[joints[0].minus[i]]);
-        (ends[0][0] - ends[1][0]).abs() < (ends[0][1] - ends[1][1]).abs()
-    };
-    let across = usize::from(!vertical);
     let position = mesh.nodes[joints[0].minus[0]][across];
     for q in 0..mesh.quads.len() {
         let nodes = mesh.quads[q].nodes;
