@@ -9,6 +9,7 @@ use crate::case::{Formulation, InPlane};
 use crate::element::Kinematics;
 use crate::input::BuiltLaw;
 use crate::plugin::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided};
+use abi::status::Outcome;
 use layer::Layer;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,10 @@ use std::sync::Arc;
 
 /// Points that one thread takes at a time.
 const BATCH: usize = 1024;
+/// Components of the strain (jump) that a linear law is tried with, and what its stress may be off
+/// its tangent's, relative to the largest of both.
+const PROBE: [f64; 4] = [1e-4, -5e-5, 2.5e-5, 7.5e-5];
+const LINEAR: f64 = 1e-8;
 
 /// Number of a batch, and where its fluxes, internal variables and operators go.
 type Batch<'a> = (usize, &'a mut [f64], &'a mut [f64], &'a mut [f64]);
@@ -439,11 +444,12 @@ impl Group {
         }
     }
 
-    /// The constant tangent of a linear law.
+    /// The constant tangent of a linear law, held against what the law makes of a small strain.
     fn operator_of_first_point(&mut self) -> Result<Vec<f64>, BatchFailure> {
         let law = &self.law.built.law;
         let n = law.n_components();
         let zero = vec![0.0; n];
+        let strain: Vec<f64> = PROBE.iter().copied().cycle().take(n).collect();
         let mut flux = vec![0.0; n];
         let mut operator = vec![0.0; n * n];
         let rows = Strided::rows(n);
@@ -451,7 +457,7 @@ impl Group {
             &Start {
                 n_points: 1,
                 gradient: (&zero, rows),
-                gradient_end: (&zero, rows),
+                gradient_end: (&strain, rows),
                 flux: (&zero, rows),
                 state: &[],
                 time: 0.0,
@@ -467,6 +473,25 @@ impl Group {
             },
         )?;
         self.count(1, Operator::Consistent);
+        let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let scale = largest(&operator) * largest(&strain);
+        for (i, row) in operator.chunks_exact(n).enumerate() {
+            let product: f64 = row.iter().zip(&strain).map(|(d, e)| d * e).sum();
+            if (flux[i] - product).abs() > LINEAR * scale {
+                return Err(BatchFailure {
+                    point: 0,
+                    outcome: Outcome::Internal,
+                    message: format!(
+                        "the law calls itself linear, but a strain of {strain:?} gives stress {} = \
+                         {:.6e} where its tangent gives {product:.6e}; `pilum check` says more",
+                        i + 1,
+                        flux[i]
+                    ),
+                    factor: None,
+                    call: None,
+                });
+            }
+        }
         Ok(operator)
     }
 

@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 49] = [
+const GALLERY: [(&str, &str, &str, Point); 50] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -188,6 +188,7 @@ const GALLERY: [(&str, &str, &str, Point); 49] = [
         "failed",
         CannotTell,
     ),
+    ("bad_linear", "linearity-as-declared", "failed", CannotTell),
     (
         "bad_zero_increment",
         "zero-increment-changes-nothing",
@@ -314,6 +315,60 @@ fn panics_are_reported_by_the_function_they_happen_in() {
         let details = report.check(id)["details"].as_str().unwrap();
         assert!(details.contains(says), "{details}");
     }
+}
+
+/// The host takes one tangent of a linear law for all its points: it has to be believed once.
+#[test]
+fn a_run_does_not_believe_a_law_that_calls_itself_linear_and_is_not() {
+    const CASE: &str = r#"
+law_path = ["."]
+analysis = "plane_strain"
+[mesh]
+columns = [{ n = 1, to = 1.0 }]
+rows = [{ n = 2, to = 1.0 }]
+[[mesh.region]]
+group = "soil"
+[mesh.lines]
+bottom = { y = 0.0 }
+top = { y = 1.0 }
+middle = { y = 0.5 }
+[laws.soil]
+law = "elastic"
+parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }
+[laws.joint]
+law = "fixture"
+parameters = { normal_stiffness = 1e6, shear_stiffness = 1e5 }
+[groups.soil]
+formulation = "solid"
+law = "soil"
+[groups.joint]
+formulation = "zero_thickness"
+line = "middle"
+law = "joint"
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "weight"
+increments = 2
+pressure = [{ line = "top", value = 10.0 }]
+"#;
+    let folder = folder();
+    if compiled("bad_linear", folder.path()).is_none() {
+        return;
+    }
+    let case = folder.path().join("case.toml");
+    std::fs::write(&case, CASE).unwrap();
+    let out = folder.path().join("out");
+    let outcome = pilum(&[
+        "run",
+        case.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(outcome.status.code(), Some(3));
+    let said = String::from_utf8(outcome.stderr).unwrap();
+    assert!(said.contains("calls itself linear"), "{said}");
 }
 
 #[test]
