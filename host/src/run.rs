@@ -1,11 +1,12 @@
 //! Running a case: phases, increments, cut-back and regrowth, results.
 
+mod keeper;
 mod path;
 
 use crate::assembly::{System, fold};
 use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Control, Equations, PhaseInput};
-use crate::checkpoint::{Checkpoint, PhaseCourse, RunState, identity};
+use crate::checkpoint::{PhaseCourse, RunState, identity};
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
@@ -17,9 +18,10 @@ use crate::solver::{
     Costs, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
     StepFailure, StepSuccess, mesh_lines,
 };
+use keeper::Keeper;
 use path::PathEnd;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Progress of a run, for whoever shows it.
@@ -99,14 +101,9 @@ pub fn run_reusing(
         observer,
         warnings: Vec::new(),
     };
-    let mut keeper = Keeper {
-        identity: identity(case, &model),
-        folder: folder.to_owned(),
-        every: options.checkpoints,
-        last: started,
-    };
+    let mut keeper = Keeper::new(identity(case, &model), folder, options.checkpoints);
     let found = if options.resume {
-        Checkpoint::read(folder, &keeper.identity)?
+        keeper.found()?
     } else {
         None
     };
@@ -141,39 +138,6 @@ pub fn run_reusing(
         keeper.end(&results, &observer.warnings)?;
     }
     Ok(results.figures().clone())
-}
-
-/// Writes the checkpoints of a run.
-struct Keeper {
-    identity: String,
-    folder: PathBuf,
-    every: Option<Duration>,
-    last: Instant,
-}
-
-impl Keeper {
-    /// Whether it is time for another checkpoint.
-    fn is_due(&self) -> bool {
-        self.every.is_some_and(|every| self.last.elapsed() >= every)
-    }
-
-    fn keep(&mut self, run: RunState, results: &Results, warnings: &[String]) -> Result<(), Error> {
-        if self.every.is_some() {
-            let state = results.state()?;
-            Checkpoint::new(&self.identity, state, warnings, Some(run)).write(&self.folder)?;
-            self.last = Instant::now();
-        }
-        Ok(())
-    }
-
-    /// The last checkpoint: there is nothing left to do.
-    fn end(&self, results: &Results, warnings: &[String]) -> Result<(), Error> {
-        if self.every.is_some() {
-            let state = results.state()?;
-            Checkpoint::new(&self.identity, state, warnings, None).write(&self.folder)?;
-        }
-        Ok(())
-    }
 }
 
 /// An observer that also keeps the warnings, for the summary.
@@ -349,47 +313,6 @@ impl<'a> Run<'a> {
             self.phase(number, course.take(), results, observer, keeper)?;
         }
         Ok(())
-    }
-
-    /// The state after a whole increment of a phase.
-    fn state(&self, phase: usize, course: PhaseCourse) -> RunState {
-        let state = |group: &Group| group.state(course.has_matrix);
-        RunState {
-            phase,
-            groups: self.groups.iter().map(state).collect(),
-            displacement: self.displacement.clone(),
-            prescribed: self.prescribed.clone(),
-            pressure: self.pressure.clone(),
-            force: self.force.clone(),
-            time: self.time,
-            largest_force: self.largest_force,
-            course,
-        }
-    }
-
-    /// Takes over a state that [`Self::state`] gave. Returns where its phase stands.
-    fn restore(&mut self, state: RunState) -> Result<PhaseCourse, Error> {
-        let n_dofs = self.displacement.len();
-        let course = &state.course;
-        let sizes = [&state.displacement, &state.force, &course.loads.force_start];
-        if state.groups.len() != self.groups.len() || sizes.iter().any(|v| v.len() != n_dofs) {
-            let message = "the checkpoint is not that of this mesh; run without --resume";
-            return Err(Error::Usage(message.to_owned()));
-        }
-        let groups = self.groups.iter_mut().zip(state.groups).enumerate();
-        for (number, (group, state)) in groups {
-            let swaps = self.model.swaps.iter().flatten();
-            let laws = swaps.filter(|(g, _)| *g == number);
-            let laws: Vec<GroupLaw> = laws.map(|(_, law)| law.clone()).collect();
-            group.restore(state, &laws).map_err(Error::Internal)?;
-        }
-        self.displacement = state.displacement;
-        self.prescribed = state.prescribed;
-        self.pressure = state.pressure;
-        self.force = state.force;
-        self.time = state.time;
-        self.largest_force = state.largest_force;
-        Ok(state.course)
     }
 
     fn phase(
