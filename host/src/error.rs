@@ -1,5 +1,6 @@
 //! What can go wrong, sorted by who has to act; the program's exit code follows.
 
+use crate::file;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode, SourceSpan};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -26,7 +27,7 @@ impl Source {
     /// # Errors
     /// [`Error::Unreadable`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read(path)
+        let text = file::read_text(path)
             .and_then(|bytes| String::from_utf8(bytes).map_err(|error| not_utf_8(&error)))
             .map_err(|source| Error::Unreadable {
                 path: path.to_owned(),
@@ -279,7 +280,7 @@ impl Error {
         }
     }
 
-    /// Adds what the user could do to an error of a run.
+    /// Adds what the user could do.
     #[must_use]
     pub fn with_hint(self, more: &str) -> Self {
         let add = |hint: Option<String>| match hint {
@@ -295,6 +296,10 @@ impl Error {
                 message,
                 hint: add(hint),
             },
+            Self::Input(mut input) => {
+                input.hint = add(input.hint.take());
+                Self::Input(input)
+            }
             other => other,
         }
     }

@@ -5,6 +5,7 @@
 //! profilers, which look for the file), the file itself is opened after it was hashed.
 
 use super::trust;
+use crate::file;
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -33,7 +34,7 @@ impl Image {
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let unreadable = |why: io::Error| format!("cannot be read: {why}");
         let warnings = trust::check_permissions(path)?;
-        let mut file = File::open(path).map_err(unreadable)?;
+        let mut file = file::open_regular(path).map_err(unreadable)?;
         #[cfg(target_os = "linux")]
         let mut memory = memory_file();
         #[cfg(not(target_os = "linux"))]

@@ -290,6 +290,18 @@ fn unique<'a>(ids: impl Iterator<Item = &'a str>, what: &str) -> Result<(), Stri
     Ok(())
 }
 
+/// Copies the description of a library that was never loaded, such as one made of random bytes.
+///
+/// # Errors
+/// What is wrong with it, in words.
+///
+/// # Safety
+/// Structs, tables and texts that it points to, directly or not, are as long as they say.
+pub unsafe fn describe_memory(plugin: &Plugin) -> Result<Vec<LawDescription>, String> {
+    let laws = describe(plugin)?.laws;
+    Ok(laws.into_iter().map(|(law, _)| law).collect())
+}
+
 fn describe(plugin: &Plugin) -> Result<OpenLibrary, String> {
     if plugin.n_laws == 0 || plugin.n_laws > LONGEST_TABLE || plugin.law.is_null() {
         return Err(format!("it declares {} laws", plugin.n_laws));

@@ -3,6 +3,7 @@
 use super::adapter::Foreign;
 use super::{Library, LoadedLaw};
 use crate::error::{Error, suggestion};
+use crate::file;
 use crate::inspect;
 use crate::lock::Pins;
 use std::collections::BTreeMap;
@@ -182,7 +183,7 @@ fn manifests(folder: &Path) -> Vec<(PathBuf, Vec<String>)> {
 
 /// Ids in the manifest section of a library. Only the parts of the file that are needed are read.
 fn manifest(path: &Path) -> Option<Vec<String>> {
-    let file = std::fs::File::open(path).ok()?;
+    let file = file::open_regular(path).ok()?;
     let cache = object::ReadCache::new(file);
     let file = object::File::parse(&cache).ok()?;
     let laws = inspect::manifest(&file)?;

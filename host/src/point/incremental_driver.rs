@@ -162,6 +162,23 @@ impl Driver {
     }
 }
 
+impl Driver {
+    /// Increments of a test; the two files beside it are read for `n` parameters and variables.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at what is not understood or cannot be done.
+    pub(crate) fn parse_incremental(
+        [test, material, initial]: [&Source; 3],
+        n: usize,
+    ) -> Result<usize, Error> {
+        let segments = segments(test)?;
+        let ids: Vec<String> = (0..n).map(|i| format!("p{i}")).collect();
+        parameters(material, &ids)?;
+        initial_conditions(initial, n)?;
+        Ok(segments.iter().map(|segment| segment.increments).sum())
+    }
+}
+
 /// Name of the material, and the parameters in their declared order.
 fn parameters(source: &Source, ids: &[String]) -> Result<(String, ParameterTable), Error> {
     let mut lines = Lines::new(source);
