@@ -3,8 +3,8 @@
 
 mod replay;
 
-pub use replay::replay;
 pub(crate) use replay::repeat;
+pub use replay::replay;
 
 use crate::error::{Error, Source, suggestion};
 use crate::input::toml_error;
@@ -204,12 +204,16 @@ impl Capsule {
             let message = format!("there is no hypothesis `{}`", capsule.law.hypothesis);
             let known = Hypothesis::ALL.map(Hypothesis::name);
             let hint = suggestion(&capsule.law.hypothesis, known);
-            return Err(capsule.error(&["law", "hypothesis"], message).with_hint(&hint));
+            return Err(capsule
+                .error(&["law", "hypothesis"], message)
+                .with_hint(&hint));
         }
         if capsule.request().is_none() {
             let message = format!("there is no request `{}`", capsule.call.request);
             let hint = suggestion(&capsule.call.request, REQUESTS.map(|(name, _)| name));
-            return Err(capsule.error(&["call", "request"], message).with_hint(&hint));
+            return Err(capsule
+                .error(&["call", "request"], message)
+                .with_hint(&hint));
         }
         Ok(capsule)
     }
@@ -420,7 +424,9 @@ impl Capsule {
             let keys = [keys, &[other]].concat();
             let names: Vec<&str> = names.collect();
             let message = format!("law `{}` has no {what} `{other}`", self.law.id);
-            return Err(self.error(&keys, message).with_hint(&suggestion(other, names)));
+            return Err(self
+                .error(&keys, message)
+                .with_hint(&suggestion(other, names)));
         }
         names
             .map(|name| {

@@ -274,12 +274,9 @@ fn execute(command: Command) -> Result<(), Error> {
                 interface_stiffness,
             };
             let mut out = Output::default();
-            let done = trade_off::run(
-                &input,
-                &options,
-                &mut |text| out.line(text),
-                &mut |doing| say!("{doing}"),
-            );
+            let done = trade_off::run(&input, &options, &mut |text| out.line(text), &mut |doing| {
+                say!("{doing}")
+            });
             out.end(done)
         }
         Command::Check(arguments) => {

@@ -39,6 +39,7 @@ impl Image {
         let mut memory = memory_file();
         #[cfg(not(target_os = "linux"))]
         let mut memory: Option<File> = None;
+        let mut read = 0;
         let mut hash = Sha256::new();
         let mut piece = vec![0; PIECE];
         loop {
@@ -48,6 +49,11 @@ impl Image {
                 Err(why) if why.kind() == io::ErrorKind::Interrupted => continue,
                 Err(why) => return Err(unreadable(why)),
             };
+            read += n as u64;
+            if read > file::LARGEST_LIBRARY {
+                let most = file::LARGEST_LIBRARY >> 20;
+                return Err(format!("is longer than {most} MB, the most that is read"));
+            }
             hash.update(&piece[..n]);
             if memory
                 .as_mut()

@@ -21,6 +21,8 @@ use toml::Spanned;
 
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 10_000_000;
+/// Most stretches of a path that are kept, repeated ones and those of waves written out.
+const MAX_SEGMENTS: usize = 200_000;
 
 /// Lines of a file, with their places.
 struct Lines<'a> {
@@ -248,7 +250,7 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
     // The name of the output file; `--csv` says here where rows go.
     lines.expect("the name of the output file")?;
     let mut steps = Vec::new();
-    let mut total = 0;
+    let (mut total, mut n_segments) = (0, 0_usize);
     while let Some((at, line)) = lines.next() {
         let keyword = keyword(&lines, &at, line)?;
         if keyword == "*End" {
@@ -269,6 +271,9 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
             if each.saturating_mul(n_times).saturating_add(total) > MAX_INCREMENTS {
                 return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
             }
+            if repeated.len().saturating_mul(n_times) > MAX_SEGMENTS {
+                return lines.refuse(at, format!("more than {MAX_SEGMENTS} steps"));
+            }
             if n_times == 0 {
                 steps.truncate(first);
             }
@@ -278,10 +283,15 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
         } else {
             steps.push(step(&mut lines, at.clone(), keyword)?);
         }
-        total += steps[first..]
-            .iter()
-            .map(|step| step.increments)
-            .sum::<usize>();
+        let new = &steps[first..];
+        total += new.iter().map(|step| step.increments).sum::<usize>();
+        n_segments += new.iter().map(Step::n_segments).sum::<usize>();
+        if n_segments > MAX_SEGMENTS {
+            let message = format!(
+                "more than {MAX_SEGMENTS} steps and increments of waves, repeated ones included"
+            );
+            return lines.refuse(at, message);
+        }
         if total > MAX_INCREMENTS {
             return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
         }
@@ -422,6 +432,10 @@ fn frame(lines: &mut Lines<'_>) -> Result<Frame, Error> {
 }
 
 impl Step {
+    fn n_segments(&self) -> usize {
+        self.harmonic.map_or(1, |_| self.increments)
+    }
+
     /// One segment, or as many as there are increments where they are not equal.
     fn segments(&self, number: u32) -> Vec<Segment> {
         let n = self.increments;

@@ -152,11 +152,7 @@ impl Memory<'_> {
     }
 
     /// Address and count of a table. Entries are of `size_1_0` bytes, or as the input says.
-    fn table(
-        &mut self,
-        size_1_0: usize,
-        one: fn(&mut Self, u32) -> Vec<usize>,
-    ) -> (usize, u32) {
+    fn table(&mut self, size_1_0: usize, one: fn(&mut Self, u32) -> Vec<usize>) -> (usize, u32) {
         let n = self.count();
         let said = match self.byte() {
             250 => u32::from(self.byte()),

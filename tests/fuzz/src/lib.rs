@@ -80,7 +80,10 @@ fn sidecar(data: &[u8]) {
     let law = source(data).and_then(|source| shown(fuzzing::sidecar(&source)));
     for parameter in law.iter().flat_map(|law| &law.parameters) {
         let bounds = parameter.bounds;
-        assert!(bounds.lower <= bounds.upper, "bounds out of order: {bounds}");
+        assert!(
+            bounds.lower <= bounds.upper,
+            "bounds out of order: {bounds}"
+        );
     }
 }
 

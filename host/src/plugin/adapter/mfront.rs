@@ -41,7 +41,8 @@ const CONSISTENT_OPERATOR: f64 = 4.0;
 pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
     let path = &foreign.library;
     let fault = |why: String| Error::plugin(format!("library {} {why}", path.display()));
-    let bytes = crate::file::read_library(path).map_err(|why| fault(format!("cannot be read: {why}")))?;
+    let bytes =
+        crate::file::read_library(path).map_err(|why| fault(format!("cannot be read: {why}")))?;
     if crate::plugin::hexadecimal_sha256(&bytes) != image.sha256 {
         return Err(fault("was changed while it was read".to_owned()));
     }
