@@ -73,7 +73,7 @@ fn says_what_was_probably_meant() {
             (
                 "no brace at the end",
                 &[("left = { x = 0.0 }\n", "left = { x = 0.0\n^")],
-                &["the `{` at case.toml:21:8 is still open", "a `}` missing"],
+                &["the `{` at case.toml:20:8 is still open", "a `}` missing"],
             ),
             (
                 "no bracket at the end",
