@@ -193,8 +193,8 @@ fn what_is_wrong_with_a_capsule_is_marked_in_it() {
         ),
         (
             "friction_angle",
-            "friction",
-            &["22:12", "`friction_angle`?"],
+            "friction_angel",
+            &["22:18", "`friction_angle`?"],
         ),
         ("cohesion = 10.0\n", "", &["18:2", "`cohesion` is missing"]),
         ("gap = 0.0", "cap = 0.0", &["34:", "`gap`?"]),
