@@ -273,16 +273,15 @@ fn execute(command: Command) -> Result<(), Error> {
                 most_increments: max_increments,
                 interface_stiffness,
             };
-            let mut out = Output::default();
-            let done = trade_off::run(&input, &options, &mut |text| out.line(text), &mut |doing| {
-                say!("{doing}")
-            });
-            out.end(done)
+            printing(|out| {
+                let mut show = |text: &str| out.line(text);
+                trade_off::run(&input, &options, &mut show, &mut |doing| {
+                    say!("{doing}");
+                })
+            })
         }
         Command::Check(arguments) => {
-            let mut out = Output::default();
-            let done = host::check::run(&arguments, &mut |text| out.text(text));
-            out.end(done)
+            printing(|out| host::check::run(&arguments, &mut |text| out.text(text)))
         }
         Command::Laws { id, law_path, json } => show_laws(id.as_deref(), &law_path, json),
         Command::NewLaw(project) => print(&project.write()?),
@@ -307,9 +306,7 @@ fn execute(command: Command) -> Result<(), Error> {
             print(&format!("lock in {}\n", lock.display()))
         }
         Command::Replay { capsule, .. } => {
-            let mut out = Output::default();
-            let done = host::capsule::replay(&capsule, &mut |line| out.line(line));
-            out.end(done)
+            printing(|out| host::capsule::replay(&capsule, &mut |line| out.line(line)))
         }
         #[cfg(unix)]
         Command::LawWorker => host::plugin::isolate::work(),
@@ -354,10 +351,18 @@ impl Output {
     }
 }
 
-fn print(text: &str) -> Result<(), Error> {
+/// Does what says something on the standard output.
+fn printing(work: impl FnOnce(&mut Output) -> Result<(), Error>) -> Result<(), Error> {
     let mut out = Output::default();
-    out.text(text);
-    out.end(Ok(()))
+    let done = work(&mut out);
+    out.end(done)
+}
+
+fn print(text: &str) -> Result<(), Error> {
+    printing(|out| {
+        out.text(text);
+        Ok(())
+    })
 }
 
 /// The user wants the run to stop after the present increment.

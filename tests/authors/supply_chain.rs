@@ -50,7 +50,9 @@ fn packages() -> Vec<Value> {
     // Without a network, those of this platform.
     let platform = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
     let found = metadata(&[]).or_else(|| metadata(&["--offline", "--filter-platform", &platform]));
-    let found = found.expect("`cargo metadata --locked` fails: is Cargo.lock up to date?");
+    let Some(found) = found else {
+        panic!("`cargo metadata --locked` fails: is Cargo.lock up to date?");
+    };
     let mut found: Value = serde_json::from_slice(&found).unwrap();
     let Value::Array(packages) = found["packages"].take() else {
         panic!("no packages");

@@ -28,6 +28,7 @@ for law in elastic coulomb_joint mepi; do cp $laws/lib$law.so $folder/bin/; done
 
 export NO_COLOR=1
 # Libraries are never unloaded on purpose, which is no leak.
+export ASAN_OPTIONS=detect_leaks=0
 limits="-timeout=10 -rss_limit_mb=2048 -malloc_limit_mb=512 -detect_leaks=0"
 if [ $# -gt 0 ] && [ -f "$1" ]; then
   PILUM_FUZZ=$targets exec $folder/bin/fuzz $limits "$@"
@@ -41,7 +42,7 @@ for target in $targets; do
   PILUM_FUZZ=$target $folder/bin/fuzz $limits -max_total_time="$seconds" -max_len=8192 \
     -artifact_prefix="$folder/findings/$target-" -dict=tests/fuzz/words.dict -print_final_stats=1 \
     "$@" "$folder/corpus/$target" "tests/fuzz/corpus/$target" >"$log" 2>&1 </dev/null || status=$?
-  number() { sed -n "s/^stat::$1: *//p" "$log"; }
+  number() { sed -n "s/^stat::$1: *//p" "$log" | tail -n 1; }
   runs=$(number number_of_executed_units)
   edges=$(sed -n 's/.* cov: \([0-9]*\).*/\1/p' "$log" | tail -n 1)
   printf '%-12s %8s executions, %5s edges, corpus %3s, peak %s MB\n' "$target" "${runs:-?}" \

@@ -261,6 +261,9 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
             let (at, [n_steps, n_times]) = lines.numbers("number of steps and of repetitions")?;
             let n_steps = lines.whole(&at, n_steps, "the number of steps")?;
             let n_times = lines.whole(&at, n_times, "the number of repetitions")?;
+            if n_steps == 0 {
+                return lines.refuse(at, "a repetition has at least one step");
+            }
             for _ in 0..n_steps {
                 let (at, line) = lines.expect("a step that is repeated")?;
                 let name = self::keyword(&lines, &at, line)?;

@@ -173,7 +173,7 @@ impl Memory<'_> {
             words.resize(words.len() + stride - entry.len(), 0);
         }
         let declared = self.declared(n);
-        if n == 0 && declared != 0 && self.byte() % 2 == 0 {
+        if n == 0 && declared != 0 && self.byte().is_multiple_of(2) {
             return (0, declared);
         }
         // A table that is declared without being there is refused for its length or its null.
