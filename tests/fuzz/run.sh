@@ -29,7 +29,7 @@ for law in elastic coulomb_joint mepi; do cp $laws/lib$law.so $folder/bin/; done
 export NO_COLOR=1
 # Libraries are never unloaded on purpose, which is no leak.
 export ASAN_OPTIONS=detect_leaks=0
-limits="-timeout=10 -rss_limit_mb=2048 -malloc_limit_mb=512 -detect_leaks=0"
+limits="-timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 -detect_leaks=0"
 if [ $# -gt 0 ] && [ -f "$1" ]; then
   PILUM_FUZZ=$targets exec $folder/bin/fuzz $limits "$@"
 fi
