@@ -3,9 +3,10 @@
 
 mod replay;
 
+pub(crate) use replay::repeat;
 pub use replay::replay;
 
-use crate::error::{Error, Source};
+use crate::error::{Error, Source, suggestion};
 use crate::input::toml_error;
 use crate::plugin::adapter::Adapter;
 use crate::plugin::{BatchFailure, Law, Moment, Operator, PointCall, Request, Site};
@@ -15,7 +16,9 @@ use abi::status::Outcome;
 use indexmap::IndexMap;
 use serde::Deserialize;
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use toml::de::DeTable;
 
 /// Name of the file in a results folder.
 pub const FILE_NAME: &str = "failure.toml";
@@ -36,6 +39,9 @@ pub struct Capsule {
     start: Values,
     #[serde(default)]
     end: Values,
+    /// The file it was read from.
+    #[serde(skip)]
+    source: Option<Source>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -173,6 +179,7 @@ impl Capsule {
                 jump: components(&call.gradient_end),
                 ..Values::default()
             },
+            source: None,
         })
     }
 
@@ -181,14 +188,47 @@ impl Capsule {
     /// # Errors
     /// [`Error::Unreadable`]; [`Error::Input`] at the place that does not fit.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let source = Source::read(path)?;
-        let capsule: Self =
+        Self::of_source(Source::read(path)?)
+    }
+
+    /// Takes the text of a capsule.
+    pub(crate) fn of_source(source: Source) -> Result<Self, Error> {
+        let mut capsule: Self =
             toml::from_str(source.text()).map_err(|why| toml_error(&source, &why))?;
+        capsule.source = Some(source);
         if capsule.version != 1 {
             let message = format!("this is a capsule of version {}", capsule.version);
-            return Err(source.error(0..0, message).into());
+            return Err(capsule.error(&["version"], message));
+        }
+        if capsule.hypothesis().is_none() {
+            let message = format!("there is no hypothesis `{}`", capsule.law.hypothesis);
+            let known = Hypothesis::ALL.map(Hypothesis::name);
+            let hint = suggestion(&capsule.law.hypothesis, known);
+            return Err(capsule
+                .error(&["law", "hypothesis"], message)
+                .with_hint(&hint));
+        }
+        if capsule.request().is_none() {
+            let message = format!("there is no request `{}`", capsule.call.request);
+            let hint = suggestion(&capsule.call.request, REQUESTS.map(|(name, _)| name));
+            return Err(capsule
+                .error(&["call", "request"], message)
+                .with_hint(&hint));
         }
         Ok(capsule)
+    }
+
+    /// An error about what stands under these keys, or about the last of them that is there.
+    fn error(&self, keys: &[&str], message: impl Into<String>) -> Error {
+        let Some(source) = &self.source else {
+            return Error::Usage(message.into());
+        };
+        source.error(place(source.text(), keys), message).into()
+    }
+
+    /// Id of the law.
+    pub(crate) fn law_id(&self) -> &str {
+        &self.law.id
     }
 
     /// Writes the capsule.
@@ -347,53 +387,88 @@ impl std::fmt::Display for Capsule {
     }
 }
 
-/// The values of a table in the order of some names.
-///
-/// # Errors
-/// The name that is missing, or too much.
-fn in_order<'a>(
-    values: &IndexMap<String, f64>,
-    names: impl Iterator<Item = &'a str> + Clone,
-    what: &str,
-) -> Result<Vec<f64>, Error> {
-    if let Some(other) = values.keys().find(|key| !names.clone().any(|n| n == *key)) {
-        return Err(Error::Usage(format!("the law has no {what} `{other}`")));
+/// Where the value under these keys stands, or else the last of the keys that is there; of a whole
+/// table its head.
+fn place(text: &str, keys: &[&str]) -> Range<usize> {
+    let mut at = 0..0;
+    let Ok(root) = DeTable::parse(text) else {
+        return at;
+    };
+    let mut table = Some(root.get_ref());
+    for key in keys {
+        let found = table.and_then(|table| table.iter().find(|(name, _)| name.get_ref() == key));
+        let Some((name, value)) = found else { break };
+        table = value.get_ref().as_table();
+        at = if table.is_some() {
+            name.span()
+        } else {
+            value.span()
+        };
     }
-    names
-        .map(|name| {
-            let value = values.get(name).copied();
-            value.ok_or_else(|| Error::Usage(format!("the capsule lacks the {what} `{name}`")))
-        })
-        .collect()
+    at
 }
 
 impl Capsule {
+    /// The values of a table in the order of some names. `keys`: what leads to the table.
+    ///
+    /// # Errors
+    /// The name that is missing, or too much.
+    fn in_order<'a>(
+        &self,
+        values: &IndexMap<String, f64>,
+        names: impl Iterator<Item = &'a str> + Clone,
+        keys: &[&str],
+        what: &str,
+    ) -> Result<Vec<f64>, Error> {
+        if let Some(other) = values.keys().find(|key| !names.clone().any(|n| n == *key)) {
+            let keys = [keys, &[other]].concat();
+            let names: Vec<&str> = names.collect();
+            let message = format!("law `{}` has no {what} `{other}`", self.law.id);
+            return Err(self
+                .error(&keys, message)
+                .with_hint(&suggestion(other, names)));
+        }
+        names
+            .map(|name| {
+                let value = values.get(name).copied();
+                value.ok_or_else(|| self.error(keys, format!("the {what} `{name}` is missing")))
+            })
+            .collect()
+    }
+
     /// The call, with its values in the order of this law.
     fn point_call(&self, law: &Law) -> Result<PointCall, Error> {
-        let request = self
-            .request()
-            .ok_or_else(|| Error::Usage(format!("there is no request `{}`", self.call.request)))?;
+        let request = self.request().ok_or_else(|| {
+            let message = format!("there is no request `{}`", self.call.request);
+            self.error(&["call", "request"], message)
+        })?;
         let (gradient, flux) = words(law.hypothesis());
-        let components = |values: &IndexMap<String, f64>, what: &str| {
+        let components = |values: &IndexMap<String, f64>, part: &str, what: &str| {
             if values.is_empty() && request == Request::InitialState {
                 return Ok(Vec::new());
             }
-            in_order(values, law.hypothesis().components().iter().copied(), what)
+            let names = law.hypothesis().components().iter().copied();
+            self.in_order(values, names, &[part, what], what)
         };
         let variables = law.formulation().internal_variables.iter();
         let state = if request == Request::InitialState {
             Vec::new()
         } else {
             let ids = variables.map(|v| v.id.as_str());
-            in_order(&self.start.internal, ids, "internal variable")?
+            self.in_order(
+                &self.start.internal,
+                ids,
+                &["start", "internal"],
+                "internal variable",
+            )?
         };
         Ok(PointCall {
             request,
             time: self.call.time,
             time_increment: self.call.time_increment,
-            gradient: components(&self.start.jump, gradient)?,
-            gradient_end: components(&self.end.jump, gradient)?,
-            flux: components(&self.start.traction, flux)?,
+            gradient: components(&self.start.jump, "start", gradient)?,
+            gradient_end: components(&self.end.jump, "end", gradient)?,
+            flux: components(&self.start.traction, "start", flux)?,
             state,
             moment: self
                 .call

@@ -36,7 +36,15 @@ impl Case {
         } else {
             path.to_owned()
         };
-        let (source, files) = base::read(Source::read(&path)?)?;
+        Self::of(Source::read(&path)?)
+    }
+
+    /// Takes the text of a case file.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the place that does not fit.
+    pub(crate) fn of(source: Source) -> Result<Vec<Self>, Error> {
+        let (source, files) = base::read(source)?;
         let case = |(variant, file)| Self {
             source: source.clone(),
             file,

@@ -16,6 +16,7 @@ mod specimen;
 
 use crate::child::{self, Ending, Work};
 use crate::error::{Error, suggestion};
+use crate::file;
 use crate::plugin::{Library, LoadedLaw, SearchPath, hexadecimal_sha256};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -146,7 +147,7 @@ struct Subject {
 
 impl Subject {
     fn bytes(&self) -> Result<Vec<u8>, Verdict> {
-        std::fs::read(&self.path).map_err(|why| failed(format!("it cannot be read: {why}")))
+        file::read_library(&self.path).map_err(|why| failed(format!("it cannot be read: {why}")))
     }
 
     /// The laws of the library.
@@ -229,18 +230,21 @@ pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Err
         print(&format!("\n{ANSWER}{answer}\n"));
         return Ok(());
     }
+    // What cannot be read needs no checks, and what it was is what is reported.
+    let bytes = file::read_library(&path).map_err(|source| Error::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let sha256 = hexadecimal_sha256(&bytes);
+    drop(bytes);
     let findings = run_all(arguments, &path)?;
     let mut counts = BTreeMap::new();
     for finding in &findings {
         *counts.entry(finding.outcome.name()).or_insert(0) += 1;
     }
-    let bytes = std::fs::read(&path).map_err(|source| Error::Unreadable {
-        path: path.clone(),
-        source,
-    })?;
     let report = Report {
         library: path.display().to_string(),
-        sha256: hexadecimal_sha256(&bytes),
+        sha256,
         seed: arguments.seed,
         checks: &findings,
         counts,

@@ -1,5 +1,6 @@
 //! What can go wrong, sorted by who has to act; the program's exit code follows.
 
+use crate::file;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode, SourceSpan};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -26,7 +27,7 @@ impl Source {
     /// # Errors
     /// [`Error::Unreadable`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read(path)
+        let text = file::read_text(path)
             .and_then(|bytes| String::from_utf8(bytes).map_err(|error| not_utf_8(&error)))
             .map_err(|source| Error::Unreadable {
                 path: path.to_owned(),
@@ -110,6 +111,22 @@ impl Source {
         format!("{}:{line}:{column}", path.display())
     }
 
+    /// Marks a second place of an error, if it is in the same file.
+    #[must_use]
+    pub fn mark(
+        &self,
+        mut error: InputError,
+        span: Range<usize>,
+        label: impl Into<String>,
+    ) -> InputError {
+        let (path, start, text) = self.file(span.start);
+        if error.source_code.name() == path.display().to_string() {
+            let span = span.start - start..span.end.saturating_sub(start).min(text.len());
+            error.second = Some((span.into(), label.into()));
+        }
+        error
+    }
+
     /// An error about the bytes `span`.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> InputError {
         let (path, start, text) = self.file(span.start);
@@ -119,6 +136,7 @@ impl Source {
             label: None,
             hint: None,
             span: span.into(),
+            second: None,
             source_code: NamedSource::new(path.display().to_string(), text.to_owned())
                 .with_language("TOML"),
         }
@@ -152,6 +170,8 @@ pub struct InputError {
     label: Option<String>,
     hint: Option<String>,
     span: SourceSpan,
+    /// Another place that it is about.
+    second: Option<(SourceSpan, String)>,
     source_code: NamedSource<String>,
 }
 
@@ -167,7 +187,11 @@ impl Diagnostic for InputError {
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let label = LabeledSpan::new_with_span(self.label.clone(), self.span);
-        Some(Box::new(std::iter::once(label)))
+        let second = self
+            .second
+            .iter()
+            .map(|(span, label)| LabeledSpan::new_with_span(Some(label.clone()), *span));
+        Some(Box::new(std::iter::once(label).chain(second)))
     }
 }
 
@@ -279,7 +303,7 @@ impl Error {
         }
     }
 
-    /// Adds what the user could do to an error of a run.
+    /// Adds what the user could do.
     #[must_use]
     pub fn with_hint(self, more: &str) -> Self {
         let add = |hint: Option<String>| match hint {
@@ -295,6 +319,10 @@ impl Error {
                 message,
                 hint: add(hint),
             },
+            Self::Input(mut input) => {
+                input.hint = add(input.hint.take());
+                Self::Input(input)
+            }
             other => other,
         }
     }
@@ -315,8 +343,11 @@ impl Error {
 
 /// The candidate closest to `name`, if any is close enough to be a slip of the pen.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // The distance takes the product of the lengths.
+    const LONGEST: usize = 200;
     candidates
         .into_iter()
+        .filter(|candidate| candidate.len().max(name.len()) <= LONGEST)
         .map(|candidate| (edit_distance(name, candidate), candidate))
         .filter(|(distance, candidate)| {
             *distance <= 1 + candidate.len() / 3 && *distance < candidate.len().max(name.len())

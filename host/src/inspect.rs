@@ -2,6 +2,7 @@
 //! kind of computer.
 
 use crate::error::Error;
+use crate::file;
 use crate::plugin::hexadecimal_sha256;
 use abi::raw::{self, MagicBlock};
 use abi::version;
@@ -85,13 +86,18 @@ pub struct ManifestEntry {
 /// # Errors
 /// [`Error::Unreadable`]; [`Error::Plugin`] for what is no library.
 pub fn inspect(path: &Path) -> Result<Inspection, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Unreadable {
+    let bytes = file::read_library(path).map_err(|source| Error::Unreadable {
         path: path.to_owned(),
         source,
     })?;
+    inspect_bytes(path, &bytes)
+}
+
+/// As [`inspect`], with the bytes of the file.
+pub(crate) fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<Inspection, Error> {
     let no_library =
         |why: &dyn fmt::Display| Error::plugin(format!("{} is no library: {why}", path.display()));
-    let file = File::parse(&*bytes).map_err(|why| no_library(&why))?;
+    let file = File::parse(bytes).map_err(|why| no_library(&why))?;
     let format = match file.format() {
         BinaryFormat::Elf => "elf",
         BinaryFormat::MachO => "mach-o",
@@ -102,12 +108,12 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
             )));
         }
     };
-    let (needs, search) = needs(&file, &bytes).map_err(|why| no_library(&why))?;
+    let (needs, search) = needs(&file, bytes).map_err(|why| no_library(&why))?;
     let (exported, undefined) = symbols(&file).map_err(|why| no_library(&why))?;
     let mut inspection = Inspection {
         path: path.to_owned(),
         bytes: bytes.len(),
-        sha256: hexadecimal_sha256(&bytes),
+        sha256: hexadecimal_sha256(bytes),
         format,
         architecture: architecture(file.architecture()),
         bits: if file.is_64() { 64 } else { 32 },

@@ -17,6 +17,9 @@ pub mod checkpoint;
 pub mod child;
 pub mod element;
 pub mod error;
+mod file;
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod group;
 pub mod input;
 pub mod inspect;

@@ -100,8 +100,20 @@ impl Pins {
     }
 
     fn add_lock(&mut self, path: &Path) -> Result<(), Error> {
-        let source = Source::read(path)?;
-        let lock: LockFile = input::parse(&source)?;
+        self.take_lock(&Source::read(path)?)?;
+        self.lock = Some(path.to_owned());
+        Ok(())
+    }
+
+    /// Reads a lock alone: the number of laws in it.
+    pub(crate) fn of_lock(source: &Source) -> Result<usize, Error> {
+        let mut pins = Self::default();
+        pins.take_lock(source)?;
+        Ok(pins.locked.len())
+    }
+
+    fn take_lock(&mut self, source: &Source) -> Result<(), Error> {
+        let lock: LockFile = input::parse(source)?;
         if *lock.version.get_ref() != 1 {
             let message = format!("this is a lock of version {}", lock.version.get_ref());
             return Err(source
@@ -111,7 +123,7 @@ impl Pins {
         }
         for law in lock.law {
             self.demands.push(Pin {
-                sha256: digits(&source, &law.sha256)?,
+                sha256: digits(source, &law.sha256)?,
                 place: format!(
                     "`sha256` at {}, for {} {} of {}",
                     source.place(&law.sha256.span()),
@@ -126,7 +138,6 @@ impl Pins {
             });
             self.locked.push(law.id);
         }
-        self.lock = Some(path.to_owned());
         Ok(())
     }
 

@@ -1,5 +1,4 @@
 //! The `pilum` program: arguments to library calls, and their outcome to messages and exit codes.
-#![expect(clippy::print_stdout, reason = "this is where the program prints")]
 
 use clap::{CommandFactory, Parser, Subcommand};
 use host::case::Case;
@@ -274,38 +273,40 @@ fn execute(command: Command) -> Result<(), Error> {
                 most_increments: max_increments,
                 interface_stiffness,
             };
-            trade_off::run(
-                &input,
-                &options,
-                &mut |text| println!("{text}"),
-                &mut |doing| say!("{doing}"),
-            )
+            printing(|out| {
+                let mut show = |text: &str| out.line(text);
+                trade_off::run(&input, &options, &mut show, &mut |doing| {
+                    say!("{doing}");
+                })
+            })
         }
-        Command::Check(arguments) => host::check::run(&arguments, &mut |text| print!("{text}")),
+        Command::Check(arguments) => {
+            printing(|out| host::check::run(&arguments, &mut |text| out.text(text)))
+        }
         Command::Laws { id, law_path, json } => show_laws(id.as_deref(), &law_path, json),
-        Command::NewLaw(project) => project.write().map(|text| print!("{text}")),
+        Command::NewLaw(project) => print(&project.write()?),
         Command::Schema { file } => print_schema(file),
         Command::Completions { shell } => {
             let mut program = Arguments::command();
-            clap_complete::generate(shell, &mut program, "pilum", &mut std::io::stdout());
-            Ok(())
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut program, "pilum", &mut script);
+            print(&String::from_utf8_lossy(&script))
         }
         Command::Man => manual(&Arguments::command()),
         Command::Inspect { library, json } => {
             let inspection = host::inspect::inspect(&library)?;
             if json {
-                print!("{}", host::inspect::json(&inspection)?);
+                print(&host::inspect::json(&inspection)?)
             } else {
-                println!("{inspection}");
+                print(&format!("{inspection}\n"))
             }
-            Ok(())
         }
         Command::Lock { input } => {
-            println!("lock in {}", host::lock::write(&input)?.display());
-            Ok(())
+            let lock = host::lock::write(&input)?;
+            print(&format!("lock in {}\n", lock.display()))
         }
         Command::Replay { capsule, .. } => {
-            host::capsule::replay(&capsule, &mut |line| println!("{line}"))
+            printing(|out| host::capsule::replay(&capsule, &mut |line| out.line(line)))
         }
         #[cfg(unix)]
         Command::LawWorker => host::plugin::isolate::work(),
@@ -315,6 +316,53 @@ fn execute(command: Command) -> Result<(), Error> {
             vetting::probe(&library, &sha256, &mut std::io::stdout().lock())
         }
     }
+}
+
+/// What a command says on the standard output.
+#[derive(Debug, Default)]
+struct Output {
+    /// Why it can say no more.
+    failure: Option<std::io::Error>,
+}
+
+impl Output {
+    fn text(&mut self, text: &str) {
+        if self.failure.is_none() {
+            let mut out = std::io::stdout().lock();
+            let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+            self.failure = written.err();
+        }
+    }
+
+    fn line(&mut self, text: &str) {
+        self.text(&format!("{text}\n"));
+    }
+
+    /// How the command ends: what it came to matters more than what could not be said of it.
+    /// Whoever reads a pipe may have read enough.
+    fn end(self, outcome: Result<(), Error>) -> Result<(), Error> {
+        let is_read = |why: &std::io::Error| why.kind() == std::io::ErrorKind::BrokenPipe;
+        outcome.and(match self.failure.filter(|why| !is_read(why)) {
+            None => Ok(()),
+            Some(why) => Err(Error::Usage(format!(
+                "cannot write to the standard output: {why}"
+            ))),
+        })
+    }
+}
+
+/// Does what says something on the standard output.
+fn printing(work: impl FnOnce(&mut Output) -> Result<(), Error>) -> Result<(), Error> {
+    let mut out = Output::default();
+    let done = work(&mut out);
+    out.end(done)
+}
+
+fn print(text: &str) -> Result<(), Error> {
+    printing(|out| {
+        out.text(text);
+        Ok(())
+    })
 }
 
 /// The user wants the run to stop after the present increment.
@@ -508,15 +556,13 @@ fn show_laws(id: Option<&str>, folders: &[PathBuf], json: bool) -> Result<(), Er
         (Some(id), false) => host::laws::page(&search.law(id)?),
         (Some(id), true) => host::laws::page_json(&search.law(id)?)?,
     };
-    print!("{text}");
-    Ok(())
+    print(&text)
 }
 
 fn print_schema(file: FileKind) -> Result<(), Error> {
     let text = serde_json::to_string_pretty(&schema::of(file))
         .map_err(|error| Error::Internal(error.to_string()))?;
-    println!("{text}");
-    Ok(())
+    print(&format!("{text}\n"))
 }
 
 /// The program's manual page, that of each command behind it.
@@ -532,8 +578,7 @@ fn manual(program: &clap::Command) -> Result<(), Error> {
         written = written.and_then(|()| section.render(&mut page));
     }
     written.map_err(|error| Error::Internal(error.to_string()))?;
-    print!("{}", String::from_utf8_lossy(&page));
-    Ok(())
+    print(&String::from_utf8_lossy(&page))
 }
 
 /// A bar on a terminal, plain lines elsewhere; both on the error stream.

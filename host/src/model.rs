@@ -262,7 +262,7 @@ impl<'a> LawShelf<'a> {
             let (source, parameters) = (self.source, &entry.parameters);
             let loaded = self.loaded(entry)?;
             let built = build_law(source, &loaded, &entry.law, hypothesis, parameters)
-                .map_err(|error| self.explain(error, group_name, group))?;
+                .map_err(|error| self.explain(error, group_name, group, name))?;
             let built = Arc::new(built);
             self.laws.insert(key, Arc::clone(&built));
             built
@@ -322,9 +322,17 @@ impl<'a> LawShelf<'a> {
     }
 
     /// Adds what the group expects to an error about the law's hypothesis.
-    fn explain(&self, error: Error, name: &Spanned<String>, group: &GroupInput) -> Error {
+    fn explain(
+        &self,
+        error: Error,
+        name: &Spanned<String>,
+        group: &GroupInput,
+        law: &Spanned<String>,
+    ) -> Error {
         match error {
             Error::Input(input) if input.to_string().contains("is made for") => {
+                let label = format!("taken by group `{}`", name.get_ref());
+                let input = self.source.mark(*input, law.span(), label);
                 Error::from(input.hint(format!(
                     "group `{}` has the formulation `{}` in the analysis `{}`",
                     name.get_ref(),

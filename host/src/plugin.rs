@@ -13,6 +13,8 @@ pub mod vetting;
 pub use description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };
+#[doc(hidden)]
+pub use library::describe_memory;
 pub use library::{Strided, probe};
 pub use search::SearchPath;
 pub use trust::Trust;

@@ -170,8 +170,18 @@ fn run_all(
                 names.join(", ")
             )));
         };
-        report(&driver.write_csv(io::stdout().lock(), Path::new("the standard output"))?);
-        return Ok(());
+        let name = Path::new("the standard output");
+        return match driver.write_csv(io::stdout().lock(), name) {
+            Ok(done) => {
+                report(&done);
+                Ok(())
+            }
+            // Whoever reads the rows has read enough.
+            Err(Error::Unwritable { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => {
+                Ok(())
+            }
+            Err(error) => Err(error),
+        };
     };
     let target = |driver: &Driver| match &driver.variant {
         Some(variant) if !alone => with_suffix(csv, variant),

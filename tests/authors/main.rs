@@ -11,4 +11,5 @@ mod laws;
 mod names;
 mod program;
 mod schema;
+mod supply_chain;
 mod validator;

@@ -175,3 +175,38 @@ fn refuses_what_is_no_capsule() {
     }
     assert_eq!(place.run(&["replay", "missing.toml"]).code, Some(BAD_INPUT));
 }
+
+#[test]
+fn what_is_wrong_with_a_capsule_is_marked_in_it() {
+    let good = include_str!("../fuzz/corpus/capsule/joint");
+    for (from, to, says) in [
+        (
+            "version = 1\n",
+            "version = 2\n",
+            &["1:11", "of version 2"][..],
+        ),
+        ("interface_2d", "interface_3d", &["6:14", "`interface_2d`?"]),
+        (
+            "fluxes and",
+            "fluxes und",
+            &["27:11", "there is no request"],
+        ),
+        (
+            "friction_angle",
+            "friction_angel",
+            &["22:18", "`friction_angle`?"],
+        ),
+        ("cohesion = 10.0\n", "", &["18:2", "`cohesion` is missing"]),
+        ("gap = 0.0", "cap = 0.0", &["34:", "`gap`?"]),
+        ("t = 1e-3", "s = 1e-3", &["37:23", "has no jump `s`"]),
+    ] {
+        assert!(good.contains(from), "{from:?}");
+        let place = Place::new();
+        place.write("failure.toml", good.replacen(from, to, 1));
+        let outcome = place.run(&["replay", "failure.toml"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        for text in says {
+            assert!(outcome.says(text), "{to:?}, {text:?}: {}", outcome.stderr);
+        }
+    }
+}

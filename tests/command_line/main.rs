@@ -14,6 +14,7 @@ mod program;
 mod results;
 #[cfg(unix)]
 mod resume;
+mod streams;
 mod syntax;
 mod trade_off;
 mod troubled;

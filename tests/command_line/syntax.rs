@@ -42,6 +42,72 @@ fn refuses_what_is_not_toml() {
 }
 
 #[test]
+fn says_what_was_probably_meant() {
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "decimal comma",
+                &[("max_iterations = 20", "force_tolerance = 1^,5")],
+                &["decimal point", "`1.5`, not `1,5`"],
+            ),
+            (
+                "decimal comma before another key",
+                &[("young_modulus = 1e4,", "young_modulus = 10000,0^,")],
+                &["`10000.0`, not `10000,0`"],
+            ),
+            (
+                "single brackets, once",
+                &[
+                    (
+                        "[[phase]]\nname = \"weight\"\nincrements = 2\n",
+                        "^[phase]\n",
+                    ),
+                    (
+                        "pressure = [{ line = \"top\", value = 10.0 }]\n\n[[phase]]\n",
+                        "",
+                    ),
+                ],
+                &["`phase` is a list of tables", "[[phase]]"],
+            ),
+            (
+                "no brace at the end",
+                &[("left = { x = 0.0 }\n", "left = { x = 0.0\n^")],
+                &["the `{` at case.toml:20:8 is still open", "a `}` missing"],
+            ),
+            (
+                "no bracket at the end",
+                &[(
+                    "rows = [{ n = 2, to = 1.0 }]\n\n",
+                    "rows = [{ n = 2, to = 1.0 }\n\n^",
+                )],
+                &["the `[` at case.toml:10:8 is still open", "a `]` missing"],
+            ),
+            (
+                "no quotation mark at the end",
+                &[("\"weight\"", "\"weight^")],
+                &["a quotation mark is missing"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn a_law_that_does_not_fit_is_marked_where_the_group_takes_it() {
+    refuses(
+        BAD_INPUT,
+        &[(
+            "an interface law for a solid",
+            &[("law = \"soil\"", "law = \"joint\"")],
+            &[
+                "is made for interface_2d, expected plane_strain",
+                "taken by group `soil`",
+            ],
+        )],
+    );
+}
+
+#[test]
 fn refuses_wrong_types() {
     refuses(
         BAD_INPUT,

@@ -1,7 +1,7 @@
 //! Repeating the call of a capsule: what comes out, how far the increment can be followed, and
 //! whether the tangent is the derivative of the update.
 
-use super::{Capsule, OutcomePart, in_order, status};
+use super::{Capsule, OutcomePart, status};
 use crate::error::Error;
 use crate::plugin::adapter::Foreign;
 use crate::plugin::{
@@ -33,7 +33,15 @@ type Answer = (Vec<f64>, Vec<f64>, Vec<f64>);
 /// [`Error::NoEquilibrium`] if the law cannot follow, [`Error::Plugin`] if it is defective.
 pub fn replay(path: &Path, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
     let capsule = Capsule::read(path)?;
-    let loaded = find(&capsule)?;
+    repeat(&capsule, &find(&capsule)?, say)
+}
+
+/// Repeats the call with this law.
+pub(crate) fn repeat(
+    capsule: &Capsule,
+    loaded: &LoadedLaw,
+    say: &mut dyn FnMut(&str),
+) -> Result<(), Error> {
     let description = loaded.description();
     say(&format!(
         "law `{}` {} of {}, {}",
@@ -57,7 +65,7 @@ pub fn replay(path: &Path, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
         })
         .collect();
     say(&format!("from {}", origin.join(", ")));
-    let law = build(&capsule, &loaded)?;
+    let law = build(capsule, loaded)?;
     let call = capsule.point_call(&law)?;
     if call.request == Request::InitialState {
         return match law.initial_state(1, (&call.flux, Strided::rows(call.flux.len()))) {
@@ -66,7 +74,7 @@ pub fn replay(path: &Path, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
                 say(&values(&law, &[], &state));
                 Ok(())
             }
-            Err(failure) => outcome(&capsule, &law, &failure, say),
+            Err(failure) => outcome(capsule, &law, &failure, say),
         };
     }
     let failure = match update(&law, &call, call.request, 1.0) {
@@ -81,7 +89,7 @@ pub fn replay(path: &Path, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
         }
         Err(failure) => failure,
     };
-    let outcome = outcome(&capsule, &law, &failure, say);
+    let outcome = outcome(capsule, &law, &failure, say);
     if let Some(fraction) = bisect(&law, &call, say) {
         say(&tangent(&law, &call, fraction));
     }
@@ -118,14 +126,12 @@ fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
 
 fn build(capsule: &Capsule, loaded: &LoadedLaw) -> Result<Law, Error> {
     let hypothesis = capsule.hypothesis().ok_or_else(|| {
-        Error::Usage(format!(
-            "there is no hypothesis `{}`",
-            capsule.law.hypothesis
-        ))
+        let message = format!("there is no hypothesis `{}`", capsule.law.hypothesis);
+        capsule.error(&["law", "hypothesis"], message)
     })?;
     let ids = loaded.description().parameters.iter();
     let ids = ids.map(|p| p.id.as_str());
-    let parameters = in_order(&capsule.parameters, ids, "parameter")?;
+    let parameters = capsule.in_order(&capsule.parameters, ids, &["parameters"], "parameter")?;
     loaded.build(hypothesis, &parameters).map_err(|failure| {
         Error::plugin(format!(
             "law `{}` refuses its parameters: {}",

@@ -7,10 +7,13 @@
 use crate::error::{Error, Source};
 use crate::input::{deserialize, toml_error};
 use serde::de::DeserializeOwned;
+use std::collections::HashMap;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// Most bytes of a file times its variants: each holds all of it.
+const MOST_TOGETHER: usize = 64 << 20;
 /// Longest chain of bases.
 const LONGEST_CHAIN: usize = 8;
 
@@ -45,6 +48,15 @@ pub(crate) fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Varia
             .error(span, "variants are written as [[variant]]")
             .into());
     };
+    if variants.len().saturating_mul(source.text().len()) > MOST_TOGETHER {
+        let message = format!(
+            "{} variants of a file of {} kB: at most {} MB are read, all variants together",
+            variants.len(),
+            source.text().len() >> 10,
+            MOST_TOGETHER >> 20
+        );
+        return Err(source.error(span, message).into());
+    }
     let mut files: Variants<T> = Vec::new();
     for variant in variants {
         let (span, given) = (variant.span(), name(&variant));
@@ -124,8 +136,13 @@ fn merge_value<'i>(below: &mut Spanned<DeValue<'i>>, value: Spanned<DeValue<'i>>
                 .chain(value.iter())
                 .all(|entry| name(entry).is_some()) =>
         {
+            let mut places = HashMap::new();
+            for (place, entry) in below.iter().enumerate() {
+                places.entry(name(entry)).or_insert(place);
+            }
             for entry in value {
-                match below.iter_mut().find(|b| name(b) == name(&entry)) {
+                let place = *places.entry(name(&entry)).or_insert(below.len());
+                match below.get_mut(place) {
                     Some(same) => merge_value(same, entry),
                     None => below.push(entry),
                 }

@@ -37,6 +37,11 @@ pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
         .find_map(|start| message.strip_prefix(start))
         .and_then(|rest| rest.split_once(", expected "));
     match found {
+        Some(("map", "a sequence")) if single_brackets(source.text(), span.start).is_some() => {
+            let name = single_brackets(source.text(), span.start).unwrap_or_default();
+            at(format!("`{name}` is a list of tables"))
+                .hint(format!("each is written with double brackets: [[{name}]]"))
+        }
         Some((found, expected)) => of_key(format!(
             "found {}, expected {}",
             found_in_words(found),
@@ -45,8 +50,79 @@ pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
         None if message.starts_with("expected") || message.contains(" is outside ") => {
             of_key(message.to_owned())
         }
-        None => at(message.to_owned()),
+        None => match meant(source, span.start, message) {
+            Some(hint) => at(message.to_owned()).hint(hint),
+            None => at(message.to_owned()),
+        },
     }
+}
+
+/// What was probably meant where the syntax breaks.
+fn meant(source: &Source, at: usize, message: &str) -> Option<String> {
+    let before = source.text().get(..at)?;
+    if let Some(number) = decimal_comma(before, &source.text()[at..]) {
+        let point = number.replace(',', ".");
+        return Some(format!(
+            "is a decimal point meant? `{point}`, not `{number}`"
+        ));
+    }
+    if message.contains("basic string") || message.contains("literal string, expected `'`") {
+        return Some("a quotation mark is missing at the end of the text".to_owned());
+    }
+    let (brace, close) = if message.contains("inline table") || message.contains("key-value pairs")
+    {
+        ('{', '}')
+    } else if message.contains("array") {
+        ('[', ']')
+    } else {
+        return None;
+    };
+    // The last one that is still open, if its line has ended.
+    let mut depth = 0_usize;
+    let open = before.char_indices().rev().find(|(_, c)| {
+        if *c == close {
+            depth += 1;
+        } else if *c == brace {
+            if depth == 0 {
+                return true;
+            }
+            depth -= 1;
+        }
+        false
+    });
+    let (open, _) = open?;
+    before[open..].contains('\n').then(|| {
+        let place = source.place(&(open..open + 1));
+        format!("the `{brace}` at {place} is still open here: is a `{close}` missing?")
+    })
+}
+
+/// A number such as `1,5` that ends where the text is divided, or has its comma there.
+fn decimal_comma(before: &str, after: &str) -> Option<String> {
+    let last = |text: &str| {
+        let is_digit = |c: char| c.is_ascii_digit();
+        let start = text.trim_end_matches(is_digit).len();
+        (start < text.len()).then(|| (text[..start].to_owned(), text[start..].to_owned()))
+    };
+    let decimals = after.strip_prefix(',').map(|rest| {
+        let end = rest.find(|c: char| !c.is_ascii_digit());
+        &rest[..end.unwrap_or(rest.len())]
+    });
+    if let Some(decimals) = decimals.filter(|decimals| !decimals.is_empty()) {
+        let (_, whole) = last(before)?;
+        return Some(format!("{whole},{decimals}"));
+    }
+    let (rest, decimals) = last(before.trim_end())?;
+    let (_, whole) = last(rest.strip_suffix(',')?)?;
+    Some(format!("{whole},{decimals}"))
+}
+
+/// The name of a table `[name]` that starts here, if it is written with single brackets.
+fn single_brackets(text: &str, at: usize) -> Option<&str> {
+    let line = text.get(at..)?.lines().next()?;
+    let name = line.trim().strip_prefix('[')?;
+    let (name, _) = name.split_once(']')?;
+    (!name.starts_with('[')).then_some(name.trim())
 }
 
 /// Name and candidates of "… `name`, expected one of `a`, `b`".
@@ -125,6 +201,16 @@ mod tests {
         assert_eq!(key('1'), Some("first"));
         assert_eq!(key('2'), None);
         assert_eq!(key('3'), Some("second"));
+    }
+
+    #[test]
+    fn recognises_decimal_commas() {
+        let text = |before, after| decimal_comma(before, after);
+        assert_eq!(text("E = 1", ",5\n").as_deref(), Some("1,5"));
+        assert_eq!(text("p = { E = 21,5", ", nu").as_deref(), Some("21,5"));
+        assert_eq!(text("p = { E = 1,5 ", "}").as_deref(), Some("1,5"));
+        assert_eq!(text("p = { E = 1, ", "}"), None);
+        assert_eq!(text("E = 1", "\n"), None);
     }
 
     #[test]

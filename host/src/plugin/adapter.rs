@@ -19,7 +19,7 @@ use super::description::LawDescription;
 use super::image::Image;
 use super::library::{Call, CallFailure, Strided};
 use super::{Moment, Site};
-use crate::error::Error;
+use crate::error::{Error, Source};
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use schemars::JsonSchema;
@@ -103,6 +103,22 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
         Adapter::Umat => umat::open(foreign, image),
         Adapter::Mfront => mfront::open(foreign, image),
     }
+}
+
+/// Reads a sidecar by itself.
+///
+/// # Errors
+/// [`Error::Input`] at the place that does not fit.
+pub(crate) fn sidecar(source: &Source) -> Result<LawDescription, Error> {
+    Ok(sidecar::Sidecar::of(source)?.law)
+}
+
+/// Describes the behaviours in the bytes of a library.
+///
+/// # Errors
+/// It has none that can be read.
+pub(crate) fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
+    mfront::describe(bytes)
 }
 
 /// A point at the start of an increment, and the gradient at its end.

@@ -5,6 +5,7 @@
 //! profilers, which look for the file), the file itself is opened after it was hashed.
 
 use super::trust;
+use crate::file;
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -33,11 +34,12 @@ impl Image {
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let unreadable = |why: io::Error| format!("cannot be read: {why}");
         let warnings = trust::check_permissions(path)?;
-        let mut file = File::open(path).map_err(unreadable)?;
+        let mut file = file::open_regular(path).map_err(unreadable)?;
         #[cfg(target_os = "linux")]
         let mut memory = memory_file();
         #[cfg(not(target_os = "linux"))]
         let mut memory: Option<File> = None;
+        let mut read = 0;
         let mut hash = Sha256::new();
         let mut piece = vec![0; PIECE];
         loop {
@@ -47,6 +49,11 @@ impl Image {
                 Err(why) if why.kind() == io::ErrorKind::Interrupted => continue,
                 Err(why) => return Err(unreadable(why)),
             };
+            read += n as u64;
+            if read > file::LARGEST_LIBRARY {
+                let most = file::LARGEST_LIBRARY >> 20;
+                return Err(format!("is longer than {most} MB, the most that is read"));
+            }
             hash.update(&piece[..n]);
             if memory
                 .as_mut()

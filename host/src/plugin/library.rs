@@ -30,6 +30,7 @@ use abi::raw::{self, Batch, Formulation, Host, Instance, Law, MagicBlock, Parame
 use abi::raw::{Status, Variable, View, ViewMut};
 use abi::version::{self, FORMULATION_SIZE_1_0, LAW_SIZE_1_0, PARAMETER_SIZE_1_0};
 use abi::version::{PLUGIN_SIZE_1_0, VARIABLE_SIZE_1_0};
+use std::cell::Cell;
 use std::ffi::{CStr, c_char};
 use std::mem::{MaybeUninit, size_of};
 use std::path::Path;
@@ -38,6 +39,8 @@ use std::sync::Mutex;
 
 /// Longest text that is copied out of a library, in bytes.
 const LONGEST_TEXT: usize = 4096;
+/// Most bytes of text in a whole description: entries may share one long text.
+const MOST_TEXT: usize = 16 << 20;
 /// Most entries of any table that is copied out of a library.
 const LONGEST_TABLE: u32 = 256;
 /// Largest size of one entry of such a table that is plausible, in bytes.
@@ -170,7 +173,8 @@ fn check_rust_layout(library: &'static libloading::Library) -> Result<(), String
     let Some(block) = block.filter(|block| !block.layout.is_null()) else {
         return Ok(());
     };
-    if text(block.abi_stable_version, "abi_stable_version")?
+    let allowance = Allowance::default();
+    if text(block.abi_stable_version, "abi_stable_version", &allowance)?
         != abi::layout::ABI_STABLE_VERSION.to_string_lossy()
     {
         return Ok(());
@@ -246,8 +250,18 @@ fn table<T: Copy>(first: *const T, n: u32, size_1_0: usize, what: &str) -> Resul
     Ok(entries.collect())
 }
 
+/// How many bytes of text are still copied out of a library.
+#[derive(Debug)]
+struct Allowance(Cell<usize>);
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Self(Cell::new(MOST_TEXT))
+    }
+}
+
 /// Copies a text; null is an empty one.
-fn text(p: *const c_char, what: &str) -> Result<String, String> {
+fn text(p: *const c_char, what: &str, allowance: &Allowance) -> Result<String, String> {
     if p.is_null() {
         return Ok(String::new());
     }
@@ -256,6 +270,10 @@ fn text(p: *const c_char, what: &str) -> Result<String, String> {
         // SAFETY: contract, "Descriptions": texts end in NUL; reading stops there.
         let byte = unsafe { p.add(i).read() } as u8;
         if byte == 0 {
+            let left = allowance.0.get().checked_sub(bytes.len());
+            allowance.0.set(left.ok_or_else(|| {
+                format!("its texts are longer than {} MB together", MOST_TEXT >> 20)
+            })?);
             let text = String::from_utf8(bytes)
                 .map_err(|_| format!("the text of `{what}` is not UTF-8"))?;
             return Ok(text.trim().to_owned());
@@ -267,8 +285,8 @@ fn text(p: *const c_char, what: &str) -> Result<String, String> {
     ))
 }
 
-fn identifier(p: *const c_char, what: &str) -> Result<String, String> {
-    let id = text(p, what)?;
+fn identifier(p: *const c_char, what: &str, allowance: &Allowance) -> Result<String, String> {
+    let id = text(p, what, allowance)?;
     let well_formed = id.starts_with(|c: char| c.is_ascii_lowercase())
         && id
             .chars()
@@ -290,10 +308,23 @@ fn unique<'a>(ids: impl Iterator<Item = &'a str>, what: &str) -> Result<(), Stri
     Ok(())
 }
 
+/// Copies the description of a library that was never loaded, such as one made of random bytes.
+///
+/// # Errors
+/// What is wrong with it, in words.
+///
+/// # Safety
+/// Structs, tables and texts that it points to, directly or not, are as long as they say.
+pub unsafe fn describe_memory(plugin: &Plugin) -> Result<Vec<LawDescription>, String> {
+    let laws = describe(plugin)?.laws;
+    Ok(laws.into_iter().map(|(law, _)| law).collect())
+}
+
 fn describe(plugin: &Plugin) -> Result<OpenLibrary, String> {
     if plugin.n_laws == 0 || plugin.n_laws > LONGEST_TABLE || plugin.law.is_null() {
         return Err(format!("it declares {} laws", plugin.n_laws));
     }
+    let allowance = Allowance::default();
     let laws = (0..plugin.n_laws as usize)
         .map(|i| {
             // SAFETY: contract, "Descriptions": `n_laws` pointers to static laws.
@@ -304,7 +335,8 @@ fn describe(plugin: &Plugin) -> Result<OpenLibrary, String> {
             // SAFETY: as above.
             let law = unsafe { known(at, LAW_SIZE_1_0) }
                 .ok_or_else(|| format!("law {i}: `pilum_law` is truncated"))?;
-            let described = describe_law(&law).map_err(|why| format!("law {i}: {why}"))?;
+            let described =
+                describe_law(&law, &allowance).map_err(|why| format!("law {i}: {why}"))?;
             Ok((described, LawHandle { at, known: law }))
         })
         .collect::<Result<Vec<_>, String>>()?;
@@ -312,7 +344,7 @@ fn describe(plugin: &Plugin) -> Result<OpenLibrary, String> {
     Ok(OpenLibrary { laws })
 }
 
-fn describe_law(law: &Law) -> Result<LawDescription, String> {
+fn describe_law(law: &Law, allowance: &Allowance) -> Result<LawDescription, String> {
     if law.create.is_none() || law.integrate.is_none() || law.destroy.is_none() {
         return Err("`create`, `integrate` or `destroy` is null".to_owned());
     }
@@ -323,7 +355,7 @@ fn describe_law(law: &Law) -> Result<LawDescription, String> {
         "parameters",
     )?
     .iter()
-    .map(describe_parameter)
+    .map(|p| describe_parameter(p, allowance))
     .collect::<Result<Vec<_>, _>>()?;
     unique(parameters.iter().map(|p| p.id.as_str()), "parameter")?;
     let mut formulations = Vec::new();
@@ -336,25 +368,33 @@ fn describe_law(law: &Law) -> Result<LawDescription, String> {
     for (index, formulation) in (0..).zip(&declared) {
         // Hypotheses that came later than this host are passed over.
         if let Some(hypothesis) = Hypothesis::from_code(formulation.hypothesis) {
-            formulations.push(describe_formulation(formulation, hypothesis, index)?);
+            formulations.push(describe_formulation(
+                formulation,
+                hypothesis,
+                index,
+                allowance,
+            )?);
         }
     }
     unique(formulations.iter().map(|f| f.hypothesis), "hypothesis")?;
     Ok(LawDescription {
-        id: identifier(law.id, "the law")?,
-        name: text(law.name, "name")?,
-        version: text(law.version, "version")?,
-        author: text(law.author, "author")?,
-        licence: text(law.licence, "licence")?,
-        doc: text(law.doc, "doc")?,
-        references: text(law.references, "references")?,
+        id: identifier(law.id, "the law", allowance)?,
+        name: text(law.name, "name", allowance)?,
+        version: text(law.version, "version", allowance)?,
+        author: text(law.author, "author", allowance)?,
+        licence: text(law.licence, "licence", allowance)?,
+        doc: text(law.doc, "doc", allowance)?,
+        references: text(law.references, "references", allowance)?,
         parameters,
         formulations,
     })
 }
 
-fn describe_parameter(p: &Parameter) -> Result<ParameterDescription, String> {
-    let id = identifier(p.id, "a parameter")?;
+fn describe_parameter(
+    p: &Parameter,
+    allowance: &Allowance,
+) -> Result<ParameterDescription, String> {
+    let id = identifier(p.id, "a parameter", allowance)?;
     let mut choices = Vec::new();
     if !p.choices.is_null() {
         for i in 0..LONGEST_TABLE as usize {
@@ -363,7 +403,7 @@ fn describe_parameter(p: &Parameter) -> Result<ParameterDescription, String> {
             if label.is_null() {
                 break;
             }
-            choices.push(text(label, &id)?);
+            choices.push(text(label, &id, allowance)?);
         }
     }
     let bounds = Bounds {
@@ -383,9 +423,9 @@ fn describe_parameter(p: &Parameter) -> Result<ParameterDescription, String> {
         ));
     }
     Ok(ParameterDescription {
-        symbol: text(p.symbol, &id)?,
-        unit: text(p.unit, &id)?,
-        doc: text(p.doc, &id)?,
+        symbol: text(p.symbol, &id, allowance)?,
+        unit: text(p.unit, &id, allowance)?,
+        doc: text(p.doc, &id, allowance)?,
         id,
         default,
         optional: p.flags & raw::PILUM_P_OPTIONAL != 0,
@@ -404,6 +444,7 @@ fn describe_formulation(
     formulation: &Formulation,
     hypothesis: Hypothesis,
     index: u32,
+    allowance: &Allowance,
 ) -> Result<FormulationDescription, String> {
     let name = hypothesis.name();
     let (gradient_id, flux_id) = match hypothesis {
@@ -421,7 +462,7 @@ fn describe_formulation(
                 "{name}: {n} gradients or fluxes, this host uses one pair"
             ));
         };
-        let id = identifier(variable.id, "a gradient or flux")?;
+        let id = identifier(variable.id, "a gradient or flux", allowance)?;
         let components = hypothesis.n_components();
         if id != expected || variable.n_components as usize != components {
             return Err(format!(
@@ -437,7 +478,7 @@ fn describe_formulation(
         VARIABLE_SIZE_1_0,
         "internal variables",
     )? {
-        internal_variables.extend(describe_variable(&variable)?);
+        internal_variables.extend(describe_variable(&variable, allowance)?);
     }
     unique(
         internal_variables.iter().map(|v| v.id.as_str()),
@@ -453,8 +494,8 @@ fn describe_formulation(
     })
 }
 
-fn describe_variable(v: &Variable) -> Result<Vec<InternalVariable>, String> {
-    let id = identifier(v.id, "an internal variable")?;
+fn describe_variable(v: &Variable, allowance: &Allowance) -> Result<Vec<InternalVariable>, String> {
+    let id = identifier(v.id, "an internal variable", allowance)?;
     if v.n_components == 0 || v.n_components > LONGEST_TABLE {
         return Err(format!(
             "internal variable `{id}` has {} components",
@@ -470,12 +511,12 @@ fn describe_variable(v: &Variable) -> Result<Vec<InternalVariable>, String> {
             } else {
                 // SAFETY: contract, "Variables": `n_components` names where the list is not null.
                 let name = unsafe { v.component_names.add(c).read() };
-                format!("{id}_{}", text(name, &id)?)
+                format!("{id}_{}", text(name, &id, allowance)?)
             };
             Ok(InternalVariable {
-                symbol: text(v.symbol, &id)?,
-                unit: text(v.unit, &id)?,
-                doc: text(v.doc, &id)?,
+                symbol: text(v.symbol, &id, allowance)?,
+                unit: text(v.unit, &id, allowance)?,
+                doc: text(v.doc, &id, allowance)?,
                 id,
                 initial_value: v.initial_value,
                 output_only: v.flags & raw::PILUM_V_OUTPUT_ONLY != 0,
@@ -796,6 +837,17 @@ mod tests {
             let why = table(entries.as_ptr(), 1, 16, "entries").unwrap_err();
             assert!(why.contains("expected at least 16"), "{why}");
         }
+    }
+
+    #[test]
+    fn texts_are_copied_up_to_a_total() {
+        let long = [vec![b'a'; LONGEST_TEXT - 1], vec![0]].concat();
+        let copy = |allowance: &Allowance| text(long.as_ptr().cast(), "doc", allowance);
+        let allowance = Allowance::default();
+        let n = (0..MOST_TEXT)
+            .take_while(|_| copy(&allowance).is_ok())
+            .count();
+        assert_eq!(n, MOST_TEXT / (LONGEST_TEXT - 1));
     }
 
     #[test]

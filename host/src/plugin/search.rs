@@ -3,6 +3,7 @@
 use super::adapter::Foreign;
 use super::{Library, LoadedLaw};
 use crate::error::{Error, suggestion};
+use crate::file;
 use crate::inspect;
 use crate::lock::Pins;
 use std::collections::BTreeMap;
@@ -145,8 +146,17 @@ impl SearchPath {
     /// Ids of all laws found, with their libraries, read from manifests without running anything.
     pub fn installed(&self) -> BTreeMap<String, PathBuf> {
         let mut found = BTreeMap::new();
-        for folder in &self.folders {
-            for (path, laws) in manifests(folder) {
+        let mut is_installed = false;
+        for (number, folder) in self.folders.iter().enumerate() {
+            // Cargo's folder of parts holds the libraries of tests too. Who has built the program
+            // has the others beside it.
+            let is_last = number + 1 == self.folders.len();
+            if is_last && is_installed && folder.ends_with("deps") {
+                continue;
+            }
+            let libraries = manifests(folder);
+            is_installed = !libraries.is_empty();
+            for (path, laws) in libraries {
                 for law in laws {
                     found.entry(law).or_insert_with(|| path.clone());
                 }
@@ -182,7 +192,11 @@ fn manifests(folder: &Path) -> Vec<(PathBuf, Vec<String>)> {
 
 /// Ids in the manifest section of a library. Only the parts of the file that are needed are read.
 fn manifest(path: &Path) -> Option<Vec<String>> {
-    let file = std::fs::File::open(path).ok()?;
+    let file = file::open_regular(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    if length > file::LARGEST_LIBRARY {
+        return None;
+    }
     let cache = object::ReadCache::new(file);
     let file = object::File::parse(&cache).ok()?;
     let laws = inspect::manifest(&file)?;

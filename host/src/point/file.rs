@@ -207,7 +207,7 @@ impl Driver {
         }
     }
 
-    fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
+    pub(crate) fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
         let (source, files) = base::read(source)?;
         let driver = |(variant, file)| Self::build(&source, variant, file, locked);
         files.into_iter().map(driver).collect()

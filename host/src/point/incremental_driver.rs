@@ -21,6 +21,8 @@ use toml::Spanned;
 
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 10_000_000;
+/// Most stretches of a path that are kept, repeated ones and those of waves written out.
+const MAX_SEGMENTS: usize = 200_000;
 
 /// Lines of a file, with their places.
 struct Lines<'a> {
@@ -162,6 +164,23 @@ impl Driver {
     }
 }
 
+impl Driver {
+    /// Increments of a test; the two files beside it are read for `n` parameters and variables.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at what is not understood or cannot be done.
+    pub(crate) fn parse_incremental(
+        [test, material, initial]: [&Source; 3],
+        n: usize,
+    ) -> Result<usize, Error> {
+        let segments = segments(test)?;
+        let ids: Vec<String> = (0..n).map(|i| format!("p{i}")).collect();
+        parameters(material, &ids)?;
+        initial_conditions(initial, n)?;
+        Ok(segments.iter().map(|segment| segment.increments).sum())
+    }
+}
+
 /// Name of the material, and the parameters in their declared order.
 fn parameters(source: &Source, ids: &[String]) -> Result<(String, ParameterTable), Error> {
     let mut lines = Lines::new(source);
@@ -231,7 +250,7 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
     // The name of the output file; `--csv` says here where rows go.
     lines.expect("the name of the output file")?;
     let mut steps = Vec::new();
-    let mut total = 0;
+    let (mut total, mut n_segments) = (0, 0_usize);
     while let Some((at, line)) = lines.next() {
         let keyword = keyword(&lines, &at, line)?;
         if keyword == "*End" {
@@ -242,6 +261,9 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
             let (at, [n_steps, n_times]) = lines.numbers("number of steps and of repetitions")?;
             let n_steps = lines.whole(&at, n_steps, "the number of steps")?;
             let n_times = lines.whole(&at, n_times, "the number of repetitions")?;
+            if n_steps == 0 {
+                return lines.refuse(at, "a repetition has at least one step");
+            }
             for _ in 0..n_steps {
                 let (at, line) = lines.expect("a step that is repeated")?;
                 let name = self::keyword(&lines, &at, line)?;
@@ -252,6 +274,9 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
             if each.saturating_mul(n_times).saturating_add(total) > MAX_INCREMENTS {
                 return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
             }
+            if repeated.len().saturating_mul(n_times) > MAX_SEGMENTS {
+                return lines.refuse(at, format!("more than {MAX_SEGMENTS} steps"));
+            }
             if n_times == 0 {
                 steps.truncate(first);
             }
@@ -261,10 +286,15 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
         } else {
             steps.push(step(&mut lines, at.clone(), keyword)?);
         }
-        total += steps[first..]
-            .iter()
-            .map(|step| step.increments)
-            .sum::<usize>();
+        let new = &steps[first..];
+        total += new.iter().map(|step| step.increments).sum::<usize>();
+        n_segments += new.iter().map(Step::n_segments).sum::<usize>();
+        if n_segments > MAX_SEGMENTS {
+            let message = format!(
+                "more than {MAX_SEGMENTS} steps and increments of waves, repeated ones included"
+            );
+            return lines.refuse(at, message);
+        }
         if total > MAX_INCREMENTS {
             return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
         }
@@ -405,6 +435,10 @@ fn frame(lines: &mut Lines<'_>) -> Result<Frame, Error> {
 }
 
 impl Step {
+    fn n_segments(&self) -> usize {
+        self.harmonic.map_or(1, |_| self.increments)
+    }
+
     /// One segment, or as many as there are increments where they are not equal.
     fn segments(&self, number: u32) -> Vec<Segment> {
         let n = self.increments;

@@ -41,7 +41,8 @@ const CONSISTENT_OPERATOR: f64 = 4.0;
 pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
     let path = &foreign.library;
     let fault = |why: String| Error::plugin(format!("library {} {why}", path.display()));
-    let bytes = std::fs::read(path).map_err(|why| fault(format!("cannot be read: {why}")))?;
+    let bytes =
+        crate::file::read_library(path).map_err(|why| fault(format!("cannot be read: {why}")))?;
     if crate::plugin::hexadecimal_sha256(&bytes) != image.sha256 {
         return Err(fault("was changed while it was read".to_owned()));
     }
@@ -71,6 +72,17 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
         law
     });
     Ok(laws.collect())
+}
+
+/// Descriptions of the behaviours in the bytes of a library.
+pub(super) fn describe(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
+    let symbols = Symbols::read(bytes)?;
+    let names = symbols.before("_mfront_mkt").into_iter();
+    let reader = |name| Reader {
+        symbols: &symbols,
+        name,
+    };
+    Ok(names.map(|name| reader(name).describe().0).collect())
 }
 
 /// What one of our parameters is there.

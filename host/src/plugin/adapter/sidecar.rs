@@ -108,7 +108,8 @@ impl Sidecar {
         Self::of(&Source::read(&path)?)
     }
 
-    fn of(source: &Source) -> Result<Self, Error> {
+    /// Takes the text of a sidecar.
+    pub(super) fn of(source: &Source) -> Result<Self, Error> {
         let file: File = input::parse(source)?;
         let parameters = file.parameter.iter().map(|p| parameter(source, p));
         let parameters = parameters.collect::<Result<Vec<_>, _>>()?;

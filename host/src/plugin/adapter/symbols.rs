@@ -5,6 +5,8 @@ use std::collections::{BTreeSet, HashMap};
 
 /// Longest text that is read, in bytes.
 const LONGEST_TEXT: usize = 4096;
+/// Most texts of a list.
+const LONGEST_LIST: u16 = 256;
 
 /// The exported data of an ELF library.
 #[derive(Debug)]
@@ -76,8 +78,10 @@ impl<'a> Symbols<'a> {
     /// The bytes at a symbol; zeros where the file leaves them to the loader.
     fn bytes<const N: usize>(&self, address: u64) -> Option<[u8; N]> {
         self.file.sections().find_map(|section| {
-            let inside = address >= section.address()
-                && address + N as u64 <= section.address() + section.size();
+            let inside = address
+                .checked_sub(section.address())
+                .and_then(|offset| section.size().checked_sub(offset))
+                .is_some_and(|left| left >= N as u64);
             let kind = section.kind();
             if inside && kind == object::SectionKind::UninitializedData {
                 return Some([0; N]);
@@ -135,8 +139,11 @@ impl<'a> Symbols<'a> {
         } else {
             *self.addresses.get(name)?
         };
+        if n > LONGEST_LIST {
+            return None;
+        }
         (0..u64::from(n))
-            .map(|i| self.text_at(first + 8 * i))
+            .map(|i| self.text_at(first.checked_add(8 * i)?))
             .collect()
     }
 
@@ -148,7 +155,10 @@ impl<'a> Symbols<'a> {
             *self.addresses.get(name)?
         };
         (0..u64::from(n))
-            .map(|i| self.bytes(first + 4 * i).map(i32::from_le_bytes))
+            .map(|i| {
+                self.bytes(first.checked_add(4 * i)?)
+                    .map(i32::from_le_bytes)
+            })
             .collect()
     }
 
@@ -160,7 +170,7 @@ impl<'a> Symbols<'a> {
         };
         let mut text = Vec::new();
         while text.len() < LONGEST_TEXT {
-            match self.bytes::<1>(address + text.len() as u64)? {
+            match self.bytes::<1>(address.checked_add(text.len() as u64)?)? {
                 [0] => return String::from_utf8(text).ok(),
                 [byte] => text.push(byte),
             }

@@ -1,0 +1,106 @@
+//! Outputs that take nothing, and inputs that never end.
+#![cfg(target_os = "linux")]
+
+use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
+
+/// Commands that print, with a library, a driver and a capsule at hand.
+const PRINT: [&[&str]; 9] = [
+    &["schema", "case"],
+    &["laws"],
+    &["laws", "--json"],
+    &["laws", "elastic"],
+    &["check", "--list"],
+    &["completions", "bash"],
+    &["man"],
+    &["lock", "case.toml"],
+    &["point", "driver.toml"],
+];
+
+const DRIVER: &str = r#"law = "elastic"
+hypothesis = "3d"
+parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }
+segment = [{ increments = 2, control = { 11 = { strain = 1e-3 } } }]
+"#;
+
+fn place() -> Place {
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    place.write("driver.toml", DRIVER);
+    place
+}
+
+#[test]
+fn a_full_output_is_said_in_a_line() {
+    for arguments in PRINT {
+        let outcome = place().run_limited("exec > /dev/full", arguments);
+        assert_eq!(
+            outcome.code,
+            Some(BAD_INPUT),
+            "{arguments:?}: {}",
+            outcome.stderr
+        );
+        assert!(
+            outcome.says("No space left"),
+            "{arguments:?}: {}",
+            outcome.stderr
+        );
+        assert!(
+            !outcome.says("panicked"),
+            "{arguments:?}: {}",
+            outcome.stderr
+        );
+    }
+}
+
+#[test]
+fn a_pipe_that_nobody_reads_any_more_is_no_error() {
+    for arguments in PRINT {
+        let reader = "mkfifo pipe; (: < pipe) & exec > pipe; wait";
+        let Outcome { code, stderr, .. } = place().run_limited(reader, arguments);
+        assert_eq!(code, Some(DONE), "{arguments:?}: {stderr}");
+        assert!(!stderr.contains("write"), "{arguments:?}: {stderr}");
+    }
+}
+
+#[test]
+fn devices_and_pipes_are_no_libraries() {
+    for file in ["/dev/zero", "./pipe"] {
+        for command in ["inspect", "check"] {
+            let outcome = place().run_limited("mkfifo pipe; ulimit -t 10", &[command, file]);
+            assert_eq!(
+                outcome.code,
+                Some(BAD_INPUT),
+                "{command}: {}",
+                outcome.stderr
+            );
+            assert!(outcome.says("expected a file"), "{}", outcome.stderr);
+        }
+    }
+}
+
+#[test]
+fn devices_and_endless_files_are_no_input() {
+    for command in ["run", "point", "lock", "replay"] {
+        let outcome = place().run_limited("ulimit -t 10", &[command, "/dev/zero"]);
+        assert_eq!(
+            outcome.code,
+            Some(BAD_INPUT),
+            "{command}: {}",
+            outcome.stderr
+        );
+        assert!(outcome.says("it is a device"), "{}", outcome.stderr);
+        let long = "truncate -s 100G long.toml; ulimit -t 10";
+        let outcome = place().run_limited(long, &[command, "long.toml"]);
+        assert_eq!(
+            outcome.code,
+            Some(BAD_INPUT),
+            "{command}: {}",
+            outcome.stderr
+        );
+        assert!(outcome.says("longer than 16 MB"), "{}", outcome.stderr);
+    }
+    // Shells write `<(…)` as a pipe.
+    let pipe = "mkfifo pipe; cat driver.toml > pipe & :";
+    let outcome = place().run_limited(pipe, &["point", "pipe"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}

@@ -1,0 +1,23 @@
+#!/bin/sh
+# The program with laws of the repository under valgrind: a driver, a case with three laws, a replayed
+# call, an inspection. Any read or write outside what was allocated, or of what was never written and
+# decides something, ends it with exit code 9.
+set -eu
+cd "$(dirname "$0")/.."
+command -v valgrind >/dev/null || { echo "valgrind is missing: tests/memory.sh is passed over"; exit 0; }
+out=target/memory
+mkdir -p $out
+watched() {
+  valgrind -q --error-exitcode=9 target/release/pilum --no-probe "$@" >$out/log 2>&1 || {
+    status=$?
+    cat $out/log
+    echo "valgrind: pilum $* ended with $status"
+    exit 1
+  }
+}
+corpus=tests/fuzz/corpus
+watched point $corpus/driver/joint
+watched run tests/fuzz/base/case.toml --threads 2 --out $out/case
+watched replay --in-process $corpus/capsule/elastic
+watched inspect target/release/deps/libelastic.so
+echo "valgrind: no error"
