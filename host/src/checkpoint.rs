@@ -138,7 +138,8 @@ impl Checkpoint {
         let checkpoint = decode(&bytes).ok_or_else(|| refused("the file is damaged"))?;
         if checkpoint.identity != identity {
             return Err(refused(
-                "it belongs to another case, another version of the program or other libraries",
+                "it belongs to another case, another version of the program, or other libraries or \
+                 sidecars",
             ));
         }
         Ok(Some(checkpoint))
@@ -162,16 +163,17 @@ fn decode(bytes: &[u8]) -> Option<Checkpoint> {
 }
 
 /// What must be the same for a run to go on: the program, the case with its variant, the bytes of
-/// its libraries, what describes them, and the parameters.
+/// its libraries and of their sidecars, and the parameters.
 pub fn identity(case: &Case, model: &Model) -> String {
     let mut text = format!("pilum {}\n", env!("CARGO_PKG_VERSION"));
     text += case.variant.as_deref().unwrap_or_default();
     text += "\n";
     for ((name, hypothesis), built) in &model.laws {
-        let sha256 = built.law.library().sha256();
-        let _ = writeln!(text, "{name} {hypothesis} {sha256}");
+        let library = built.law.library();
+        let (sha256, sidecar) = (library.sha256(), library.sidecar_sha256());
         // What a sidecar says of a library is not part of its bytes.
-        let _ = writeln!(text, "{:?}", built.law.description());
+        let sidecar = sidecar.unwrap_or_default();
+        let _ = writeln!(text, "{name} {hypothesis} {sha256} {sidecar}");
         for parameter in &built.parameters {
             let _ = writeln!(text, "{} {:x}", parameter.id, parameter.value.to_bits());
         }

@@ -315,6 +315,7 @@ impl ForeignKeys<'_> {
                 .transpose()?,
             in_process: self.in_process.is_some_and(|written| *written.get_ref()),
             record: self.record.map(path),
+            records_once: false,
         }))
     }
 }

@@ -5,6 +5,7 @@ use host::case::Case;
 use host::error::{Error, Place, suggestion};
 use host::new_law::NewLaw;
 use host::output::{Figures, remove_comparison};
+use host::plugin::adapter::{self, Adapter};
 use host::plugin::{SearchPath, Trust, vetting};
 use host::run::{Observer, Options, check, run_reusing};
 use host::schema::{self, FileKind};
@@ -68,6 +69,9 @@ enum Command {
         /// Threads; the results do not depend on it [default: all processors].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,
+        /// Write all arguments of one call of the case's UMAT to this file, before and after it.
+        #[arg(long, value_name = "FILE")]
+        record: Option<PathBuf>,
     },
     /// Lead one law at one integration point along a path.
     Point {
@@ -82,6 +86,9 @@ enum Command {
         /// File for the table; standard output if left out.
         #[arg(long)]
         csv: Option<PathBuf>,
+        /// Write all arguments of one call of the UMAT to this file, before and after it.
+        #[arg(long, value_name = "FILE")]
+        record: Option<PathBuf>,
     },
     /// Write the report of a run, or the comparison of several.
     Report {
@@ -142,6 +149,9 @@ enum Command {
     Replay {
         /// A `failure.toml`.
         capsule: PathBuf,
+        /// Write all arguments of the call, that of a UMAT, to this file, before and after it.
+        #[arg(long, value_name = "FILE")]
+        record: Option<PathBuf>,
         /// Call the law in this process, for a debugger, and not in one of its own.
         #[arg(long, conflicts_with = "isolate")]
         in_process: bool,
@@ -226,6 +236,7 @@ fn execute(command: Command) -> Result<(), Error> {
             resume,
             checkpoint,
             threads,
+            record,
         } => {
             if let Some(n) = threads {
                 rayon::ThreadPoolBuilder::new()
@@ -238,25 +249,19 @@ fn execute(command: Command) -> Result<(), Error> {
                 resume,
                 checkpoints: Some(Duration::from_secs_f64(checkpoint)),
             };
-            run_cases(&case, variant.as_deref(), out.as_deref(), options)
+            recorded(record.as_deref(), || {
+                run_cases(&case, variant.as_deref(), out.as_deref(), options)
+            })
         }
         Command::Point {
             driver,
             umat,
             variant,
             csv,
-        } => match umat {
-            Some(umat) => host::point::run_incremental(&driver, &umat, csv.as_deref(), |report| {
-                say!("{report}");
-            }),
-            None if driver.extension().is_some_and(|ending| ending == "inp") => {
-                Err(Error::Usage(format!(
-                    "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
-                    driver.display()
-                )))
-            }
-            None => run_point(&driver, variant.as_deref(), csv.as_deref()),
-        },
+            record,
+        } => recorded(record.as_deref(), || {
+            run_point(&driver, umat.as_deref(), variant.as_deref(), csv.as_deref())
+        }),
         Command::Report { folders, out } => write_report(&folders, out),
         Command::TradeOff {
             input,
@@ -305,9 +310,11 @@ fn execute(command: Command) -> Result<(), Error> {
             let lock = host::lock::write(&input)?;
             print(&format!("lock in {}\n", lock.display()))
         }
-        Command::Replay { capsule, .. } => {
+        Command::Replay {
+            capsule, record, ..
+        } => recorded(record.as_deref(), || {
             printing(|out| host::capsule::replay(&capsule, &mut |line| out.line(line)))
-        }
+        }),
         #[cfg(unix)]
         Command::LawWorker => host::plugin::isolate::work(),
         #[cfg(not(unix))]
@@ -363,6 +370,60 @@ fn print(text: &str) -> Result<(), Error> {
         out.text(text);
         Ok(())
     })
+}
+
+/// Does something while one call of a UMAT is recorded, if a file for it is given, and says whether
+/// it was.
+fn recorded(file: Option<&Path>, action: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
+    let Some(file) = file else {
+        return action();
+    };
+    let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+    // What stands there afterwards is of this call; that it can be written is found out now.
+    std::fs::File::create(&path)
+        .and_then(|_| std::fs::remove_file(&path))
+        .map_err(|source| Error::Unwritable {
+            path: path.clone(),
+            source,
+        })?;
+    adapter::record_to(path.clone());
+    let outcome = action();
+    if path.is_file() {
+        say!("all arguments of one call in {}", file.display());
+    } else if outcome.is_ok() {
+        say!("no call was recorded: none moved a point");
+    }
+    outcome
+}
+
+/// Refuses to record where it is not plain which law is meant.
+fn check_recording(cases: &[Case]) -> Result<(), Error> {
+    if adapter::is_recorded_to().is_none() {
+        return Ok(());
+    }
+    let [case] = cases else {
+        let message = "--record is for one run: name one with --variant";
+        return Err(Error::Usage(message.to_owned()));
+    };
+    let mut umats = Vec::new();
+    for (name, law) in &case.file.laws {
+        let foreign = law.get_ref().foreign(&case.source)?;
+        if foreign.is_some_and(|foreign| foreign.adapter == Adapter::Umat) {
+            umats.push(name.get_ref().as_str());
+        }
+    }
+    let message = match umats.as_slice() {
+        [_] => return Ok(()),
+        [] => format!(
+            "--record: no law of {} is a UMAT",
+            case.source.path().display()
+        ),
+        several => format!(
+            "--record: {} are UMATs; give the key `record` to the one that is meant",
+            several.join(", ")
+        ),
+    };
+    Err(Error::Usage(message))
 }
 
 /// The user wants the run to stop after the present increment.
@@ -421,6 +482,7 @@ fn run_cases(
             )));
         }
     }
+    check_recording(&cases)?;
     // All variants are checked before the first one runs.
     if cases.len() > 1 {
         cases.iter().try_for_each(check)?;
@@ -533,8 +595,22 @@ fn keep_last(outcome: &mut Result<(), Error>, error: Error) {
 }
 
 /// Tables go to standard output or files, what came out of each driver to the error stream.
-fn run_point(driver: &Path, variant: Option<&str>, csv: Option<&Path>) -> Result<(), Error> {
-    host::point::run_file_variants(driver, variant, csv, |report| say!("{report}"))
+fn run_point(
+    driver: &Path,
+    umat: Option<&Path>,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+) -> Result<(), Error> {
+    match umat {
+        Some(umat) => host::point::run_incremental(driver, umat, csv, |report| say!("{report}")),
+        None if driver.extension().is_some_and(|ending| ending == "inp") => {
+            Err(Error::Usage(format!(
+                "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
+                driver.display()
+            )))
+        }
+        None => host::point::run_file_variants(driver, variant, csv, |report| say!("{report}")),
+    }
 }
 
 fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {

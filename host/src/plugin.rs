@@ -41,6 +41,8 @@ pub struct Library {
     stamp: Option<Stamp>,
     laws: Vec<(LawDescription, Origin)>,
     foreign: Option<Foreign>,
+    /// SHA-256 of the file that describes it, where it does not do so itself.
+    sidecar: Option<String>,
 }
 
 /// Where a law is called.
@@ -111,6 +113,7 @@ impl Library {
             warnings,
             stamp,
             laws,
+            sidecar: None,
             foreign: None,
         });
         opened.push(Arc::clone(&library));
@@ -151,7 +154,8 @@ impl Library {
                 "can only run in this process here: `in_process = true`".to_owned(),
             ));
         }
-        let laws = adapter::open(foreign, &image)?;
+        let foreign = &foreign.completed();
+        let opened = adapter::open(foreign, &image)?;
         #[cfg(unix)]
         let apart = !foreign.in_process || Trust::current().isolate.is_some();
         let origin = |law: Arc<dyn ForeignLaw>| {
@@ -167,10 +171,12 @@ impl Library {
             warnings: std::mem::take(&mut image.warnings),
             sha256: image.sha256.clone(),
             stamp: None,
-            laws: laws
+            laws: opened
+                .laws
                 .into_iter()
                 .map(|(description, law)| (description, origin(law)))
                 .collect(),
+            sidecar: opened.sidecar,
             foreign: Some(foreign.clone()),
         }))
     }
@@ -178,6 +184,11 @@ impl Library {
     /// How it is named, if it is made for another program.
     pub fn foreign(&self) -> Option<&Foreign> {
         self.foreign.as_ref()
+    }
+
+    /// SHA-256 of the file that describes it, if there is one.
+    pub fn sidecar_sha256(&self) -> Option<&str> {
+        self.sidecar.as_deref()
     }
 
     /// Where the library was found.

@@ -9,6 +9,7 @@ mod figure;
 mod file;
 mod frame;
 mod incremental_driver;
+mod restrictions;
 mod table;
 
 pub use file::Driver;
@@ -18,7 +19,8 @@ pub use table::{Row, Table};
 use crate::capsule::{self, Capsule};
 use crate::error::{Error, suggestion};
 use crate::output::Figures;
-use crate::plugin::Moment;
+use crate::plugin::adapter::{self, Adapter};
+use crate::plugin::{BatchFailure, Moment};
 use abi::status::Outcome;
 use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
 pub(crate) use file::words;
@@ -156,6 +158,17 @@ fn run_all(
             let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
             let message = format!("there is no variant `{wanted}`: {known}");
             return Err(Error::Usage(message));
+        }
+    }
+    if adapter::is_recorded_to().is_some() {
+        let [driver] = drivers.as_slice() else {
+            let message = "--record is for one run: name one with --variant";
+            return Err(Error::Usage(message.to_owned()));
+        };
+        let foreign = driver.law.library().foreign();
+        if foreign.is_none_or(|foreign| foreign.adapter != Adapter::Umat) {
+            let id = &driver.law.description().id;
+            return Err(Error::Usage(format!("--record: law `{id}` is no UMAT")));
         }
     }
     for driver in &drivers {
@@ -374,6 +387,7 @@ impl Driver {
             // A flux that was led keeps its goal; what is left of its residual does not pile up.
             for i in 0..n {
                 held[i] = match segment.control[i] {
+                    _ if segment.restrictions.is_some() => walk.point.flux[i],
                     Control::Keep | Control::Flux(_) | Control::FluxBy(_) => goal.flux[i],
                     Control::Gradient(_) | Control::GradientBy(_) | Control::Stiffness(_) => {
                         walk.point.flux[i]
@@ -484,8 +498,29 @@ impl Driver {
             }
             Stop::Shortfall(shortfall) => {
                 let Shortfall { reached, obstacle } = *shortfall;
+                let numeric = |failure: &BatchFailure| failure.outcome == Outcome::Numeric;
+                if self.law.library().foreign().is_some()
+                    && obstacle.miss.is_none()
+                    && let Some(failure) = obstacle.refusal.as_ref().filter(|f| numeric(f))
+                {
+                    return Error::plugin(format!(
+                        "{place}: law `{id}` of library {} fails, however small the step: {}",
+                        self.law.library().path().display(),
+                        failure.message
+                    ));
+                }
                 let (gradient, flux) = words(self.law.hypothesis());
-                let (why, hint) = if let Some(miss) = obstacle.miss {
+                let (why, hint) = if let Some(miss) =
+                    obstacle.miss.filter(|_| obstacle.is_restricted)
+                {
+                    let why = format!(
+                        "restriction {} cannot be met: residual {:.2e} kPa, tolerance {:.1e} kPa",
+                        miss.component + 1,
+                        miss.residual,
+                        miss.tolerance
+                    );
+                    (why, None)
+                } else if let Some(miss) = obstacle.miss {
                     let frame = obstacle.frame.components();
                     let name = frame.as_ref().map_or_else(
                         || self.law.hypothesis().components()[miss.component],
@@ -588,6 +623,16 @@ impl Walk<'_> {
             gradient: self.point.gradient,
             flux: *held,
         };
+        if let Some(restrictions) = &segment.restrictions {
+            self.rate = None;
+            self.first_step = 1.0;
+            let gradient = from.gradient;
+            let goal = |flux| Goal { gradient, flux };
+            return Ramp {
+                from: goal([0.0; N_MAX]),
+                to: goal(self.search.restrict(restrictions, &self.point)),
+            };
+        }
         let mut to = from;
         let mut stiffness = [0.0; N_MAX];
         for i in 0..n {

@@ -255,15 +255,13 @@ fn refuses_keys_of_other_formulations() {
 #[test]
 fn joints_may_go_on_from_one_another() {
     let settlement = |parts: &[&str]| {
-        let more: String = parts[1..]
-            .iter()
-            .map(|line| {
-                format!(
-                    "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
-                     law = \"joint\"\n"
-                )
-            })
-            .collect();
+        let mut more = String::new();
+        for line in &parts[1..] {
+            more += &format!(
+                "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
+                 law = \"joint\"\n"
+            );
+        }
         let lines = "[mesh.lines]\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
                      centre = { y = 0.5, x = [1.0, 1.01] }\neast = { y = 0.5, x = [1.01, 2.0] }";
         let text = edited(JOINT)

@@ -6,6 +6,9 @@
     reason = "part of the tests; values that are compared are exact"
 )]
 
+mod incremental_driver;
+mod mohr_coulomb;
+
 use crate::program::{BAD_INPUT, CASE, DONE, Edit, PLUGIN_TROUBLE, Place, edited};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -377,6 +380,37 @@ fn a_routine_that_ends_its_process_ends_an_increment() {
 }
 
 #[test]
+fn a_routine_without_an_answer_is_the_librarys_fault() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    for (how, says) in [
+        (4, "leaves PNEWDT = -1"),
+        (5, "leaves PNEWDT = NaN"),
+        (6, "leaves STRESS with values that are not finite"),
+    ] {
+        // In the first call, without any strain, and on the way.
+        for (limit, at) in [("-1.0", "initial state"), ("1.1e-3", "increment 6 of 10")] {
+            let parameters = format!("how = {how}\nlimit = {limit}");
+            place.write("driver.toml", driver("stops", "", &parameters));
+            let outcome = place.run(&["point", "driver.toml"]);
+            assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+            for text in [says, at] {
+                assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+            }
+            let parameters = format!("poisson_ratio = 0.3, how = {how}, limit = {limit} }}");
+            let case = soil("stops", "").replacen("poisson_ratio = 0.3 }", &parameters, 1);
+            // On the way the run reaches no limit of this size.
+            if limit == "-1.0" {
+                let outcome = place.run_case(case);
+                assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+                assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+            }
+        }
+    }
+}
+
+#[test]
 fn what_is_overwritten_is_named() {
     let Some(place) = place("overwrites") else {
         return;
@@ -531,6 +565,130 @@ fn a_call_can_be_recorded() {
     assert_eq!(call["before"].as_table().unwrap().len(), 37);
 }
 
+/// The value of an argument in a record.
+fn recorded(place: &Place, file: &str, when: &str, name: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(place.path(file)).unwrap();
+    let call: toml::Table = toml::from_str(&text).unwrap();
+    let values = call[when][name].as_array().unwrap().iter();
+    values.map(|value| value.as_float().unwrap()).collect()
+}
+
+#[test]
+fn the_option_records_a_call() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    place.write("driver.toml", driver("elastic", "", ""));
+    // What stood there is not mistaken for a record.
+    place.write("call.toml", "an earlier one");
+    let arguments = ["point", "driver.toml", "--record", "call.toml"];
+    let outcome = place.run(&[&arguments[..], &["--csv", "out.csv"]].concat());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(
+        outcome.says("all arguments of one call in call.toml"),
+        "{}",
+        outcome.stderr
+    );
+    assert_eq!(recorded(&place, "call.toml", "before", "STRESS"), [0.0; 4]);
+    let rows = table(&place.path("out.csv"));
+    assert_eq!(
+        recorded(&place, "call.toml", "after", "STRESS")[0].to_bits(),
+        number(&rows[1], "stress_11").to_bits()
+    );
+
+    place.write("case.toml", soil("elastic", ""));
+    let outcome = place.run(&["run", "case.toml", "--out", "out", "--record", "run.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_eq!(recorded(&place, "run.toml", "before", "PROPS"), [1e4, 0.3]);
+
+    // With the native law there is nothing to record, with two it is not plain which.
+    place.write("native.toml", CASE);
+    let own = driver("elastic", "", "")
+        .replacen("umat_elastic", "elastic", 1)
+        .replacen("adapter = \"umat\"\nlibrary = \"libelastic.so\"\n", "", 1);
+    place.write("own.toml", own);
+    let second = soil("elastic", "").replacen(
+        "[laws.joint]",
+        "[laws.other]\nlaw = \"umat_elastic\"\nadapter = \"umat\"\n\
+         library = \"libelastic.so\"\n\n[laws.joint]",
+        1,
+    );
+    place.write("two.toml", second);
+    for (command, file, says) in [
+        ("run", "native.toml", "no law of native.toml is a UMAT"),
+        (
+            "run",
+            "two.toml",
+            "soil, other are UMATs; give the key `record`",
+        ),
+        ("point", "own.toml", "law `elastic` is no UMAT"),
+    ] {
+        let outcome = place.run(&[command, file, "--record", "none.toml"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+    }
+    let outcome = place.run(&["point", "driver.toml", "--record", "no/where.toml"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(!place.path("none.toml").exists());
+}
+
+#[test]
+fn a_call_that_never_returns_is_recorded_too() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    place.write(
+        "driver.toml",
+        driver("stops", "", "how = 1\nlimit = 1.1e-3"),
+    );
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let outcome = place.run(&["replay", "out.failure.toml", "--record", "call.toml"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let rows = table(&place.path("out.csv"));
+    let before = recorded(&place, "call.toml", "before", "STRESS");
+    assert_eq!(
+        before[1].to_bits(),
+        number(rows.last().unwrap(), "stress_22").to_bits()
+    );
+    let text = std::fs::read_to_string(place.path("call.toml")).unwrap();
+    assert!(
+        text.ends_with("# The routine has not returned.\n"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_changed_sidecar_is_another_run() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    // ν is left to the default of the sidecar.
+    let case = soil("elastic", "").replacen(", poisson_ratio = 0.3 }", " }", 1);
+    let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
+    let sidecar = sidecar.replacen("thread_safe", "cmname = \"SAND\"\nthread_safe", 1);
+    place.write("elastic.law.toml", &sidecar);
+    assert_eq!(place.run_case(case).code, Some(DONE));
+    let resumed = || place.run(&["run", "case.toml", "--out", "out", "--resume"]);
+    let outcome = resumed();
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for (from, to) in [
+        ("default = 0.3", "default = 0.25"),
+        ("cmname = \"SAND\"", "cmname = \"CLAY\""),
+        ("ntens = [4, 6]", "ntens = [6]\nexpand = true"),
+    ] {
+        assert!(sidecar.contains(from), "{from}");
+        place.write("elastic.law.toml", sidecar.replacen(from, to, 1));
+        let outcome = resumed();
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{to}: {}", outcome.stderr);
+        for text in ["checkpoint.bin", "other libraries or sidecars"] {
+            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+        }
+    }
+    place.write("elastic.law.toml", &sidecar);
+    assert_eq!(resumed().code, Some(DONE));
+}
+
 #[test]
 fn mistakes_in_files_are_named() {
     let Some(place) = place("elastic") else {
@@ -633,145 +791,51 @@ fn mistakes_in_files_are_named() {
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
-/// Input of the IncrementalDriver for a material with E = 2e4 and ν = 0.3.
-fn incremental(place: &Place, test: &str) {
-    place.write("test.inp", format!("out.txt # a remark\n{test}"));
-    place.write(
-        "parameters.inp",
-        "elastic  # E, nu\n2\n2.0d4   E\n0.3     nu\n",
-    );
-    place.write(
-        "initialconditions.inp",
-        "6\n-100.0d0\n-100.0\n-100.0\n0\n0\n0\n0\n",
-    );
-}
-
 #[test]
-fn input_of_the_incremental_driver_is_followed() {
+fn sidecars_without_sense_are_refused() {
     let Some(place) = place("elastic") else {
         return;
     };
-    incremental(
-        &place,
-        "*OedometricE1\n4 100 1.0\n-1.0d-3\n*OedometricS1\n4 100 1.0\n-20.0\n\
-         *TriaxialE1\n4 100 2.0 : 2\n-1e-3\n*TriaxialS1\n4 100 1.0\n-30.\n\
-         *TriaxialUq\n4 100 1.0\n24.0\n*TriaxialUEq\n4 100 1.0\n1e-3\n\
-         *PureRelaxation\n2 100 1.0\n*PureCreep\n2 100 1.0\n*UndrainedCreep\n2 100 1.0\n\
-         *CirculatingLoad\n8 100 1.0\n*Cartesian\n0 0 0 0\n0 0 0 0\n0 0 0 0\n0 1e-3 0 0\n\
-         0 0 0 0\n0 0 0 0\n\
-         *Repetition\n2 3\n*LinearLoad\n2 100 1.0\n*Rendulic\n1 5.0\n0 0\n0 0\n0 0\n0 0\n0 0\n\
-         *PureCreep\n1 1 0.5\n*End\nwhatever follows\n",
-    );
-    let outcome = place.run(&[
-        "point",
-        "test.inp",
-        "--umat",
-        "libelastic.so",
-        "--csv",
-        "out.csv",
-    ]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let rows = table(&place.path("out.csv"));
-    assert_eq!(rows.len(), 1 + 6 * 4 + 3 * 2 + 8 + 3 * 3);
-    let (g, lambda) = (2e4 / 2.6, 2e4 * 0.3 / (1.3 * 0.4));
-    // The change of a column between two rows.
-    let close = |from: usize, to: usize, what: &str, expected: f64| {
-        let found = number(&rows[to], what) - number(&rows[from], what);
-        let scale = if what.starts_with("stress") {
-            100.0
-        } else {
-            1e-3
-        };
-        assert!(
-            (found - expected).abs() < 1e-9 * scale,
-            "{what} {from} to {to}: {found} {expected}"
-        );
-    };
-    close(0, 4, "stress_11", -(lambda + 2.0 * g) * 1e-3);
-    close(0, 4, "stress_33", -lambda * 1e-3);
-    close(4, 8, "strain_11", -20.0 / (lambda + 2.0 * g));
-    close(4, 8, "strain_22", 0.0);
-    close(8, 12, "stress_11", -2e4 * 1e-3);
-    close(8, 12, "stress_22", 0.0);
-    close(12, 16, "strain_11", -30.0 / 2e4);
-    // Undrained: q = −Δσ₁₁ + Δσ₂₂ = 3G ε_q, ε_q = −Δε₁₁.
-    close(16, 20, "strain_11", -24.0 / (3.0 * g));
-    close(16, 20, "strain_33", 12.0 / (3.0 * g));
-    close(20, 24, "strain_11", -1e-3);
-    close(20, 24, "stress_11", -2.0 * g * 1e-3);
-    for what in [
-        "stress_11",
-        "stress_22",
-        "stress_12",
-        "strain_11",
-        "strain_12",
+    let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
+    place.write("driver.toml", driver("elastic", "", ""));
+    for (from, to, says) in [
+        (
+            "[\"plane_strain\", \"axisymmetric\", \"3d\"]",
+            "[]",
+            "elastic.law.toml:4:14",
+        ),
+        (
+            "[\"plane_strain\", \"axisymmetric\", \"3d\"]",
+            "[]",
+            "name those that the routine is made for: plane_strain",
+        ),
+        (
+            "[[parameter]]",
+            "[[internal]]\nid = \"stress_11\"\nunit = \"-\"\ndoc = \"d\"\n[[parameter]]",
+            "internal variable `stress_11` has the name of another column",
+        ),
+        (
+            "[[parameter]]",
+            "[[internal]]\nid = \"strain\"\ncomponents = 12\nunit = \"-\"\ndoc = \"d\"\n\
+             [[parameter]]",
+            "internal variable `strain_11` has the name of another column",
+        ),
+        (
+            "[[parameter]]",
+            "[[internal]]\nid = \"iterations\"\nunit = \"-\"\ndoc = \"d\"\n[[parameter]]",
+            "`iterations` has the name",
+        ),
+        (
+            "[[parameter]]",
+            "[[internal]]\nid = \"a\"\ncomponents = 2\nunit = \"-\"\ndoc = \"d\"\n\
+             [[internal]]\nid = \"a_2\"\nunit = \"-\"\ndoc = \"d\"\n[[parameter]]",
+            "internal variable `a_2` is declared twice",
+        ),
     ] {
-        close(24, 30, what, 0.0);
-        // A whole period.
-        close(30, 38, what, 0.0);
-    }
-    // Its rate in the middle of the first of 8 increments: 2π/8 cos(π/8).
-    let first = std::f64::consts::FRAC_PI_4 * std::f64::consts::FRAC_PI_8.cos() * 1e-3;
-    close(30, 31, "strain_12", first);
-    // Three times −σ₁₁ grows by 5, the radial strain kept.
-    close(38, 47, "stress_11", -15.0);
-    close(38, 47, "strain_22", 0.0);
-    close(38, 47, "strain_11", -15.0 / (lambda + 2.0 * g));
-}
-
-#[test]
-fn what_is_not_read_of_the_incremental_driver_is_said() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
-    for (test, says) in [
-        (
-            "*DeformationGradient\n1 1 1\n",
-            &["test.inp:2:1", "small strains"][..],
-        ),
-        (
-            "*PureCreep\n1 1 1\n*ObeyRestrictions\n1 1 1\n",
-            &["test.inp:4:1", "linear restrictions"],
-        ),
-        (
-            "*OedometricE1 ? s1 > 3\n1 1 1\n1\n",
-            &["test.inp:2:1", "ends a step early"],
-        ),
-        (
-            "*Oedometric\n1 1 1\n1\n",
-            &["test.inp:2:1", "no keyword", "*OedometricE1"],
-        ),
-        ("*LinearLoad\n1 1 1\n*Haigh\n", &["test.inp:4:1", "*Roscoe"]),
-        (
-            "*LinearLoad\n1 1 1\n*Roscoe\n2 1.0\n",
-            &["test.inp:5:1", "expected 0 (strain) or 1 (stress)"],
-        ),
-        (
-            "*TriaxialE1\n10 x\n",
-            &["test.inp:3:1", "number of increments"],
-        ),
-        (
-            "*TriaxialE1\n10 1 1\n",
-            &["the file ends where the change over the step is expected"],
-        ),
-        ("", &["the test has no step"]),
-    ] {
-        incremental(&place, test);
-        let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{test}: {}", outcome.stderr);
-        for text in says {
-            assert!(outcome.says(text), "{test}: {text}\n{}", outcome.stderr);
-        }
-    }
-    incremental(&place, "*PureCreep\n1 1 1\n");
-    place.write("parameters.inp", "elastic\n3\n1\n1\n1\n");
-    let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    for text in [
-        "parameters.inp:2:1",
-        "3 parameters",
-        "young_modulus, poisson_ratio",
-    ] {
-        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+        assert!(sidecar.contains(from), "{from}");
+        place.write("elastic.law.toml", sidecar.replacen(from, to, 1));
+        let outcome = place.run(&["point", "driver.toml"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{to}: {}", outcome.stderr);
+        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
     }
 }

@@ -19,10 +19,18 @@ static ENTRIES: LazyLock<(TempDir, PathBuf)> = LazyLock::new(|| {
 
 /// Panics if an entry differs from the native one.
 fn compare(law: &str, behaviour: &str, flux: f64, step: f64, parameters: &[f64]) {
+    let file = law.strip_suffix("_softening").unwrap_or(law);
     let mut command = Command::new(&ENTRIES.1);
-    command.arg(library(law)).arg(behaviour);
+    command.arg(library(file)).args([law, behaviour]);
     let numbers = [flux, step].into_iter().chain(parameters.iter().copied());
-    command.args(numbers.map(|number| number.to_string()));
+    // What is no number is left out.
+    command.args(numbers.map(|number| {
+        if number.is_nan() {
+            "-".to_owned()
+        } else {
+            number.to_string()
+        }
+    }));
     let line = last_line(&mut command);
     assert!(line.ends_with(" 0 differences"), "{line}");
 }
@@ -32,8 +40,13 @@ fn laws_for_solids() {
     let plastic = [34e3, 0.3, 1.0, 36.5, 12.0];
     compare("elastic", "Elastic", -100.0, 1e-3, &plastic[..2]);
     compare("mohr_coulomb", "MohrCoulomb", -100.0, 1e-3, &plastic);
-    // In axes of the layer, which MFront's interface does not know.
-    compare("oriented_mohr_coulomb", "-", -100.0, 1e-3, &plastic);
+    compare(
+        "oriented_mohr_coulomb",
+        "OrientedMohrCoulomb",
+        -100.0,
+        1e-3,
+        &plastic,
+    );
 }
 
 #[test]
@@ -42,4 +55,8 @@ fn laws_for_interfaces() {
     compare("coulomb_joint", "CoulombJoint", -100.0, 1e-4, &joint);
     let mepi = [1e3, 0.4e3, 0.9, 0.2, 0.62, 0.5, 8e-3, 1.5, 2e-3];
     compare("mepi", "Mepi", -100.0, 1e-5, &mepi);
+    // P0 and SigmaNi stand between those that must be given.
+    let (other, softening) = (f64::NAN, [0.45, 5.0, 2e-4]);
+    let mepi = [&mepi[..], &[other, other], &softening[..]].concat();
+    compare("mepi_softening", "MepiSoftening", -100.0, 1e-5, &mepi);
 }

@@ -8,6 +8,7 @@ mod entries;
 mod kratos;
 mod mfront;
 mod opengeosys;
+mod zone;
 
 use std::env;
 use std::path::{Path, PathBuf};

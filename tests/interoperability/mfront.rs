@@ -3,8 +3,11 @@
 
 use crate::{BondedPile, assert_close, installed, library};
 use host::error::Source;
-use host::point::Driver;
+use host::plugin::adapter::{Adapter, Foreign};
+use host::plugin::{Bounds, Library};
+use host::point::{Driver, PointReport};
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 const PROGRAM: &str = "opengeosys/bin/ogs";
@@ -24,17 +27,30 @@ fn behaviours() -> PathBuf {
 
 /// The last row of a driver, by column.
 fn last_row(text: &str) -> BTreeMap<String, f64> {
+    rows(text).0.pop().unwrap()
+}
+
+/// All rows of a driver, by column, and what it reports.
+pub(crate) fn rows(text: &str) -> (Vec<BTreeMap<String, f64>>, PointReport) {
     let driver = Driver::from_source(&Source::new("driver.toml", text)).unwrap();
     let mut out = Vec::new();
-    driver.write_csv(&mut out, Path::new("table")).unwrap();
+    let report = driver.write_csv(&mut out, Path::new("table")).unwrap();
     let table = String::from_utf8(out).unwrap();
-    let names = table.lines().next().unwrap().split(',').map(str::to_owned);
-    let last = table.lines().last().unwrap().split(',');
-    names.zip(last.map(|cell| cell.parse().unwrap())).collect()
+    let mut lines = table.lines().map(|line| line.split(','));
+    let names: Vec<&str> = lines.next().unwrap().collect();
+    let row = |cells: std::str::Split<'_, char>| {
+        let cells = cells.map(|cell| cell.parse().unwrap());
+        names
+            .iter()
+            .map(|name| (*name).to_owned())
+            .zip(cells)
+            .collect()
+    };
+    (lines.map(row).collect(), report)
 }
 
 /// A driver of a law in a library.
-fn driver(library: &Path, law: &str, rest: &str) -> String {
+pub(crate) fn driver(library: &Path, law: &str, rest: &str) -> String {
     let library = toml::Value::from(library.to_str().unwrap());
     format!("adapter = \"mfront\"\nin_process = true\nlibrary = {library}\nlaw = \"{law}\"\n{rest}")
 }
@@ -84,6 +100,133 @@ fn a_cohesive_zone_comes_back_as_the_native_joint() {
     let here = last_row(&format!("{ours}{path}"));
     for column in ["traction_n", "traction_t", "jump_n"] {
         assert_close(there[column], here[column], 1e-9, column);
+    }
+}
+
+/// Strain and stress, 11 22 33 12 with γ = 2ε, in axes at this angle in degrees.
+fn turned([a, b, c, d]: [f64; 4], angle: f64, shear: f64) -> [f64; 4] {
+    let (sin, cos) = angle.to_radians().sin_cos();
+    let d = d / shear;
+    [
+        cos * cos * a + sin * sin * b + 2.0 * cos * sin * d,
+        sin * sin * a + cos * cos * b - 2.0 * cos * sin * d,
+        c,
+        shear * (cos * sin * (b - a) + (cos * cos - sin * sin) * d),
+    ]
+}
+
+#[test]
+fn a_layer_at_an_angle_is_the_oriented_law_in_its_axes() {
+    let parameters = [
+        ("young_modulus", 34e3),
+        ("poisson_ratio", 0.3),
+        ("cohesion", 1.0),
+        ("friction_angle", 30.0),
+        ("dilatancy_angle", 8.0),
+    ];
+    let path = |strain: [f64; 4], stress: [f64; 4]| {
+        let named = |values: [f64; 4], word: &str| {
+            let entries = ["11", "22", "33", "12"].into_iter().zip(values);
+            let entries = entries.map(|(name, value)| match word {
+                "" => format!("{name} = {value:?}"),
+                word => format!("{name} = {{ {word} = {value:?} }}"),
+            });
+            entries.collect::<Vec<_>>().join(", ")
+        };
+        format!(
+            "[initial]\nstress = {{ {} }}\n[[segment]]\nincrements = 20\ncontrol = {{ {} }}\n",
+            named(stress, ""),
+            named(strain, "strain")
+        )
+    };
+    // In the layer: pressed together, and sheared until it slides.
+    let (strain, stress) = ([1e-3, -2e-3, 0.0, 2e-2], [-60.0, -100.0, -80.0, 5.0]);
+    let mut ours = "law = \"oriented_mohr_coulomb\"\nhypothesis = \"axisymmetric\"\n\
+                    [parameters]\n"
+        .to_owned();
+    let mut theirs = "hypothesis = \"axisymmetric\"\n[parameters]\n".to_owned();
+    for (name, value) in parameters {
+        let _ = writeln!(ours, "{name} = {value:?}");
+        let _ = writeln!(theirs, "{} = {value:?}", spelled(name));
+    }
+    let here = last_row(&(ours + &path(strain, stress)));
+    assert!(here["plastic_strain"] > 1e-3, "it slides");
+    for angle in [0.0, 30.0, 90.0, -135.0] {
+        let (strain, stress) = (turned(strain, -angle, 2.0), turned(stress, -angle, 1.0));
+        let text = format!("{theirs}LayerAngle = {angle:?}\n{}", path(strain, stress));
+        let text = driver(
+            &library("oriented_mohr_coulomb"),
+            "OrientedMohrCoulomb",
+            &text,
+        );
+        let there = last_row(&text);
+        let stress = ["11", "22", "33", "12"].map(|c| there[&format!("stress_{c}")]);
+        for (component, found) in ["11", "22", "33", "12"]
+            .iter()
+            .zip(turned(stress, angle, 1.0))
+        {
+            let expected = here[&format!("stress_{component}")];
+            // Of 100 kPa; what the strains lose in being written and turned.
+            assert!(
+                (found - expected).abs() < 1e-10 * 100.0,
+                "{component} at {angle}: {found} {expected}"
+            );
+        }
+        assert_close(there["PlasticStrain"], here["plastic_strain"], 1e-10, "γ_p");
+    }
+}
+
+/// `young_modulus` as `YoungModulus`.
+fn spelled(id: &str) -> String {
+    let capital = |word: &str| word[..1].to_ascii_uppercase() + &word[1..];
+    id.split('_').map(capital).collect()
+}
+
+#[test]
+fn bounds_and_defaults_of_our_laws_are_exported() {
+    for (file, hypothesis) in [
+        ("elastic", "3d"),
+        ("mohr_coulomb", "3d"),
+        ("oriented_mohr_coulomb", "axisymmetric"),
+        ("coulomb_joint", "interface_2d"),
+        ("mepi", "interface_2d"),
+    ] {
+        let native = Library::open(&library(file)).unwrap();
+        let foreign = Foreign {
+            adapter: Adapter::Mfront,
+            library: library(file),
+            sidecar: None,
+            in_process: true,
+            record: None,
+            records_once: false,
+        };
+        let foreign = Library::open_foreign(&foreign, |_| Ok(())).unwrap();
+        let mut n = 0;
+        for law in native.laws() {
+            let behaviour = foreign.law(&spelled(&law.id)).unwrap();
+            let behaviour = behaviour.description();
+            assert!(
+                behaviour
+                    .formulations
+                    .iter()
+                    .any(|f| f.hypothesis == hypothesis)
+            );
+            for ours in &law.parameters {
+                let name = spelled(&ours.id);
+                let theirs = behaviour.parameters.iter().find(|p| p.id == name);
+                let theirs = theirs.unwrap_or_else(|| panic!("{name} is missing"));
+                assert_eq!(theirs.default, ours.default, "{name}");
+                assert_eq!(theirs.optional, ours.optional, "{name}");
+                // A `long double` is read on this processor only.
+                if cfg!(target_arch = "x86_64") {
+                    let ends = |b: &Bounds| (b.lower, b.upper);
+                    assert_eq!(ends(&theirs.bounds), ends(&ours.bounds), "{name}");
+                    assert_eq!(ends(&theirs.usual), ends(&ours.usual), "{name}");
+                }
+                n += 1;
+            }
+        }
+        assert!(n >= 2);
     }
 }
 

@@ -24,6 +24,10 @@ use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
 /// `Joint`. A law that does not offer all of the hypotheses names those it offers, in MFront's
 /// words: `abi::export_foreign!(continuum Layer in PlaneStrain Axisymmetrical);`.
 ///
+/// With the names of all material properties and parameters, in MFront's spelling and in their order,
+/// defaults and bounds are exported too; a name that does not fit is refused when the law is compiled:
+/// `abi::export_foreign!(interface Joint, properties: [NormalStiffness], parameters: [Cohesion]);`.
+///
 /// A library holds one entry for user materials: with several laws for solids, name the one that
 /// it is for with [`export_umat!`](crate::export_umat), and export the behaviours of all of them with
 /// [`export_mfront!`](crate::export_mfront).
@@ -33,8 +37,8 @@ macro_rules! export_foreign {
         $crate::export_mfront!(continuum $law $($hypotheses)*);
         $crate::export_umat!($law);
     };
-    (interface $law:ident) => {
-        $crate::export_mfront!(interface $law);
+    (interface $law:ident $($names:tt)*) => {
+        $crate::export_mfront!(interface $law $($names)*);
     };
 }
 

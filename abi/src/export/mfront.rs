@@ -4,7 +4,11 @@
 //! The behaviour is named as the Rust type. Names of properties and variables are the ids in
 //! MFront's spelling: `young_modulus` is `YoungModulus`. Parameters that must be given are
 //! *material properties*; those with a default, and optional ones, are MFront's *parameters*, which
-//! hold for the whole process and are set with `<behaviour>_setParameter`.
+//! hold for the whole process and are set with `<behaviour>_setParameter`. Bounds are MFront's physical
+//! bounds, usual ranges its bounds.
+//!
+//! A law in axes of a layer has one more material property, `LayerAngle`: the angle in degrees from the
+//! first axis to the layer's tangent, towards the second. So the behaviour takes global axes.
 //!
 //! Gradients and fluxes are Kelvin–Mandel vectors there: shear strain γ/√2, shear stress √2 τ.
 
@@ -13,7 +17,7 @@ use super::foreign::{Laws, MOST_PARAMETERS, Point, has_default, tell};
 use super::umat::row;
 use crate::descriptor::{Hypothesis, Parameters};
 use crate::law::Tangent;
-use crate::raw::PILUM_T_LINEAR;
+use crate::raw::{self, PILUM_T_LINEAR, PILUM_T_LOCAL_AXES};
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ffi::{CStr, c_char, c_int};
 use std::fmt;
@@ -23,17 +27,59 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Exports a law as a behaviour of MFront's generic interface; see [`export_foreign!`](crate::export_foreign).
 #[macro_export]
 macro_rules! export_mfront {
-    (continuum $law:ident) => {
-        $crate::export_mfront!(continuum $law in Tridimensional PlaneStrain Axisymmetrical);
+    (continuum $law:ident $(, $($names:tt)+)?) => {
+        $crate::export_mfront!(continuum $law in Tridimensional PlaneStrain Axisymmetrical
+            $(, $($names)+)?);
     };
-    (continuum $law:ident in $($hypothesis:ident)+) => {
+    (continuum $law:ident in $($hypothesis:ident)+ $(, $($names:tt)+)?) => {
         $crate::export_mfront!(@behaviour $law, $crate::export::Continuum<$law>,
             [Strain Stress StandardStrainBased], [$($hypothesis)+]);
+        $( $crate::export_mfront!(@bounds $law, $crate::export::Continuum<$law>, $($names)+); )?
     };
-    (interface $law:ident) => {
+    (interface $law:ident $(, $($names:tt)+)?) => {
         $crate::export_mfront!(@behaviour $law, $crate::export::Interface<$law>,
             [OpeningDisplacement CohesiveForce CohesiveZone], [PlaneStrain Axisymmetrical]);
+        $( $crate::export_mfront!(@bounds $law, $crate::export::Interface<$law>, $($names)+); )?
     };
+    (@bounds $law:ident, $exported:ty,
+        properties: [$($property:ident)*], parameters: [$($setting:ident)*]) => {
+        const _: () = {
+            use $crate::export::mfront as m;
+            type Law = $exported;
+            const {
+                assert!(
+                    m::are_named::<Law>(
+                        &[$(stringify!($property)),*],
+                        &[$(stringify!($setting)),*],
+                    ),
+                    "these are not the names of all properties and parameters in their order"
+                );
+            }
+            $crate::export_mfront!(@bound $law [$($property)* $($setting)*]);
+            $( const _: () = {
+                #[unsafe(export_name = concat!(stringify!($law), "_", stringify!($setting),
+                    "_ParameterDefaultValue"))]
+                pub static DATUM: f64 = m::declared::<Law>(stringify!($setting)).default_value;
+            }; )*
+        };
+    };
+    (@bound $law:ident [$($name:ident)*]) => { $(
+        $crate::export_mfront!(@long_doubles $law $name [
+            "_LowerPhysicalBound" = lower,
+            "_UpperPhysicalBound" = upper,
+            "_LowerBound" = usual_lower,
+            "_UpperBound" = usual_upper,
+        ]);
+    )* };
+    (@long_doubles $law:ident $name:ident [$($suffix:literal = $field:ident,)+]) => { $(
+        // Only there it is known how C stores a `long double`.
+        #[cfg(all(target_arch = "x86_64", unix))]
+        const _: () = {
+            #[unsafe(export_name = concat!(stringify!($law), "_", stringify!($name), $suffix))]
+            pub static DATUM: m::LongDouble =
+                m::LongDouble::of(m::declared::<Law>(stringify!($name)).$field);
+        };
+    )+ };
     (@behaviour $law:ident, $exported:ty, [$gradient:ident $flux:ident $kind:ident],
         [$($hypothesis:ident)+]) => {
         const _: () = {
@@ -241,6 +287,8 @@ impl<const N: usize> Texts<N> {
 /// A name in MFront's spelling, padded with NUL.
 pub type Name = [u8; LONGEST_NAME];
 const LONGEST_NAME: usize = 64;
+/// The material property that a law in axes of its layer has besides.
+const LAYER_ANGLE: &CStr = c"layer_angle";
 /// Most internal variables of a behaviour.
 const MOST_STATES: usize = 64;
 
@@ -298,14 +346,24 @@ const fn parameter_names<L: Exported, const N: usize>(left_out: bool) -> [Name; 
     names
 }
 
-/// Number of material properties.
+/// Number of material properties: the parameters that must be given, and the layer's angle of a law in
+/// its axes.
 pub const fn n_properties<L: Exported>() -> usize {
-    n_parameters::<L>(false)
+    n_parameters::<L>(false) + has_axes::<L>() as usize
+}
+
+/// Whether a law is in axes of its layer.
+const fn has_axes<L: Exported>() -> bool {
+    L::FORMULATIONS[0].flags & PILUM_T_LOCAL_AXES != 0
 }
 
 /// Their names.
 pub const fn property_names<L: Exported, const N: usize>() -> [Name; N] {
-    parameter_names::<L, N>(false)
+    let mut names = parameter_names::<L, N>(false);
+    if has_axes::<L>() {
+        names[N - 1] = spelled(LAYER_ANGLE.as_ptr());
+    }
+    names
 }
 
 /// Number of MFront's parameters.
@@ -316,6 +374,85 @@ pub const fn n_settings<L: Exported>() -> usize {
 /// Their names.
 pub const fn setting_names<L: Exported, const N: usize>() -> [Name; N] {
     parameter_names::<L, N>(true)
+}
+
+/// The description of the parameter that has this name in MFront's spelling.
+///
+/// # Panics
+/// If there is none; at compile time, where a law is exported.
+pub const fn declared<L: Exported>(name: &str) -> &'static raw::Parameter {
+    let table = <L::Parameters as Parameters>::TABLE;
+    let mut i = 0;
+    while i < table.len() && !is_spelled(table[i].raw(), name) {
+        i += 1;
+    }
+    assert!(
+        i < table.len(),
+        "the law has no parameter of this name in MFront's spelling"
+    );
+    table[i].raw()
+}
+
+const fn is_spelled(parameter: &raw::Parameter, name: &str) -> bool {
+    let (spelled, name) = (spelled(parameter.id), name.as_bytes());
+    let mut i = 0;
+    while i < name.len() {
+        if i >= LONGEST_NAME || spelled[i] != name[i] {
+            return false;
+        }
+        i += 1;
+    }
+    spelled[i] == 0
+}
+
+/// Whether these are the names of all parameters that must be given, and of all others.
+pub const fn are_named<L: Exported>(properties: &[&str], settings: &[&str]) -> bool {
+    let table = <L::Parameters as Parameters>::TABLE;
+    let (mut n_properties, mut n_settings) = (0, 0);
+    let mut i = 0;
+    while i < table.len() {
+        let (names, n) = if has_default(&table[i]) {
+            n_settings += 1;
+            (settings, n_settings)
+        } else {
+            n_properties += 1;
+            (properties, n_properties)
+        };
+        if n > names.len() || !is_spelled(table[i].raw(), names[n - 1]) {
+            return false;
+        }
+        i += 1;
+    }
+    n_properties == properties.len() && n_settings == settings.len()
+}
+
+/// A `long double` of x86-64: 64 bits of mantissa with the leading one, 15 of exponent, a sign.
+#[repr(C, align(16))]
+#[derive(Debug)]
+pub struct LongDouble([u8; 16]);
+
+impl LongDouble {
+    /// The same number; those too small to be normal are 0.
+    pub const fn of(value: f64) -> Self {
+        let bits = value.to_bits();
+        let sign = (bits >> 63) as u16;
+        let fraction = bits << 12 >> 1;
+        let (exponent, mantissa) = match (bits >> 52) & 0x7ff {
+            0 => (0, 0),
+            0x7ff => (0x7fff, 1 << 63 | fraction),
+            exponent => (exponent as u16 + (16383 - 1023), 1 << 63 | fraction),
+        };
+        let mantissa = mantissa.to_le_bytes();
+        let top = (sign << 15 | exponent).to_le_bytes();
+        let mut bytes = [0; 16];
+        let mut i = 0;
+        while i < 8 {
+            bytes[i] = mantissa[i];
+            i += 1;
+        }
+        (bytes[8], bytes[9]) = (top[0], top[1]);
+        Self(bytes)
+    }
 }
 
 /// Number of internal variables.
@@ -548,6 +685,16 @@ unsafe fn carry<L: Exported>(
         };
     }
     let scale = Scale::of(hypothesis);
+    let axes = if has_axes::<L>() {
+        // SAFETY: as many as there are names, of which the angle is the last.
+        let angle = unsafe { *s1.material_properties.add(n_properties::<L>() - 1) };
+        if !angle.is_finite() {
+            return Err(refuse("LayerAngle is not finite"));
+        }
+        Axes::at(angle)
+    } else {
+        Axes(None)
+    };
     let mut unused = [0.0; MOST_STATES];
     // SAFETY: `n` components.
     let point = unsafe {
@@ -559,9 +706,9 @@ unsafe fn carry<L: Exported>(
         };
         Point {
             n_components: n,
-            gradient: scale.gradient(begin),
-            increment: scale.gradient(std::array::from_fn(|i| end[i] - begin[i])),
-            flux: scale.flux(row(s0.thermodynamic_forces, n)),
+            gradient: axes.strain(scale.gradient(begin)),
+            increment: axes.strain(scale.gradient(std::array::from_fn(|i| end[i] - begin[i]))),
+            flux: axes.stress(scale.flux(row(s0.thermodynamic_forces, n))),
             state0: s0.internal_state_variables,
             state1: if request.prediction {
                 unused.as_mut_ptr()
@@ -580,10 +727,11 @@ unsafe fn carry<L: Exported>(
     let answer = answer.ok_or(factor)?;
     let operator =
         loading(laws, &given[..table.len()], &point, request.tangent).unwrap_or(answer.operator);
+    let (flux, operator) = (axes.back(answer.flux), axes.operator_back(&operator));
     for i in 0..n {
         if !request.prediction {
             // SAFETY: `n` components.
-            unsafe { *s1.thermodynamic_forces.add(i) = answer.flux[i] / scale.0[i] };
+            unsafe { *s1.thermodynamic_forces.add(i) = flux[i] / scale.0[i] };
         }
         for j in 0..n {
             if request.tangent != Tangent::None {
@@ -652,5 +800,71 @@ impl Scale {
 
     fn flux(&self, mandel: [f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| mandel[i] * self.0[i])
+    }
+}
+
+/// Axes of a layer in a plane problem: the matrix that takes strains 11 22 33 12 to them. Stresses come
+/// back by its transpose.
+struct Axes(Option<[[f64; 4]; 4]>);
+
+impl Axes {
+    /// Their tangent lies at this angle in degrees.
+    fn at(angle: f64) -> Self {
+        let (s, c) = angle.to_radians().sin_cos();
+        Self(Some([
+            [c * c, s * s, 0.0, c * s],
+            [s * s, c * c, 0.0, -c * s],
+            [0.0, 0.0, 1.0, 0.0],
+            [-2.0 * c * s, 2.0 * c * s, 0.0, (c - s) * (c + s)],
+        ]))
+    }
+
+    /// Strains in these axes.
+    fn strain(&self, global: [f64; 6]) -> [f64; 6] {
+        self.times(global, |t, i, j| t[i][j])
+    }
+
+    /// Stresses in these axes.
+    fn stress(&self, global: [f64; 6]) -> [f64; 6] {
+        // A shear stress stands for half a shear strain.
+        let halved = |i: usize| if i == 3 { 0.5 } else { 1.0 };
+        self.times(global, |t, i, j| t[i][j] * halved(i) / halved(j))
+    }
+
+    /// Stresses in these axes to global ones.
+    fn back(&self, local: [f64; 6]) -> [f64; 6] {
+        self.times(local, |t, i, j| t[j][i])
+    }
+
+    fn times(
+        &self,
+        vector: [f64; 6],
+        entry: impl Fn(&[[f64; 4]; 4], usize, usize) -> f64,
+    ) -> [f64; 6] {
+        let Some(turn) = &self.0 else {
+            return vector;
+        };
+        let mut turned = [0.0; 6];
+        for (i, to) in turned.iter_mut().take(4).enumerate() {
+            *to = (0..4).map(|j| entry(turn, i, j) * vector[j]).sum();
+        }
+        turned
+    }
+
+    /// Tᵀ C T of a tangent C in these axes, row by row, four components.
+    fn operator_back(&self, operator: &[f64; 36]) -> [f64; 36] {
+        let Some(t) = &self.0 else {
+            return *operator;
+        };
+        let mut turned = [0.0; 36];
+        for i in 0..4 {
+            for j in 0..4 {
+                let sum = (0..4).flat_map(|k| (0..4).map(move |l| (k, l)));
+                turned[4 * i + j] = sum
+                    .map(|(k, l)| t[k][i] * operator[4 * k + l] * t[l][j])
+                    .sum();
+            }
+        }
+        turned
     }
 }

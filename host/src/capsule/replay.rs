@@ -111,6 +111,7 @@ fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
             // `--isolate`, which is the default here, has the last word.
             in_process: true,
             record: None,
+            records_once: false,
         };
         return search.foreign_law(&part.id, &foreign);
     }

@@ -26,7 +26,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What a library is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -61,6 +61,34 @@ pub struct Foreign {
     pub in_process: bool,
     /// Write the arguments of one call here.
     pub record: Option<PathBuf>,
+    /// Not if they are there already.
+    pub records_once: bool,
+}
+
+static RECORD: OnceLock<PathBuf> = OnceLock::new();
+
+/// From now on, UMATs that this process opens write the arguments of one call to this file, where
+/// no key `record` says otherwise. Returns whether it was set; later files are ignored.
+pub fn record_to(path: PathBuf) -> bool {
+    RECORD.set(path).is_ok()
+}
+
+/// The file of [`record_to`].
+pub fn is_recorded_to() -> Option<&'static PathBuf> {
+    RECORD.get()
+}
+
+impl Foreign {
+    /// As the file names it, and with what this process was told beside it.
+    pub(super) fn completed(&self) -> Self {
+        let mut foreign = self.clone();
+        if foreign.adapter == Adapter::Umat && foreign.record.is_none() {
+            foreign.record = RECORD.get().cloned();
+            // A replay calls anew, in other workers, after the call that is meant.
+            foreign.records_once = true;
+        }
+        foreign
+    }
 }
 
 /// A law of a foreign library, without parameters yet.
@@ -91,8 +119,14 @@ pub(super) trait ForeignInstance: Debug + Send + Sync {
     fn integrate(&self, call: Call<'_>) -> (Status, String);
 }
 
-/// Laws with what builds them.
-pub(super) type ForeignLaws = Vec<(LawDescription, Arc<dyn ForeignLaw>)>;
+/// What a foreign library offers.
+#[derive(Debug)]
+pub(super) struct ForeignLaws {
+    /// Laws with what builds them.
+    pub(super) laws: Vec<(LawDescription, Arc<dyn ForeignLaw>)>,
+    /// SHA-256 of the file that describes them, where the library does not.
+    pub(super) sidecar: Option<String>,
+}
 
 /// Describes the laws of a foreign library. Nothing of it runs.
 ///

@@ -7,6 +7,9 @@
 //! | F | `flux` of [`Goal`] | what flux + K (gradient − origin) has to become |
 //! | r | `residual` | flux + K (gradient − origin) − F, in the components f |
 //!
+//! Under [`Restrictions`] all components are free, and what these make of the changes since the start of
+//! the segment stands for the flux.
+//!
 //! Newton's method with the law's tangent, restricted to f, comes first. Where that matrix is
 //! singular, the step is the least-squares solution of minimum norm. A line search keeps ‖r‖
 //! falling. Where it does not fall, the flux does not answer to what is left of r: on an edge, at
@@ -15,6 +18,7 @@
 //! Anderson (type II).
 
 use super::frame::Frame;
+use super::restrictions::Restrictions;
 use super::{N_MAX, Vector};
 use crate::plugin::{BatchFailure, End, Law, Moment, Operator, Start, Strided};
 use abi::status::Outcome;
@@ -109,6 +113,8 @@ pub(super) struct Obstacle {
     pub(super) miss: Option<Miss>,
     /// What its components are.
     pub(super) frame: Frame,
+    /// Its components are restrictions.
+    pub(super) is_restricted: bool,
     norm: f64,
 }
 
@@ -137,6 +143,8 @@ pub(super) struct Search<'a> {
     /// Which segment and increment it is.
     pub(super) moment: Moment,
     frame: Frame,
+    /// Restrictions, scaled, and the point where they begin.
+    restricted: Option<(Restrictions, Point)>,
     /// Calls of the law.
     pub(super) calls: usize,
     /// Number of updates that the law called unreliable, and its first words about them.
@@ -170,6 +178,7 @@ impl<'a> Search<'a> {
             obstacle: Obstacle::default(),
             moment: Moment::default(),
             frame: Frame::Cartesian,
+            restricted: None,
             calls: 0,
             unreliable: (0, String::new()),
         }
@@ -189,6 +198,28 @@ impl<'a> Search<'a> {
         }
         self.stiffness = stiffness;
         self.origin = origin;
+        if self.restricted.take().is_some() {
+            self.set_frame(self.frame);
+        }
+    }
+
+    /// Puts restrictions from this point on in the place of controlled components. What they have
+    /// to become at the end.
+    pub(super) fn restrict(&mut self, restrictions: &Restrictions, from: &Point) -> Vector {
+        self.control(0..self.n, [0.0; N_MAX], [0.0; N_MAX]);
+        let scaled = restrictions.scaled(self.elastic_norm);
+        scaled.operator(&mut self.elastic);
+        let change = scaled.change;
+        self.restricted = Some((scaled, from.clone()));
+        change
+    }
+
+    /// What is compared with the goal F.
+    fn answer(&self, point: &Point) -> Vector {
+        match &self.restricted {
+            None => point.flux,
+            Some((restrictions, from)) => restrictions.answer(from, point),
+        }
     }
 
     /// The answer to a step of no size, and with it the elastic operator. `None` if the law
@@ -231,6 +262,7 @@ impl<'a> Search<'a> {
         let frame = self.frame;
         Obstacle {
             frame,
+            is_restricted: self.restricted.is_some(),
             ..std::mem::take(&mut self.obstacle)
         }
     }
@@ -303,6 +335,9 @@ impl<'a> Search<'a> {
                 self.trial.point.flux = frame.flux(&self.trial.point.flux);
                 if operator != Operator::None {
                     frame.operator(&mut self.trial.operator);
+                    if let Some((restrictions, _)) = &self.restricted {
+                        restrictions.operator(&mut self.trial.operator);
+                    }
                 }
                 self.assess(step);
                 Ok(true)
@@ -348,6 +383,7 @@ impl<'a> Search<'a> {
 
     /// Residual of the trial sample, and how near it is.
     fn assess(&mut self, step: &Step<'_>) {
+        let (answer, at_start) = (self.answer(&self.trial.point), self.answer(step.start));
         let sample = &mut self.trial;
         let (flux, gradient) = (&sample.point.flux[..self.n], &sample.point.gradient);
         let start_reach = largest(&step.start.gradient[..self.n]);
@@ -365,8 +401,8 @@ impl<'a> Search<'a> {
         let mut worst = 0.0;
         let mut miss = None;
         for (k, &i) in self.free[..self.n_free].iter().enumerate() {
-            let r = flux[i] + springs[k] - step.goal.flux[i];
-            let own = step.goal.flux[i].abs().max(step.start.flux[i].abs());
+            let r = answer[i] + springs[k] - step.goal.flux[i];
+            let own = step.goal.flux[i].abs().max(at_start[i].abs());
             let own = own.max(f64::abs(springs[k]));
             let floor = ROUND_OFF * (scale + (self.elastic_norm + self.stiffness[i]) * reach);
             let close = RELATIVE_TOLERANCE * scale + floor;
@@ -381,7 +417,7 @@ impl<'a> Search<'a> {
                 worst = r.abs();
                 miss = Some(Miss {
                     component: i,
-                    flux: flux[i],
+                    flux: answer[i],
                     goal: step.goal.flux[i] - springs[k],
                     residual: r,
                     tolerance: close,
@@ -418,6 +454,7 @@ impl<'a> Search<'a> {
     /// The end of the step if the law were elastic.
     fn elastic_guess(&self, step: &Step<'_>) -> Vector {
         let (goal, start) = (step.goal, step.start);
+        let answer = self.answer(start);
         let mut gradient = goal.gradient;
         for &i in &self.free[..self.n_free] {
             gradient[i] = start.gradient[i];
@@ -428,7 +465,7 @@ impl<'a> Search<'a> {
             let prescribed: f64 = (0..self.n)
                 .map(|j| self.elastic[i * self.n + j] * (gradient[j] - start.gradient[j]))
                 .sum();
-            r[k] = start.flux[i] + spring - goal.flux[i] + prescribed;
+            r[k] = answer[i] + spring - goal.flux[i] + prescribed;
         }
         let d = self.descent(&self.elastic, &r);
         for &i in &self.free[..self.n_free] {

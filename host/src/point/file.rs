@@ -1,6 +1,7 @@
 //! The driver file: reading it, and checking everything that can be checked before the first call.
 
 use super::frame::Frame;
+use super::restrictions::Restrictions;
 use super::{N_MAX, Vector};
 use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
@@ -152,6 +153,8 @@ pub(super) struct Segment {
     pub(super) frame: Frame,
     /// Time of an increment.
     pub(super) time_increment: f64,
+    /// What holds in place of the controls.
+    pub(super) restrictions: Option<Restrictions>,
 }
 
 /// Names of gradient and flux of a hypothesis.
@@ -576,6 +579,7 @@ fn segments(source: &Source, file: &File, hypothesis: Hypothesis) -> Result<Vec<
                 first: 0,
                 frame: Frame::Cartesian,
                 time_increment: 1.0,
+                restrictions: None,
             })
         })
         .collect()

@@ -2,11 +2,12 @@
 //! UMATs: `test.inp`, `parameters.inp` and `initialconditions.inp` in one folder.
 //!
 //! Lines are read as Fortran does: the numbers asked for, separated by blanks or commas, and
-//! whatever follows on the line is a remark. Components are 11 22 33 12 13 23, tension positive,
+//! whatever follows on the line is a remark, unless it is another number. Components are 11 22 33 12 13 23, tension positive,
 //! γ = 2ε. What is not read is refused with its line.
 
 use super::file::{Control, Driver, Segment};
 use super::frame::Frame;
+use super::restrictions::Restrictions;
 use super::{N_MAX, Vector};
 use crate::error::{Error, Source};
 use crate::input::{self, ParameterTable, ParameterValue};
@@ -63,17 +64,34 @@ impl<'a> Lines<'a> {
     /// `N` numbers at the start of the next line.
     fn numbers<const N: usize>(&mut self, what: &str) -> Result<(Range<usize>, [f64; N]), Error> {
         let (at, line) = self.expect(what)?;
+        let numbers = self.numbers_of(&at, line, what)?;
+        Ok((at, numbers))
+    }
+
+    /// `N` numbers at the start of a line.
+    fn numbers_of<const N: usize>(
+        &self,
+        at: &Range<usize>,
+        line: &str,
+        what: &str,
+    ) -> Result<[f64; N], Error> {
         let mut words = line
             .split(|c: char| c.is_whitespace() || c == ',')
             .filter(|word| !word.is_empty());
         let mut numbers = [0.0; N];
         for number in &mut numbers {
-            *number = words.next().and_then(real).ok_or_else(|| {
-                let message = format!("expected {what}");
-                Error::from(self.source.error(at.clone(), message))
-            })?;
+            let Some(value) = words.next().and_then(real) else {
+                return self.refuse(at.clone(), format!("expected {what}"));
+            };
+            *number = value;
         }
-        Ok((at, numbers))
+        match words.next().filter(|word| real(word).is_some()) {
+            None => Ok(numbers),
+            Some(word) => self.refuse(
+                at.clone(),
+                format!("`{word}` is a number too many, expected {what}"),
+            ),
+        }
     }
 
     fn count(&mut self, what: &str) -> Result<usize, Error> {
@@ -111,6 +129,8 @@ struct Step {
     linear: [(bool, f64); N_MAX],
     /// Amplitude and phase of every component, of `*CirculatingLoad`.
     harmonic: Option<[(f64, f64); N_MAX]>,
+    /// What holds in place of them, of `*ObeyRestrictions`.
+    restrictions: Option<Restrictions>,
 }
 
 impl Driver {
@@ -129,6 +149,7 @@ impl Driver {
             sidecar: None,
             in_process: false,
             record: None,
+            records_once: false,
         };
         let library = crate::plugin::Library::open_foreign(&foreign, |_| Ok(()))?;
         let id = library.laws().next().map(|law| law.id.clone());
@@ -232,15 +253,7 @@ fn initial_conditions(source: &Source, n_states: usize) -> Result<(Vector, Vec<f
         let Some((at, line)) = lines.next() else {
             break;
         };
-        let word = line.split(|c: char| c.is_whitespace() || c == ',');
-        let Some(number) = word
-            .into_iter()
-            .find(|word| !word.is_empty())
-            .and_then(real)
-        else {
-            return lines.refuse(at, "expected a state variable");
-        };
-        *value = number;
+        [*value] = lines.numbers_of(&at, line, "a state variable")?;
     }
     Ok((stress, internal))
 }
@@ -261,8 +274,8 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
             let (at, [n_steps, n_times]) = lines.numbers("number of steps and of repetitions")?;
             let n_steps = lines.whole(&at, n_steps, "the number of steps")?;
             let n_times = lines.whole(&at, n_times, "the number of repetitions")?;
-            if n_steps == 0 {
-                return lines.refuse(at, "a repetition has at least one step");
+            if n_steps == 0 || n_times == 0 {
+                return lines.refuse(at, "at least one step is repeated at least once");
             }
             for _ in 0..n_steps {
                 let (at, line) = lines.expect("a step that is repeated")?;
@@ -276,9 +289,6 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
             }
             if repeated.len().saturating_mul(n_times) > MAX_SEGMENTS {
                 return lines.refuse(at, format!("more than {MAX_SEGMENTS} steps"));
-            }
-            if n_times == 0 {
-                steps.truncate(first);
             }
             for _ in 1..n_times {
                 steps.extend_from_slice(&repeated);
@@ -322,10 +332,6 @@ fn keyword<'a>(lines: &Lines<'_>, at: &Range<usize>, line: &'a str) -> Result<&'
 fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, Error> {
     let refused = match keyword {
         "*DeformationGradient" => "laws here take small strains, no deformation gradients",
-        "*ObeyRestrictions" => {
-            "linear restrictions between stress and strain are not understood here; a \
-             segment of a driver file controls each component by itself"
-        }
         "*PerturbationsS" | "*PerturbationsE" => {
             "response envelopes start every increment anew, which a path here cannot"
         }
@@ -348,6 +354,7 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
         "*PureRelaxation",
         "*PureCreep",
         "*UndrainedCreep",
+        "*ObeyRestrictions",
     ];
     if !known.contains(&keyword) {
         let message = format!("`{keyword}` is no keyword of a step");
@@ -362,9 +369,13 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
         frame: Frame::Cartesian,
         linear: [(false, 0.0); N_MAX],
         harmonic: None,
+        restrictions: None,
     };
     if step.increments == 0 {
         return lines.refuse(at, "a step has at least one increment");
+    }
+    if time <= 0.0 {
+        return lines.refuse(at, format!("a step takes a time above 0, not {time}"));
     }
     match keyword {
         "*LinearLoad" => {
@@ -385,6 +396,7 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
             }
             step.harmonic = Some(harmonic);
         }
+        "*ObeyRestrictions" => step.restrictions = Some(restrictions(lines)?),
         "*PureRelaxation" => {}
         "*PureCreep" => step.linear = [(true, 0.0); N_MAX],
         "*UndrainedCreep" => {
@@ -410,6 +422,81 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
         }
     }
     Ok(step)
+}
+
+/// Six lines like `-sd1 + 3.0*sd3 + 2e4*ed2 = -10`: sums of changes of stresses `sd1` to `sd6` and of
+/// strains `ed1` to `ed6` over the step. A remark begins with `#` or `!`.
+fn restrictions(lines: &mut Lines<'_>) -> Result<Restrictions, Error> {
+    let mut restrictions = Restrictions::default();
+    for i in 0..N_MAX {
+        let (at, line) = lines.expect("a restriction, of which there are six")?;
+        let text = line.split(['#', '!']).next().unwrap_or_default();
+        let Some((left, right)) = text.split_once('=') else {
+            return lines.refuse(at, "a restriction has a `=`");
+        };
+        let packed = |text: &str| text.split_whitespace().collect::<String>();
+        restrictions.change[i] = match real(&packed(right)) {
+            Some(value) if !right.contains(':') => value,
+            _ => {
+                let message = format!("`{}` is no number", right.trim());
+                return lines.refuse(at, message);
+            }
+        };
+        for (sign, term) in terms(&packed(left)) {
+            let (factor, name) = match term.split_once('*') {
+                Some((factor, name)) => (real(factor), name),
+                None => (Some(1.0), term),
+            };
+            let number = name.get(2..).and_then(|number| number.parse().ok());
+            let row = match (name.get(..2), number, factor) {
+                (Some("sd"), Some(1..=6), Some(_)) => &mut restrictions.stress[i],
+                (Some("ed"), Some(1..=6), Some(_)) => &mut restrictions.strain[i],
+                _ => {
+                    let message = format!("`{term}` is no change, or a number times one");
+                    let error = lines.source.error(at, message);
+                    let hint = "sd1 to sd6 are the changes of stresses 11 22 33 12 13 23, ed1 to ed6 of \
+                                strains, γ for shear";
+                    return Err(error.hint(hint).into());
+                }
+            };
+            row[number.unwrap_or(1) - 1] += sign * factor.unwrap_or_default();
+        }
+        let row = restrictions.stress[i].iter().chain(&restrictions.strain[i]);
+        if row.into_iter().all(|factor| *factor == 0.0) {
+            return lines.refuse(at, "the restriction restricts nothing");
+        }
+    }
+    Ok(restrictions)
+}
+
+/// The summands of a sum, with their signs. A sign within a number like `1e-3` is part of it.
+fn terms(sum: &str) -> Vec<(f64, &str)> {
+    let bytes = sum.as_bytes();
+    let is_exponent = |at: usize| {
+        let digit = |i: usize| {
+            bytes
+                .get(i)
+                .is_some_and(|c| c.is_ascii_digit() || *c == b'.')
+        };
+        at >= 2 && matches!(bytes[at - 1], b'e' | b'E' | b'd' | b'D') && digit(at - 2)
+    };
+    let mut starts: Vec<usize> = (0..bytes.len())
+        .filter(|&i| matches!(bytes[i], b'+' | b'-') && !is_exponent(i))
+        .collect();
+    if starts.first() != Some(&0) {
+        starts.insert(0, 0);
+    }
+    let ends = starts.iter().skip(1).copied().chain([sum.len()]);
+    let pieces = starts
+        .iter()
+        .zip(ends)
+        .map(|(start, end)| &sum[*start..end]);
+    pieces
+        .map(|piece| match piece.strip_prefix('-') {
+            Some(term) => (-1.0, term),
+            None => (1.0, piece.strip_prefix('+').unwrap_or(piece)),
+        })
+        .collect()
 }
 
 fn flag(lines: &Lines<'_>, at: &Range<usize>, value: f64) -> Result<bool, Error> {
@@ -455,6 +542,7 @@ impl Step {
             first,
             frame: self.frame,
             time_increment: self.time / n as f64,
+            restrictions: self.restrictions.clone(),
         };
         let Some(harmonic) = &self.harmonic else {
             return vec![segment(n, 0, &|i| self.linear[i].1)];

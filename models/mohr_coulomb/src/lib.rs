@@ -218,4 +218,6 @@ fn check(p: &Parameters) -> Result<(), Refusal> {
 }
 
 abi::export_laws!(continuum MohrCoulomb);
-abi::export_foreign!(continuum MohrCoulomb);
+abi::export_foreign!(continuum MohrCoulomb,
+    properties: [YoungModulus PoissonRatio Cohesion FrictionAngle DilatancyAngle],
+    parameters: [TensileStrength Scheme Substeps SchemeTolerance]);

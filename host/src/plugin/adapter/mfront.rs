@@ -71,7 +71,10 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
         );
         law
     });
-    Ok(laws.collect())
+    Ok(ForeignLaws {
+        laws: laws.collect(),
+        sidecar: None,
+    })
 }
 
 /// Descriptions of the behaviours in the bytes of a library.
@@ -302,7 +305,7 @@ impl Reader<'_> {
             let default = self.symbol(modelling, &format!("{name}_ParameterDefaultValue"));
             // Whole numbers steer the algorithm.
             if kind == 0 {
-                let default = self.symbols.real(&default);
+                let default = self.symbols.real(&default).filter(|v| !v.is_nan());
                 let parameter = ParameterDescription {
                     // Not given, it is left as it is.
                     optional: default.is_none(),

@@ -5,6 +5,7 @@ use crate::input;
 use crate::plugin::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
 };
+use crate::plugin::hexadecimal_sha256;
 use abi::Hypothesis;
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -34,7 +35,7 @@ struct File {
     references: String,
     symbol: Option<String>,
     cmname: Option<Spanned<String>>,
-    hypotheses: Vec<Spanned<String>>,
+    hypotheses: Spanned<Vec<Spanned<String>>>,
     ntens: Vec<Spanned<usize>>,
     #[serde(default)]
     expand: bool,
@@ -92,6 +93,8 @@ pub(super) struct Sidecar {
     pub(super) ntens: Vec<usize>,
     /// Calls need not follow one another.
     pub(super) is_thread_safe: bool,
+    /// SHA-256 of the file.
+    pub(super) sha256: String,
 }
 
 impl Sidecar {
@@ -118,14 +121,18 @@ impl Sidecar {
         for internal in &file.internal {
             variables.extend(components(source, internal)?);
         }
-        unique(
-            source,
-            file.internal.iter().map(|v| &v.id),
-            "internal variable",
-        )?;
+        columns(source, &file.internal)?;
         let mut formulations = Vec::new();
         let mut ntens = Vec::new();
-        for name in &file.hypotheses {
+        let hypotheses = file.hypotheses.get_ref();
+        if hypotheses.is_empty() {
+            let names = Hypothesis::ALL.map(Hypothesis::name).join(", ");
+            return Err(source
+                .error(file.hypotheses.span(), "`hypotheses` is empty")
+                .hint(format!("name those that the routine is made for: {names}"))
+                .into());
+        }
+        for name in hypotheses {
             let hypothesis = hypothesis(source, name)?;
             ntens.push(called_with(source, &file, name, hypothesis)?);
             formulations.push(FormulationDescription {
@@ -137,7 +144,7 @@ impl Sidecar {
                 internal_variables: variables.clone(),
             });
         }
-        unique(source, file.hypotheses.iter(), "hypothesis")?;
+        unique(source, hypotheses.iter(), "hypothesis")?;
         let id = identifier(source, &file.id, "the law")?;
         let cmname = file.cmname.as_ref().map_or(&id, Spanned::get_ref);
         if cmname.len() > CMNAME || !cmname.is_ascii() {
@@ -157,6 +164,7 @@ impl Sidecar {
             symbol: file.symbol,
             ntens,
             is_thread_safe: file.thread_safe,
+            sha256: hexadecimal_sha256(source.text().as_bytes()),
             law: LawDescription {
                 name: or(file.name, &id),
                 version: or(file.version, "unversioned"),
@@ -212,6 +220,37 @@ fn unique<'a>(
         if !seen.insert(id.get_ref()) {
             let message = format!("{what} `{}` is declared twice", id.get_ref());
             return Err(source.error(id.span(), message).into());
+        }
+    }
+    Ok(())
+}
+
+/// Internal variables are columns of tables: each has a name of its own, which none of the others
+/// that stand there has.
+fn columns(source: &Source, internal: &[Internal]) -> Result<(), Error> {
+    let places = ["phase", "increment", "group", "element", "point"];
+    let columns = ["x", "y", "s", "iterations"].into_iter().chain(places);
+    let mut seen: HashSet<String> = columns.map(str::to_owned).collect();
+    for word in ["strain", "stress", "jump", "traction"] {
+        for hypothesis in Hypothesis::ALL {
+            let components = hypothesis.components().iter();
+            seen.extend(components.map(|c| format!("{word}_{c}")));
+        }
+    }
+    let taken = seen.clone();
+    for written in internal {
+        for variable in components(source, written)? {
+            let id = variable.id;
+            if taken.contains(&id) {
+                let message = format!(
+                    "internal variable `{id}` has the name of another column in tables of results"
+                );
+                return Err(source.error(written.id.span(), message).into());
+            }
+            if !seen.insert(id.clone()) {
+                let message = format!("internal variable `{id}` is declared twice");
+                return Err(source.error(written.id.span(), message).into());
+            }
         }
     }
     Ok(())

@@ -75,14 +75,18 @@ const ARGUMENTS: [(&str, Kind, bool); N_ARGUMENTS] = [
 /// As [`Sidecar::read`].
 pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
     let sidecar = Sidecar::read(&foreign.library, foreign.sidecar.as_deref())?;
-    let law = sidecar.law.clone();
+    let (law, sha256) = (sidecar.law.clone(), sidecar.sha256.clone());
     let umat = Umat {
         library: foreign.library.clone(),
         sha256: image.sha256.clone(),
         record: foreign.record.clone(),
+        records_once: foreign.records_once,
         sidecar,
     };
-    Ok(vec![(law, Arc::new(umat))])
+    Ok(ForeignLaws {
+        laws: vec![(law, Arc::new(umat))],
+        sidecar: Some(sha256),
+    })
 }
 
 /// A library with a UMAT.
@@ -91,12 +95,14 @@ struct Umat {
     library: PathBuf,
     sha256: String,
     record: Option<PathBuf>,
+    records_once: bool,
     sidecar: Sidecar,
 }
 
 impl ForeignLaw for Umat {
     fn is_serial(&self) -> bool {
-        !self.sidecar.is_thread_safe
+        // What is recorded is one call.
+        !self.sidecar.is_thread_safe || self.record.is_some()
     }
 
     fn create(
@@ -137,6 +143,7 @@ impl ForeignLaw for Umat {
             sizes,
             turn: self.is_serial().then(Mutex::default),
             record: self.record.clone(),
+            records_once: self.records_once,
             is_recorded,
         }))
     }
@@ -252,6 +259,14 @@ impl Block {
         words.iter().map(|word| f64::from_bits(*word))
     }
 
+    /// The first result that holds a number that is none.
+    fn not_finite(&self) -> Option<&'static str> {
+        let results = [A::Stress, A::Statev, A::Ddsdde];
+        let mut bad = results.into_iter();
+        bad.find(|result| self.reals(*result).any(|value| !value.is_finite()))
+            .map(|result| ARGUMENTS[result as usize].0)
+    }
+
     /// The first argument that a call has written to without right, in words.
     fn damage(&self, before: &Self) -> Option<String> {
         for (i, (name, kind, is_output)) in ARGUMENTS.iter().enumerate() {
@@ -338,6 +353,7 @@ struct Instance {
     /// Whose turn it is, unless the routine says that it may be called by several threads.
     turn: Option<Mutex<()>>,
     record: Option<PathBuf>,
+    records_once: bool,
     is_recorded: AtomicBool,
 }
 
@@ -367,6 +383,21 @@ impl Instance {
             .collect();
         self.call(block, start, &increment)?;
         let n = self.sizes.n;
+        if let Some(name) = block.not_finite() {
+            // A smaller increment may mend it, unless there is none at all.
+            let at_rest = increment.iter().all(|v| *v == 0.0);
+            return Err(Refusal::error(
+                if at_rest {
+                    raw::PILUM_E_INTERNAL
+                } else {
+                    raw::PILUM_E_NUMERIC
+                },
+                format!(
+                    "the routine leaves {name} with values that are not finite{}",
+                    if at_rest { ", without any strain" } else { "" }
+                ),
+            ));
+        }
         let rest = block.reals(A::Stress).skip(n);
         let largest = block
             .reals(A::Stress)
@@ -421,12 +452,18 @@ impl Instance {
         block.set_integers(A::Jstep, &[start.moment.step as i32, 1, 0, 0]);
         block.set_integers(A::Kinc, &[start.moment.increment as i32]);
         let before = block.clone();
+        let recorded = self.record.as_ref().filter(|file| {
+            increment.iter().any(|v| *v != 0.0)
+                && !self.is_recorded.swap(true, Ordering::Relaxed)
+                && !(self.records_once && file.exists())
+        });
+        if let Some(path) = recorded {
+            // What a routine is given, even if it never returns.
+            record(path, &before, None)?;
+        }
         self.routine.call(&mut block.words, &block.at, N_CMNAME);
-        if let Some(path) = &self.record
-            && increment.iter().any(|v| *v != 0.0)
-            && !self.is_recorded.swap(true, Ordering::Relaxed)
-        {
-            record(path, &before, block)?;
+        if let Some(path) = recorded {
+            record(path, &before, Some(block))?;
         }
         if let Some(damage) = block.damage(&before) {
             return Err(Refusal::error(raw::PILUM_E_INTERNAL, damage));
@@ -443,17 +480,24 @@ impl Instance {
             });
         }
         Err(Refusal::error(
-            raw::PILUM_E_NUMERIC,
-            format!("the routine leaves PNEWDT = {factor}"),
+            raw::PILUM_E_INTERNAL,
+            format!(
+                "the routine leaves PNEWDT = {factor}; a fraction between 0 and 1 asks for a \
+                 smaller increment"
+            ),
         ))
     }
 }
 
-fn record(path: &Path, before: &Block, after: &Block) -> Result<(), Refusal> {
+/// Writes the arguments before a call, and after it once it has returned.
+fn record(path: &Path, before: &Block, after: Option<&Block>) -> Result<(), Refusal> {
     let text = format!(
-        "# All arguments of one call of a UMAT; matrices column by column.\n{}\n{}",
+        "# All arguments of one call of a UMAT, in their order; matrices column by column.\n\n{}\n{}",
         before.text("before"),
-        after.text("after")
+        after.map_or_else(
+            || "# The routine has not returned.\n".to_owned(),
+            |after| after.text("after")
+        )
     );
     std::fs::write(path, text).map_err(|why| {
         let message = format!("`record`: {} cannot be written: {why}", path.display());

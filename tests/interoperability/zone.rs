@@ -1,0 +1,185 @@
+//! A cohesive zone that somebody else wrote: `zone.cpp`, after the specification of MFront's generic
+//! interface and without a line of our export. No such behaviour was to be had in a package.
+
+use crate::mfront::{driver, rows};
+use crate::{assert_close, beside, last_line};
+use host::error::Source;
+use host::point::Driver;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::LazyLock;
+use tempfile::TempDir;
+
+/// The library, compiled once.
+static ZONE: LazyLock<(TempDir, PathBuf)> = LazyLock::new(|| {
+    let folder = TempDir::new().unwrap();
+    let library = folder.path().join("libzone.so");
+    let mut compiler = Command::new("c++");
+    compiler.args(["-std=c++17", "-Wall", "-Wextra", "-Werror", "-O1"]);
+    compiler.args(["-shared", "-fPIC", "-fvisibility=hidden", "-o"]);
+    last_line(compiler.arg(&library).arg(beside("zone.cpp")));
+    (folder, library)
+});
+
+/// Stiffnesses, kPa/m, and openings where damage starts and ends, m.
+const K_N: f64 = 1e7;
+const K_T: f64 = 4e6;
+const W_0: f64 = 1e-5;
+const W_F: f64 = 1e-4;
+
+fn damage(w: f64) -> f64 {
+    W_F * (w - W_0) / (w * (W_F - W_0))
+}
+
+fn zone(more: &str, segments: &[(usize, &str)]) -> String {
+    let mut text = format!(
+        "hypothesis = \"interface_2d\"\n[parameters]\nNormalStiffness = {K_N:?}\n\
+         TangentialStiffness = {K_T:?}\n{more}\n"
+    );
+    for (increments, control) in segments {
+        let _ = writeln!(
+            text,
+            "[[segment]]\nincrements = {increments}\ncontrol = {{ {control} }}"
+        );
+    }
+    driver(&ZONE.1, "BrittleZone", &text)
+}
+
+#[test]
+fn it_opens_closes_and_shears_as_its_closed_form() {
+    let opened = 5.5e-5;
+    let (rows, report) = rows(&zone(
+        "",
+        &[
+            (11, "n = { jump = 5.5e-5 }, t = { jump = 0.0 }"),
+            (4, "n = { jump = 1e-5 }, t = { jump = 0.0 }"),
+            (4, "n = { jump = -1e-6 }, t = { jump = 2e-5 }"),
+        ],
+    ));
+    assert_eq!(report.hypothesis, "interface_2d");
+    // Linear softening from K w₀.
+    let peak = K_N * W_0;
+    assert_close(rows[2]["traction_n"], peak, 1e-12, "peak");
+    let soft = peak * (W_F - opened) / (W_F - W_0);
+    assert_close(rows[11]["traction_n"], soft, 1e-12, "softening");
+    assert_close(rows[11]["Damage"], damage(opened), 1e-12, "damage");
+    assert_close(rows[11]["LargestOpening"], opened, 1e-12, "opening");
+    let whole = 1.0 - damage(opened);
+    assert_close(
+        rows[15]["traction_n"],
+        whole * K_N * 1e-5,
+        1e-12,
+        "unloading",
+    );
+    assert_close(rows[19]["traction_n"], -K_N * 1e-6, 1e-12, "closed");
+    assert_close(rows[19]["traction_t"], whole * K_T * 2e-5, 1e-12, "sheared");
+}
+
+#[test]
+fn its_tangent_leads_the_iterations() {
+    let path = "n = { traction = 20.0 }, t = { jump = 4e-5 }";
+    let (rows, report) = rows(&zone("", &[(2, "n = { traction = 20.0 }"), (20, path)]));
+    assert_eq!(report.cut_backs, 0);
+    let end = rows.last().unwrap();
+    let w = end["jump_n"].hypot(end["jump_t"]);
+    assert!(w > 3.0 * W_0);
+    let whole = 1.0 - damage(w);
+    assert_close(whole * K_N * end["jump_n"], 20.0, 1e-9, "normal traction");
+    assert_close(
+        end["traction_t"],
+        whole * K_T * 4e-5,
+        1e-12,
+        "shear traction",
+    );
+    // Without the terms of damage in the tangent the iterations converge linearly.
+    assert!(rows.iter().all(|row| row["iterations"] <= 6.0));
+}
+
+#[test]
+fn its_own_parameters_are_set_and_its_refusals_cut_steps() {
+    let path: &[(usize, &str)] = &[(4, "n = { jump = 4e-5 }, t = { jump = 0.0 }")];
+    let (all, _) = rows(&zone("OnsetOpening = 2e-5", path));
+    let softened = K_N * 2e-5 * (W_F - 4e-5) / (W_F - 2e-5);
+    assert_close(all[4]["traction_n"], softened, 1e-12, "later onset");
+    // Another image: nothing is left of that.
+    let (whole, _) = rows(&zone("", path));
+    let (cut, report) = rows(&zone("LargestDamageIncrement = 0.2", path));
+    assert!(report.cut_backs > 0, "{report}");
+    assert_close(cut[4]["traction_n"], whole[4]["traction_n"], 1e-12, "cut");
+}
+
+#[test]
+fn its_bounds_are_kept() {
+    let path: &[(usize, &str)] = &[(1, "n = { jump = 1e-6 }")];
+    let text = zone("", path).replacen("NormalStiffness = 10000000.0", "NormalStiffness = -1.0", 1);
+    let error = Driver::from_source(&Source::new("driver.toml", text)).unwrap_err();
+    assert!(error.to_string().contains("NormalStiffness"), "{error}");
+    let text = zone("", path).replacen("Stiffness = 4000000.0", "Stiffness = 2e9", 1);
+    let (_, report) = rows(&text);
+    assert!(
+        report
+            .warnings
+            .iter()
+            .any(|w| w.contains("TangentialStiffness")),
+        "{report}"
+    );
+}
+
+#[test]
+fn it_joins_two_blocks() {
+    let library = toml::Value::from(ZONE.1.to_str().unwrap());
+    let case = format!(
+        r#"title = "A zone pulled apart"
+analysis = "plane_strain"
+[mesh]
+columns = [{{ n = 1, to = 1.0 }}]
+rows = [{{ n = 2, to = 1.0 }}]
+[[mesh.region]]
+group = "block"
+[mesh.lines]
+bottom = {{ y = 0.0 }}
+top = {{ y = 1.0 }}
+middle = {{ y = 0.5 }}
+[laws.block]
+law = "elastic"
+parameters = {{ young_modulus = 1e8, poisson_ratio = 0.0 }}
+[laws.zone]
+adapter = "mfront"
+in_process = true
+library = {library}
+law = "BrittleZone"
+parameters = {{ NormalStiffness = 1e7, TangentialStiffness = 4e6 }}
+[groups.block]
+formulation = "solid"
+law = "block"
+[groups.zone]
+formulation = "zero_thickness"
+line = "middle"
+law = "zone"
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "pull"
+increments = 10
+displacement = [{{ line = "top", y = 3e-5 }}]
+[probes]
+traction = {{ group = "zone", quantity = "traction_n" }}
+opening = {{ group = "zone", quantity = "jump_n" }}
+"#
+    );
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("case.toml");
+    std::fs::write(&file, case).unwrap();
+    let case = &host::case::Case::load(&file).unwrap()[0];
+    host::run::run(case, folder.path(), &mut tests::case::Silent::default()).unwrap();
+    let rows = tests::case::table(&folder.path().join("history.csv"));
+    let end = rows.last().unwrap();
+    let number = |name: &str| end[name].parse::<f64>().unwrap();
+    // t = s (w_f − w) and w + t h/E = u, with h/E = 1e-8 of both blocks together.
+    let s = K_N * W_0 / (W_F - W_0);
+    let w = (3e-5 - s * W_F * 1e-8) / (1.0 - s * 1e-8);
+    assert_close(number("opening"), w, 1e-8, "opening");
+    assert_close(number("traction"), s * (W_F - w), 1e-8, "traction");
+}
