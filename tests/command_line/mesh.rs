@@ -257,10 +257,11 @@ fn joints_may_go_on_from_one_another() {
     let settlement = |parts: &[&str]| {
         let mut more = String::new();
         for line in &parts[1..] {
-            more += &format!(
+            let group = format!(
                 "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
                  law = \"joint\"\n"
             );
+            more += &group;
         }
         let lines = "[mesh.lines]\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
                      centre = { y = 0.5, x = [1.0, 1.01] }\neast = { y = 0.5, x = [1.01, 2.0] }";
