@@ -232,6 +232,7 @@ impl LinearDomain {
             let mut factors = Multifrontal::new(&system.pattern, kind, &kept, Some(&lines))?;
             let pattern = system.forget_matrix();
             factors.factorise(&values)?;
+            factors.forget_entries();
             let factors = Arc::new(factors);
             if let Some(reuse) = reuse {
                 reuse.remember(Condensed {

@@ -313,6 +313,12 @@ impl Multifrontal {
         Ok(update)
     }
 
+    /// Gives up what only another factorisation would need.
+    pub(super) fn forget_entries(&mut self) {
+        self.analysis.entries = Vec::new();
+        self.analysis.kept_entries = Vec::new();
+    }
+
     /// The supernodes that give the values of some equations: theirs, and all above them.
     pub(super) fn fronts_of(&self, wanted: &[bool]) -> Vec<bool> {
         let analysis = &self.analysis;
