@@ -180,6 +180,14 @@ impl System {
             .copied()
     }
 
+    /// The degrees of freedom that one follows from: itself, or those it is tied to.
+    pub fn masters(&self, dof: usize) -> Vec<usize> {
+        let tie = self.ties.iter().find(|tie| tie.dof == dof);
+        tie.map_or(vec![dof], |tie| {
+            tie.masters.map(|(master, _)| master).to_vec()
+        })
+    }
+
     /// Mesh lines of the unknowns, from those of the nodes.
     pub fn lines(&self, of_nodes: &[[u32; 2]]) -> Vec<[u32; 2]> {
         self.free.iter().map(|&dof| of_nodes[dof / 2]).collect()

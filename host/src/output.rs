@@ -476,11 +476,10 @@ impl Results {
             time,
             probes,
         });
-        if let Some(fields) = &mut self.fields {
-            let is_written = fields.times.last().is_some_and(|last| *last >= time);
-            if !is_written {
-                fields.write(time, snapshot, mesh)?;
-            }
+        if let Some(fields) = &mut self.fields
+            && fields.times.last().copied() != Some(time)
+        {
+            fields.write(time, snapshot, mesh)?;
         }
         Ok(())
     }

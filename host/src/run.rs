@@ -367,7 +367,10 @@ impl<'a> Run<'a> {
             results,
             (observer, keeper),
         );
-        let of_domain = equations.domain.as_ref().map_or(0.0, |d| d.round_off);
+        let of_domain = equations
+            .domain
+            .as_ref()
+            .map_or(0.0, |d| d.standing().round_off);
         let round_off = of_domain.max(record.round_off);
         if round_off > 0.0 {
             observer.warning(&format!(
@@ -531,15 +534,9 @@ impl<'a> Run<'a> {
             };
             let length = end - start;
             let last = course.last.as_ref();
-            match self.attempt(&course.loads, [start, end], last, equations, record) {
+            let attempt = self.attempt(&course.loads, [start, end], last, equations, record);
+            match self.without_leap(attempt, course, length) {
                 Ok(success) => {
-                    results.iterations(place, end, &success.iterations)?;
-                    done.iterations += success.iterations.len();
-                    if let Some(why) = &success.unreliable {
-                        record.unreliable += 1;
-                        done.warning.get_or_insert_with(|| why.clone());
-                    }
-                    record.round_off = record.round_off.max(success.round_off);
                     if success.relaxed {
                         record.relaxed += 1;
                         observer.warning(&format!(
@@ -550,13 +547,9 @@ impl<'a> Run<'a> {
                     if success.iterations.len() as f64 <= easy {
                         course.step = (REGROWTH * step).min(1.0 / n as f64);
                     }
-                    let iterations = success.iterations.len();
-                    self.accept(&success, &course.loads, equations, end);
-                    course.last = Some((length, success.increment));
-                    course.lambda = end;
-                    if settings.control == Control::ArcLength {
-                        self.step(place, course, equations, record, results, iterations)?;
-                    }
+                    self.take_over(
+                        success, end, place, course, equations, record, results, &mut done,
+                    )?;
                 }
                 Err(failure) => {
                     results.iterations(place, end, &failure.iterations)?;
@@ -571,14 +564,11 @@ impl<'a> Run<'a> {
                         return Err(self.cannot_go_on(place, start, n, &failure, results)?);
                     } else if follows && course.step < PATIENCE / n as f64 {
                         let goal = [n as f64, target];
-                        match self
-                            .follow(place, goal, course, equations, record, results, observer)?
-                        {
-                            PathEnd::Reached(spent) => done.iterations += spent,
-                            PathEnd::Stopped(failure) => {
-                                let at = course.lambda;
-                                return Err(self.cannot_go_on(place, at, n, &failure, results)?);
-                            }
+                        let end = self.follow_path(
+                            place, goal, course, equations, record, results, observer, &mut done,
+                        )?;
+                        if let PathEnd::Stopped(failure, highest) = end {
+                            return Err(self.cannot_go_on(place, highest, n, &failure, results)?);
                         }
                     } else if course.step < smallest {
                         return Err(self.cannot_go_on(place, start, n, &failure, results)?);
@@ -587,6 +577,37 @@ impl<'a> Run<'a> {
             }
         }
         Ok(done)
+    }
+
+    /// Takes over a step that reached equilibrium at load factor λ, with all that is to be said of
+    /// it.
+    #[expect(clippy::too_many_arguments, reason = "what a phase works on, apart")]
+    fn take_over(
+        &mut self,
+        success: StepSuccess,
+        lambda: f64,
+        place: &Place,
+        course: &mut PhaseCourse,
+        equations: &mut PhaseEquations,
+        record: &mut PhaseRecord,
+        results: &mut Results,
+        done: &mut IncrementRecord,
+    ) -> Result<(), Error> {
+        let iterations = success.iterations.len();
+        results.iterations(place, lambda, &success.iterations)?;
+        done.iterations += iterations;
+        record.round_off = record.round_off.max(success.round_off);
+        if let Some(why) = &success.unreliable {
+            record.unreliable += 1;
+            done.warning.get_or_insert_with(|| why.clone());
+        }
+        self.accept(&success, &course.loads, equations, lambda);
+        course.last = Some((lambda - course.lambda, success.increment));
+        course.lambda = lambda;
+        if self.file().solver.control == Control::ArcLength {
+            self.write_step(place, course, equations, record, results, iterations)?;
+        }
+        Ok(())
     }
 
     /// The error of a phase that ends at load factor λ, with the call of the law that failed.

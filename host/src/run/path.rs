@@ -2,9 +2,10 @@
 //! increments.
 
 use super::{PhaseEquations, Run};
+use crate::case::{Control, Method, SolverInput};
 use crate::checkpoint::PhaseCourse;
 use crate::error::{Error, Place};
-use crate::output::{PhaseRecord, Results};
+use crate::output::{IncrementRecord, PhaseRecord, Results};
 use crate::run::{EASY, Noting, Observer};
 use crate::solver::{Measure, Newton, StepFailure, StepSuccess};
 
@@ -14,15 +15,17 @@ const MAX_STEPS: usize = 500;
 const FIRST: f64 = 0.25;
 /// A step is halved at most so many times.
 const HALVINGS: i32 = 12;
+/// A step by the load has leapt where the points move faster than this, relative to the last step.
+const LEAP: f64 = 4.0;
 /// Growth of a step after an easy one.
 const GROWTH: f64 = 1.5;
 
 /// How a path ends.
 pub(super) enum PathEnd {
-    /// At the load that was sought, after so many iterations.
-    Reached(usize),
-    /// No equilibrium was found.
-    Stopped(Box<StepFailure>),
+    /// At the load that was sought.
+    Reached,
+    /// No equilibrium was found; with the highest load factor that was reached.
+    Stopped(Box<StepFailure>, f64),
 }
 
 /// A path on its way.
@@ -33,8 +36,6 @@ struct Course {
     /// Load factors it has been at.
     lowest: f64,
     highest: f64,
-    /// Iterations so far.
-    spent: usize,
 }
 
 impl Run<'_> {
@@ -44,7 +45,7 @@ impl Run<'_> {
     /// # Errors
     /// Results cannot be written, or the linear groups are not in equilibrium.
     #[expect(clippy::too_many_arguments, reason = "what a phase works on, apart")]
-    pub(super) fn follow(
+    pub(super) fn follow_path(
         &mut self,
         place: &Place,
         [n, target]: [f64; 2],
@@ -53,63 +54,59 @@ impl Run<'_> {
         record: &mut PhaseRecord,
         results: &mut Results,
         observer: &mut Noting<'_>,
+        done: &mut IncrementRecord,
     ) -> Result<PathEnd, Error> {
-        let settings = &self.case.file.solver;
-        let easy = EASY * settings.method.max_iterations() as f64;
         let start = phase.lambda;
-        let stopped = |reason: String| {
-            let failure = StepFailure::because(reason);
-            Ok(PathEnd::Stopped(Box::new(failure)))
-        };
         let Some(mut course) = self.set_out(phase, n) else {
             let reason = "no non-linear group deforms: there is no path to follow";
-            return stopped(reason.to_owned());
+            let failure = StepFailure::because(reason.to_owned());
+            return Ok(PathEnd::Stopped(Box::new(failure), start));
         };
         for _ in 0..MAX_STEPS {
             let from = phase.lambda;
-            match self.go(phase, course.distance, equations, record) {
-                Ok((success, lambda)) if lambda < target => {
-                    results.iterations(place, lambda, &success.iterations)?;
-                    let iterations = success.iterations.len();
-                    course.spent += iterations;
+            let mut step = self.advance(phase, course.distance, equations, record);
+            if let Ok((beyond, lambda)) = &step
+                && *lambda >= target
+            {
+                // Onto the target itself, by the load.
+                done.iterations += beyond.iterations.len();
+                let guess = (lambda - from, beyond.increment.clone());
+                let ends = [from, target];
+                let onto = self.attempt(&phase.loads, ends, Some(&guess), equations, record);
+                step = onto.map(|success| (success, target));
+            }
+            match step {
+                Ok((success, lambda)) => {
+                    let is_easy = success.iterations.len() as f64
+                        <= EASY * self.file().solver.max_iterations() as f64;
+                    self.take_over(
+                        success, lambda, place, phase, equations, record, results, done,
+                    )?;
+                    record.arc_length += 1;
+                    if lambda >= target {
+                        // Not so short that the next increment starts with next to nothing.
+                        phase.step = (target - from).clamp(FIRST / n, 1.0 / n);
+                        observer.warning(&format!(
+                            "{place}: the load could not simply rise from {start:.4} of the phase; \
+                             the path of equilibrium was followed between {:.4} and {:.4} \
+                             (path.csv)",
+                            course.lowest, course.highest
+                        ));
+                        return Ok(PathEnd::Reached);
+                    }
                     course.highest = course.highest.max(lambda);
                     course.lowest = course.lowest.min(lambda);
-                    record.arc_length += 1;
-                    self.arrive(success, phase, equations, lambda);
-                    self.step(place, phase, equations, record, results, iterations)?;
-                    if iterations as f64 <= easy {
+                    if is_easy {
                         course.distance = (GROWTH * course.distance).min(course.whole);
                     }
                 }
-                Ok((beyond, lambda)) => {
-                    course.spent += beyond.iterations.len();
-                    // Onto the target itself, by the load.
-                    let guess = (lambda - from, beyond.increment);
-                    let ends = [from, target];
-                    let onto = self.attempt(&phase.loads, ends, Some(&guess), equations, record);
-                    let Ok(success) = onto else {
-                        course.distance *= 0.5;
-                        continue;
-                    };
-                    results.iterations(place, target, &success.iterations)?;
-                    let iterations = success.iterations.len();
-                    self.arrive(success, phase, equations, target);
-                    phase.step = (target - from).min(1.0 / n);
-                    self.step(place, phase, equations, record, results, iterations)?;
-                    observer.warning(&format!(
-                        "{place}: the load could not simply rise from {start:.4} of the phase; the \
-                         path of equilibrium was followed between {:.4} and {:.4} (path.csv)",
-                        course.lowest, course.highest
-                    ));
-                    return Ok(PathEnd::Reached(course.spent + iterations));
-                }
                 Err(failure) => {
                     results.iterations(place, from, &failure.iterations)?;
-                    course.spent += failure.iterations.len();
+                    done.iterations += failure.iterations.len();
                     record.cut_backs += 1;
+                    course.distance *= 0.5;
                     results.cut_back(place, from, course.distance, &failure.reason)?;
                     observer.cut_back(place, &failure.reason);
-                    course.distance *= 0.5;
                     let smallest = FIRST * course.whole * f64::powi(2.0, -HALVINGS);
                     if failure.defect.is_some() || course.distance < smallest {
                         let reason = format!(
@@ -118,16 +115,49 @@ impl Run<'_> {
                             failure.reason, course.lowest, course.highest
                         );
                         let failure = StepFailure { reason, ..failure };
-                        return Ok(PathEnd::Stopped(Box::new(failure)));
+                        return Ok(PathEnd::Stopped(Box::new(failure), course.highest));
                     }
                 }
             }
         }
-        stopped(format!(
-            "the load does not rise beyond {:.4} of the phase: in {MAX_STEPS} steps along the path of \
-             equilibrium it went down to {:.4} and is at {:.4}",
+        let failure = StepFailure::because(format!(
+            "the load does not rise beyond {:.4} of the phase: in {MAX_STEPS} steps along the \
+             path of equilibrium it went down to {:.4} and is at {:.4}",
             course.highest, course.lowest, phase.lambda
-        ))
+        ));
+        Ok(PathEnd::Stopped(Box::new(failure), course.highest))
+    }
+
+    /// A step by the load under arc-length control, unless it has leapt over a piece of the path:
+    /// then the points that the path is measured by have moved much farther than in the last step.
+    pub(super) fn without_leap(
+        &self,
+        attempt: Result<StepSuccess, StepFailure>,
+        phase: &PhaseCourse,
+        length: f64,
+    ) -> Result<StepSuccess, StepFailure> {
+        let success = attempt?;
+        let followed = self.file().solver.control == Control::ArcLength;
+        let last = phase.last.as_ref().filter(|_| followed);
+        let Some((last_length, last)) = last else {
+            return Ok(success);
+        };
+        let Some(measure) = Measure::new(&self.groups, last) else {
+            return Ok(success);
+        };
+        let before = (measure.of(last) / last_length).abs();
+        let now = (measure.of(&success.increment) / length).abs();
+        if now <= LEAP * before {
+            return Ok(success);
+        }
+        Err(StepFailure {
+            iterations: success.iterations,
+            ..StepFailure::because(format!(
+                "the non-linear groups move {:.1} times as fast as in the last step, which may leap \
+                 over a piece of the path of equilibrium",
+                now / before
+            ))
+        })
     }
 
     /// A path from where the phase stands.
@@ -140,12 +170,11 @@ impl Run<'_> {
             whole,
             lowest: phase.lambda,
             highest: phase.lambda,
-            spent: 0,
         })
     }
 
     /// One step along the path, guessed from the last one. Returns its load factor too.
-    fn go(
+    fn advance(
         &mut self,
         phase: &PhaseCourse,
         distance: f64,
@@ -162,16 +191,21 @@ impl Run<'_> {
         };
         let ratio = distance / measure.of(increment);
         let guess = increment.iter().map(|u| ratio * u).collect();
+        // The path turns: a matrix of another state is of no use there.
+        let settings = SolverInput {
+            method: Method::Newton,
+            ..self.case.file.solver
+        };
         let mut newton = Newton::new(
             &equations.system,
             equations.domain.as_ref(),
             (&mut equations.solver, &mut equations.matrix),
             &mut self.groups,
-            &self.case.file.solver,
+            &settings,
             &mut record.costs,
         );
         let start = [phase.lambda, self.time];
-        newton.follow(
+        newton.step_along(
             &phase.loads,
             start,
             (&measure, distance),
@@ -179,21 +213,8 @@ impl Run<'_> {
         )
     }
 
-    /// Takes over a step to load factor λ.
-    fn arrive(
-        &mut self,
-        success: StepSuccess,
-        phase: &mut PhaseCourse,
-        equations: &mut PhaseEquations,
-        lambda: f64,
-    ) {
-        self.accept(&success, &phase.loads, equations, lambda);
-        phase.last = Some((lambda - phase.lambda, success.increment));
-        phase.lambda = lambda;
-    }
-
     /// Writes a step in equilibrium into the path.
-    pub(super) fn step(
+    pub(super) fn write_step(
         &mut self,
         place: &Place,
         phase: &PhaseCourse,

@@ -12,13 +12,14 @@
 //! - S Δu_b = Δλ r' + Δf_b, r' = r_b − K_bi K_ii⁻¹ r_i (2)
 //!
 //! which is all that the iterations see. Δu_i follows from the first of (1) when it is wanted.
-//! Everything is counted from the last state that was completed, so round-off does not add up.
+//! Everything is counted from the last state that was completed.
 //! Where only some groups are looked at (the pile whose head force is wanted, not the sand), they
-//! alone are brought to the state in question; the others wait for the next complete one.
+//! alone are brought to the state in question, counted from the one before it; the others wait for
+//! the next complete one.
 
 use super::Singular;
 use super::multifrontal::{Kind, Multifrontal};
-use super::newton::{ACCEPTED_ROUND_OFF, Loads, last_bit_scattered, norm};
+use super::newton::{ACCEPTED_ROUND_OFF, Loads, STILL_SMALL, last_bit_scattered, norm};
 use crate::assembly::{Pattern, System, Tie};
 use crate::group::Group;
 use crate::plugin::Operator;
@@ -143,6 +144,8 @@ pub struct Standing {
     /// Of every group of the model, whether it belongs to that part; `None` if the latest state is
     /// the complete one.
     part: Option<Vec<bool>>,
+    /// Largest relative residual that had to be taken for round-off, above the tolerance; else 0.
+    pub round_off: f64,
 }
 
 /// The linear part of a model during one phase.
@@ -165,8 +168,6 @@ pub struct LinearDomain {
     part: Option<Part>,
     /// All groups.
     whole: Option<Part>,
-    /// Largest relative residual that had to be taken for round-off, above the tolerance; else 0.
-    pub round_off: f64,
 }
 
 /// Whether condensation pays: the linear part is the larger one, and its boundary small.
@@ -258,7 +259,6 @@ impl LinearDomain {
             system,
             y: Vec::new(),
             condensed: Vec::new(),
-            round_off: 0.0,
         };
         Ok(Some((domain, rest)))
     }
@@ -323,6 +323,7 @@ impl LinearDomain {
             complete,
             forces: self.boundary.iter().map(|&dof| internal[dof]).collect(),
             part: None,
+            round_off: self.standing.round_off,
         };
     }
 
@@ -462,7 +463,8 @@ impl LinearDomain {
             wanted[equation] && !shared[equation] && !self.on_boundary[equation]
         };
         let inner = (0..wanted.len()).filter(own).collect();
-        for equation in dofs.iter().filter_map(|&dof| self.system.equation(dof)) {
+        let known = dofs.iter().flat_map(|&dof| self.system.masters(dof));
+        for equation in known.filter_map(|dof| self.system.equation(dof)) {
             wanted[equation] = true;
         }
         Part {
@@ -512,7 +514,7 @@ impl LinearDomain {
                     break (0.0, internal);
                 }
                 let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
-                if relative <= ACCEPTED_ROUND_OFF * last_bit {
+                if relative <= ACCEPTED_ROUND_OFF * last_bit && relative <= STILL_SMALL {
                     break (relative, internal);
                 }
                 return Err(format!(
@@ -543,7 +545,7 @@ impl LinearDomain {
             let dof = free[equation];
             displacement[dof] = origin.displacement[dof] + increment[dof];
         }
-        self.round_off = self.round_off.max(relative);
+        self.standing.round_off = self.standing.round_off.max(relative);
         Ok(internal)
     }
 

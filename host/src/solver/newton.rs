@@ -31,7 +31,7 @@ const EXACT: f64 = 1e-3;
 const PATIENCE: usize = 6;
 const PROGRESS: f64 = 0.1;
 /// Largest relative residual that may be round-off.
-const STILL_SMALL: f64 = 1e-6;
+pub(super) const STILL_SMALL: f64 = 1e-6;
 /// Round-off that a state may have, in changes of its forces by the last bit of the displacement
 /// increments.
 pub(super) const ACCEPTED_ROUND_OFF: f64 = 8.0;
@@ -348,7 +348,7 @@ impl<'a> Newton<'a> {
             let is_over = series.len() > self.settings.max_iterations();
             let is_equilibrium = self.is_equilibrium(&balance, &last);
             let ends = stands_still || is_over;
-            if is_equilibrium || ends && self.is_round_off(&increment, &balance, &task) {
+            if is_equilibrium || (ends && self.is_round_off(&increment, &balance, &task)) {
                 let round_off = if is_equilibrium {
                     0.0
                 } else {

@@ -4,13 +4,13 @@
 //! the next load. The path turns back in load and in displacement (a snap-back), but the
 //! deformation of those points goes on. So a step is measured by that,
 //!
-//! - c·Δu = s, c = Σ ∫ Bᵀ Δε₀ dV / ‖Δε₀‖
+//! - c·Δu = s, c = Σ ∫ Bᵀ Δε₀ dV / ‖Δε₀‖ (of interfaces ∫ Bᵀ Δ⟦u⟧₀ dA)
 //!
 //! with Δε₀ the strain increments, of interfaces the jump increments, of the non-linear groups in
 //! the last step: a local, linear arc length (Riks 1979; de Borst 1987; Geers 1999). It is blind to
 //! motions of a body as a whole. The load factor is the unknown that goes with it,
 //!
-//! - K δ_r = r, K δ_q = q = dr/dλ, dλ = (s − c·(Δu + δ_r)) / c·δ_q, δ = δ_r + dλ δ_q.
+//! - K δ_r = r, K δ_q = q = dr/dλ (prescribed displacements included, also in δ_q), dλ = (s − c·(Δu + δ_r)) / c·δ_q, δ = δ_r + dλ δ_q.
 
 use super::{Iteration, Loads, Newton, StepFailure, StepSuccess, Task, failed_law, norm, plain};
 use crate::case::Formulation;
@@ -42,13 +42,13 @@ impl Measure {
             for (point, strain) in strains.chunks_exact_mut(n).enumerate() {
                 let weight = group.kinematics.weight(point);
                 if let Some(thickness) = group.thickness(point) {
-                    // A layer's jumps, squared as they stand in the product c·Δu.
+                    // Strains across the layer times its thickness are its jumps.
                     strain[0] = 0.0;
                     strain[2] = 0.0;
-                    let jumps = strain.iter().map(|e| (thickness * e).powi(2));
-                    square += weight * jumps.sum::<f64>();
+                    // The weight is a volume: jumps² dA = t e² dV.
+                    square += weight * thickness * strain.iter().map(|e| e * e).sum::<f64>();
                     for e in strain.iter_mut() {
-                        *e *= thickness * thickness;
+                        *e *= thickness;
                     }
                 } else {
                     square += weight * strain.iter().map(|e| e * e).sum::<f64>();
@@ -77,7 +77,7 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// No equilibrium within the allowed iterations, or a law or the equations failed.
-    pub fn follow(
+    pub fn step_along(
         &mut self,
         loads: &Loads,
         [from, time]: [f64; 2],
@@ -139,7 +139,12 @@ impl Newton<'_> {
                 .map(|(r, q)| r + more * q)
                 .collect();
             // As far as the residual does not grow; never less than the shortest length.
-            let mut lengths = STEP_LENGTHS.into_iter().peekable();
+            let tries = if self.settings.line_search {
+                STEP_LENGTHS.len()
+            } else {
+                1
+            };
+            let mut lengths = STEP_LENGTHS[..tries].iter().copied().peekable();
             let length = loop {
                 let Some(length) = lengths.next() else {
                     return Err(plain("the path ends here"));
