@@ -7,6 +7,7 @@
 //! Asserts     every probe of every increment within 1e-9 of its largest value; factorisations
 //!             from `summary.json`
 
+use crate::setup::Results as _;
 use host::case::Case;
 use host::run::{Options, run_reusing};
 use host::solver::Reuse;
@@ -128,4 +129,68 @@ fn variants_on_one_mesh_share_the_factors_of_the_ground() {
     assert_eq!(shared + 1, own);
     assert_eq!(changed, changed_own);
     assert!(alone == together, "reuse changes results");
+}
+
+/// A column on a linear thin layer with mean strain: its mid-thickness nodes are tied. Beside it one
+/// that yields, so that the linear groups are condensed.
+const TIED: &str = r#"
+analysis = "plane_strain"
+[mesh]
+origin = [0.0, -0.1]
+columns = [{ n = 4, to = 1.0 }, { n = 4, to = 2.0 }]
+rows = [{ n = 1, to = 0.0 }, { n = 1, to = 1e-2 }, { n = 2, to = 0.2 }]
+[[mesh.region]]
+group = "soil"
+[[mesh.region]]
+group = "yielding"
+x = [0.0, 1.0]
+y = [0.0, 1e-2]
+[[mesh.region]]
+group = "layer"
+x = [1.0, 2.0]
+y = [0.0, 1e-2]
+[mesh.lines]
+base = { y = -0.1 }
+top = { y = 0.2 }
+side = { x = 1.5, y = [0.0, 1e-2] }
+[laws]
+soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.2 } }
+[laws.yielding]
+law = "mohr_coulomb"
+parameters = { young_modulus = 1e4, poisson_ratio = 0.2, cohesion = 10.0, friction_angle = 30.0, dilatancy_angle = 0.0 }
+[groups]
+soil = { formulation = "solid", law = "soil" }
+layer = { formulation = "thin_layer", integration = "mean", law = "soil" }
+yielding = { formulation = "thin_layer", integration = "mean", law = "yielding" }
+[[supports]]
+line = "base"
+fixed = ["x", "y"]
+[[phase]]
+name = "press"
+increments = 5
+pressure = [{ line = "top", value = 10.0 }]
+[solver]
+equations = "EQUATIONS"
+[probes]
+middle = { line = "side", y = [1e-4, 0.9e-2], quantity = "displacement_y" }
+[output]
+points = "POINTS"
+"#;
+
+#[test]
+fn what_is_looked_at_does_not_depend_on_what_is_written() {
+    let found = |equations: &str, points: &str| {
+        let text = TIED
+            .replace("EQUATIONS", equations)
+            .replace("POINTS", points);
+        crate::setup::run(&text).history("middle")
+    };
+    let expected = found("sparse", "never");
+    for points in ["never", "phases", "increments"] {
+        let middle = found("condensed", points);
+        assert_eq!(middle.len(), 5);
+        for (a, b) in middle.iter().zip(&expected) {
+            assert!((a - b).abs() < 1e-9 * b.abs(), "{points}: {a} {b}");
+        }
+    }
 }

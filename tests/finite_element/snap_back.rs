@@ -210,6 +210,34 @@ fn a_snap_back_is_followed_by_its_arc_length() {
 }
 
 #[test]
+fn no_increments_and_no_method_leap_over_it() {
+    let [highest, lowest] = turning_points();
+    let largest = SIGMA * friction(PEAK);
+    for (increments, method) in [
+        (5, "newton"),
+        (10, "newton"),
+        (80, "newton"),
+        (40, "quasi_newton"),
+        (40, "initial_stress"),
+    ] {
+        let solver = format!("control = \"arc_length\"\nmethod = \"{method}\"");
+        let pull =
+            format!("increments = {increments}\ndisplacement = [{{ line = \"end\", x = 0.02 }}]");
+        let finished = run(&text(&solver, &pull));
+        let path = path(finished.folder());
+        let what = format!("{increments} increments, {method}");
+        for &[slip, force, _] in &path {
+            assert_close(&what, force, force_at(slip), UNEVEN, largest);
+        }
+        let turn = path.windows(2).position(|pair| pair[1][2] < pair[0][2]);
+        let turn = turn.unwrap_or_else(|| panic!("{what}: no step back"));
+        let least = path[turn..].iter().map(|step| step[2]);
+        let least = least.fold(highest, f64::min);
+        assert_close(&what, least, lowest, 0.05, lowest);
+    }
+}
+
+#[test]
 fn a_force_beyond_the_limit_stops_with_the_limit_in_words() {
     let limit = SIGMA * friction(PEAK);
     let asked = 1.1 * limit;
