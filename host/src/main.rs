@@ -379,16 +379,25 @@ fn recorded(file: Option<&Path>, action: impl FnOnce() -> Result<(), Error>) -> 
         return action();
     };
     let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
-    // What stands there afterwards is of this call; that it can be written is found out now.
-    std::fs::File::create(&path)
-        .and_then(|_| std::fs::remove_file(&path))
-        .map_err(|source| Error::Unwritable {
-            path: path.clone(),
-            source,
-        })?;
-    adapter::record_to(path.clone());
+    let unwritable = |source| Error::Unwritable {
+        path: path.clone(),
+        source,
+    };
+    if std::fs::metadata(&path).is_ok_and(|found| !found.is_file()) {
+        let other = "there is something else than a file of this name";
+        return Err(unwritable(std::io::Error::other(other)));
+    }
+    // The record takes the place of an earlier one when there is one, not before.
+    let mut partial = path.clone().into_os_string();
+    partial.push(".part");
+    let partial = std::path::PathBuf::from(partial);
+    std::fs::File::create(&partial)
+        .and_then(|_| std::fs::remove_file(&partial))
+        .map_err(unwritable)?;
+    adapter::record_to(partial.clone());
     let outcome = action();
-    if path.is_file() {
+    if partial.is_file() {
+        std::fs::rename(&partial, &path).map_err(unwritable)?;
         say!("all arguments of one call in {}", file.display());
     } else if outcome.is_ok() {
         say!("no call was recorded: none moved a point");

@@ -189,6 +189,11 @@ fn cut(mut file: &File, length: u64) -> std::io::Result<()> {
 }
 
 fn create(path: &Path) -> Result<File, Error> {
+    // A pipe that nobody reads would keep the run waiting for ever.
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        let other = std::io::Error::other("there is something else than a file of this name");
+        return Err(unwritable(path, other));
+    }
     File::create(path).map_err(|error| unwritable(path, error))
 }
 

@@ -136,6 +136,21 @@ fn leaves_earlier_results_alone_when_the_input_is_bad() {
     assert!(read() == before);
 }
 
+/// A pipe of a table's name would keep the run waiting for a reader.
+#[cfg(unix)]
+#[test]
+fn does_not_write_into_a_pipe() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("out")).unwrap();
+    let made = std::process::Command::new("mkfifo")
+        .arg(place.path("out/history.csv"))
+        .status();
+    assert!(made.unwrap().success());
+    let outcome = place.run_case(CASE);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("history.csv"), "{}", outcome.stderr);
+}
+
 /// Everything a run can write, with a figure called `curve`.
 fn with_everything() -> String {
     let figure = "[[figure]]\nname = \"curve\"\nx = \"settlement\"\ny = [\"tau\"]\n";

@@ -623,13 +623,16 @@ fn the_option_records_a_call() {
         ),
         ("point", "own.toml", "law `elastic` is no UMAT"),
     ] {
+        place.write("none.toml", "an earlier one");
         let outcome = place.run(&[command, file, "--record", "none.toml"]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
         assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
     }
     let outcome = place.run(&["point", "driver.toml", "--record", "no/where.toml"]);
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(!place.path("none.toml").exists());
+    // What stood there is not lost to a command that was refused.
+    let kept = std::fs::read_to_string(place.path("none.toml")).unwrap();
+    assert_eq!(kept, "an earlier one");
 }
 
 #[test]
