@@ -4,7 +4,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use host::case::Case;
 use host::error::{Error, Place, suggestion};
 use host::new_law::NewLaw;
-use host::output::{Figures, remove_comparison};
+use host::output::{Figures, refuse_other, remove_comparison};
 use host::plugin::adapter::{self, Adapter};
 use host::plugin::{SearchPath, Trust, vetting};
 use host::run::{Observer, Options, check, run_reusing};
@@ -383,14 +383,11 @@ fn recorded(file: Option<&Path>, action: impl FnOnce() -> Result<(), Error>) -> 
         path: path.clone(),
         source,
     };
-    if std::fs::metadata(&path).is_ok_and(|found| !found.is_file()) {
-        let other = "there is something else than a file of this name";
-        return Err(unwritable(std::io::Error::other(other)));
-    }
+    refuse_other(&path)?;
     // The record takes the place of an earlier one when there is one, not before.
     let mut partial = path.clone().into_os_string();
     partial.push(".part");
-    let partial = std::path::PathBuf::from(partial);
+    let partial = PathBuf::from(partial);
     std::fs::File::create(&partial)
         .and_then(|_| std::fs::remove_file(&partial))
         .map_err(unwritable)?;

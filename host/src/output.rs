@@ -188,12 +188,21 @@ fn cut(mut file: &File, length: u64) -> std::io::Result<()> {
     Ok(())
 }
 
-fn create(path: &Path) -> Result<File, Error> {
-    // A pipe that nobody reads would keep the run waiting for ever.
+/// Refuses to write where something else than a file is: a pipe that nobody reads would keep the
+/// program waiting for ever.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn refuse_other(path: &Path) -> Result<(), Error> {
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
         let other = std::io::Error::other("there is something else than a file of this name");
         return Err(unwritable(path, other));
     }
+    Ok(())
+}
+
+fn create(path: &Path) -> Result<File, Error> {
+    refuse_other(path)?;
     File::create(path).map_err(|error| unwritable(path, error))
 }
 
