@@ -5,7 +5,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use host::assembly::System;
+use host::assembly::{Places, System};
 use host::case::{Axis, Case, SolverInput};
 use host::error::{Place, Source};
 use host::group::Group;
@@ -217,13 +217,16 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
     let (mut domain, system) = chamber.condense();
     let still = vec![0.0; chamber.prescribed.len()];
     domain.start(&chamber.model.groups, &chamber.loads, &still);
-    let mut solver = LinearSolver::new(&system.pattern, false, None).expect("a sound pattern");
+    let block = domain.block(&system);
+    let solver = LinearSolver::with_block(&system.pattern, None, block);
+    let mut solver = solver.expect("a sound pattern");
+    let places = Places::new(&system, &chamber.prescribed);
     let mut iterations = 0;
     bencher.bench_local(|| {
         let mut matrix = Matrix::default();
         let mut costs = Costs::default();
         let mut newton = Newton::new(
-            &system,
+            (&system, &places),
             Some(&domain),
             (&mut solver, &mut matrix),
             &mut chamber.model.groups,

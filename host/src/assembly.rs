@@ -73,6 +73,13 @@ pub fn fold(ties: &[Tie], force: &mut [f64]) {
     }
 }
 
+/// Gives tied degrees of freedom the values that follow from the others.
+fn follow(ties: &[Tie], displacement: &mut [f64]) {
+    for tie in ties {
+        displacement[tie.dof] = tie.masters.iter().map(|&(m, w)| w * displacement[m]).sum();
+    }
+}
+
 /// Unknowns and pattern of one phase, of all groups or of some.
 #[derive(Debug)]
 pub struct System {
@@ -83,12 +90,110 @@ pub struct System {
     ties: Vec<Tie>,
     /// Of every group, its elements; none of a group that does not take part.
     elements: Vec<Vec<ElementMap>>,
-    /// Degrees of freedom of a domain that stands beside the groups as one dense element.
+    /// Degrees of freedom that are shared with a domain beside the groups.
     boundary: Vec<usize>,
-    /// Positions in the matrix of every pair of them, column-major.
-    boundary_slots: Vec<u32>,
-    /// Pattern of the matrix.
+    /// Pattern of the matrix of the groups.
     pub pattern: Pattern,
+}
+
+/// The degrees of freedom that take part in the iterations, used by the groups or prescribed: those
+/// of a large domain beside them are not touched. A vector *by place* has an entry for each.
+#[derive(Debug)]
+pub struct Places {
+    /// Degrees of freedom, ascending.
+    dofs: Vec<usize>,
+    /// Place of every equation.
+    pub free: Vec<usize>,
+    /// Number of degrees of freedom, with those that take no part.
+    n_dofs: usize,
+    /// Places of the boundary.
+    pub boundary: Vec<usize>,
+    /// Places of prescribed degrees of freedom.
+    pub prescribed: Vec<usize>,
+    ties: Vec<Tie>,
+}
+
+impl Places {
+    /// Of a system.
+    pub fn new(system: &System, prescribed: &[bool]) -> Self {
+        let mut takes_part = prescribed.to_vec();
+        for &dof in system.elements.iter().flatten().flat_map(|map| &map.dofs) {
+            takes_part[dof] = true;
+        }
+        // Ties of other groups may follow degrees of freedom that have no place.
+        let has_masters = |tie: &&Tie| tie.masters.iter().all(|&(master, _)| takes_part[master]);
+        let ties: Vec<Tie> = system.ties.iter().filter(has_masters).copied().collect();
+        for tie in &ties {
+            takes_part[tie.dof] = true;
+        }
+        let dofs: Vec<usize> = (0..prescribed.len())
+            .filter(|&dof| takes_part[dof])
+            .collect();
+        let place = |dof: &usize| dofs.partition_point(|other| other < dof);
+        let is_prescribed = |place: &usize| prescribed[dofs[*place]];
+        Self {
+            free: system.free.iter().map(place).collect(),
+            boundary: system.boundary.iter().map(place).collect(),
+            prescribed: (0..dofs.len()).filter(is_prescribed).collect(),
+            ties: ties
+                .iter()
+                .map(|tie| Tie {
+                    dof: place(&tie.dof),
+                    masters: tie.masters.map(|(master, weight)| (place(&master), weight)),
+                })
+                .collect(),
+            n_dofs: prescribed.len(),
+            dofs,
+        }
+    }
+
+    /// Number of degrees of freedom, with those that take no part.
+    pub fn n_dofs(&self) -> usize {
+        self.n_dofs
+    }
+
+    /// Number of places.
+    pub fn n(&self) -> usize {
+        self.dofs.len()
+    }
+
+    /// A vector by place, from one by degree of freedom.
+    pub fn gather(&self, values: &[f64]) -> Vec<f64> {
+        self.dofs.iter().map(|&dof| values[dof]).collect()
+    }
+
+    /// Puts a vector by place where its degrees of freedom stand.
+    pub fn scatter(&self, values: &[f64], to: &mut [f64]) {
+        for (&dof, value) in self.dofs.iter().zip(values) {
+            to[dof] = *value;
+        }
+    }
+
+    /// Adds a vector by place to one by degree of freedom.
+    pub fn add(&self, values: &[f64], to: &mut [f64]) {
+        for (&dof, value) in self.dofs.iter().zip(values) {
+            to[dof] += value;
+        }
+    }
+
+    /// A vector by place, from one by degree of freedom that is left zero.
+    pub fn take(&self, values: &mut [f64]) -> Vec<f64> {
+        let taken = self
+            .dofs
+            .iter()
+            .map(|&dof| std::mem::take(&mut values[dof]));
+        taken.collect()
+    }
+
+    /// Gives tied degrees of freedom the values that follow from the others.
+    pub fn follow(&self, displacement: &mut [f64]) {
+        follow(&self.ties, displacement);
+    }
+
+    /// Moves forces at tied degrees of freedom to those they follow.
+    pub fn fold(&self, force: &mut [f64]) {
+        fold(&self.ties, force);
+    }
 }
 
 /// How an element's matrix goes into the system's.
@@ -104,8 +209,7 @@ struct ElementMap {
 
 impl System {
     /// Numbers the unknowns of the groups that take part: all degrees of freedom they use that
-    /// are neither prescribed nor tied. A `domain` of other groups that touches them is one dense
-    /// element on the unknowns it shares with them.
+    /// are neither prescribed nor tied. They may share some with a `domain` of other groups.
     pub fn new(
         groups: &[Group],
         takes_part: impl Fn(&Group) -> bool,
@@ -148,21 +252,16 @@ impl System {
         let is_shared = |dof: &usize| domain.is_some_and(|domain| domain.equation[*dof].is_some());
         let boundary: Vec<usize> = free.iter().copied().filter(is_shared).collect();
         let of_elements = elements.iter().flatten().map(|map| map.dofs.as_slice());
-        let all = of_elements.chain([boundary.as_slice()]);
-        let pattern = Pattern::new(free.len(), &equation, all);
+        let pattern = Pattern::new(free.len(), &equation, of_elements);
         for map in elements.iter_mut().flatten() {
             map.slots = find_slots(&map.dofs, &equation, &pattern);
         }
-        // Row-major of the transposed: the same places, column-major.
-        let boundary_slots =
-            transposed(&find_slots(&boundary, &equation, &pattern), boundary.len());
         Self {
             equation,
             free,
             ties: ties.to_vec(),
             elements,
             boundary,
-            boundary_slots,
             pattern,
         }
     }
@@ -211,14 +310,6 @@ impl System {
         &self.boundary
     }
 
-    /// Adds the stiffness of the domain beside the groups (column-major, by
-    /// [`Self::boundary`]) to the matrix.
-    pub fn add_domain(&self, stiffness: &[f64], values: &mut [f64]) {
-        for (slot, value) in self.boundary_slots.iter().zip(stiffness) {
-            values[*slot as usize] += value;
-        }
-    }
-
     /// Number of equations.
     pub fn n_equations(&self) -> usize {
         self.free.len()
@@ -236,9 +327,7 @@ impl System {
 
     /// Gives tied degrees of freedom the values that follow from the others.
     pub fn follow(&self, displacement: &mut [f64]) {
-        for tie in &self.ties {
-            displacement[tie.dof] = tie.masters.iter().map(|&(m, w)| w * displacement[m]).sum();
-        }
+        follow(&self.ties, displacement);
     }
 
     /// Moves forces at tied degrees of freedom to those they follow.
@@ -400,11 +489,6 @@ fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> 
         }
     }
     slots
-}
-
-/// An n × n matrix with rows and columns exchanged.
-fn transposed(matrix: &[u32], n: usize) -> Vec<u32> {
-    (0..n * n).map(|at| matrix[at % n * n + at / n]).collect()
 }
 
 impl Pattern {

@@ -627,8 +627,11 @@ impl SolverInput {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Consistent tangents at every iteration.
+    /// Consistent tangents; those of an earlier iteration, or of the step before, as long as each
+    /// correction takes nearly all of the residual away.
     #[default]
+    Auto,
+    /// Consistent tangents at every iteration.
     Newton,
     /// Consistent tangents at the first iteration of every step.
     ModifiedNewton,
@@ -643,6 +646,7 @@ impl Method {
     /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Newton => "newton",
             Self::ModifiedNewton => "modified_newton",
             Self::InitialStress => "initial_stress",
@@ -650,10 +654,15 @@ impl Method {
         }
     }
 
+    /// Whether iterations fall back on consistent tangents wherever others do worse.
+    pub fn is_newton(self) -> bool {
+        matches!(self, Self::Auto | Self::Newton)
+    }
+
     /// Iterations that are allowed by default: the slower the method, the more.
     pub fn max_iterations(self) -> usize {
         match self {
-            Self::Newton => 25,
+            Self::Auto | Self::Newton => 25,
             Self::ModifiedNewton => 200,
             Self::InitialStress => 1000,
             Self::QuasiNewton => 100,

@@ -10,6 +10,7 @@ use crate::group::GroupState;
 use crate::model::Model;
 use crate::output::{PhaseRecord, ResultsState, unwritable};
 use crate::plugin::hexadecimal_sha256;
+use crate::run::History;
 use crate::solver::{Loads, Standing};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -22,7 +23,7 @@ use std::path::Path;
 pub const FILE_NAME: &str = "checkpoint.bin";
 
 /// First bytes of the file: the format and its version.
-const HEAD: &[u8] = b"pilum checkpoint 2\n";
+const HEAD: &[u8] = b"pilum checkpoint 3\n";
 
 /// A run after a whole increment.
 #[derive(Debug, Serialize, Deserialize)]
@@ -70,8 +71,8 @@ pub struct PhaseCourse {
     pub lambda: f64,
     /// Length of the next step.
     pub step: f64,
-    /// Length and displacement increments of the last step.
-    pub last: Option<(f64, Vec<f64>)>,
+    /// The last steps.
+    pub history: History,
     /// Where the linear domain stands.
     pub domain: Option<Standing>,
     /// A matrix of the groups' tangents is in use.

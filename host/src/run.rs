@@ -1,9 +1,10 @@
 //! Running a case: phases, increments, cut-back and regrowth, results.
 
+mod history;
 mod keeper;
 mod path;
 
-use crate::assembly::{System, fold};
+use crate::assembly::{Places, System, fold};
 use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Control, Equations, PhaseInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
@@ -15,9 +16,10 @@ use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figure
 use crate::plugin::Moment;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    Costs, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
+    Costs, Guess, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
     StepFailure, StepSuccess, mesh_lines,
 };
+pub(crate) use history::History;
 use keeper::Keeper;
 use path::PathEnd;
 use std::collections::BTreeMap;
@@ -202,6 +204,7 @@ struct Run<'a> {
 struct PhaseEquations {
     /// Unknowns of the groups that iterate.
     system: System,
+    places: Places,
     /// The groups that do not.
     domain: Option<LinearDomain>,
     solver: LinearSolver,
@@ -352,7 +355,7 @@ impl<'a> Run<'a> {
                 increment: 0,
                 lambda: 0.0,
                 step: 1.0 / *phase.increments.get_ref() as f64,
-                last: None,
+                history: History::default(),
                 domain: None,
                 has_matrix: false,
                 record: PhaseRecord::new(name, equations.n(), imbalance),
@@ -533,9 +536,9 @@ impl<'a> Run<'a> {
                 start + step
             };
             let length = end - start;
-            let last = course.last.as_ref();
-            let attempt = self.attempt(&course.loads, [start, end], last, equations, record);
-            match self.without_leap(attempt, course, length) {
+            let guess = course.history.guess(length);
+            let attempt = self.attempt(&course.loads, [start, end], guess, equations, record);
+            match self.without_leap(attempt, course, equations, length) {
                 Ok(success) => {
                     if success.relaxed {
                         record.relaxed += 1;
@@ -559,7 +562,8 @@ impl<'a> Run<'a> {
                     course.step = factor * length;
                     results.cut_back(place, end, course.step, &failure.reason)?;
                     observer.cut_back(place, &failure.reason);
-                    let follows = settings.control == Control::ArcLength && course.last.is_some();
+                    let follows =
+                        settings.control == Control::ArcLength && course.history.latest().is_some();
                     if failure.defect.is_some() {
                         return Err(self.cannot_go_on(place, start, n, &failure, results)?);
                     } else if follows && course.step < PATIENCE / n as f64 {
@@ -602,7 +606,7 @@ impl<'a> Run<'a> {
             done.warning.get_or_insert_with(|| why.clone());
         }
         self.accept(&success, &course.loads, equations, lambda);
-        course.last = Some((lambda - course.lambda, success.increment));
+        course.history.add(lambda - course.lambda, success);
         course.lambda = lambda;
         if self.file().solver.control == Control::ArcLength {
             self.write_step(place, course, equations, record, results, iterations)?;
@@ -629,22 +633,18 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// One step; with a guess from the last one if there is one, else from the tangent.
+    /// One step; from a guess if there is one, else from the tangent.
     fn attempt(
         &mut self,
         loads: &Loads,
         [from, to]: [f64; 2],
-        last: Option<&(f64, Vec<f64>)>,
+        guess: Option<Guess>,
         equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
     ) -> Result<StepSuccess, StepFailure> {
-        let guess = last.map(|(length, increment)| {
-            let ratio = (to - from) / length;
-            increment.iter().map(|u| ratio * u).collect()
-        });
         let settings = &self.case.file.solver;
         let mut newton = Newton::new(
-            &equations.system,
+            (&equations.system, &equations.places),
             equations.domain.as_ref(),
             (&mut equations.solver, &mut equations.matrix),
             &mut self.groups,
@@ -668,11 +668,12 @@ impl<'a> Run<'a> {
             }
         }
         if let Some(domain) = &mut equations.domain {
-            domain.follow(&success.increment);
+            let boundary = equations.places.boundary.iter();
+            let moved: Vec<f64> = boundary.map(|&place| success.increment[place]).collect();
+            domain.follow(&moved);
         }
-        for (u, increment) in self.displacement.iter_mut().zip(&success.increment) {
-            *u += increment;
-        }
+        let places = &equations.places;
+        places.add(&success.increment, &mut self.displacement);
         let ends = loads.force_start.iter().zip(&loads.force_end);
         for (force, (start, end)) in self.force.iter_mut().zip(ends) {
             *force = start + lambda * (end - start);
@@ -809,9 +810,14 @@ impl<'a> Run<'a> {
             .iter()
             .all(|group| group.is_linear() && group.is_symmetric());
         let symmetric = domain.is_none() && all_symmetric;
-        // A dense boundary leaves nothing to dissect.
-        let own_lines = domain.is_none().then(|| system.lines(&lines));
-        let solver = LinearSolver::new(&system.pattern, symmetric, own_lines.as_deref())?;
+        let own_lines = system.lines(&lines);
+        let own_lines = Some(own_lines.as_slice());
+        let solver = match &domain {
+            Some(domain) => {
+                LinearSolver::with_block(&system.pattern, own_lines, domain.block(&system))?
+            }
+            None => LinearSolver::new(&system.pattern, symmetric, own_lines)?,
+        };
         let mut unknowns = system.free().to_vec();
         unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
         unknowns.sort_unstable();
@@ -828,6 +834,7 @@ impl<'a> Run<'a> {
             }
         }
         let mut equations = PhaseEquations {
+            places: Places::new(&system, is_prescribed),
             system,
             domain,
             solver,
@@ -839,7 +846,7 @@ impl<'a> Run<'a> {
         if let Some(course) = course {
             if course.has_matrix {
                 let restored = Newton::new(
-                    &equations.system,
+                    (&equations.system, &equations.places),
                     equations.domain.as_ref(),
                     (&mut equations.solver, &mut equations.matrix),
                     &mut self.groups,

@@ -151,7 +151,7 @@ fn a_killed_run_resumes_to_the_same_bits() {
 #[test]
 fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
     // 20 iterations are too few for the slow ones, and far beyond the layer's strength even 500.
-    for method in ["quasi_newton", "modified_newton", "initial_stress"] {
+    for method in ["auto", "quasi_newton", "modified_newton", "initial_stress"] {
         let solver = format!("method = \"{method}\"\nforce_tolerance = 1e-6");
         let text = long_case(&solver)
             .replace("max_iterations = 20", "max_iterations = 500")

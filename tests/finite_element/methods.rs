@@ -13,7 +13,7 @@ use crate::setup::{Finished, Results, run};
 use std::path::Path;
 
 const TOLERANCE: f64 = 1e-9;
-const KEPT: [&str; 3] = ["modified_newton", "initial_stress", "quasi_newton"];
+const KEPT: [&str; 4] = ["auto", "modified_newton", "initial_stress", "quasi_newton"];
 
 fn chamber(method: &str) -> Finished {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/chamber_mesh1/case.toml");

@@ -186,7 +186,8 @@ impl Strength {
     }
 }
 
-pub(crate) fn pressed(cohesion: f64, angles: [f64; 2], n: usize, integration: &str) -> Finished {
+/// The case of a cylinder that is pressed from inside.
+pub(crate) fn pressing(cohesion: f64, angles: [f64; 2], n: usize, integration: &str) -> String {
     let law = format!(
         "ground = {{ law = \"mohr_coulomb\", parameters = {{ young_modulus = {YOUNG:?}, \
          poisson_ratio = {POISSON}, cohesion = {cohesion:?}, friction_angle = {:?}, \
@@ -194,7 +195,11 @@ pub(crate) fn pressed(cohesion: f64, angles: [f64; 2], n: usize, integration: &s
         angles[0], angles[1]
     );
     let load = "increments = 40\ndisplacement = [{ line = \"inner\", r = 0.02 }]";
-    run(&text(&law, n, integration, load, ""))
+    text(&law, n, integration, load, "")
+}
+
+fn pressed(cohesion: f64, angles: [f64; 2], n: usize, integration: &str) -> Finished {
+    run(&pressing(cohesion, angles, n, integration))
 }
 
 fn assert_pressures(cohesion: f64, angles: [f64; 2], tolerance: f64) {

@@ -7,7 +7,7 @@ use crate::checkpoint::PhaseCourse;
 use crate::error::{Error, Place};
 use crate::output::{IncrementRecord, PhaseRecord, Results};
 use crate::run::{EASY, Noting, Observer};
-use crate::solver::{Measure, Newton, StepFailure, StepSuccess};
+use crate::solver::{Guess, Measure, Newton, StepFailure, StepSuccess};
 
 /// Steps along the path within one increment, at most.
 const MAX_STEPS: usize = 500;
@@ -57,7 +57,7 @@ impl Run<'_> {
         done: &mut IncrementRecord,
     ) -> Result<PathEnd, Error> {
         let start = phase.lambda;
-        let Some(mut course) = self.set_out(phase, n) else {
+        let Some(mut course) = self.set_out(phase, equations, n) else {
             let reason = "no non-linear group deforms: there is no path to follow";
             let failure = StepFailure::because(reason.to_owned());
             return Ok(PathEnd::Stopped(Box::new(failure), start));
@@ -70,9 +70,13 @@ impl Run<'_> {
             {
                 // Onto the target itself, by the load.
                 done.iterations += beyond.iterations.len();
-                let guess = (lambda - from, beyond.increment.clone());
+                let ratio = (target - from) / (lambda - from);
+                let guess = Guess {
+                    increment: beyond.increment.iter().map(|u| ratio * u).collect(),
+                    contraction: None,
+                };
                 let ends = [from, target];
-                let onto = self.attempt(&phase.loads, ends, Some(&guess), equations, record);
+                let onto = self.attempt(&phase.loads, ends, Some(guess), equations, record);
                 step = onto.map(|success| (success, target));
             }
             match step {
@@ -134,15 +138,16 @@ impl Run<'_> {
         &self,
         attempt: Result<StepSuccess, StepFailure>,
         phase: &PhaseCourse,
+        equations: &PhaseEquations,
         length: f64,
     ) -> Result<StepSuccess, StepFailure> {
         let success = attempt?;
         let followed = self.file().solver.control == Control::ArcLength;
-        let last = phase.last.as_ref().filter(|_| followed);
+        let last = phase.history.latest().filter(|_| followed);
         let Some((last_length, last)) = last else {
             return Ok(success);
         };
-        let Some(measure) = Measure::new(&self.groups, last) else {
+        let Some(measure) = Measure::new(&self.groups, &equations.places, last) else {
             return Ok(success);
         };
         let before = (measure.of(last) / last_length).abs();
@@ -161,9 +166,9 @@ impl Run<'_> {
     }
 
     /// A path from where the phase stands.
-    fn set_out(&self, phase: &PhaseCourse, n: f64) -> Option<Course> {
-        let (length, increment) = phase.last.as_ref()?;
-        let measure = Measure::new(&self.groups, increment)?;
+    fn set_out(&self, phase: &PhaseCourse, equations: &PhaseEquations, n: f64) -> Option<Course> {
+        let (length, increment) = phase.history.latest()?;
+        let measure = Measure::new(&self.groups, &equations.places, increment)?;
         let whole = measure.of(increment) / (n * length).abs();
         Some(Course {
             distance: FIRST * whole,
@@ -181,9 +186,13 @@ impl Run<'_> {
         equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
     ) -> Result<(StepSuccess, f64), StepFailure> {
-        let last = phase.last.as_ref();
+        let last = phase.history.latest();
         let known = last.and_then(|(length, increment)| {
-            Some((Measure::new(&self.groups, increment)?, length, increment))
+            Some((
+                Measure::new(&self.groups, &equations.places, increment)?,
+                length,
+                increment,
+            ))
         });
         let Some((measure, length, increment)) = known else {
             let reason = "no non-linear group deforms any more: the path ends";
@@ -197,7 +206,7 @@ impl Run<'_> {
             ..self.case.file.solver
         };
         let mut newton = Newton::new(
-            &equations.system,
+            (&equations.system, &equations.places),
             equations.domain.as_ref(),
             (&mut equations.solver, &mut equations.matrix),
             &mut self.groups,

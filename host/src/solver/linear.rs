@@ -1,24 +1,68 @@
 //! Sparse linear equations: which factorisation, and the check of every solution.
 
+use super::dense::{self, Exchanges};
 use super::multifrontal::{Kind, Multifrontal};
 use crate::assembly::Pattern;
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{ColMut, Par};
+use faer::{ColMut, MatMut, Par};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Largest backward error of an accepted solution.
 const BACKWARD_ERROR: f64 = 1e-10;
 
-/// Sparse equations of one pattern. A multifrontal factorisation does the work; where its
+/// A dense matrix that stands beside the sparse one: the condensed stiffness of a domain.
+#[derive(Debug)]
+pub struct Block {
+    /// Its equations, ascending.
+    equations: Vec<usize>,
+    /// What it is the Schur complement of.
+    factors: Arc<Multifrontal>,
+    /// Sums of the absolute values of its rows.
+    row_sums: Vec<f64>,
+    /// Its share in the matrix that was factorised last.
+    share: f64,
+}
+
+impl Block {
+    /// The Schur complement of these factors on these equations, which are as many as it keeps.
+    pub(super) fn new(equations: Vec<usize>, factors: &Arc<Multifrontal>) -> Self {
+        let mut row_sums = vec![0.0; equations.len()];
+        for column in factors.schur().chunks_exact(equations.len().max(1)) {
+            for (sum, value) in row_sums.iter_mut().zip(column) {
+                *sum += value.abs();
+            }
+        }
+        Self {
+            equations,
+            factors: Arc::clone(factors),
+            row_sums,
+            share: 1.0,
+        }
+    }
+
+    /// Column-major.
+    fn values(&self) -> &[f64] {
+        self.factors.schur()
+    }
+}
+
+/// Sparse equations of one pattern, with a dense block on some of them. A multifrontal factorisation does the work; where its
 /// restricted row exchanges lose accuracy, `faer`'s LU with full row exchanges takes over.
 #[derive(Debug)]
 pub struct LinearSolver {
     pattern: Pattern,
+    block: Option<Block>,
     multifrontal: Multifrontal,
+    /// Row exchanges among the equations of the block, which are eliminated last.
+    exchanges: Exchanges,
     values: Vec<f64>,
     /// The last matrix has been factorised by the multifrontal method.
     factorised: bool,
+    /// A solution with the last matrix has been accurate at once.
+    proven: bool,
     row_exchanges: Option<RowExchanges>,
     /// Numerical factorisations so far.
     pub factorisations: u64,
@@ -29,6 +73,8 @@ pub struct LinearSolver {
 /// The other method.
 #[derive(Debug)]
 struct RowExchanges {
+    /// Pattern of matrix and block together.
+    pattern: Pattern,
     symbolic: SymbolicLu<u32>,
     factors: Option<Lu<u32, f64>>,
 }
@@ -53,38 +99,97 @@ impl LinearSolver {
         } else {
             Kind::Unsymmetric
         };
+        Self::of_kind(kind, pattern, lines, None)
+    }
+
+    /// As [`Self::new`] for matrices that are not symmetric, with a dense block.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_block(
+        pattern: &Pattern,
+        lines: Option<&[[u32; 2]]>,
+        block: Block,
+    ) -> Result<Self, Singular> {
+        Self::of_kind(Kind::Unsymmetric, pattern, lines, Some(block))
+    }
+
+    fn of_kind(
+        kind: Kind,
+        pattern: &Pattern,
+        lines: Option<&[[u32; 2]]>,
+        block: Option<Block>,
+    ) -> Result<Self, Singular> {
+        let mut kept = vec![false; pattern.n()];
+        for &equation in block.iter().flat_map(|block| &block.equations) {
+            kept[equation] = true;
+        }
         Ok(Self {
-            multifrontal: Multifrontal::new(pattern, kind, &vec![false; pattern.n()], lines)?,
+            multifrontal: Multifrontal::new(pattern, kind, &kept, lines)?,
             pattern: pattern.clone(),
+            block,
+            exchanges: Exchanges::default(),
             values: Vec::new(),
             factorised: false,
+            proven: false,
             row_exchanges: None,
             factorisations: 0,
             fallbacks: 0,
         })
     }
 
-    /// Factorises the matrix with these values.
+    /// Factorises the matrix with these values, the block as it is.
     ///
     /// # Errors
     /// [`Singular`].
     pub fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
+        self.factorise_with(values, 1.0)
+    }
+
+    /// Factorises the matrix with these values and a multiple of the block.
+    ///
+    /// # Errors
+    /// [`Singular`].
+    pub fn factorise_with(&mut self, values: &[f64], share: f64) -> Result<(), Singular> {
         self.values.clear();
         self.values.extend_from_slice(values);
+        self.proven = false;
+        if let Some(block) = &mut self.block {
+            block.share = share;
+        }
         if let Some(other) = &mut self.row_exchanges {
             other.factors = None;
         }
-        if values.is_empty() {
+        if self.pattern.n() == 0 {
             self.factorised = true;
             return Ok(());
         }
         self.factorisations += 1;
-        self.factorised = self.multifrontal.factorise(values).is_ok();
+        self.factorised = self.factorise_fast().is_ok();
         if self.factorised {
             Ok(())
         } else {
             self.fall_back()
         }
+    }
+
+    /// Factorises with row exchanges inside supernodes only, and among the equations of the block.
+    fn factorise_fast(&mut self) -> Result<(), Singular> {
+        let Some(block) = &self.block else {
+            return self.multifrontal.factorise(&self.values);
+        };
+        let mut dense = self.multifrontal.take_schur();
+        dense.clear();
+        dense.extend_from_slice(block.values());
+        if (block.share - 1.0).abs() > 0.0 {
+            for value in &mut dense {
+                *value *= block.share;
+            }
+        }
+        self.multifrontal.factorise_onto(dense, &self.values)?;
+        let n = block.equations.len();
+        let matrix = MatMut::from_column_major_slice_mut(self.multifrontal.schur_mut(), n, n);
+        dense::factorise(matrix, &mut self.exchanges)
     }
 
     /// Factorises with full row exchanges.
@@ -93,25 +198,66 @@ impl LinearSolver {
         faer::set_global_parallelism(Par::Seq);
         self.factorised = false;
         self.fallbacks += 1;
+        let (pattern, values) = self.with_block_entries();
         let other = match &mut self.row_exchanges {
             Some(other) => other,
             none => none.insert(RowExchanges {
-                symbolic: SymbolicLu::try_new(symbolic(&self.pattern)).map_err(|_| Singular)?,
+                symbolic: SymbolicLu::try_new(symbolic(&pattern)).map_err(|_| Singular)?,
+                pattern,
                 factors: None,
             }),
         };
-        let matrix = SparseColMatRef::new(symbolic(&self.pattern), &self.values);
+        let matrix = SparseColMatRef::new(symbolic(&other.pattern), &values);
         let factors = Lu::try_new_with_symbolic(other.symbolic.clone(), matrix);
         other.factors = Some(factors.map_err(|_| Singular)?);
         Ok(())
     }
 
+    /// Matrix and block as one sparse matrix.
+    fn with_block_entries(&self) -> (Pattern, Vec<f64>) {
+        let Some(block) = &self.block else {
+            return (self.pattern.clone(), self.values.clone());
+        };
+        let mut pattern = Pattern {
+            column_start: vec![0],
+            rows: Vec::new(),
+        };
+        let mut values = Vec::new();
+        let mut columns = block
+            .equations
+            .iter()
+            .zip(block.values().chunks_exact(block.equations.len().max(1)));
+        let mut next = columns.next();
+        for column in 0..self.pattern.n() {
+            let own = self.pattern.places(column);
+            let own = own.map(|at| (self.pattern.rows[at], self.values[at]));
+            let mut entries: BTreeMap<u32, f64> = own.collect();
+            if let Some((&equation, of_block)) = next
+                && equation == column
+            {
+                for (&row, value) in block.equations.iter().zip(of_block) {
+                    *entries.entry(row as u32).or_default() += block.share * value;
+                }
+                next = columns.next();
+            }
+            pattern.rows.extend(entries.keys());
+            values.extend(entries.values());
+            pattern.column_start.push(pattern.rows.len() as u32);
+        }
+        (pattern, values)
+    }
+
     /// Solves for one right-hand side, refines the solution where that helps, and checks its
-    /// backward error.
+    /// backward error; of a matrix whose first solution was accurate, only that.
     ///
     /// # Errors
     /// [`Singular`] if the matrix was never factorised or the solution is not one.
     pub fn solve(&mut self, right: &[f64]) -> Result<Vec<f64>, Singular> {
+        if self.proven {
+            let x = self.solve_once(right)?;
+            let is_finite = x.iter().all(|value| value.is_finite());
+            return if is_finite { Ok(x) } else { Err(Singular) };
+        }
         if self.factorised {
             if let Ok(x) = self.refined(right) {
                 return Ok(x);
@@ -121,14 +267,15 @@ impl LinearSolver {
         self.refined(right)
     }
 
-    fn refined(&self, right: &[f64]) -> Result<Vec<f64>, Singular> {
+    fn refined(&mut self, right: &[f64]) -> Result<Vec<f64>, Singular> {
         let mut x = self.solve_once(right)?;
-        for _ in 0..3 {
+        for refinements in 0..3 {
             let (residual, error) = self.residual(right, &x);
             if !error.is_finite() {
                 return Err(Singular);
             }
             if error <= BACKWARD_ERROR {
+                self.proven = refinements == 0;
                 return Ok(x);
             }
             let correction = self.solve_once(&residual)?;
@@ -139,7 +286,10 @@ impl LinearSolver {
 
     fn solve_once(&self, right: &[f64]) -> Result<Vec<f64>, Singular> {
         if self.factorised {
-            let (y, kept) = self.multifrontal.forward(right, None);
+            let (y, mut kept) = self.multifrontal.forward(right, None);
+            if self.block.is_some() {
+                kept = dense::solve(self.multifrontal.schur(), &self.exchanges, &kept);
+            }
             return Ok(self.multifrontal.backward(&y, &kept, None));
         }
         let other = self
@@ -162,6 +312,20 @@ impl LinearSolver {
                 let row = self.pattern.rows[at] as usize;
                 residual[row] -= self.values[at] * x[column];
                 row_sums[row] += self.values[at].abs();
+            }
+        }
+        if let Some(block) = &self.block {
+            let at = block.equations.iter();
+            let n = block.equations.len().max(1);
+            let mut product = vec![0.0; n];
+            for (&column, values) in at.clone().zip(block.values().chunks_exact(n)) {
+                for (sum, value) in product.iter_mut().zip(values) {
+                    *sum += value * x[column];
+                }
+            }
+            for ((&row, product), row_sum) in at.zip(product).zip(&block.row_sums) {
+                residual[row] -= block.share * product;
+                row_sums[row] += block.share * row_sum;
             }
         }
         let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));

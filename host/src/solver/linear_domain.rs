@@ -18,6 +18,7 @@
 //! the next complete one.
 
 use super::Singular;
+use super::linear::Block;
 use super::multifrontal::{Kind, Multifrontal};
 use super::newton::{ACCEPTED_ROUND_OFF, Loads, STILL_SMALL, last_bit_scattered, norm};
 use crate::assembly::{Pattern, System, Tie};
@@ -29,7 +30,7 @@ use std::sync::Arc;
 
 /// Corrections of a complete state, at most.
 const REFINEMENTS: usize = 3;
-/// A complete state whose residual is within this of the tolerance is left as it is.
+/// A complete state whose residual is within this of the tolerance is not corrected at all.
 const REFINED: f64 = 0.1;
 /// Matrices whose factors are remembered.
 const REMEMBERED: usize = 3;
@@ -155,6 +156,8 @@ pub struct LinearDomain {
     factors: Arc<Multifrontal>,
     /// Whether the factors were made for this phase.
     pub factorised: bool,
+    /// Largest entry of the boundary's stiffness.
+    pub largest: f64,
     /// Degrees of freedom of the boundary, in the order of the Schur complement.
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
@@ -248,7 +251,9 @@ impl LinearDomain {
         };
         let free = system.free();
         let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();
+        let largest = |largest: f64, value: &f64| largest.max(value.abs());
         let domain = Self {
+            largest: factors.schur().iter().fold(0.0, largest),
             standing: Standing::default(),
             part: None,
             whole: None,
@@ -261,6 +266,12 @@ impl LinearDomain {
             condensed: Vec::new(),
         };
         Ok(Some((domain, rest)))
+    }
+
+    /// The domain as a dense block in the equations of the rest.
+    pub fn block(&self, rest: &System) -> Block {
+        let equations = self.boundary.iter().filter_map(|&dof| rest.equation(dof));
+        Block::new(equations.collect(), &self.factors)
     }
 
     /// Stiffness of the boundary, column-major: S of (2).
@@ -360,14 +371,14 @@ impl LinearDomain {
         }
     }
 
-    /// The boundary has moved by these increments (by degree of freedom).
+    /// The boundary has moved by these increments, in the order of the system's boundary.
     pub fn follow(&mut self, increment: &[f64]) {
         let Standing {
             complete, latest, ..
         } = &mut self.standing;
         for origin in [complete, latest] {
-            for (moved, &dof) in origin.moved.iter_mut().zip(&self.boundary) {
-                *moved += increment[dof];
+            for (moved, increment) in origin.moved.iter_mut().zip(increment) {
+                *moved += increment;
             }
         }
     }
@@ -508,11 +519,11 @@ impl LinearDomain {
             if relative <= REFINED * goal.tolerance {
                 break (0.0, internal);
             }
+            if relative <= goal.tolerance && before.is_finite() {
+                break (0.0, internal);
+            }
             // A residual that no longer falls has come down to round-off.
             if relative > 0.5 * before || tries.next().is_none() {
-                if relative <= goal.tolerance {
-                    break (0.0, internal);
-                }
                 let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
                 if relative <= ACCEPTED_ROUND_OFF * last_bit && relative <= STILL_SMALL {
                     break (relative, internal);

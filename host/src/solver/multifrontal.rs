@@ -13,11 +13,10 @@
 //! row exchanges inside a supernode only. The caller checks solutions by their residual and has
 //! another method at hand for matrices that need more.
 
-use super::{Singular, dissection};
+use super::{Singular, dense, dissection};
 use crate::assembly::Pattern;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor as cholesky_kernel;
-use faer::linalg::lu::partial_pivoting::factor as lu_kernel;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul as triangular_matmul};
 use faer::linalg::triangular_solve as triangular;
@@ -98,9 +97,8 @@ struct Shape {
 struct Front {
     /// L below U₁₁ (n × k, column-major), then, if unsymmetric, U₁₂ (k × m, column-major).
     values: Vec<f64>,
-    /// Row exchanges inside the pivot block, and their inverse.
-    exchange: Vec<usize>,
-    exchange_inverse: Vec<usize>,
+    /// Row exchanges inside the pivot block.
+    exchanges: dense::Exchanges,
 }
 
 /// A factorised matrix.
@@ -140,16 +138,39 @@ impl Multifrontal {
         &self.schur
     }
 
+    /// Its memory, for the next one.
+    pub(super) fn take_schur(&mut self) -> Vec<f64> {
+        std::mem::take(&mut self.schur)
+    }
+
+    /// As [`Self::schur`], to be worked on.
+    pub(super) fn schur_mut(&mut self) -> &mut [f64] {
+        &mut self.schur
+    }
+
     /// Factorises a matrix of the analysed pattern.
     ///
     /// # Errors
     /// [`Singular`]: a pivot vanishes, or a symmetric matrix is not positive definite.
     pub(super) fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
-        let analysis = &self.analysis;
-        let n = analysis.kept.len();
-        let mut schur = std::mem::take(&mut self.schur);
+        let n = self.analysis.kept.len();
+        let mut schur = self.take_schur();
         schur.clear();
         schur.resize(n * n, 0.0);
+        self.factorise_onto(schur, values)
+    }
+
+    /// As [`Self::factorise`]; the Schur complement is added to a matrix of the kept equations.
+    ///
+    /// # Errors
+    /// As [`Self::factorise`].
+    pub(super) fn factorise_onto(
+        &mut self,
+        mut schur: Vec<f64>,
+        values: &[f64],
+    ) -> Result<(), Singular> {
+        let analysis = &self.analysis;
+        let n = analysis.kept.len();
         for entry in &analysis.kept_entries {
             schur[entry.target as usize] += values[entry.source as usize];
         }
@@ -280,24 +301,10 @@ impl Multifrontal {
             subtract_square(&mut update, m, below.rb());
             return Ok(update);
         }
-        front.exchange.resize(k, 0);
-        front.exchange_inverse.resize(k, 0);
-        let scratch = lu_kernel::lu_in_place_scratch::<usize, f64>(k, k, Par::Seq, Spec::default());
-        let mut memory = MemBuffer::new(scratch);
-        lu_kernel::lu_in_place(
-            pivots.rb_mut(),
-            &mut front.exchange,
-            &mut front.exchange_inverse,
-            Par::Seq,
-            MemStack::new(&mut memory),
-            Spec::default(),
-        );
-        if (0..k).any(|i| pivots[(i, i)].abs() < f64::MIN_POSITIVE || !pivots[(i, i)].is_finite()) {
-            return Err(Singular);
-        }
+        dense::factorise(pivots.rb_mut(), &mut front.exchanges)?;
         let mut exchanged = vec![0.0; k];
         for column in u.chunks_exact_mut(k) {
-            for (value, &from) in exchanged.iter_mut().zip(&front.exchange) {
+            for (value, &from) in exchanged.iter_mut().zip(&front.exchanges.forward) {
                 *value = column[from];
             }
             column.copy_from_slice(&exchanged);
@@ -353,7 +360,10 @@ impl Multifrontal {
             let start = shape.pivots.start;
             match analysis.kind {
                 Kind::Symmetric => own.extend_from_slice(&y[shape.pivots.clone()]),
-                Kind::Unsymmetric => own.extend(front.exchange.iter().map(|&from| y[start + from])),
+                Kind::Unsymmetric => {
+                    let exchanged = front.exchanges.forward.iter();
+                    own.extend(exchanged.map(|&from| y[start + from]));
+                }
             }
             own.resize(n, 0.0);
             for j in 0..k {
@@ -428,8 +438,18 @@ impl Multifrontal {
     }
 }
 
+/// a·b, added up in eight sums that can be worked on at once.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let (a, of_a) = a.as_chunks::<8>();
+    let (b, of_b) = b.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..8 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    let rest: f64 = of_a.iter().zip(of_b).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 /// Adds a child's update to its parent's front (L: n × k, U: k × m) and update (m × m).
@@ -797,7 +817,8 @@ impl Supernodes {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let lines = lines.filter(|_| n >= WORTH_DISSECTING);
+        // Chains of unknowns between kept ones: minimum degree would not see those.
+        let lines = lines.filter(|_| n >= WORTH_DISSECTING || n < pattern.n());
         let (mut forward, mut inverse) = (Vec::new(), vec![0; n]);
         if let Some(lines) = lines {
             let of_eliminated = eliminated.iter().map(|&equation| lines[equation as usize]);

@@ -1,5 +1,7 @@
 //! Newton iterations and a line search; with consistent tangents, or with a matrix that is kept.
 //! Viscous relaxation where full Newton iterations come to a standstill, or arc-length control.
+//!
+//! Displacements and forces are vectors by place ([`Places`]) if nothing else is said.
 
 mod acceleration;
 mod matrix;
@@ -12,7 +14,7 @@ pub use path::Measure;
 use super::diagnosis::{self, Snapshot};
 use super::linear::LinearSolver;
 use super::linear_domain::LinearDomain;
-use crate::assembly::System;
+use crate::assembly::{Places, System};
 use crate::case::{Control, Method, SolverInput};
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
@@ -139,10 +141,20 @@ pub struct Costs {
     pub factorisations: u64,
 }
 
+/// Where the iterations of a step start.
+#[derive(Clone, Debug)]
+pub struct Guess {
+    /// Displacement increments, by place.
+    pub increment: Vec<f64>,
+    /// Fraction of the residual that the first correction will probably leave, as it did in the
+    /// last step; `None` if nothing is known.
+    pub contraction: Option<f64>,
+}
+
 /// A step that reached equilibrium. The groups' trial state is that of equilibrium.
 #[derive(Clone, Debug)]
 pub struct StepSuccess {
-    /// Displacement increments, by degree of freedom.
+    /// Displacement increments, by place.
     pub increment: Vec<f64>,
     /// What happened.
     pub iterations: Vec<Iteration>,
@@ -190,6 +202,7 @@ impl StepFailure {
 pub struct Newton<'a> {
     /// Unknowns.
     system: &'a System,
+    places: &'a Places,
     /// Linear groups that stand beside the system as one element.
     domain: Option<&'a LinearDomain>,
     /// Equations.
@@ -209,15 +222,23 @@ pub struct Newton<'a> {
     renewed: bool,
     /// The kept matrix makes too little progress.
     stalls: bool,
+    /// Fraction of the residual that the next correction will probably leave if the matrix is kept.
+    contraction: f64,
     /// Forces of the domain at the end of the step if its boundary stays where it is.
     domain_forces: Vec<f64>,
+    /// Room for displacements and forces by degree of freedom; the forces are zero between
+    /// evaluations.
+    displacement: Vec<f64>,
+    force: Vec<f64>,
 }
 
 /// A step's end.
 struct Task<'t> {
-    /// External forces, by degree of freedom.
+    /// External forces.
     external: &'t [f64],
-    /// Increments of prescribed displacements, by degree of freedom.
+    /// Norm of those on all degrees of freedom.
+    imposed: f64,
+    /// Increments of prescribed displacements.
     prescribed: &'t [f64],
     /// Time at the start, and its increment.
     period: (f64, f64),
@@ -233,7 +254,7 @@ struct Balance {
 impl<'a> Newton<'a> {
     /// Iterations on these elements and equations.
     pub fn new(
-        system: &'a System,
+        (system, places): (&'a System, &'a Places),
         domain: Option<&'a LinearDomain>,
         (solver, matrix): (&'a mut LinearSolver, &'a mut Matrix),
         groups: &'a mut [Group],
@@ -247,6 +268,7 @@ impl<'a> Newton<'a> {
         matrix.is_constant = included.all(|(_, group)| group.is_linear());
         Self {
             system,
+            places,
             domain,
             solver,
             matrix,
@@ -257,7 +279,10 @@ impl<'a> Newton<'a> {
             tangents: Operator::None,
             renewed: false,
             stalls: false,
+            contraction: f64::INFINITY,
             domain_forces: Vec::new(),
+            displacement: vec![0.0; system.n_dofs()],
+            force: vec![0.0; system.n_dofs()],
         }
     }
 
@@ -267,7 +292,7 @@ impl<'a> Newton<'a> {
     /// It is singular.
     pub fn restore_matrix(&mut self) -> Result<(), StepFailure> {
         let values = self.stiffness();
-        self.factorise(&values)?;
+        self.factorise(&values, 1.0)?;
         self.matrix.hold();
         Ok(())
     }
@@ -283,10 +308,12 @@ impl<'a> Newton<'a> {
         lambda_start: f64,
         lambda_end: f64,
         time: f64,
-        guess: Option<Vec<f64>>,
+        guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
         self.scale = loads.scale;
-        self.renewed = false;
+        self.begin();
+        let contraction = guess.as_ref().and_then(|guess| guess.contraction);
+        self.contraction = contraction.unwrap_or(f64::INFINITY);
         if let Some(domain) = self.domain {
             self.domain_forces = domain.forces_at(lambda_end);
         }
@@ -309,18 +336,20 @@ impl<'a> Newton<'a> {
         loads: &Loads,
         [lambda_start, lambda_end]: [f64; 2],
         time: f64,
-        guess: Option<Vec<f64>>,
+        guess: Option<Guess>,
         iterations: &mut Vec<Iteration>,
     ) -> Result<StepSuccess, StepFailure> {
         let external = loads.external(lambda_end);
         let prescribed = loads.prescribed_increments(lambda_start, lambda_end);
+        let prescribed = self.places.gather(&prescribed);
         let task = Task {
-            external: &external,
+            external: &self.places.gather(&external),
+            imposed: norm(&external).max(self.scale),
             prescribed: &prescribed,
             period: (time, lambda_end - lambda_start),
         };
         let mut increment = match guess {
-            Some(guess) => self.completed(guess, loads, &prescribed),
+            Some(guess) => self.completed(guess.increment, &prescribed),
             None => self.predict(&task)?,
         };
         let operator = self.operator();
@@ -335,18 +364,17 @@ impl<'a> Newton<'a> {
         let mut relaxation: Option<Relaxation> = None;
         let relaxes = self.settings.relaxation
             && self.settings.control == Control::Load
-            && self.settings.method == Method::Newton;
+            && self.settings.method.is_newton();
         let mut may_relax = relaxes;
         // Where Newton iterations first came to a standstill, and how many they were.
         let mut standstill = (Vec::new(), 0);
         // Where the last series of Newton iterations starts.
         let mut first = 0;
         loop {
-            let last = iterations[iterations.len() - 1];
             let series = &iterations[first..];
             let stands_still = relaxation::stands_still(series);
             let is_over = series.len() > self.settings.max_iterations();
-            let is_equilibrium = self.is_equilibrium(&balance, &last);
+            let is_equilibrium = self.is_equilibrium(&balance, &series[series.len() - 1]);
             let ends = stands_still || is_over;
             if is_equilibrium || (ends && self.is_round_off(&increment, &balance, &task)) {
                 let round_off = if is_equilibrium {
@@ -389,7 +417,7 @@ impl<'a> Newton<'a> {
                 continue;
             }
             self.stalls = stalls(&iterations[since..]);
-            if self.prepare(&increment, &task)? {
+            if self.renew(&iterations[first..], &increment, &task)? {
                 since = iterations.len() - 1;
                 acceleration = quasi.then(Acceleration::default);
             }
@@ -398,7 +426,7 @@ impl<'a> Newton<'a> {
                 correction = acceleration.improve(correction);
             }
             let relative = norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE);
-            let ends = self.probably_ends(&iterations[first..], relative);
+            let ends = self.probably_ends(balance.relative, relative);
             let (step_length, next, at) =
                 self.search(&increment, &correction, &balance, &task, ends)?;
             if let Some(acceleration) = &mut acceleration {
@@ -417,22 +445,36 @@ impl<'a> Newton<'a> {
         Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
     }
 
-    /// A guess with the increments of prescribed and tied degrees of freedom.
-    fn completed(&self, mut guess: Vec<f64>, loads: &Loads, prescribed: &[f64]) -> Vec<f64> {
-        for &(dof, ..) in &loads.prescribed {
-            guess[dof] = prescribed[dof];
+    /// Takes up what the last correction achieved, and renews the matrix where the method wants it.
+    /// Says whether there is another one now.
+    fn renew(
+        &mut self,
+        iterations: &[Iteration],
+        increment: &[f64],
+        task: &Task<'_>,
+    ) -> Result<bool, StepFailure> {
+        let achieved = achieved(iterations);
+        self.contraction = achieved.unwrap_or(self.contraction);
+        let renewed = self.prepare(increment, task)?;
+        if renewed && achieved.is_some() {
+            // The residual will fall quadratically: r₃ / r₂ = (r₂ / r₁)².
+            self.contraction *= self.contraction;
         }
-        self.system.follow(&mut guess);
+        Ok(renewed)
+    }
+
+    /// A guess with the increments of prescribed and tied degrees of freedom.
+    fn completed(&self, mut guess: Vec<f64>, prescribed: &[f64]) -> Vec<f64> {
+        for &place in &self.places.prescribed {
+            guess[place] = prescribed[place];
+        }
+        self.places.follow(&mut guess);
         guess
     }
 
-    /// Whether a correction of this relative size will probably be the last one, the residual
-    /// falling quadratically: r₃ = r₂ (r₂/r₁)².
-    fn probably_ends(&self, iterations: &[Iteration], correction: f64) -> bool {
-        let [.., before, last] = iterations else {
-            return false;
-        };
-        let expected = last.residual * (last.residual / before.residual).powi(2);
+    /// Whether a correction of this relative size will probably be the last one.
+    fn probably_ends(&self, residual: f64, correction: f64) -> bool {
+        let expected = residual * self.contraction;
         let tolerance = self.settings.force_tolerance;
         expected <= EXACT * tolerance
             || (expected <= tolerance && correction <= self.settings.displacement_tolerance)
@@ -458,7 +500,7 @@ impl<'a> Newton<'a> {
         }
         let operator = self.tangents;
         let mut scattered = last_bit_scattered(increment);
-        self.system.follow(&mut scattered);
+        self.places.follow(&mut scattered);
         let moved = self.evaluate(&scattered, task, Operator::None);
         let again = self.evaluate(increment, task, operator);
         let (Ok(moved), Ok(_)) = (moved, again) else {
@@ -502,9 +544,10 @@ impl<'a> Newton<'a> {
         balance: &Balance,
         task: &Task<'_>,
     ) -> Option<String> {
-        if self.settings.method != Method::Newton {
+        if !self.settings.method.is_newton() {
             return None;
         }
+        self.contraction = f64::INFINITY;
         self.prepare(increment, task).ok()?;
         let before = Snapshot::of(self.groups);
         let correction = self.solve(&balance.residual, None).ok()?;
@@ -525,7 +568,7 @@ impl<'a> Newton<'a> {
         for (value, prescribed) in increment.iter_mut().zip(task.prescribed) {
             *value += prescribed;
         }
-        self.system.follow(&mut increment);
+        self.places.follow(&mut increment);
         Ok(increment)
     }
 
@@ -596,45 +639,31 @@ impl<'a> Newton<'a> {
         task: &Task<'_>,
         operator: Operator,
     ) -> Result<Balance, PointFailure> {
-        let (time, time_increment) = task.period;
-        let external = task.external;
         let start = Instant::now();
         self.will_compute(operator);
         self.costs.evaluations += 1;
-        let mut internal = vec![0.0; increment.len()];
-        let mut unreliable = None;
-        for (number, group) in self.groups.iter_mut().enumerate() {
-            if !self.system.includes(number) {
-                continue;
-            }
-            let success = group.evaluate(increment, operator, time, time_increment)?;
-            group
-                .kinematics
-                .add_forces(&group.stress.trial, &mut internal);
-            unreliable = unreliable.or(success
-                .unreliable
-                .map(|(_, why)| format!("group `{}`: {why}", group.name)));
-        }
+        self.places.scatter(increment, &mut self.displacement);
+        let outcome = self.evaluate_groups(task.period, operator);
+        let mut internal = self.places.take(&mut self.force);
+        let unreliable = outcome?;
         self.tangents = operator;
-        self.system.fold(&mut internal);
+        self.places.fold(&mut internal);
         // Forces in play before those of the domain cancel them out.
         let in_play = norm(&internal);
         if let Some(domain) = self.domain {
-            let boundary = self.system.boundary();
-            let moved: Vec<f64> = boundary.iter().map(|&dof| increment[dof]).collect();
+            let boundary = &self.places.boundary;
+            let moved: Vec<f64> = boundary.iter().map(|&place| increment[place]).collect();
             let mut forces = self.domain_forces.clone();
             domain.add_product(&moved, &mut forces);
-            for (&dof, force) in boundary.iter().zip(forces) {
-                internal[dof] += force;
+            for (&place, force) in boundary.iter().zip(forces) {
+                internal[place] += force;
             }
         }
-        let residual: Vec<f64> = self
-            .system
-            .free()
-            .iter()
-            .map(|&dof| external[dof] - internal[dof])
+        let free = self.places.free.iter();
+        let residual: Vec<f64> = free
+            .map(|&place| task.external[place] - internal[place])
             .collect();
-        let imposed = norm(external).max(self.scale);
+        let imposed = task.imposed;
         // Where no force has ever acted, what is below round-off of K u counts as none.
         let floor = if imposed > 0.0 {
             0.0
@@ -652,6 +681,43 @@ impl<'a> Newton<'a> {
             unreliable,
         })
     }
+
+    /// Trial state of the groups under the displacements in their room; the forces are added up in
+    /// theirs. Says which law calls its result unreliable.
+    fn evaluate_groups(
+        &mut self,
+        (time, time_increment): (f64, f64),
+        operator: Operator,
+    ) -> Result<Option<String>, PointFailure> {
+        let mut unreliable = None;
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            if !self.system.includes(number) {
+                continue;
+            }
+            let success = group.evaluate(&self.displacement, operator, time, time_increment)?;
+            group
+                .kinematics
+                .add_forces(&group.stress.trial, &mut self.force);
+            unreliable = unreliable.or(success
+                .unreliable
+                .map(|(_, why)| format!("group `{}`: {why}", group.name)));
+        }
+        Ok(unreliable)
+    }
+}
+
+/// Fraction of the residual that the last correction left; `None` before the first one, infinite if
+/// it was not taken as a whole.
+fn achieved(iterations: &[Iteration]) -> Option<f64> {
+    let [.., before, last] = iterations else {
+        return None;
+    };
+    let is_whole = last.step_length >= 1.0 && last.viscosity <= 0.0;
+    Some(if is_whole {
+        last.residual / before.residual
+    } else {
+        f64::INFINITY
+    })
 }
 
 /// Whether iterations with one matrix make too little progress.

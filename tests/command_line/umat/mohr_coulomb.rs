@@ -178,7 +178,7 @@ fn its_own_tangent_converges_quadratically() {
             ),
             (
                 "[solver]",
-                "flow = { group = \"soil\", quantity = \"plastic_strain\" }\n\n[solver]",
+                "flow = { group = \"soil\", quantity = \"plastic_strain\" }\n\n[solver]\nmethod = \"newton\"",
             ),
         ];
         let text = edits.iter().fold(text, |text, (from, to)| {

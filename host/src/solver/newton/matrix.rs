@@ -5,11 +5,18 @@ use crate::case::Method;
 use crate::plugin::Operator;
 use std::time::Instant;
 
-/// What the solver of a phase holds factorised. As long as it is `held`, the groups keep the
-/// tangents it was assembled from: evaluations then ask their laws for none.
+/// A matrix is kept as long as each correction leaves no more than this fraction of the residual:
+/// of equations beside a condensed domain, and of all others. Found by trial: a few iterations more
+/// are cheap where the laws of an interface are all there is to evaluate.
+const FAST: [f64; 2] = [0.1, 0.01];
+
+/// What the solver of a phase holds factorised.
 #[derive(Debug, Default)]
 pub struct Matrix {
+    /// There is one to compute corrections with.
     held: bool,
+    /// The groups still keep the tangents it was assembled from.
+    has_tangents: bool,
     /// There is only one: all groups are linear.
     pub(super) is_constant: bool,
     /// Largest entry.
@@ -19,21 +26,29 @@ pub struct Matrix {
 impl Matrix {
     pub(super) fn hold(&mut self) {
         self.held = true;
+        self.has_tangents = true;
     }
 
     /// Whether this matrix outlives the step under this method.
     pub fn is_kept(&self, method: Method) -> bool {
-        let outlives = matches!(method, Method::InitialStress | Method::QuasiNewton);
-        self.held && (self.is_constant || outlives)
+        let outlives = !matches!(method, Method::Newton | Method::ModifiedNewton);
+        self.held && self.has_tangents && (self.is_constant || outlives)
     }
 }
 
 impl Newton<'_> {
+    /// Begins a step: with the matrix of the last one only if an interrupted run would have it, too.
+    pub(super) fn begin(&mut self) {
+        self.renewed = false;
+        self.matrix.held &= self.matrix.has_tangents;
+    }
+
     /// Whether the next correction needs another matrix.
     fn renews(&self) -> bool {
         !self.matrix.held
             || !self.matrix.is_constant
                 && match self.settings.method {
+                    Method::Auto => self.contraction > FAST[usize::from(self.domain.is_none())],
                     Method::Newton => true,
                     Method::ModifiedNewton => !self.renewed,
                     Method::InitialStress => false,
@@ -54,7 +69,7 @@ impl Newton<'_> {
     pub(super) fn will_compute(&mut self, operator: Operator) {
         self.tangents = Operator::None;
         if operator != Operator::None && !self.matrix.is_constant {
-            self.matrix.held = false;
+            self.matrix.has_tangents = false;
         }
     }
 
@@ -78,35 +93,33 @@ impl Newton<'_> {
                 .map_err(failed_law)?;
         }
         let values = self.stiffness();
-        self.factorise(&values)?;
-        self.matrix.held = true;
+        self.factorise(&values, 1.0)?;
+        self.matrix.hold();
         self.renewed = true;
         self.stalls = false;
         Ok(true)
     }
 
-    /// The matrix from the tangents that the groups hold.
+    /// The matrix from the tangents that the groups hold, without the domain.
     pub(super) fn stiffness(&mut self) -> Vec<f64> {
         let start = Instant::now();
         let mut values = Vec::new();
         self.system.assemble(self.groups, &mut values);
-        if let Some(domain) = self.domain {
-            self.system.add_domain(domain.stiffness(), &mut values);
-        }
         let largest = |largest: f64, value: &f64| largest.max(value.abs());
-        self.matrix.largest = values.iter().fold(0.0, largest);
+        let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
+        self.matrix.largest = values.iter().fold(of_domain, largest);
         self.costs.assembly += start.elapsed();
         values
     }
 
-    /// Factorises a matrix.
+    /// Factorises a matrix with a multiple of the domain's stiffness.
     ///
     /// # Errors
     /// It is singular.
-    pub(super) fn factorise(&mut self, values: &[f64]) -> Result<(), StepFailure> {
+    pub(super) fn factorise(&mut self, values: &[f64], share: f64) -> Result<(), StepFailure> {
         let start = Instant::now();
         self.matrix.held = false;
-        let outcome = self.solver.factorise(values);
+        let outcome = self.solver.factorise_with(values, share);
         self.costs.equations += start.elapsed();
         self.costs.factorisations += 1;
         outcome.map_err(|_| singular())
@@ -124,8 +137,9 @@ impl Newton<'_> {
         let start = Instant::now();
         let mut coupling = vec![0.0; residual.len()];
         if let Some(increment) = prescribed {
-            self.system
-                .prescribed_forces(self.groups, increment, &mut coupling);
+            self.places.scatter(increment, &mut self.displacement);
+            let (system, increment) = (self.system, &self.displacement);
+            system.prescribed_forces(self.groups, increment, &mut coupling);
         }
         self.costs.assembly += start.elapsed();
         let start = Instant::now();
@@ -133,11 +147,11 @@ impl Newton<'_> {
         let solution = self.solver.solve(&right);
         self.costs.equations += start.elapsed();
         let solution = solution.map_err(|_| singular())?;
-        let mut correction = vec![0.0; self.system.n_dofs()];
-        for (&dof, value) in self.system.free().iter().zip(solution) {
-            correction[dof] = value;
+        let mut correction = vec![0.0; self.places.n()];
+        for (&place, value) in self.places.free.iter().zip(solution) {
+            correction[place] = value;
         }
-        self.system.follow(&mut correction);
+        self.places.follow(&mut correction);
         Ok(correction)
     }
 }

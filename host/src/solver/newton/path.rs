@@ -13,6 +13,7 @@
 //! - K δ_r = r, K δ_q = q = dr/dλ (prescribed displacements included, also in δ_q), dλ = (s − c·(Δu + δ_r)) / c·δ_q, δ = δ_r + dλ δ_q.
 
 use super::{Iteration, Loads, Newton, StepFailure, StepSuccess, Task, failed_law, norm, plain};
+use crate::assembly::Places;
 use crate::case::Formulation;
 use crate::group::Group;
 
@@ -26,18 +27,19 @@ pub struct Measure {
 }
 
 impl Measure {
-    /// That of the direction of a step, given by its displacement increments (by degree of
-    /// freedom). `None` if no non-linear group has deformed. Interfaces alone count if there are
+    /// That of the direction of a step, given by its displacement increments (by place). `None` if no non-linear group has deformed. Interfaces alone count if there are
     /// any: their jumps, in metres, cannot be added to strains.
-    pub fn new(groups: &[Group], increment: &[f64]) -> Option<Self> {
+    pub fn new(groups: &[Group], places: &Places, increment: &[f64]) -> Option<Self> {
         let is_interface = |group: &&Group| group.formulation != Formulation::Solid;
         let nonlinear = || groups.iter().filter(|group| !group.is_linear());
         let any_interface = nonlinear().any(|group| is_interface(&group));
-        let mut weights = vec![0.0; increment.len()];
+        let mut displacement = vec![0.0; places.n_dofs()];
+        places.scatter(increment, &mut displacement);
+        let mut weights = vec![0.0; places.n_dofs()];
         let mut square = 0.0;
         for group in nonlinear().filter(|group| is_interface(group) == any_interface) {
             let mut strains = vec![0.0; group.strain.trial.len()];
-            group.kinematics.add_gradients(increment, &mut strains);
+            group.kinematics.add_gradients(&displacement, &mut strains);
             let n = group.kinematics.n_components();
             for (point, strain) in strains.chunks_exact_mut(n).enumerate() {
                 let weight = group.kinematics.weight(point);
@@ -57,6 +59,7 @@ impl Measure {
             group.kinematics.add_forces(&strains, &mut weights);
         }
         let size = square.sqrt();
+        let mut weights = places.take(&mut weights);
         (size > 0.0).then(|| {
             for weight in &mut weights {
                 *weight /= size;
@@ -85,7 +88,7 @@ impl Newton<'_> {
         guess: (Vec<f64>, f64),
     ) -> Result<(StepSuccess, f64), StepFailure> {
         self.scale = loads.scale;
-        self.renewed = false;
+        self.begin();
         let mut iterations = Vec::new();
         let outcome = self.iterate_along(
             loads,
@@ -108,14 +111,15 @@ impl Newton<'_> {
         (mut increment, mut rise): (Vec<f64>, f64),
         iterations: &mut Vec<Iteration>,
     ) -> Result<(StepSuccess, f64), StepFailure> {
-        let rate = loads.prescribed_rate();
+        let rate = self.places.gather(&loads.prescribed_rate());
         let right = self.load_rate(loads);
-        let mut balance = self.evaluate_along(loads, [from, time], &mut increment, rise)?;
+        let mut balance = self.evaluate_along(loads, &rate, [from, time], &mut increment, rise)?;
         iterations.push(Iteration::first(&balance));
         for _ in 0..self.settings.max_iterations() {
             let external = loads.external(from + rise);
             let task = Task {
-                external: &external,
+                external: &self.places.gather(&external),
+                imposed: norm(&external).max(self.scale),
                 prescribed: &[],
                 period: (time + from, rise.abs()),
             };
@@ -125,7 +129,7 @@ impl Newton<'_> {
             for (value, rate) in of_load.iter_mut().zip(&rate) {
                 *value += rate;
             }
-            self.system.follow(&mut of_load);
+            self.places.follow(&mut of_load);
             let missing = distance - measure.of(&increment) - measure.of(&of_residual);
             let more = missing / measure.of(&of_load);
             if !more.is_finite() {
@@ -153,7 +157,7 @@ impl Newton<'_> {
                 let mut moved: Vec<f64> = moved.map(|(u, d)| u + length * d).collect();
                 let risen = rise + length * more;
                 let is_last = lengths.peek().is_none();
-                match self.evaluate_along(loads, [from, time], &mut moved, risen) {
+                match self.evaluate_along(loads, &rate, [from, time], &mut moved, risen) {
                     Ok(at) if is_last || at.relative <= balance.relative => {
                         (increment, balance, rise) = (moved, at, risen);
                         break length;
@@ -194,20 +198,22 @@ impl Newton<'_> {
     fn evaluate_along(
         &mut self,
         loads: &Loads,
+        rate: &[f64],
         [from, time]: [f64; 2],
         increment: &mut [f64],
         rise: f64,
     ) -> Result<super::Balance, StepFailure> {
         let external = loads.external(from + rise);
-        for &(dof, start, end) in &loads.prescribed {
-            increment[dof] = rise * (end - start);
+        for &place in &self.places.prescribed {
+            increment[place] = rise * rate[place];
         }
-        self.system.follow(increment);
+        self.places.follow(increment);
         if let Some(domain) = self.domain {
             self.domain_forces = domain.forces_at(from + rise);
         }
         let task = Task {
-            external: &external,
+            external: &self.places.gather(&external),
+            imposed: norm(&external).max(self.scale),
             prescribed: &[],
             period: (time + from, rise.abs()),
         };
@@ -219,13 +225,13 @@ impl Newton<'_> {
     /// Change of the residual with the load factor at constant displacements, by equation; without
     /// that of prescribed displacements in the groups that iterate.
     fn load_rate(&self, loads: &Loads) -> Vec<f64> {
-        let mut rate: Vec<f64> = loads.external_rate();
+        let mut rate = self.places.gather(&loads.external_rate());
         if let Some(domain) = self.domain {
-            let boundary = self.system.boundary().iter();
-            for (&dof, force) in boundary.zip(domain.load_rate()) {
-                rate[dof] += force;
+            let boundary = self.places.boundary.iter();
+            for (&place, force) in boundary.zip(domain.load_rate()) {
+                rate[place] += force;
             }
         }
-        self.system.free().iter().map(|&dof| rate[dof]).collect()
+        self.places.free.iter().map(|&place| rate[place]).collect()
     }
 }

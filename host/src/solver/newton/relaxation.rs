@@ -36,9 +36,9 @@ const PROGRESS: f64 = 0.9;
 /// A relaxation under way.
 #[derive(Debug)]
 pub(super) struct Relaxation {
-    /// Elastic stiffness, in the matrix's pattern.
+    /// Elastic stiffness, in the matrix's pattern; without the domain.
     elastic: Vec<f64>,
-    /// Displacement increments reached, by degree of freedom.
+    /// Displacement increments reached.
     increment: Vec<f64>,
     /// Viscous steps so far.
     steps: usize,
@@ -67,12 +67,12 @@ impl Newton<'_> {
         let still = vec![0.0; task.external.len()];
         let before = self.evaluate(&still, task, Operator::Elastic).ok()?;
         let elastic = self.stiffness();
-        self.factorise(&elastic).ok()?;
+        self.factorise(&elastic, 1.0).ok()?;
         let mut increment = self.solve(&before.residual, Some(task.prescribed)).ok()?;
         for (value, prescribed) in increment.iter_mut().zip(task.prescribed) {
             *value += prescribed;
         }
-        self.system.follow(&mut increment);
+        self.places.follow(&mut increment);
         Some(Relaxation {
             elastic,
             increment,
@@ -134,7 +134,7 @@ impl Newton<'_> {
         for (value, elastic) in values.iter_mut().zip(elastic) {
             *value += VISCOSITY * elastic;
         }
-        self.factorise(&values)?;
+        self.factorise(&values, 1.0 + VISCOSITY)?;
         self.solve(residual, None)
     }
 }
