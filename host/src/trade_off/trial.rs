@@ -4,7 +4,9 @@ use super::clock::cpu_seconds;
 use super::division::divide;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
-use crate::case::{Case, Equations, Formulation, Integration, OutputInput, SolverInput};
+use crate::case::{
+    Case, Equations, Formulation, Integration, Method, OutputInput, SolverInput,
+};
 use crate::error::{Error, Place};
 use crate::input::set_parameters;
 use crate::run::{Observer, run};
@@ -26,6 +28,15 @@ impl std::fmt::Debug for SolverChoice {
 
 /// All choices of the solver that a study tries.
 pub(super) const SOLVER_CHOICES: &[SolverChoice] = &[
+    choice("method", "auto", |s| s.method = Method::Auto),
+    choice("method", "newton", |s| s.method = Method::Newton),
+    choice("method", "modified_newton", |s| {
+        s.method = Method::ModifiedNewton;
+    }),
+    choice("method", "initial_stress", |s| {
+        s.method = Method::InitialStress;
+    }),
+    choice("method", "quasi_newton", |s| s.method = Method::QuasiNewton),
     choice("equations", "auto", |s| s.equations = Equations::Auto),
     choice("equations", "condensed", |s| {
         s.equations = Equations::Condensed;
