@@ -7,6 +7,7 @@
 use crate::group::Group;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Elements that one thread takes at a time.
 const PIECE: usize = 256;
@@ -88,7 +89,7 @@ pub struct System {
     /// Positions in the matrix of every pair of them, column-major.
     boundary_slots: Vec<u32>,
     /// Pattern of the matrix.
-    pub pattern: Pattern,
+    pub pattern: Arc<Pattern>,
 }
 
 /// How an element's matrix goes into the system's.
@@ -163,7 +164,7 @@ impl System {
             elements,
             boundary,
             boundary_slots,
-            pattern,
+            pattern: Arc::new(pattern),
         }
     }
 
@@ -194,7 +195,7 @@ impl System {
     }
 
     /// Gives up what only the matrix needs, which will not be assembled again. Returns its pattern.
-    pub fn forget_matrix(&mut self) -> Pattern {
+    pub fn forget_matrix(&mut self) -> Arc<Pattern> {
         for map in self.elements.iter_mut().flatten() {
             map.slots = Vec::new();
         }

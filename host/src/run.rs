@@ -78,7 +78,9 @@ pub fn check(case: &Case) -> Result<(), Error> {
 /// of equilibrium has been written.
 pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Figures, Error> {
     let options = Options::default();
-    run_reusing(case, folder, observer, &mut Reuse::default(), options)
+    let mut reuse = Reuse::default();
+    reuse.is_last_run = true;
+    run_reusing(case, folder, observer, &mut reuse, options)
 }
 
 /// As [`run`], with what earlier runs have factorised, and with checkpoints.
@@ -333,7 +335,7 @@ impl<'a> Run<'a> {
             .map(|dof| self.prescribed.contains_key(&dof))
             .collect();
         let (mut equations, loads) = self
-            .equations(&is_prescribed, loads, course.as_ref())
+            .equations(number, &is_prescribed, loads, course.as_ref())
             .map_err(|Singular| Error::NoEquilibrium {
                 message: format!("phase `{name}`: the equations are singular"),
                 hint: Some("a part of the model is not supported".to_owned()),
@@ -781,23 +783,24 @@ impl<'a> Run<'a> {
     /// balance at its start.
     fn equations(
         &mut self,
+        number: usize,
         is_prescribed: &[bool],
         mut loads: Loads,
         course: Option<&PhaseCourse>,
     ) -> Result<(PhaseEquations, Loads), Singular> {
         let (case, groups, ties) = (self.case, &self.groups, &self.model.ties);
         let lines = mesh_lines(&self.mesh.nodes);
-        let wanted = self.file().solver.equations;
+        self.reuse.is_last_phase = number + 1 == case.file.phases.len();
+        let wanted = case.file.solver.equations;
         let condensed = if wanted == Equations::Sparse {
             None
         } else {
             // Groups that are held by the others alone cannot be condensed.
             let always = wanted == Equations::Condensed;
-            // A case of one phase has nothing to reuse, unless others follow it.
-            let may_recur = case.variant.is_some() || case.file.phases.len() > 1;
-            let reuse = may_recur.then_some(&mut *self.reuse);
+            let reuse = Some(&mut *self.reuse);
             LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
         };
+        self.reuse.forget();
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),
             None => (

@@ -6,6 +6,7 @@ use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{ColMut, Par};
+use std::sync::Arc;
 
 /// Largest backward error of an accepted solution.
 const BACKWARD_ERROR: f64 = 1e-10;
@@ -14,7 +15,7 @@ const BACKWARD_ERROR: f64 = 1e-10;
 /// restricted row exchanges lose accuracy, `faer`'s LU with full row exchanges takes over.
 #[derive(Debug)]
 pub struct LinearSolver {
-    pattern: Pattern,
+    pattern: Arc<Pattern>,
     multifrontal: Multifrontal,
     values: Vec<f64>,
     /// The last matrix has been factorised by the multifrontal method.
@@ -44,7 +45,7 @@ impl LinearSolver {
     /// # Errors
     /// [`Singular`] if the pattern alone makes the matrix singular, or memory runs out.
     pub fn new(
-        pattern: &Pattern,
+        pattern: &Arc<Pattern>,
         symmetric: bool,
         lines: Option<&[[u32; 2]]>,
     ) -> Result<Self, Singular> {
@@ -55,7 +56,7 @@ impl LinearSolver {
         };
         Ok(Self {
             multifrontal: Multifrontal::new(pattern, kind, &vec![false; pattern.n()], lines)?,
-            pattern: pattern.clone(),
+            pattern: Arc::clone(pattern),
             values: Vec::new(),
             factorised: false,
             row_exchanges: None,
@@ -68,18 +69,17 @@ impl LinearSolver {
     ///
     /// # Errors
     /// [`Singular`].
-    pub fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
-        self.values.clear();
-        self.values.extend_from_slice(values);
+    pub fn factorise(&mut self, values: Vec<f64>) -> Result<(), Singular> {
+        self.values = values;
         if let Some(other) = &mut self.row_exchanges {
             other.factors = None;
         }
-        if values.is_empty() {
+        if self.values.is_empty() {
             self.factorised = true;
             return Ok(());
         }
         self.factorisations += 1;
-        self.factorised = self.multifrontal.factorise(values).is_ok();
+        self.factorised = self.multifrontal.factorise(&self.values).is_ok();
         if self.factorised {
             Ok(())
         } else {
@@ -186,18 +186,18 @@ fn symbolic(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, u32> {
 mod tests {
     use super::*;
 
-    fn two_by_two() -> Pattern {
-        Pattern {
+    fn two_by_two() -> Arc<Pattern> {
+        Arc::new(Pattern {
             column_start: vec![0, 2, 4],
             rows: vec![0, 1, 0, 1],
-        }
+        })
     }
 
     #[test]
     fn solves_an_unsymmetric_system() {
         let mut solver = LinearSolver::new(&two_by_two(), false, None).unwrap();
         // Columns (4, 1), (2, 3).
-        solver.factorise(&[4.0, 1.0, 2.0, 3.0]).unwrap();
+        solver.factorise(vec![4.0, 1.0, 2.0, 3.0]).unwrap();
         let x = solver.solve(&[8.0, 7.0]).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
     }
@@ -223,8 +223,8 @@ mod tests {
             }
             pattern.column_start.push(pattern.rows.len() as u32);
         }
-        let mut solver = LinearSolver::new(&pattern, false, None).unwrap();
-        solver.factorise(&values).unwrap();
+        let mut solver = LinearSolver::new(&Arc::new(pattern), false, None).unwrap();
+        solver.factorise(values).unwrap();
         let x = solver.solve(&vec![1.0; n]).unwrap();
         assert!(x.iter().all(|x| (x - 0.5).abs() < 1e-15));
     }
@@ -232,8 +232,8 @@ mod tests {
     #[test]
     fn refuses_a_singular_system() {
         let mut solver = LinearSolver::new(&two_by_two(), false, None).unwrap();
-        let refused =
-            solver.factorise(&[1.0, 2.0, 2.0, 4.0]).is_err() || solver.solve(&[1.0, 1.0]).is_err();
+        let refused = solver.factorise(vec![1.0, 2.0, 2.0, 4.0]).is_err()
+            || solver.solve(&[1.0, 1.0]).is_err();
         assert!(refused);
     }
 }

@@ -267,7 +267,7 @@ impl<'a> Newton<'a> {
     /// It is singular.
     pub fn restore_matrix(&mut self) -> Result<(), StepFailure> {
         let values = self.stiffness();
-        self.factorise(&values)?;
+        self.factorise(values)?;
         self.matrix.hold();
         Ok(())
     }

@@ -78,7 +78,7 @@ impl Newton<'_> {
                 .map_err(failed_law)?;
         }
         let values = self.stiffness();
-        self.factorise(&values)?;
+        self.factorise(values)?;
         self.matrix.held = true;
         self.renewed = true;
         self.stalls = false;
@@ -103,7 +103,7 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// It is singular.
-    pub(super) fn factorise(&mut self, values: &[f64]) -> Result<(), StepFailure> {
+    pub(super) fn factorise(&mut self, values: Vec<f64>) -> Result<(), StepFailure> {
         let start = Instant::now();
         self.matrix.held = false;
         let outcome = self.solver.factorise(values);
