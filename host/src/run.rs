@@ -116,7 +116,7 @@ pub fn run_reusing(
             return Ok(checkpoint.results.figures(case, &probes));
         };
         observer.resumed(from.as_ref());
-        observer.warnings = checkpoint.warnings;
+        observer.warnings = checkpoint.warnings.into_owned();
         let results = Results::resume(folder, case, &model, &probes, checkpoint.results)?;
         (results, Some(state))
     } else {
@@ -299,7 +299,7 @@ impl<'a> Run<'a> {
 
     fn phases(
         &mut self,
-        state: Option<RunState>,
+        state: Option<RunState<'_>>,
         results: &mut Results,
         observer: &mut Noting<'_>,
         keeper: &mut Keeper,
@@ -394,6 +394,8 @@ impl<'a> Run<'a> {
                 .map_err(|failure| cannot_start(&self.case.source, self.file(), &failure))?;
         }
         Model::check_layers(self.case, &self.groups)?;
+        // The equations of the phase are set up in the room of trial states.
+        self.groups.iter_mut().for_each(Group::forget_trial);
         let mut loads = self.loads(phase);
         fold(&self.model.ties, &mut loads.force_start);
         fold(&self.model.ties, &mut loads.force_end);
@@ -455,13 +457,11 @@ impl<'a> Run<'a> {
             course.increment = increment;
             let stops = observer.wants_to_stop();
             if stops || keeper.is_due() {
-                let course = PhaseCourse {
-                    domain: equations.domain.as_ref().map(|d| d.standing().clone()),
-                    has_matrix: equations.matrix.is_kept(self.file().solver.method),
-                    record: equations.counted_in(record),
-                    ..course.clone()
-                };
-                keeper.keep(self.state(number, course), results, &observer.warnings)?;
+                course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
+                course.has_matrix = equations.matrix.is_kept(self.file().solver.method);
+                course.record = equations.counted_in(record);
+                keeper.keep(self.state(number, &course), results, &observer.warnings)?;
+                course.domain = None;
             }
             if stops {
                 return Err(Error::Interrupted { place });
