@@ -107,7 +107,11 @@ fn factorise(bencher: Bencher<'_, '_>, mesh: &str, symmetric: bool) {
     let values = equations.matrix();
     bencher
         .counter(ItemsCount::new(pattern.n()))
-        .bench_local(|| solver.factorise(&values).expect("the matrix is regular"));
+        .bench_local(|| {
+            solver
+                .factorise(values.clone())
+                .expect("the matrix is regular");
+        });
     assert_eq!(solver.fallbacks, 0, "the fast method did the work");
 }
 
@@ -129,7 +133,7 @@ fn solution(bencher: Bencher<'_, '_>, mesh: &str) {
     let equations = Equations::new(mesh);
     let pattern = &equations.system.pattern;
     let mut solver = equations.solver(false);
-    let factorised = solver.factorise(&equations.matrix());
+    let factorised = solver.factorise(equations.matrix());
     factorised.expect("the matrix is regular");
     let right = vec![1.0; pattern.n()];
     bencher

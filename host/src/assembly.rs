@@ -7,6 +7,7 @@
 use crate::group::Group;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Elements that one thread takes at a time.
 const PIECE: usize = 256;
@@ -93,7 +94,7 @@ pub struct System {
     /// Degrees of freedom that are shared with a domain beside the groups.
     boundary: Vec<usize>,
     /// Pattern of the matrix of the groups.
-    pub pattern: Pattern,
+    pub pattern: Arc<Pattern>,
 }
 
 /// The degrees of freedom that take part in the iterations, used by the groups or prescribed: those
@@ -262,7 +263,7 @@ impl System {
             ties: ties.to_vec(),
             elements,
             boundary,
-            pattern,
+            pattern: Arc::new(pattern),
         }
     }
 
@@ -293,7 +294,7 @@ impl System {
     }
 
     /// Gives up what only the matrix needs, which will not be assembled again. Returns its pattern.
-    pub fn forget_matrix(&mut self) -> Pattern {
+    pub fn forget_matrix(&mut self) -> Arc<Pattern> {
         for map in self.elements.iter_mut().flatten() {
             map.slots = Vec::new();
         }

@@ -9,14 +9,16 @@ use crate::error::{Error, Place};
 use crate::group::GroupState;
 use crate::model::Model;
 use crate::output::{PhaseRecord, ResultsState, unwritable};
-use crate::plugin::hexadecimal_sha256;
+use crate::plugin::{hexadecimal, hexadecimal_sha256};
 use crate::run::History;
 use crate::solver::{Loads, Standing};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::Write as _;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// Name of the file in a results folder.
@@ -25,39 +27,42 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of the file: the format and its version.
 const HEAD: &[u8] = b"pilum checkpoint 3\n";
 
+/// Bytes that are summed and written at a time: they stay in the processor's cache.
+const PIECE: usize = 1 << 17;
+
 /// A run after a whole increment.
 #[derive(Debug, Serialize, Deserialize)]
-pub struct Checkpoint {
-    identity: String,
+pub struct Checkpoint<'c> {
+    identity: Cow<'c, str>,
     /// The results so far.
     pub results: ResultsState,
     /// Warnings so far.
-    pub warnings: Vec<String>,
+    pub warnings: Cow<'c, [String]>,
     /// The run; `None` if it has come to its end.
-    pub run: Option<RunState>,
+    pub run: Option<RunState<'c>>,
 }
 
 /// State of a run.
 #[derive(Debug, Serialize, Deserialize)]
-pub struct RunState {
+pub struct RunState<'c> {
     /// Number of the phase, from 0.
     pub phase: usize,
     /// Groups.
-    pub groups: Vec<GroupState>,
+    pub groups: Vec<GroupState<'c>>,
     /// Displacements by degree of freedom.
-    pub displacement: Vec<f64>,
+    pub displacement: Cow<'c, [f64]>,
     /// Prescribed displacements by degree of freedom.
-    pub prescribed: BTreeMap<usize, f64>,
+    pub prescribed: Cow<'c, BTreeMap<usize, f64>>,
     /// Pressures by line.
-    pub pressure: BTreeMap<String, f64>,
+    pub pressure: Cow<'c, BTreeMap<String, f64>>,
     /// External forces by degree of freedom.
-    pub force: Vec<f64>,
+    pub force: Cow<'c, [f64]>,
     /// Pseudo-time at the start of the phase.
     pub time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     pub largest_force: f64,
     /// Where the phase stands.
-    pub course: PhaseCourse,
+    pub course: Cow<'c, PhaseCourse>,
 }
 
 /// Where a phase stands.
@@ -81,18 +86,18 @@ pub struct PhaseCourse {
     pub record: PhaseRecord,
 }
 
-impl Checkpoint {
+impl<'c> Checkpoint<'c> {
     /// A checkpoint of this case.
     pub fn new(
-        identity: &str,
+        identity: &'c str,
         results: ResultsState,
-        warnings: &[String],
-        run: Option<RunState>,
+        warnings: &'c [String],
+        run: Option<RunState<'c>>,
     ) -> Self {
         Self {
-            identity: identity.to_owned(),
+            identity: identity.into(),
             results,
-            warnings: warnings.to_vec(),
+            warnings: warnings.into(),
             run,
         }
     }
@@ -102,15 +107,9 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::Unwritable`]; the earlier one is still there.
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
-        let body = postcard::to_stdvec(self).map_err(|e| Error::Internal(e.to_string()))?;
         let path = folder.join(FILE_NAME);
         let partial = folder.join(format!("{FILE_NAME}.part"));
-        let written = File::create(&partial).and_then(|mut file| {
-            file.write_all(HEAD)?;
-            file.write_all(hexadecimal_sha256(&body).as_bytes())?;
-            file.write_all(&body)?;
-            file.sync_all()
-        });
+        let written = File::create(&partial).and_then(|file| self.write_to(file));
         written
             .and_then(|()| std::fs::rename(&partial, &path))
             .map_err(|error| {
@@ -119,11 +118,34 @@ impl Checkpoint {
             })
     }
 
+    /// Writes it into a file without a copy of it in memory: the checksum follows what it is of.
+    fn write_to(&self, mut file: File) -> io::Result<()> {
+        file.write_all(HEAD)?;
+        file.write_all(&[b' '; 64])?;
+        let body = Summed {
+            file,
+            sum: Sha256::new(),
+            outcome: Ok(()),
+        };
+        let mut body = BufWriter::with_capacity(PIECE, body);
+        let encoded = postcard::to_io(self, &mut body).map(|_| ());
+        let Summed {
+            mut file,
+            sum,
+            outcome,
+        } = body.into_inner().map_err(io::IntoInnerError::into_error)?;
+        outcome?;
+        encoded.map_err(io::Error::other)?;
+        file.seek(SeekFrom::Start(HEAD.len() as u64))?;
+        file.write_all(hexadecimal(&sum.finalize()).as_bytes())?;
+        file.sync_all()
+    }
+
     /// Reads the checkpoint of a run of this identity; `None` if there is none.
     ///
     /// # Errors
     /// It cannot be read, is damaged, or belongs to another run.
-    pub fn read(folder: &Path, identity: &str) -> Result<Option<Self>, Error> {
+    pub fn read(folder: &Path, identity: &str) -> Result<Option<Checkpoint<'static>>, Error> {
         let path = folder.join(FILE_NAME);
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
@@ -156,7 +178,29 @@ impl Checkpoint {
     }
 }
 
-fn decode(bytes: &[u8]) -> Option<Checkpoint> {
+/// A file with the checksum of what is written into it.
+struct Summed {
+    file: File,
+    sum: Sha256,
+    /// The encoder would take a failure for one of its own: it is kept until everything is encoded.
+    outcome: io::Result<()>,
+}
+
+impl Write for Summed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.outcome.is_ok() {
+            self.sum.update(bytes);
+            self.outcome = self.file.write_all(bytes);
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn decode(bytes: &[u8]) -> Option<Checkpoint<'static>> {
     let rest = bytes.strip_prefix(HEAD)?;
     let (checksum, body) = rest.split_at_checked(64)?;
     (hexadecimal_sha256(body).as_bytes() == checksum).then_some(())?;

@@ -13,6 +13,7 @@ use abi::status::Outcome;
 use layer::Layer;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Points that one thread takes at a time.
@@ -30,20 +31,33 @@ type Batch<'a> = (usize, &'a mut [f64], &'a mut [f64], &'a mut [f64]);
 pub struct Field {
     /// At the start of the increment.
     pub committed: Vec<f64>,
-    /// As of the last iteration.
+    /// As of the last iteration; empty before the first one of a phase.
     pub trial: Vec<f64>,
 }
 
 impl Field {
     fn new(committed: Vec<f64>) -> Self {
         Self {
-            trial: committed.clone(),
             committed,
+            trial: Vec::new(),
+        }
+    }
+
+    /// Makes room for a trial state.
+    fn begin(&mut self) {
+        if self.trial.len() != self.committed.len() {
+            self.trial.clone_from(&self.committed);
         }
     }
 
     fn commit(&mut self) {
-        self.committed.copy_from_slice(&self.trial);
+        if !self.trial.is_empty() {
+            self.committed.copy_from_slice(&self.trial);
+        }
+    }
+
+    fn forget_trial(&mut self) {
+        self.trial = Vec::new();
     }
 }
 
@@ -126,16 +140,16 @@ impl std::fmt::Display for PointFailure {
 
 /// What a group carries from one increment to the next.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct GroupState {
+pub struct GroupState<'g> {
     /// Name of the law in the case file.
-    law: String,
-    strain: Vec<f64>,
-    stress: Vec<f64>,
-    internal: Vec<f64>,
-    jump: Vec<f64>,
-    law_calls: Vec<LawCalls>,
+    law: Cow<'g, str>,
+    strain: Cow<'g, [f64]>,
+    stress: Cow<'g, [f64]>,
+    internal: Cow<'g, [f64]>,
+    jump: Cow<'g, [f64]>,
+    law_calls: Cow<'g, [LawCalls]>,
     /// Tangents, where a matrix made of them is still in use.
-    tangent: Option<Vec<f64>>,
+    tangent: Option<Cow<'g, [f64]>>,
 }
 
 /// A group of elements.
@@ -217,16 +231,16 @@ impl Group {
     }
 
     /// The committed state; with the tangents of the last evaluation if they are wanted.
-    pub fn state(&self, with_tangents: bool) -> GroupState {
-        let jump = self.layer.as_ref().map(|layer| &layer.jump.committed);
+    pub fn state(&self, with_tangents: bool) -> GroupState<'_> {
+        let jump = self.layer.as_ref().map(|layer| &layer.jump.committed[..]);
         GroupState {
-            law: self.law.name.clone(),
-            strain: self.strain.committed.clone(),
-            stress: self.stress.committed.clone(),
-            internal: self.internal.committed.clone(),
-            jump: jump.cloned().unwrap_or_default(),
-            law_calls: self.law_calls.clone(),
-            tangent: with_tangents.then(|| self.tangent.clone()),
+            law: (&self.law.name).into(),
+            strain: (&self.strain.committed).into(),
+            stress: (&self.stress.committed).into(),
+            internal: (&self.internal.committed).into(),
+            jump: jump.unwrap_or_default().into(),
+            law_calls: (&self.law_calls).into(),
+            tangent: with_tangents.then(|| (&self.tangent).into()),
         }
     }
 
@@ -235,7 +249,7 @@ impl Group {
     ///
     /// # Errors
     /// The state is not that of this group, or its law has no elastic operator.
-    pub fn restore(&mut self, state: GroupState, laws: &[GroupLaw]) -> Result<(), String> {
+    pub fn restore(&mut self, state: GroupState<'_>, laws: &[GroupLaw]) -> Result<(), String> {
         let wrong = || format!("the state is not that of group `{}`", self.name);
         let known = laws.iter().chain([&self.law]);
         let law = known.into_iter().find(|law| law.name == state.law);
@@ -252,22 +266,22 @@ impl Group {
         {
             return Err(wrong());
         }
-        self.stress = Field::new(state.stress);
-        self.start_law(law, Some(state.internal.clone()))
+        self.stress = Field::new(state.stress.into_owned());
+        self.start_law(law, Some(state.internal.to_vec()))
             .map_err(|failure| failure.to_string())?;
         // Initial values that the case file gives held at the start of the law only.
-        self.internal = Field::new(state.internal);
-        self.strain = Field::new(state.strain);
+        self.internal = Field::new(state.internal.into_owned());
+        self.strain = Field::new(state.strain.into_owned());
         if let Some(layer) = &mut self.layer {
-            layer.jump = Field::new(state.jump);
+            layer.jump = Field::new(state.jump.into_owned());
         }
         if let Some(tangent) = state.tangent {
             if tangent.len() != self.tangent.len() {
                 return Err(format!("the state is not that of group `{}`", self.name));
             }
-            self.tangent = tangent;
+            self.tangent = tangent.into_owned();
         }
-        self.law_calls = state.law_calls;
+        self.law_calls = state.law_calls.into_owned();
         Ok(())
     }
 
@@ -321,10 +335,8 @@ impl Group {
             if let Some(layer) = &mut self.layer {
                 layer.start(&operator, starts_anew);
             }
-            self.stress.trial.copy_from_slice(&self.stress.committed);
-            self.internal
-                .trial
-                .copy_from_slice(&self.internal.committed);
+            // That was no state of the group's, only a call of its law.
+            self.forget_trial();
         }
         Ok(())
     }
@@ -389,7 +401,7 @@ impl Group {
         time: f64,
         time_increment: f64,
     ) -> Result<BatchSuccess, PointFailure> {
-        self.strain.trial.copy_from_slice(&self.strain.committed);
+        self.strain.trial.clone_from(&self.strain.committed);
         self.kinematics
             .add_gradients(increment, &mut self.strain.trial);
         if self.tangents_are_constant {
@@ -423,6 +435,7 @@ impl Group {
 
     /// σ = σ₀ + D Δε.
     fn evaluate_linear(&mut self) {
+        self.stress.begin();
         let n = self.kinematics.n_components();
         let points = self
             .stress
@@ -513,6 +526,9 @@ impl Group {
         operators: &mut [f64],
     ) -> Result<BatchSuccess, BatchFailure> {
         self.count(self.kinematics.n_points(), operator);
+        for field in self.fields() {
+            field.begin();
+        }
         let place = self.flux_place();
         let gradient = match &self.layer {
             Some(layer) if self.law.built.law.n_components() == 2 => &layer.jump,
@@ -627,12 +643,18 @@ impl Group {
 
     /// Makes the trial state the committed one.
     pub fn commit(&mut self) {
-        self.strain.commit();
-        self.stress.commit();
-        self.internal.commit();
-        if let Some(layer) = &mut self.layer {
-            layer.jump.commit();
-        }
+        self.fields().for_each(Field::commit);
+    }
+
+    /// Gives up the room of the trial state until the next one is computed.
+    pub fn forget_trial(&mut self) {
+        self.fields().for_each(Field::forget_trial);
+    }
+
+    fn fields(&mut self) -> impl Iterator<Item = &mut Field> {
+        let jump = self.layer.as_mut().map(|layer| &mut layer.jump);
+        let others = [&mut self.strain, &mut self.stress, &mut self.internal];
+        others.into_iter().chain(jump)
     }
 
     /// Thickness at a point of a thin layer.

@@ -506,7 +506,8 @@ fn run_cases(
     let mut folders = Vec::new();
     // Variants on one mesh share the factors of its linear part.
     let mut reuse = Reuse::default();
-    for case in &cases {
+    for (number, case) in (1..).zip(&cases) {
+        reuse.is_last_run = number == cases.len();
         let folder = match (out, &case.variant) {
             (None, _) => case.default_folder(),
             (Some(out), Some(name)) if variant.is_none() => out.join(name),

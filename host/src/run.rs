@@ -80,7 +80,9 @@ pub fn check(case: &Case) -> Result<(), Error> {
 /// of equilibrium has been written.
 pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Figures, Error> {
     let options = Options::default();
-    run_reusing(case, folder, observer, &mut Reuse::default(), options)
+    let mut reuse = Reuse::default();
+    reuse.is_last_run = true;
+    run_reusing(case, folder, observer, &mut reuse, options)
 }
 
 /// As [`run`], with what earlier runs have factorised, and with checkpoints.
@@ -116,7 +118,7 @@ pub fn run_reusing(
             return Ok(checkpoint.results.figures(case, &probes));
         };
         observer.resumed(from.as_ref());
-        observer.warnings = checkpoint.warnings;
+        observer.warnings = checkpoint.warnings.into_owned();
         let results = Results::resume(folder, case, &model, &probes, checkpoint.results)?;
         (results, Some(state))
     } else {
@@ -300,7 +302,7 @@ impl<'a> Run<'a> {
 
     fn phases(
         &mut self,
-        state: Option<RunState>,
+        state: Option<RunState<'_>>,
         results: &mut Results,
         observer: &mut Noting<'_>,
         keeper: &mut Keeper,
@@ -336,7 +338,7 @@ impl<'a> Run<'a> {
             .map(|dof| self.prescribed.contains_key(&dof))
             .collect();
         let (mut equations, loads) = self
-            .equations(&is_prescribed, loads, course.as_ref())
+            .equations(number, &is_prescribed, loads, course.as_ref())
             .map_err(|Singular| Error::NoEquilibrium {
                 message: format!("phase `{name}`: the equations are singular"),
                 hint: Some("a part of the model is not supported".to_owned()),
@@ -395,6 +397,8 @@ impl<'a> Run<'a> {
                 .map_err(|failure| cannot_start(&self.case.source, self.file(), &failure))?;
         }
         Model::check_layers(self.case, &self.groups)?;
+        // The equations of the phase are set up in the room of trial states.
+        self.groups.iter_mut().for_each(Group::forget_trial);
         let mut loads = self.loads(phase);
         fold(&self.model.ties, &mut loads.force_start);
         fold(&self.model.ties, &mut loads.force_end);
@@ -456,13 +460,11 @@ impl<'a> Run<'a> {
             course.increment = increment;
             let stops = observer.wants_to_stop();
             if stops || keeper.is_due() {
-                let course = PhaseCourse {
-                    domain: equations.domain.as_ref().map(|d| d.standing().clone()),
-                    has_matrix: equations.matrix.is_kept(self.file().solver.method),
-                    record: equations.counted_in(record),
-                    ..course.clone()
-                };
-                keeper.keep(self.state(number, course), results, &observer.warnings)?;
+                course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
+                course.has_matrix = equations.matrix.is_kept(self.file().solver.method);
+                course.record = equations.counted_in(record);
+                keeper.keep(self.state(number, &course), results, &observer.warnings)?;
+                course.domain = None;
             }
             if stops {
                 return Err(Error::Interrupted { place });
@@ -782,23 +784,24 @@ impl<'a> Run<'a> {
     /// balance at its start.
     fn equations(
         &mut self,
+        number: usize,
         is_prescribed: &[bool],
         mut loads: Loads,
         course: Option<&PhaseCourse>,
     ) -> Result<(PhaseEquations, Loads), Singular> {
         let (case, groups, ties) = (self.case, &self.groups, &self.model.ties);
         let lines = mesh_lines(&self.mesh.nodes);
-        let wanted = self.file().solver.equations;
+        self.reuse.is_last_phase = number + 1 == case.file.phases.len();
+        let wanted = case.file.solver.equations;
         let condensed = if wanted == Equations::Sparse {
             None
         } else {
             // Groups that are held by the others alone cannot be condensed.
             let always = wanted == Equations::Condensed;
-            // A case of one phase has nothing to reuse, unless others follow it.
-            let may_recur = case.variant.is_some() || case.file.phases.len() > 1;
-            let reuse = may_recur.then_some(&mut *self.reuse);
+            let reuse = Some(&mut *self.reuse);
             LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
         };
+        self.reuse.forget();
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),
             None => (

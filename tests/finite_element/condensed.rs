@@ -99,14 +99,19 @@ fn variants_on_one_mesh_share_the_factors_of_the_ground() {
                     [[variant]]\nname = \"smooth\"\nlaws.mepi.parameters.mu_p = 0.6\n\
                     [[variant]]\nname = \"soft_ground\"\nlaws.sand.parameters.young_modulus = 30e3\n";
     let mut reuse = Reuse::default();
+    let mut nothing = Reuse::default();
+    nothing.is_last_run = true;
     let cases = chamber("chamber_mesh1", variants);
     let mut factorised = Vec::new();
     let mut alone = Vec::new();
     let mut together = Vec::new();
+    let mut last = Vec::new();
     for case in &cases {
         for (reuse, rows) in [
             (&mut reuse, &mut together),
             (&mut Reuse::default(), &mut alone),
+            // Where nothing follows, nothing is kept.
+            (&mut nothing, &mut last),
         ] {
             let folder = tempfile::tempdir().unwrap();
             run_reusing(
@@ -123,12 +128,14 @@ fn variants_on_one_mesh_share_the_factors_of_the_ground() {
     }
     // Confinement and loading hold different displacements, so each run of its own factorises
     // its ground in both phases; in the loading of the second variant one is saved.
-    let [_, _, shared, own, changed, changed_own] = factorised[..] else {
-        panic!("six runs")
+    let [_, _, _, shared, own, own_last, changed, changed_own, _] = factorised[..] else {
+        panic!("nine runs")
     };
     assert_eq!(shared + 1, own);
+    assert_eq!(own_last, own);
     assert_eq!(changed, changed_own);
     assert!(alone == together, "reuse changes results");
+    assert!(alone == last, "what is not kept changes results");
 }
 
 /// A column on a linear thin layer with mean strain: its mid-thickness nodes are tied. Beside it one

@@ -53,7 +53,6 @@ impl Layer {
         if anew {
             self.jump.committed.fill(0.0);
         }
-        self.jump.trial.copy_from_slice(&self.jump.committed);
         for (stiffness, operator) in self.stiffness.iter_mut().zip(operators.chunks_exact(4)) {
             *stiffness = [operator[0], operator[3]];
         }
@@ -99,6 +98,7 @@ impl Layer {
 
     /// Trial jumps, equation (1) in increments.
     pub(super) fn jumps_from_strains(&mut self, strain_0: &[f64], strain: &[f64]) {
+        self.jump.begin();
         for point in 0..self.stiffness.len() {
             let Moduli { t, kappa, .. } = self.moduli(point);
             let change = |c: usize| strain[4 * point + c] - strain_0[4 * point + c];

@@ -5,6 +5,7 @@ use crate::checkpoint::{Checkpoint, PhaseCourse, RunState};
 use crate::error::Error;
 use crate::group::{Group, GroupLaw};
 use crate::output::Results;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -31,7 +32,7 @@ impl Keeper {
     ///
     /// # Errors
     /// It is damaged, or belongs to another run.
-    pub(super) fn found(&self) -> Result<Option<Checkpoint>, Error> {
+    pub(super) fn found(&self) -> Result<Option<Checkpoint<'static>>, Error> {
         Checkpoint::read(&self.folder, &self.identity)
     }
 
@@ -42,7 +43,7 @@ impl Keeper {
 
     pub(super) fn keep(
         &mut self,
-        run: RunState,
+        run: RunState<'_>,
         results: &Results,
         warnings: &[String],
     ) -> Result<(), Error> {
@@ -66,26 +67,30 @@ impl Keeper {
 
 impl Run<'_> {
     /// The state after a whole increment of a phase.
-    pub(super) fn state(&self, phase: usize, course: PhaseCourse) -> RunState {
-        let state = |group: &Group| group.state(course.has_matrix);
+    pub(super) fn state<'s>(&'s self, phase: usize, course: &'s PhaseCourse) -> RunState<'s> {
+        let state = |group: &'s Group| group.state(course.has_matrix);
         RunState {
             phase,
             groups: self.groups.iter().map(state).collect(),
-            displacement: self.displacement.clone(),
-            prescribed: self.prescribed.clone(),
-            pressure: self.pressure.clone(),
-            force: self.force.clone(),
+            displacement: (&self.displacement).into(),
+            prescribed: Cow::Borrowed(&self.prescribed),
+            pressure: Cow::Borrowed(&self.pressure),
+            force: (&self.force).into(),
             time: self.time,
             largest_force: self.largest_force,
-            course,
+            course: Cow::Borrowed(course),
         }
     }
 
     /// Takes over a state that [`Self::state`] gave. Returns where its phase stands.
-    pub(super) fn restore(&mut self, state: RunState) -> Result<PhaseCourse, Error> {
+    pub(super) fn restore(&mut self, state: RunState<'_>) -> Result<PhaseCourse, Error> {
         let n_dofs = self.displacement.len();
         let course = &state.course;
-        let sizes = [&state.displacement, &state.force, &course.loads.force_start];
+        let sizes = [
+            &state.displacement[..],
+            &state.force,
+            &course.loads.force_start,
+        ];
         if state.groups.len() != self.groups.len() || sizes.iter().any(|v| v.len() != n_dofs) {
             let message = "the checkpoint is not that of this mesh; run without --resume";
             return Err(Error::Usage(message.to_owned()));
@@ -97,12 +102,12 @@ impl Run<'_> {
             let laws: Vec<GroupLaw> = laws.map(|(_, law)| law.clone()).collect();
             group.restore(state, &laws).map_err(Error::Internal)?;
         }
-        self.displacement = state.displacement;
-        self.prescribed = state.prescribed;
-        self.pressure = state.pressure;
-        self.force = state.force;
+        self.displacement = state.displacement.into_owned();
+        self.prescribed = state.prescribed.into_owned();
+        self.pressure = state.pressure.into_owned();
+        self.force = state.force.into_owned();
         self.time = state.time;
         self.largest_force = state.largest_force;
-        Ok(state.course)
+        Ok(state.course.into_owned())
     }
 }

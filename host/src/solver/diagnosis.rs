@@ -24,14 +24,15 @@ struct PointState {
 impl Snapshot {
     /// The trial state of the last evaluation.
     pub(super) fn of(groups: &[Group]) -> Self {
-        Self(groups.iter().map(states).collect())
+        Self(groups.iter().map(|group| states(group).collect()).collect())
     }
 }
 
-fn states(group: &Group) -> Vec<PointState> {
+/// None of a linear group: it keeps no iteration from settling.
+fn states(group: &Group) -> impl Iterator<Item = PointState> {
     let n = group.kinematics.n_components();
     let per_element = group.kinematics.points_per_element();
-    let state = |point: usize| {
+    let state = move |point: usize| {
         let tangents = group.element_tangents(point / per_element);
         let stress = &group.stress.trial[n * point..][..n];
         PointState {
@@ -44,7 +45,12 @@ fn states(group: &Group) -> Vec<PointState> {
             tangent: tangents[point % per_element * n * n..][..n * n].to_vec(),
         }
     };
-    (0..group.kinematics.n_points()).map(state).collect()
+    let n_points = if group.is_linear() {
+        0
+    } else {
+        group.kinematics.n_points()
+    };
+    (0..n_points).map(state)
 }
 
 /// How a point differs between two iterates; greater is worse.
@@ -82,8 +88,8 @@ pub(super) fn compare(groups: &[Group], before: &Snapshot) -> Option<String> {
     let mut changed = 0;
     let mut worst: Option<(Change, &Group, usize)> = None;
     for (group, old) in groups.iter().zip(&before.0) {
-        for (point, (old, new)) in old.iter().zip(&states(group)).enumerate() {
-            let Some(change) = Change::between(old, new) else {
+        for (point, (old, new)) in old.iter().zip(states(group)).enumerate() {
+            let Some(change) = Change::between(old, &new) else {
                 continue;
             };
             changed += 1;

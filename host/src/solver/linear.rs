@@ -53,7 +53,7 @@ impl Block {
 /// restricted row exchanges lose accuracy, `faer`'s LU with full row exchanges takes over.
 #[derive(Debug)]
 pub struct LinearSolver {
-    pattern: Pattern,
+    pattern: Arc<Pattern>,
     block: Option<Block>,
     multifrontal: Multifrontal,
     /// Row exchanges among the equations of the block, which are eliminated last.
@@ -74,7 +74,7 @@ pub struct LinearSolver {
 #[derive(Debug)]
 struct RowExchanges {
     /// Pattern of matrix and block together.
-    pattern: Pattern,
+    pattern: Arc<Pattern>,
     symbolic: SymbolicLu<u32>,
     factors: Option<Lu<u32, f64>>,
 }
@@ -90,7 +90,7 @@ impl LinearSolver {
     /// # Errors
     /// [`Singular`] if the pattern alone makes the matrix singular, or memory runs out.
     pub fn new(
-        pattern: &Pattern,
+        pattern: &Arc<Pattern>,
         symmetric: bool,
         lines: Option<&[[u32; 2]]>,
     ) -> Result<Self, Singular> {
@@ -107,7 +107,7 @@ impl LinearSolver {
     /// # Errors
     /// As [`Self::new`].
     pub fn with_block(
-        pattern: &Pattern,
+        pattern: &Arc<Pattern>,
         lines: Option<&[[u32; 2]]>,
         block: Block,
     ) -> Result<Self, Singular> {
@@ -116,7 +116,7 @@ impl LinearSolver {
 
     fn of_kind(
         kind: Kind,
-        pattern: &Pattern,
+        pattern: &Arc<Pattern>,
         lines: Option<&[[u32; 2]]>,
         block: Option<Block>,
     ) -> Result<Self, Singular> {
@@ -126,7 +126,7 @@ impl LinearSolver {
         }
         Ok(Self {
             multifrontal: Multifrontal::new(pattern, kind, &kept, lines)?,
-            pattern: pattern.clone(),
+            pattern: Arc::clone(pattern),
             block,
             exchanges: Exchanges::default(),
             values: Vec::new(),
@@ -142,7 +142,7 @@ impl LinearSolver {
     ///
     /// # Errors
     /// [`Singular`].
-    pub fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
+    pub fn factorise(&mut self, values: Vec<f64>) -> Result<(), Singular> {
         self.factorise_with(values, 1.0)
     }
 
@@ -150,9 +150,8 @@ impl LinearSolver {
     ///
     /// # Errors
     /// [`Singular`].
-    pub fn factorise_with(&mut self, values: &[f64], share: f64) -> Result<(), Singular> {
-        self.values.clear();
-        self.values.extend_from_slice(values);
+    pub fn factorise_with(&mut self, values: Vec<f64>, share: f64) -> Result<(), Singular> {
+        self.values = values;
         self.proven = false;
         if let Some(block) = &mut self.block {
             block.share = share;
@@ -178,15 +177,8 @@ impl LinearSolver {
         let Some(block) = &self.block else {
             return self.multifrontal.factorise(&self.values);
         };
-        let mut dense = self.multifrontal.take_schur();
-        dense.clear();
-        dense.extend_from_slice(block.values());
-        if (block.share - 1.0).abs() > 0.0 {
-            for value in &mut dense {
-                *value *= block.share;
-            }
-        }
-        self.multifrontal.factorise_onto(dense, &self.values)?;
+        let values = block.values().iter().map(|value| block.share * value);
+        self.multifrontal.factorise_onto(values, &self.values)?;
         let n = block.equations.len();
         let matrix = MatMut::from_column_major_slice_mut(self.multifrontal.schur_mut(), n, n);
         dense::factorise(matrix, &mut self.exchanges)
@@ -214,9 +206,9 @@ impl LinearSolver {
     }
 
     /// Matrix and block as one sparse matrix.
-    fn with_block_entries(&self) -> (Pattern, Vec<f64>) {
+    fn with_block_entries(&self) -> (Arc<Pattern>, Vec<f64>) {
         let Some(block) = &self.block else {
-            return (self.pattern.clone(), self.values.clone());
+            return (Arc::clone(&self.pattern), self.values.clone());
         };
         let mut pattern = Pattern {
             column_start: vec![0],
@@ -244,7 +236,7 @@ impl LinearSolver {
             values.extend(entries.values());
             pattern.column_start.push(pattern.rows.len() as u32);
         }
-        (pattern, values)
+        (Arc::new(pattern), values)
     }
 
     /// Solves for one right-hand side, refines the solution where that helps, and checks its
@@ -350,18 +342,18 @@ fn symbolic(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, u32> {
 mod tests {
     use super::*;
 
-    fn two_by_two() -> Pattern {
-        Pattern {
+    fn two_by_two() -> Arc<Pattern> {
+        Arc::new(Pattern {
             column_start: vec![0, 2, 4],
             rows: vec![0, 1, 0, 1],
-        }
+        })
     }
 
     #[test]
     fn solves_an_unsymmetric_system() {
         let mut solver = LinearSolver::new(&two_by_two(), false, None).unwrap();
         // Columns (4, 1), (2, 3).
-        solver.factorise(&[4.0, 1.0, 2.0, 3.0]).unwrap();
+        solver.factorise(vec![4.0, 1.0, 2.0, 3.0]).unwrap();
         let x = solver.solve(&[8.0, 7.0]).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
     }
@@ -387,8 +379,8 @@ mod tests {
             }
             pattern.column_start.push(pattern.rows.len() as u32);
         }
-        let mut solver = LinearSolver::new(&pattern, false, None).unwrap();
-        solver.factorise(&values).unwrap();
+        let mut solver = LinearSolver::new(&Arc::new(pattern), false, None).unwrap();
+        solver.factorise(values).unwrap();
         let x = solver.solve(&vec![1.0; n]).unwrap();
         assert!(x.iter().all(|x| (x - 0.5).abs() < 1e-15));
     }
@@ -396,8 +388,8 @@ mod tests {
     #[test]
     fn refuses_a_singular_system() {
         let mut solver = LinearSolver::new(&two_by_two(), false, None).unwrap();
-        let refused =
-            solver.factorise(&[1.0, 2.0, 2.0, 4.0]).is_err() || solver.solve(&[1.0, 1.0]).is_err();
+        let refused = solver.factorise(vec![1.0, 2.0, 2.0, 4.0]).is_err()
+            || solver.solve(&[1.0, 1.0]).is_err();
         assert!(refused);
     }
 }

@@ -41,19 +41,35 @@ const REMEMBERED: usize = 3;
 pub struct Reuse {
     /// The latest last.
     known: VecDeque<Condensed>,
+    /// No other run follows.
+    pub is_last_run: bool,
+    /// Nor, in the present one, another phase.
+    pub(crate) is_last_phase: bool,
 }
 
 /// A matrix and what became of it.
 #[derive(Debug)]
 struct Condensed {
     kind: Kind,
-    pattern: Pattern,
+    pattern: Arc<Pattern>,
     values: Vec<f64>,
     kept: Vec<bool>,
     factors: Arc<Multifrontal>,
 }
 
 impl Reuse {
+    /// Whether anything follows that may find what is remembered.
+    fn may_recur(&self) -> bool {
+        !(self.is_last_run && self.is_last_phase)
+    }
+
+    /// Gives up what nothing that follows can find.
+    pub(crate) fn forget(&mut self) {
+        if !self.may_recur() {
+            self.known.clear();
+        }
+    }
+
     /// The factors of a matrix that is known, to the bit.
     fn find(
         &self,
@@ -65,7 +81,7 @@ impl Reuse {
         let same = |known: &&Condensed| {
             known.kind == kind
                 && known.kept == kept
-                && known.pattern == *pattern
+                && *known.pattern == *pattern
                 && known
                     .values
                     .iter()
@@ -193,7 +209,7 @@ impl LinearDomain {
         ties: &[Tie],
         lines: &[[u32; 2]],
         always: bool,
-        reuse: Option<&mut Reuse>,
+        mut reuse: Option<&mut Reuse>,
     ) -> Result<Option<(Self, System)>, Singular> {
         let mut system = System::new(groups, Group::is_linear, prescribed, ties, None);
         if system.n_equations() == 0 {
@@ -228,17 +244,25 @@ impl LinearDomain {
         let known = reuse
             .as_ref()
             .and_then(|reuse| reuse.find(kind, &system.pattern, &values, &kept));
+        if let Some(reuse) = &mut reuse {
+            reuse.forget();
+        }
+        let pattern = system.forget_matrix();
         let factorised = known.is_none();
         let factors = if let Some(factors) = known {
             factors
         } else {
             let lines = system.lines(lines);
-            let mut factors = Multifrontal::new(&system.pattern, kind, &kept, Some(&lines))?;
-            let pattern = system.forget_matrix();
-            factors.factorise(&values)?;
-            factors.forget_entries();
+            let mut factors = Multifrontal::new(&pattern, kind, &kept, Some(&lines))?;
+            let gathered = factors.gather(&values);
+            // Where nothing may find the matrix, it is given up before its factors need the room.
+            let remembered = reuse
+                .filter(|reuse| reuse.may_recur())
+                .map(|reuse| (reuse, pattern, values));
+            factors.factorise_gathered(&gathered)?;
+            drop(gathered);
             let factors = Arc::new(factors);
-            if let Some(reuse) = reuse {
+            if let Some((reuse, pattern, values)) = remembered {
                 reuse.remember(Condensed {
                     kind,
                     pattern,

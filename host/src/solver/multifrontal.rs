@@ -64,14 +64,15 @@ struct Analysis {
     rows: Vec<u32>,
     /// Where each of them stands in the parent's front; without a parent, in `kept`.
     relative: Vec<u32>,
-    /// Entries of the matrix by front.
-    entries: Vec<Entry>,
+    /// Entries of the matrix by front: their places in the pattern, and where they go.
+    sources: Vec<u32>,
+    targets: Vec<u32>,
     /// Entries between kept equations; targets in the column-major Schur complement.
     kept_entries: Vec<Entry>,
     roots: Vec<usize>,
 }
 
-/// Where an entry of the matrix goes.
+/// Where an entry between kept equations goes.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     source: u32,
@@ -85,7 +86,7 @@ struct Shape {
     pivots: Range<usize>,
     /// Within `rows`.
     rows: Range<usize>,
-    /// Within `entries`.
+    /// Within `sources` and `targets`.
     entries: Range<usize>,
     children: Vec<usize>,
     /// Floating-point operations of it and its descendants.
@@ -95,11 +96,25 @@ struct Shape {
 /// The factors of one supernode.
 #[derive(Debug, Default)]
 struct Front {
-    /// L below U₁₁ (n × k, column-major), then, if unsymmetric, U₁₂ (k × m, column-major).
+    /// L below U₁₁ (n × k, column-major), then U₁₂ (k × m, column-major). If symmetric, the columns
+    /// of L from the diagonal on.
     values: Vec<f64>,
     /// Row exchanges inside the pivot block.
     exchanges: dense::Exchanges,
 }
+
+/// Values of a matrix.
+#[derive(Clone, Copy)]
+enum Values<'v> {
+    /// By place in the pattern.
+    OfPattern(&'v [f64]),
+    /// By entry of the fronts.
+    OfFronts(&'v [f64]),
+}
+
+/// Values of a matrix that count, in the order in which the fronts take them.
+#[derive(Debug)]
+pub(super) struct Gathered(Vec<f64>);
 
 /// A factorised matrix.
 #[derive(Debug)]
@@ -138,11 +153,6 @@ impl Multifrontal {
         &self.schur
     }
 
-    /// Its memory, for the next one.
-    pub(super) fn take_schur(&mut self) -> Vec<f64> {
-        std::mem::take(&mut self.schur)
-    }
-
     /// As [`Self::schur`], to be worked on.
     pub(super) fn schur_mut(&mut self) -> &mut [f64] {
         &mut self.schur
@@ -153,27 +163,65 @@ impl Multifrontal {
     /// # Errors
     /// [`Singular`]: a pivot vanishes, or a symmetric matrix is not positive definite.
     pub(super) fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
-        let n = self.analysis.kept.len();
-        let mut schur = self.take_schur();
-        schur.clear();
-        schur.resize(n * n, 0.0);
-        self.factorise_onto(schur, values)
+        self.clear_schur();
+        self.add_kept(values);
+        self.eliminate_all(Values::OfPattern(values))
     }
 
-    /// As [`Self::factorise`]; the Schur complement is added to a matrix of the kept equations.
+    /// As [`Self::factorise`]; the Schur complement is added to a matrix of the kept equations
+    /// (column-major).
     ///
     /// # Errors
     /// As [`Self::factorise`].
     pub(super) fn factorise_onto(
         &mut self,
-        mut schur: Vec<f64>,
+        block: impl Iterator<Item = f64>,
         values: &[f64],
     ) -> Result<(), Singular> {
-        let analysis = &self.analysis;
-        let n = analysis.kept.len();
-        for entry in &analysis.kept_entries {
-            schur[entry.target as usize] += values[entry.source as usize];
+        self.schur.clear();
+        self.schur.extend(block);
+        self.add_kept(values);
+        self.eliminate_all(Values::OfPattern(values))
+    }
+
+    /// Takes what counts of the values of the last matrix there will be, and gives up what only
+    /// another one would need.
+    pub(super) fn gather(&mut self, values: &[f64]) -> Gathered {
+        self.clear_schur();
+        self.add_kept(values);
+        self.analysis.kept_entries = Vec::new();
+        let sources = std::mem::take(&mut self.analysis.sources);
+        Gathered(sources.iter().map(|&at| values[at as usize]).collect())
+    }
+
+    /// Factorises the last matrix.
+    ///
+    /// # Errors
+    /// As [`Self::factorise`].
+    pub(super) fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
+        self.eliminate_all(Values::OfFronts(&values.0))?;
+        self.analysis.targets = Vec::new();
+        self.analysis.relative = Vec::new();
+        Ok(())
+    }
+
+    fn clear_schur(&mut self) {
+        let n = self.analysis.kept.len();
+        self.schur.clear();
+        self.schur.resize(n * n, 0.0);
+    }
+
+    /// Adds the entries between kept equations to the Schur complement.
+    fn add_kept(&mut self, values: &[f64]) {
+        for entry in &self.analysis.kept_entries {
+            self.schur[entry.target as usize] += values[entry.source as usize];
         }
+    }
+
+    fn eliminate_all(&mut self, values: Values<'_>) -> Result<(), Singular> {
+        let n = self.analysis.kept.len();
+        let mut schur = std::mem::take(&mut self.schur);
+        let analysis = &self.analysis;
         let updates: Vec<_> = analysis
             .roots
             .par_iter()
@@ -207,7 +255,7 @@ impl Multifrontal {
     }
 
     /// Factorises a front after its descendants. Returns its update matrix.
-    fn branch(&self, front: usize, values: &[f64]) -> Result<Vec<f64>, Singular> {
+    fn branch(&self, front: usize, values: Values<'_>) -> Result<Vec<f64>, Singular> {
         let shape = &self.analysis.fronts[front];
         // Deep trees are walked without recursion where there is nothing to gain.
         if shape.work < TASK {
@@ -228,7 +276,7 @@ impl Multifrontal {
         self.eliminate(front, values, &updates)
     }
 
-    fn small_branch(&self, front: usize, values: &[f64]) -> Result<Vec<f64>, Singular> {
+    fn small_branch(&self, front: usize, values: Values<'_>) -> Result<Vec<f64>, Singular> {
         // Every front is visited twice: before its children, and after them.
         let mut todo = vec![(front, false)];
         let mut done: Vec<Vec<f64>> = Vec::new();
@@ -256,7 +304,7 @@ impl Multifrontal {
     fn eliminate(
         &self,
         number: usize,
-        values: &[f64],
+        values: Values<'_>,
         updates: &[Vec<f64>],
     ) -> Result<Vec<f64>, Singular> {
         let analysis = &self.analysis;
@@ -270,8 +318,19 @@ impl Multifrontal {
         front
             .values
             .resize(if symmetric { n * k } else { n * k + k * m }, 0.0);
-        for entry in &analysis.entries[shape.entries.clone()] {
-            front.values[entry.target as usize] += values[entry.source as usize];
+        let targets = &analysis.targets[shape.entries.clone()];
+        match values {
+            Values::OfPattern(values) => {
+                let sources = &analysis.sources[shape.entries.clone()];
+                for (&target, &source) in targets.iter().zip(sources) {
+                    front.values[target as usize] += values[source as usize];
+                }
+            }
+            Values::OfFronts(values) => {
+                for (&target, value) in targets.iter().zip(&values[shape.entries.clone()]) {
+                    front.values[target as usize] += value;
+                }
+            }
         }
         let mut update = vec![0.0; m * m];
         let (l, u) = front.values.split_at_mut(n * k);
@@ -299,6 +358,7 @@ impl Multifrontal {
                 Par::Seq,
             );
             subtract_square(&mut update, m, below.rb());
+            pack(&mut front.values, n, k);
             return Ok(update);
         }
         dense::factorise(pivots.rb_mut(), &mut front.exchanges)?;
@@ -318,12 +378,6 @@ impl Multifrontal {
         );
         subtract_product(&mut update, m, below.rb(), right.rb());
         Ok(update)
-    }
-
-    /// Gives up what only another factorisation would need.
-    pub(super) fn forget_entries(&mut self) {
-        self.analysis.entries = Vec::new();
-        self.analysis.kept_entries = Vec::new();
     }
 
     /// The supernodes that give the values of some equations: theirs, and all above them.
@@ -367,12 +421,16 @@ impl Multifrontal {
             }
             own.resize(n, 0.0);
             for j in 0..k {
-                let column = &front.values[j * n..(j + 1) * n];
+                let start = match analysis.kind {
+                    Kind::Symmetric => packed(n, j),
+                    Kind::Unsymmetric => j * n + j,
+                };
+                let column = &front.values[start..start + n - j];
                 if analysis.kind == Kind::Symmetric {
-                    own[j] /= column[j];
+                    own[j] /= column[0];
                 }
                 let x = own[j];
-                for (value, l) in own[j + 1..].iter_mut().zip(&column[j + 1..]) {
+                for (value, l) in own[j + 1..].iter_mut().zip(&column[1..]) {
                     *value -= l * x;
                 }
             }
@@ -397,20 +455,20 @@ impl Multifrontal {
             let k = shape.pivots.len();
             let rows = &analysis.rows[shape.rows.clone()];
             let n = k + rows.len();
-            let (l, u) = front.values.split_at(n * k);
             own.clear();
             own.extend_from_slice(&x[shape.pivots.clone()]);
             match analysis.kind {
                 Kind::Symmetric => {
                     let below: Vec<f64> = rows.iter().map(|&row| x[row as usize]).collect();
                     for j in (0..k).rev() {
-                        let column = &l[j * n..(j + 1) * n];
-                        let from_below = dot(&column[k..], &below);
-                        let from_own = dot(&column[j + 1..k], &own[j + 1..]);
-                        own[j] = (own[j] - from_below - from_own) / column[j];
+                        let column = &front.values[packed(n, j)..packed(n, j + 1)];
+                        let from_below = dot(&column[k - j..], &below);
+                        let from_own = dot(&column[1..k - j], &own[j + 1..]);
+                        own[j] = (own[j] - from_below - from_own) / column[0];
                     }
                 }
                 Kind::Unsymmetric => {
+                    let (l, u) = front.values.split_at(n * k);
                     for (column, &row) in u.chunks_exact(k).zip(rows) {
                         let value = x[row as usize];
                         for (own, u) in own.iter_mut().zip(column) {
@@ -450,6 +508,20 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     let rest: f64 = of_a.iter().zip(of_b).map(|(a, b)| a * b).sum();
     sums.iter().sum::<f64>() + rest
+}
+
+/// Where column j of a packed L of n rows starts.
+fn packed(n: usize, j: usize) -> usize {
+    j * (2 * n + 1 - j) / 2
+}
+
+/// Moves the columns of L (n × k) together, without what stands above the diagonal.
+fn pack(values: &mut Vec<f64>, n: usize, k: usize) {
+    for j in 1..k {
+        values.copy_within(j * n + j..(j + 1) * n, packed(n, j));
+    }
+    values.truncate(packed(n, k));
+    values.shrink_to_fit();
 }
 
 /// Adds a child's update to its parent's front (L: n × k, U: k × m) and update (m × m).
@@ -579,7 +651,8 @@ impl Analysis {
             fronts: Vec::new(),
             rows: Vec::new(),
             relative: Vec::new(),
-            entries: Vec::new(),
+            sources: Vec::new(),
+            targets: Vec::new(),
             kept_entries: Vec::new(),
             roots: Vec::new(),
         };
@@ -725,13 +798,13 @@ impl Analysis {
         // Rows of the matrix, for entries above the diagonal: the transposed pattern is the same.
         let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
         let mut place = vec![0_u32; position.len()];
-        let mut entries = Vec::new();
+        let (mut sources, mut targets) = (Vec::new(), Vec::new());
         for front in 0..self.fronts.len() {
             let Shape { pivots, rows, .. } = &self.fronts[front];
             let (pivots, rows) = (pivots.clone(), rows.clone());
             let (k, n) = (pivots.len(), pivots.len() + rows.len());
             self.place_front(pivots.clone(), rows, &mut place);
-            let start = entries.len();
+            let start = targets.len();
             for (column, pivot) in pivots.clone().enumerate() {
                 let equation = self.order[pivot] as usize;
                 for at in pattern.places(equation) {
@@ -739,26 +812,22 @@ impl Analysis {
                     let lower = self.kind == Kind::Unsymmetric || row >= pivot;
                     if row >= pivots.start && lower {
                         let target = column * n + place[row] as usize;
-                        entries.push(Entry {
-                            source: at as u32,
-                            target: target as u32,
-                        });
+                        sources.push(at as u32);
+                        targets.push(target as u32);
                     }
                     // The entry across the diagonal, in the row of this pivot.
                     if let Some(transposed) = &transposed
                         && row >= pivots.end
                     {
                         let target = n * k + (place[row] as usize - k) * k + column;
-                        entries.push(Entry {
-                            source: transposed[at],
-                            target: target as u32,
-                        });
+                        sources.push(transposed[at]);
+                        targets.push(target as u32);
                     }
                 }
             }
-            self.fronts[front].entries = start..entries.len();
+            self.fronts[front].entries = start..targets.len();
         }
-        self.entries = entries;
+        (self.sources, self.targets) = (sources, targets);
     }
 
     fn add_kept_entries(&mut self, pattern: &Pattern, position: &[u32]) {
@@ -941,6 +1010,28 @@ mod tests {
             let x = DVector::from_vec(factors.backward(&y, of_kept.as_slice(), None));
             let residual = dense * x - DVector::from_vec(right);
             assert!(residual.amax() < 1e-11, "{}", residual.amax());
+        }
+    }
+
+    #[test]
+    fn gives_the_same_bits_for_the_last_matrix() {
+        for (skew, kind) in [(0.0, Kind::Symmetric), (0.3, Kind::Unsymmetric)] {
+            let (pattern, values, _) = grid(14, skew);
+            let kept: Vec<bool> = (0..pattern.n()).map(|i| i % 14 == 6).collect();
+            let analysed = || Multifrontal::new(&pattern, kind, &kept, None).unwrap();
+            let solution = |factors: &Multifrontal| {
+                let (y, left) = factors.forward(&right_side(pattern.n()), None);
+                (factors.schur().to_vec(), factors.backward(&y, &left, None))
+            };
+            let mut factors = analysed();
+            // What an earlier matrix left behind does not count.
+            let earlier: Vec<f64> = values.iter().map(|value| 3.0 * value).collect();
+            factors.factorise(&earlier).unwrap();
+            factors.factorise(&values).unwrap();
+            let mut last = analysed();
+            let gathered = last.gather(&values);
+            last.factorise_gathered(&gathered).unwrap();
+            assert_eq!(solution(&factors), solution(&last));
         }
     }
 

@@ -292,7 +292,7 @@ impl<'a> Newton<'a> {
     /// It is singular.
     pub fn restore_matrix(&mut self) -> Result<(), StepFailure> {
         let values = self.stiffness();
-        self.factorise(&values, 1.0)?;
+        self.factorise(values, 1.0)?;
         self.matrix.hold();
         Ok(())
     }

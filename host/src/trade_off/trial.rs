@@ -4,9 +4,7 @@ use super::clock::cpu_seconds;
 use super::division::divide;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
-use crate::case::{
-    Case, Equations, Formulation, Integration, Method, OutputInput, SolverInput,
-};
+use crate::case::{Case, Equations, Formulation, Integration, Method, OutputInput, SolverInput};
 use crate::error::{Error, Place};
 use crate::input::set_parameters;
 use crate::run::{Observer, run};

@@ -93,7 +93,7 @@ impl Newton<'_> {
                 .map_err(failed_law)?;
         }
         let values = self.stiffness();
-        self.factorise(&values, 1.0)?;
+        self.factorise(values, 1.0)?;
         self.matrix.hold();
         self.renewed = true;
         self.stalls = false;
@@ -116,7 +116,7 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// It is singular.
-    pub(super) fn factorise(&mut self, values: &[f64], share: f64) -> Result<(), StepFailure> {
+    pub(super) fn factorise(&mut self, values: Vec<f64>, share: f64) -> Result<(), StepFailure> {
         let start = Instant::now();
         self.matrix.held = false;
         let outcome = self.solver.factorise_with(values, share);

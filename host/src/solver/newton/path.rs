@@ -38,7 +38,7 @@ impl Measure {
         let mut weights = vec![0.0; places.n_dofs()];
         let mut square = 0.0;
         for group in nonlinear().filter(|group| is_interface(group) == any_interface) {
-            let mut strains = vec![0.0; group.strain.trial.len()];
+            let mut strains = vec![0.0; group.strain.committed.len()];
             group.kinematics.add_gradients(&displacement, &mut strains);
             let n = group.kinematics.n_components();
             for (point, strain) in strains.chunks_exact_mut(n).enumerate() {

@@ -67,7 +67,7 @@ impl Newton<'_> {
         let still = vec![0.0; task.external.len()];
         let before = self.evaluate(&still, task, Operator::Elastic).ok()?;
         let elastic = self.stiffness();
-        self.factorise(&elastic, 1.0).ok()?;
+        self.factorise(elastic.clone(), 1.0).ok()?;
         let mut increment = self.solve(&before.residual, Some(task.prescribed)).ok()?;
         for (value, prescribed) in increment.iter_mut().zip(task.prescribed) {
             *value += prescribed;
@@ -134,7 +134,7 @@ impl Newton<'_> {
         for (value, elastic) in values.iter_mut().zip(elastic) {
             *value += VISCOSITY * elastic;
         }
-        self.factorise(&values, 1.0 + VISCOSITY)?;
+        self.factorise(values, 1.0 + VISCOSITY)?;
         self.solve(residual, None)
     }
 }
