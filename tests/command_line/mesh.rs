@@ -323,8 +323,8 @@ fn joints_may_go_on_from_one_another() {
     }
 }
 
-/// The joint of the case and one across it, in any order of their groups, the joint in one group or
-/// in two that go on from one another where they cross: the same answer.
+/// The joint of the case and one across it, in any order of their groups, each in one group or in
+/// two that go on from one another where they cross: the same answer.
 #[test]
 fn joints_may_cross() {
     let settlement = |lines: &[&str]| {
@@ -339,7 +339,8 @@ fn joints_may_cross() {
             .replace(
                 "[mesh.lines]",
                 "[mesh.lines]\nupright = { x = 1.0 }\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
-                 east = { y = 0.5, x = [1.0, 2.0] }",
+                 east = { y = 0.5, x = [1.0, 2.0] }\nsouth = { x = 1.0, y = [0.0, 0.5] }\n\
+                 north = { x = 1.0, y = [0.5, 1.0] }",
             )
             .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", lines[0]))
             .replace("[[supports]]", &format!("{more}\n[[supports]]"))
@@ -356,6 +357,7 @@ fn joints_may_cross() {
         &["upright", "west", "east"],
         &["west", "upright", "east"],
         &["east", "west", "upright"],
+        &["west", "south", "east", "north"],
     ] {
         for (one, other) in one.iter().zip(&settlement(other)) {
             approx::assert_relative_eq!(one, other, max_relative = 1e-6);

@@ -267,7 +267,7 @@ fn a_force_beyond_the_limit_stops_with_the_limit_in_words() {
 /// It takes over where the load may not be halved any more, however early that is.
 #[test]
 fn the_arc_length_takes_over_at_the_last_halving() {
-    for halvings in [0, 2] {
+    for halvings in [0, 1] {
         let solver = format!("control = \"arc_length\"\nmax_halvings = {halvings}");
         let pull = "increments = 40\ndisplacement = [{ line = \"end\", x = 0.02 }]";
         let finished = run(&text(&solver, pull));

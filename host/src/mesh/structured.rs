@@ -123,8 +123,11 @@ enum Fault {
     },
 }
 
+/// Number of a quad and of its edge.
+type Edge = (usize, usize);
+
 /// The coordinate that is the same all along an edge.
-fn across(mesh: &Mesh, edge: (usize, usize)) -> usize {
+fn across(mesh: &Mesh, edge: Edge) -> usize {
     let [a, b, _] = mesh.edge(edge).map(|node| mesh.nodes[node]);
     perpendicular(a, b)
 }
@@ -439,11 +442,16 @@ fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, 
     }
 }
 
-/// Refuses a line that ends on an earlier one across it, or on which an earlier one ends: which quads stay
-/// joined there would depend on the order. Lines may cross, also where lines go on from one
-/// another. `uses`: in how many edges of the new line its nodes are. Returns where, and the earlier
-/// group.
-fn meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Option<([u64; 2], usize)> {
+/// Refuses a line that ends on an earlier one across it, or on which an earlier one ends: which
+/// quads stay joined there would depend on the order. Lines may cross, also where lines go on from
+/// one another. `pairs`: edges of the new line, `group_of`: their groups by mid-side node, `uses`:
+/// in how many of them a node is.
+fn refuse_meeting(
+    mesh: &Mesh,
+    pairs: &[(Edge, Edge)],
+    group_of: &HashMap<usize, usize>,
+    uses: &HashMap<usize, usize>,
+) -> Result<(), Fault> {
     let key = |node: usize| mesh.nodes[node].map(f64::to_bits);
     // By direction and place: in how many elements, the first of them of which group.
     let mut earlier: IndexMap<(usize, [u64; 2]), (usize, usize)> = IndexMap::new();
@@ -468,7 +476,16 @@ fn meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Option<([u64; 2], usize
     let mut meetings = earlier
         .into_iter()
         .filter(|((_, at), (others, _))| ends(at, *others));
-    meetings.next().map(|((_, at), (_, group))| (at, group))
+    let Some(((_, at), (_, other))) = meetings.next() else {
+        return Ok(());
+    };
+    let mut edges = pairs.iter().map(|&(minus, _)| mesh.edge(minus));
+    let edge = edges.find(|edge| edge.iter().any(|&node| key(node) == at));
+    Err(Fault::Meets {
+        group: edge.map_or(other, |edge| group_of[&edge[2]]),
+        other,
+        at: at.map(f64::from_bits),
+    })
 }
 
 /// Doubles the nodes of lines along one straight line and inserts zero-thickness elements between
@@ -489,7 +506,7 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), Fault> {
         let nodes = mesh.quads[q].nodes;
         [0, 1].map(|c| nodes[..4].iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / 4.0)
     };
-    let mut sides: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
+    let mut sides: HashMap<usize, Vec<Edge>> = HashMap::new();
     for &(q, e) in &edges {
         sides.entry(mesh.edge((q, e))[2]).or_default().push((q, e));
     }
@@ -517,16 +534,7 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), Fault> {
             *uses.entry(node).or_default() += 1;
         }
     }
-    if let Some((at, other)) = meeting(mesh, &uses) {
-        let is_there = |node: &usize| mesh.nodes[*node].map(f64::to_bits) == at;
-        let edge = pairs.iter().map(|&(minus, _)| mesh.edge(minus));
-        let edge = edge.into_iter().find(|edge| edge.iter().any(is_there));
-        return Err(Fault::Meets {
-            group: edge.map_or(cuts[0].group, |edge| group_of[&edge[2]]),
-            other,
-            at: at.map(f64::from_bits),
-        });
-    }
+    refuse_meeting(mesh, &pairs, &group_of, &uses)?;
     let mut copy: HashMap<usize, usize> = HashMap::new();
     let mut joints = Vec::new();
     for &(minus, _) in &pairs {
