@@ -17,7 +17,9 @@ mod specimen;
 use crate::child::{self, Ending, Work};
 use crate::error::{Error, suggestion};
 use crate::file;
+use crate::plugin::probe::NO_OUTCOME;
 use crate::plugin::{Library, LoadedLaw, SearchPath, hexadecimal_sha256};
+use abi::raw;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -131,6 +133,39 @@ fn skipped(why: impl Into<String>) -> Verdict {
     Verdict::Skipped(why.into())
 }
 
+/// A status as the header calls it, with its number.
+fn status_name(status: raw::Status) -> String {
+    let name = match status {
+        NO_OUTCOME => return "no outcome".to_owned(),
+        raw::PILUM_OK => "PILUM_OK",
+        raw::PILUM_OK_UNRELIABLE => "PILUM_OK_UNRELIABLE",
+        raw::PILUM_CUT_STEP => "PILUM_CUT_STEP",
+        raw::PILUM_E_ARGUMENT => "PILUM_E_ARGUMENT",
+        raw::PILUM_E_PARAMETER => "PILUM_E_PARAMETER",
+        raw::PILUM_E_UNSUPPORTED => "PILUM_E_UNSUPPORTED",
+        raw::PILUM_E_DOMAIN => "PILUM_E_DOMAIN",
+        raw::PILUM_E_NUMERIC => "PILUM_E_NUMERIC",
+        raw::PILUM_E_INTERNAL => "PILUM_E_INTERNAL",
+        _ => {
+            return format!(
+                "the unknown status {status} (the contract has {} to {})",
+                raw::PILUM_E_INTERNAL,
+                raw::PILUM_CUT_STEP
+            );
+        }
+    };
+    format!("{name} ({status})")
+}
+
+/// A failure in words: its status, and what the law says of it.
+fn refusal(status: raw::Status, message: Option<&str>) -> String {
+    let name = status_name(status);
+    match message {
+        Some(message) if !message.is_empty() => format!("{name}: {message}"),
+        _ => format!("{name}, without a message"),
+    }
+}
+
 impl From<std::io::Error> for Verdict {
     fn from(why: std::io::Error) -> Self {
         skipped(format!("the check cannot be set up: {why}"))
@@ -210,12 +245,13 @@ struct Report<'a> {
 /// Checks a library and prints what it found.
 ///
 /// # Errors
-/// [`Error::Usage`] for an unknown check, [`Error::Plugin`] if there is no such library or a check
-/// fails or crashes.
+/// [`Error::Usage`] for an unknown check or settings that no law can have, [`Error::Unreadable`],
+/// [`Error::Plugin`] if there is no such law or a check fails or crashes.
 pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Error> {
     let ids: Vec<&str> = checks().map(|check| check.id).collect();
     for id in &arguments.only {
-        if !ids.contains(&id.as_str()) {
+        let is_inner = arguments.in_process && id == SETTINGS.id;
+        if !is_inner && !ids.contains(&id.as_str()) {
             let known = suggestion(id, ids.iter().copied());
             return Err(Error::Usage(format!("there is no check `{id}`: {known}")));
         }
@@ -237,6 +273,9 @@ pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Err
     })?;
     let sha256 = hexadecimal_sha256(&bytes);
     drop(bytes);
+    if !arguments.set.is_empty() {
+        refuse_settings(arguments, &path)?;
+    }
     let findings = run_all(arguments, &path)?;
     let mut counts = BTreeMap::new();
     for finding in &findings {
@@ -306,7 +345,10 @@ fn library_path(name: &str) -> Result<PathBuf, Error> {
     if looks_like_a_path || path.is_file() {
         return std::path::absolute(path)
             .and_then(|path| std::fs::metadata(&path).map(|_| path))
-            .map_err(|why| Error::plugin(format!("library {name} cannot be read: {why}")));
+            .map_err(|source| Error::Unreadable {
+                path: path.to_owned(),
+                source,
+            });
     }
     let search = SearchPath::new(&[]);
     let installed = search.installed();
@@ -322,6 +364,24 @@ fn library_path(name: &str) -> Result<PathBuf, Error> {
                 installed.keys().map(String::as_str).collect::<Vec<_>>(),
             )),
         })
+}
+
+/// What is asked of `--set` before the checks: no check of the library.
+static SETTINGS: Check = Check {
+    id: "settings-fit",
+    family: Family::Description,
+    description: "`--set` names parameters, and values that the laws accept.",
+    needs: &[],
+    run: specimen::settings_fit,
+};
+
+/// Refuses settings that do not fit the laws. A library that cannot answer is left to the checks.
+fn refuse_settings(arguments: &Arguments, path: &Path) -> Result<(), Error> {
+    let finding = in_child(&SETTINGS, arguments, path, &ScratchFolder::new()?)?;
+    match finding.outcome {
+        Outcome::Failed => Err(Error::Usage(finding.details)),
+        _ => Ok(()),
+    }
 }
 
 /// Runs the checks, all that can at the same time.
@@ -397,6 +457,7 @@ fn in_process(arguments: &Arguments, path: PathBuf) -> Result<String, Error> {
         settings: arguments.set.clone(),
     };
     let check = checks()
+        .chain([&SETTINGS])
         .find(|check| arguments.only.iter().any(|id| id == check.id))
         .ok_or_else(|| Error::Internal("there is no check to run".to_owned()))?;
     let (outcome, details) = match (check.run)(&subject) {

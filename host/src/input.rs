@@ -11,6 +11,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -35,7 +36,51 @@ pub fn deserialize<T: DeserializeOwned>(
     for (key, value) in table.get_ref() {
         refuse_infinite(source, key.get_ref(), value)?;
     }
-    T::deserialize(toml::Deserializer::from(table)).map_err(|error| toml_error(source, &error))
+    let again = (source.text().len() <= MOST_COPIED).then(|| table.clone());
+    T::deserialize(toml::Deserializer::from(table)).map_err(|error| {
+        let choices = again.and_then(|table| choice_error::<T>(source, table, &error));
+        choices.unwrap_or_else(|| toml_error(source, &error))
+    })
+}
+
+/// Longest text, in bytes, whose contents are kept a second time for the sake of a message.
+const MOST_COPIED: usize = 1 << 20;
+
+/// The error of a value that stands where a choice is expected and is no text. What the choices
+/// are is said of a text that is none of them.
+fn choice_error<T: DeserializeOwned>(
+    source: &Source,
+    mut table: Spanned<DeTable<'_>>,
+    error: &toml::de::Error,
+) -> Option<Error> {
+    let span = error.span().filter(|_| wording::expects_choice(error))?;
+    let mut values = table.get_mut().iter_mut().map(|(_, value)| value);
+    let value = value_at(&mut values, &span)?.get_mut();
+    let found = wording::value_in_words(value);
+    *value = DeValue::String("".into());
+    let refused = T::deserialize(toml::Deserializer::from(table)).err()?;
+    (refused.span()? == span).then(|| wording::no_choice(source, &refused, &found).into())
+}
+
+/// The value that stands at this place of the text.
+fn value_at<'t, 'i: 't>(
+    values: &mut dyn Iterator<Item = &'t mut Spanned<DeValue<'i>>>,
+    span: &Range<usize>,
+) -> Option<&'t mut Spanned<DeValue<'i>>> {
+    for value in values {
+        if value.span() == *span {
+            return Some(value);
+        }
+        let found = match value.get_mut() {
+            DeValue::Array(entries) => value_at(&mut entries.iter_mut(), span),
+            DeValue::Table(table) => value_at(&mut table.iter_mut().map(|(_, value)| value), span),
+            _ => None,
+        };
+        if found.is_some() {
+            return found;
+        }
+    }
+    None
 }
 
 /// An error of the TOML reader, at its place.

@@ -190,9 +190,13 @@ fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
+            let said = error.print().and_then(|()| std::io::stdout().flush());
             // Help and version are no errors; everything else is bad input.
-            let _ = error.print();
-            return ExitCode::from(u8::from(error.use_stderr()));
+            if error.use_stderr() {
+                return ExitCode::from(1);
+            }
+            let failure = said.err();
+            return ended(Output { failure }.end(Ok(())));
         }
     };
     let trust = Trust {
@@ -217,6 +221,11 @@ fn main() -> ExitCode {
                 "the program panicked; please report it".to_owned(),
             ))
         });
+    ended(outcome)
+}
+
+/// The exit code, after the message.
+fn ended(outcome: Result<(), Error>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -196,6 +196,16 @@ impl Library {
         &self.path
     }
 
+    /// Whether it lies where the program's own laws do.
+    pub fn is_beside_program(&self) -> bool {
+        let folder = self.path.parent().map(Path::canonicalize);
+        let Some(Ok(folder)) = folder else {
+            return false;
+        };
+        let mut own = search::beside_program().into_iter();
+        own.any(|own| own.canonicalize().is_ok_and(|own| own == folder))
+    }
+
     /// SHA-256 of the file, in hexadecimal digits.
     pub fn sha256(&self) -> &str {
         &self.sha256
@@ -565,6 +575,14 @@ impl Law {
         &self.parameters
     }
 
+    /// Whether a failure that no smaller step helps is trouble with the library, and not a limit of
+    /// what the law can follow: numbers that are not finite under a claim of success, which is all
+    /// that is numeric about routines made for other programs.
+    pub fn breaks_down(&self, failure: &BatchFailure) -> bool {
+        let is_foreign = self.library().foreign().is_some();
+        failure.outcome == Outcome::Numeric && (is_foreign || failure.message == NOT_FINITE)
+    }
+
     /// Whether the law is told where its points lie.
     pub fn asks_for_sites(&self) -> bool {
         self.library().foreign().is_some()
@@ -795,6 +813,9 @@ fn judge(
     }
 }
 
+/// What is said of a success that is none.
+const NOT_FINITE: &str = "the law claims success with a result that is not finite";
+
 /// Distrusts success: every output must be finite.
 fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), BatchFailure> {
     let whole = |(values, place, n): &(&[f64], Strided, usize)| {
@@ -811,7 +832,7 @@ fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), B
                 return Err(BatchFailure {
                     point,
                     outcome: Outcome::Numeric,
-                    message: "the law claims success with a result that is not finite".to_owned(),
+                    message: NOT_FINITE.to_owned(),
                     factor: None,
                     call: None,
                 });

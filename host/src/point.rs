@@ -19,8 +19,8 @@ pub use table::{Row, Table};
 use crate::capsule::{self, Capsule};
 use crate::error::{Error, suggestion};
 use crate::output::Figures;
+use crate::plugin::Moment;
 use crate::plugin::adapter::{self, Adapter};
-use crate::plugin::{BatchFailure, Moment};
 use abi::status::Outcome;
 use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
 pub(crate) use file::words;
@@ -498,10 +498,9 @@ impl Driver {
             }
             Stop::Shortfall(shortfall) => {
                 let Shortfall { reached, obstacle } = *shortfall;
-                let numeric = |failure: &BatchFailure| failure.outcome == Outcome::Numeric;
-                if self.law.library().foreign().is_some()
-                    && obstacle.miss.is_none()
-                    && let Some(failure) = obstacle.refusal.as_ref().filter(|f| numeric(f))
+                let broken = obstacle.refusal.as_ref();
+                if obstacle.miss.is_none()
+                    && let Some(failure) = broken.filter(|failure| self.law.breaks_down(failure))
                 {
                     return Error::plugin(format!(
                         "{place}: law `{id}` of library {} fails, however small the step: {}",

@@ -6,14 +6,14 @@ mod path;
 
 use crate::assembly::{Places, System, fold};
 use crate::capsule::{self, Capsule};
-use crate::case::{Axis, Case, CaseFile, Control, Equations, PhaseInput};
+use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
 use crate::model::{Model, cannot_start, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
-use crate::plugin::Moment;
+use crate::plugin::{Library, Moment};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
     Costs, Guess, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
@@ -53,7 +53,8 @@ pub struct Options {
     pub checkpoints: Option<Duration>,
 }
 
-/// Step, as a fraction of an increment, below which arc-length control takes over.
+/// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
+/// be halved so often.
 const PATIENCE: f64 = 0.2;
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
@@ -568,7 +569,7 @@ impl<'a> Run<'a> {
                         settings.control == Control::ArcLength && course.history.latest().is_some();
                     if failure.defect.is_some() {
                         return Err(self.cannot_go_on(place, start, n, &failure, results)?);
-                    } else if follows && course.step < PATIENCE / n as f64 {
+                    } else if follows && course.step < smallest.max(PATIENCE / n as f64) {
                         let goal = [n as f64, target];
                         let end = self.follow_path(
                             place, goal, course, equations, record, results, observer, &mut done,
@@ -626,12 +627,51 @@ impl<'a> Run<'a> {
         results: &Results,
     ) -> Result<Error, Error> {
         let kept = self.keep_capsule(place, failure, results)?;
-        Ok(match &failure.defect {
-            Some(defect) => Error::Plugin {
+        if let Some(defect) = &failure.defect {
+            return Ok(Error::Plugin {
                 message: format!("{place}: {defect}"),
                 hint: kept,
-            },
-            None => Self::no_equilibrium(place, lambda, n, failure, kept),
+            });
+        }
+        let broken = failure.failed.as_ref().filter(|point| {
+            let mut groups = self.groups.iter();
+            let group = groups.find(|group| group.name == point.group);
+            group.is_some_and(|group| group.law.built.law.breaks_down(&point.failure))
+        });
+        if let Some(broken) = broken {
+            return Ok(Error::Plugin {
+                message: format!("{place}: {broken}\n  however small the step"),
+                hint: kept,
+            });
+        }
+        let hint = kept.or_else(|| self.suspicion(failure));
+        Ok(Self::no_equilibrium(place, lambda, n, failure, hint))
+    }
+
+    /// Where to look if a law of the user's own may have kept the iterations from converging: a
+    /// wrong tangent does that.
+    fn suspicion(&self, failure: &StepFailure) -> Option<String> {
+        let asks_for_tangents = self.file().solver.method != Method::InitialStress;
+        let iterates = failure.failed.is_none() && !failure.iterations.is_empty();
+        let mut libraries: Vec<&Path> = self
+            .groups
+            .iter()
+            .filter(|group| !group.is_linear())
+            .map(|group| group.law.built.law.library())
+            .filter(|library| library.foreign().is_none() && !library.is_beside_program())
+            .map(Library::path)
+            .collect();
+        libraries.sort_unstable();
+        libraries.dedup();
+        let checks = libraries
+            .iter()
+            .map(|library| format!("`pilum check {}`", library.display()));
+        let checks: Vec<String> = checks.collect();
+        (asks_for_tangents && iterates && !checks.is_empty()).then(|| {
+            format!(
+                "{} tells whether a wrong tangent is a cause",
+                checks.join(", ")
+            )
         })
     }
 

@@ -251,6 +251,47 @@ fn refuses_keys_of_other_formulations() {
     );
 }
 
+const ROW: &str = "[mesh.lines]\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
+    centre = { y = 0.5, x = [1.0, 1.01] }\neast = { y = 0.5, x = [1.01, 2.0] }\n\
+    stub = { x = 1.01, y = [0.5, 1.0] }";
+
+/// A line that ends on one of three that go on from one another: the one it ends on is marked,
+/// whichever stands first.
+#[test]
+fn marks_the_line_that_another_one_ends_on() {
+    const GROUPS: &str = "[groups.a]\nformulation = \"zero_thickness\"\nline = \"west\"\nlaw = \"joint\"\n\
+        [groups.b]\nformulation = \"zero_thickness\"\nline = ^\"centre\"\nlaw = \"joint\"\n\
+        [groups.c]\nformulation = \"zero_thickness\"\nline = \"east\"\nlaw = \"joint\"\n\n[[supports]]";
+    const STUB: &str = "[groups.b]\nformulation = \"zero_thickness\"\nline = \"centre\"\nlaw = \"joint\"\n\
+        [groups.c]\nformulation = \"zero_thickness\"\nline = ^\"stub\"\nlaw = \"joint\"\n\n[[supports]]";
+    refuses_joints(&[
+        (
+            "the end stands before",
+            &[
+                ("line = \"middle\"\n", "line = \"stub\"\n"),
+                ("[mesh.lines]", ROW),
+                ("[[supports]]", GROUPS),
+            ],
+            &[
+                "group `b`: the line meets the line of the `zero_thickness` group `layer` at \
+                 (1.01, 0.5)",
+            ],
+        ),
+        (
+            "the end stands behind",
+            &[
+                ("line = \"middle\"\n", "line = \"west\"\n"),
+                ("[mesh.lines]", ROW),
+                ("[[supports]]", STUB),
+            ],
+            &[
+                "group `c`: the line meets the line of the `zero_thickness` group `b` at \
+                 (1.01, 0.5)",
+            ],
+        ),
+    ]);
+}
+
 /// The joint of the case in one group, and in three that go on from one another: the same answer.
 #[test]
 fn joints_may_go_on_from_one_another() {
@@ -263,10 +304,8 @@ fn joints_may_go_on_from_one_another() {
             );
             more += &group;
         }
-        let lines = "[mesh.lines]\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
-                     centre = { y = 0.5, x = [1.0, 1.01] }\neast = { y = 0.5, x = [1.01, 2.0] }";
         let text = edited(JOINT)
-            .replace("[mesh.lines]", lines)
+            .replace("[mesh.lines]", ROW)
             .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", parts[0]))
             .replace("[[supports]]", &format!("{more}\n[[supports]]"))
             .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
@@ -284,27 +323,27 @@ fn joints_may_go_on_from_one_another() {
     }
 }
 
-/// The joint of the case and one across it, in one group or the other first: the same answer.
+/// The joint of the case and one across it, in any order of their groups, each in one group or in
+/// two that go on from one another where they cross: the same answer.
 #[test]
 fn joints_may_cross() {
-    let settlement = |first: &str, second: &str| {
-        let lines = [
-            "\"zero_thickness\"\nline = \"middle\"\n",
-            "formulation = \"zero_thickness\"\nline = \"upright\"\nlaw = \"joint\"\n",
-        ];
+    let settlement = |lines: &[&str]| {
+        let group = |line: &&str| {
+            format!(
+                "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
+                 law = \"joint\"\n"
+            )
+        };
+        let more: String = lines[1..].iter().map(group).collect();
         let text = edited(JOINT)
-            .replace("[mesh.lines]", "[mesh.lines]\nupright = { x = 1.0 }")
             .replace(
-                lines[0],
-                &format!("\"zero_thickness\"\nline = \"{first}\"\n"),
+                "[mesh.lines]",
+                "[mesh.lines]\nupright = { x = 1.0 }\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
+                 east = { y = 0.5, x = [1.0, 2.0] }\nsouth = { x = 1.0, y = [0.0, 0.5] }\n\
+                 north = { x = 1.0, y = [0.5, 1.0] }",
             )
-            .replace(
-                "[[supports]]",
-                &format!(
-                    "[groups.more]\n{}\n[[supports]]",
-                    lines[1].replace("upright", second)
-                ),
-            )
+            .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", lines[0]))
+            .replace("[[supports]]", &format!("{more}\n[[supports]]"))
             .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
             .replace("\"traction_t\"", "\"stress_12\"");
         let place = Place::new();
@@ -312,9 +351,16 @@ fn joints_may_cross() {
         assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
         tests::case::column(&place.path("out/history.csv"), "settlement")
     };
-    let one = settlement("middle", "upright");
-    let other = settlement("upright", "middle");
-    for (one, other) in one.iter().zip(&other) {
-        approx::assert_relative_eq!(one, other, max_relative = 1e-6);
+    let one = settlement(&["middle", "upright"]);
+    for other in [
+        &["upright", "middle"][..],
+        &["upright", "west", "east"],
+        &["west", "upright", "east"],
+        &["east", "west", "upright"],
+        &["west", "south", "east", "north"],
+    ] {
+        for (one, other) in one.iter().zip(&settlement(other)) {
+            approx::assert_relative_eq!(one, other, max_relative = 1e-6);
+        }
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, Place, edited};
 use crate::program::{Edit, JOINT};
+use crate::troubled;
 use tests::case::table;
 
 /// The upper half slides on the joint: without friction 10 kPa over 2 m resist, and a pressure
@@ -121,6 +122,29 @@ fn keeps_what_was_reached_when_there_is_no_equilibrium() {
     assert_eq!(summary(&place)["status"], "no equilibrium");
     let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
     assert!(report.contains("<span class=\"status failed\">no equilibrium</span>"));
+}
+
+/// Iterations with a wrong tangent may not converge. A law of the user's own is named, those that
+/// come with the program are not: the checks are among its tests.
+#[test]
+fn names_the_check_of_a_law_that_may_have_a_wrong_tangent() {
+    const CLAUSE: &str = "tells whether a wrong tangent is a cause";
+    let Some(place) = troubled::place("SHEAR_TANGENT=0.3") else {
+        return;
+    };
+    let case = troubled::case("cut").replacen("limit = 1.0e-6", "limit = 1.0", 1);
+    let outcome = place.run_case(case);
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    let check = format!("`pilum check {}` {CLAUSE}", troubled::library());
+    assert!(outcome.says(&check), "{}", outcome.stderr);
+    // With the tangent that is right, the law fails of itself.
+    let place = troubled::place("").unwrap();
+    let outcome = place.run_case(troubled::case("cut"));
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert!(!outcome.says(CLAUSE), "{}", outcome.stderr);
+    let outcome = Place::new().run_case(sliding());
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert!(!outcome.says(CLAUSE), "{}", outcome.stderr);
 }
 
 #[test]

@@ -4,7 +4,10 @@
 use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
 
 /// Commands that print, with a library, a driver and a capsule at hand.
-const PRINT: [&[&str]; 9] = [
+const PRINT: [&[&str]; 12] = [
+    &["--help"],
+    &["run", "--help"],
+    &["--version"],
     &["schema", "case"],
     &["laws"],
     &["laws", "--json"],

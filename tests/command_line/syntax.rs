@@ -189,6 +189,49 @@ fn refuses_wrong_types() {
     );
 }
 
+#[test]
+fn lists_the_choices_where_something_else_than_a_text_stands() {
+    const SETTING: &str = "max_iterations = 20";
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "a number",
+                &[(SETTING, "control = ^3")],
+                &[
+                    "`control`: found the number 3, expected a text in quotes",
+                    "there is: load, arc_length",
+                ],
+            ),
+            (
+                "a truth value",
+                &[("\"plane_strain\"", "^true")],
+                &["`analysis`: found `true`", "axisymmetric, plane_strain"],
+            ),
+            (
+                "a list",
+                &[(SETTING, "equations = ^[\"sparse\"]")],
+                &["`equations`: found a list", "auto, condensed, sparse"],
+            ),
+            (
+                "an empty table",
+                &[("profile = \"phases\"", "profile = ^{}")],
+                &["`profile`: found a table", "never, phases, increments"],
+            ),
+            (
+                "a number in a list",
+                &[("fixed = [\"x\", \"y\"]", "fixed = [\"x\", ^2]")],
+                &["found the number 2", "there is: r, x, y, z"],
+            ),
+            (
+                "a date, in a group",
+                &[("formulation = \"solid\"", "formulation = ^2026-01-01")],
+                &["`formulation`: found a date", "solid", "zero_thickness"],
+            ),
+        ],
+    );
+}
+
 /// TOML has such numbers, and each key that takes a number could be given one.
 #[test]
 fn refuses_numbers_that_are_not_finite() {

@@ -1,7 +1,7 @@
 //! Laws that keep the contract.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{check, compiled, folder, library_of, pilum};
+use crate::program::{check, compiled, folder, library_of, pilum, refused};
 use std::path::Path;
 
 /// No check fails; those that say nothing of this law are skipped for its own reason.
@@ -150,8 +150,13 @@ fn refuses_what_is_not_there() {
         (["check", "elastik", "--json"], 3, "did you mean `elastic`?"),
         (
             ["check", "no/such/library.so", "--json"],
-            3,
-            "no/such/library.so cannot be",
+            1,
+            "cannot read no/such/library.so",
+        ),
+        (
+            ["inspect", "no/such/library.so", "--json"],
+            1,
+            "cannot read no/such/library.so",
         ),
         (
             ["check", "elastic", "--only=repeatabel"],
@@ -159,15 +164,45 @@ fn refuses_what_is_not_there() {
             "did you mean `repeatable`?",
         ),
     ] {
-        let output = pilum(&arguments);
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        let words = stderr
-            .split(['\n', '│', '×'])
-            .map(str::trim)
-            .collect::<Vec<_>>()
-            .join(" ");
-        assert!(words.contains(says), "{arguments:?}: {stderr}");
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}");
-        assert!(output.stdout.is_empty());
+        let words = refused(&arguments, code);
+        assert!(words.contains(says), "{arguments:?}: {words}");
+    }
+}
+
+#[test]
+fn refuses_settings_that_no_law_of_the_library_can_have() {
+    for (law, settings, says) in [
+        (
+            "elastic",
+            &["young_modulos=1e4"][..],
+            "has a parameter `young_modulos`: did you mean `young_modulus`? There is: \
+             poisson_ratio, young_modulus",
+        ),
+        (
+            "elastic",
+            &["young_modulus=-1"],
+            "--set young_modulus=-1: -1 is outside (0, ∞) kPa",
+        ),
+        (
+            "elastic",
+            &["poisson_ratio=NaN"],
+            "NaN is outside (-1, 0.5)",
+        ),
+        (
+            "mepi_softening",
+            &["peak=2"],
+            "2 is outside the choices 0 (continuous), 1 (published)",
+        ),
+        // Each within its bounds, but not together.
+        (
+            "mepi_softening",
+            &["mu_0=0.5", "mu_p=0.2"],
+            "`mepi` under interface_2d accepts no parameters with these values: PILUM_E_PARAMETER",
+        ),
+    ] {
+        let mut arguments = vec!["check", law, "--only=create-works"];
+        arguments.extend(settings.iter().flat_map(|setting| ["--set", *setting]));
+        let words = refused(&arguments, 1);
+        assert!(words.contains(says), "{arguments:?}: {words}");
     }
 }

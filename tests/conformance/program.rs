@@ -50,12 +50,27 @@ pub(crate) fn folder() -> TempDir {
 /// tests must not be skipped.
 pub(crate) fn compiled(fixture: &str, folder: &Path) -> Option<PathBuf> {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    compiled_from(&tests.join(format!("fixtures/{fixture}.c")), folder)
+}
+
+/// Compiles the law of the fixtures with these definitions, which make `name` of it.
+pub(crate) fn compiled_with(definitions: &str, name: &str, folder: &Path) -> Option<PathBuf> {
+    let source = folder.join(format!("{name}.c"));
+    std::fs::write(&source, format!("{definitions}\n#include \"law.h\"\n")).unwrap();
+    compiled_from(&source, folder)
+}
+
+fn compiled_from(source: &Path, folder: &Path) -> Option<PathBuf> {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let fixture = source.file_stem().unwrap().to_str().unwrap();
     let library = folder.join(format!("{DLL_PREFIX}{fixture}{DLL_SUFFIX}"));
     let output = Command::new("cc")
         .args(["-std=gnu11", "-O1", "-Wall", "-Werror", "-shared", "-fPIC"])
         .args(["-fvisibility=hidden", "-I"])
         .arg(tests.join("../abi/include"))
-        .arg(tests.join(format!("fixtures/{fixture}.c")))
+        .arg("-I")
+        .arg(tests.join("fixtures"))
+        .arg(source)
         .arg("-o")
         .arg(&library)
         .arg("-lm")
@@ -96,6 +111,22 @@ pub(crate) fn check(library: &Path, more: &[&str]) -> Report {
         stdout,
         stderr,
     }
+}
+
+/// A message in one line, without its frame.
+pub(crate) fn words(message: &str) -> String {
+    let words = message.split_whitespace();
+    let words = words.filter(|word| !["│", "×", "╰─▶"].contains(word));
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// What `pilum` refuses to do.
+pub(crate) fn refused(arguments: &[&str], code: i32) -> String {
+    let output = pilum(arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    words(&stderr)
 }
 
 impl Report {

@@ -263,3 +263,15 @@ fn a_force_beyond_the_limit_stops_with_the_limit_in_words() {
     assert_close("load", load_factor.unwrap(), residual / asked, 1e-3, 1.0);
     assert_eq!(stopped["probes"]["tau"].as_f64(), Some(residual));
 }
+
+/// It takes over where the load may not be halved any more, however early that is.
+#[test]
+fn the_arc_length_takes_over_at_the_last_halving() {
+    for halvings in [0, 1] {
+        let solver = format!("control = \"arc_length\"\nmax_halvings = {halvings}");
+        let pull = "increments = 40\ndisplacement = [{ line = \"end\", x = 0.02 }]";
+        let finished = run(&text(&solver, pull));
+        let steps = finished.summary()["phases"][1]["arc_length_steps"].as_u64();
+        assert!(steps >= Some(8), "{halvings}: {steps:?}");
+    }
+}

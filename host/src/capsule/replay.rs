@@ -233,6 +233,7 @@ fn outcome(
         status(failure.outcome)
     );
     Err(match failure.outcome {
+        _ if law.breaks_down(failure) => Error::plugin(text),
         Outcome::CutStep | Outcome::Domain | Outcome::Numeric => Error::NoEquilibrium {
             message: text,
             hint: None,

@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses};
-use super::{Check, Family, Found, Subject, Verdict, failed};
+use super::{Check, Family, Found, Subject, Verdict, failed, refusal, status_name};
 use crate::plugin::LoadedLaw;
 use crate::plugin::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME};
 use abi::raw;
@@ -90,16 +90,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
 ];
 
-fn name(status: raw::Status) -> String {
-    if status == NO_OUTCOME {
-        return "no outcome".to_owned();
-    }
-    match Outcome::from_code(status) {
-        Outcome::Unknown(code) => format!("the unknown status {code}"),
-        outcome => format!("{outcome:?} ({status})"),
-    }
-}
-
 fn create_works(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "create");
     let specimens = subject.specimens(2, &mut random)?;
@@ -125,8 +115,8 @@ fn must_refuse(
     if created.status != expected {
         return Err(failed(format!(
             "`{id}`: {what}: `create` returned {}, expected {}",
-            name(created.status),
-            name(expected)
+            status_name(created.status),
+            status_name(expected)
         )));
     }
     if created.probe.is_some() {
@@ -191,7 +181,7 @@ fn wrong_arguments_are_refused(subject: &Subject) -> Found {
                     return Err(failed(format!(
                         "`{}`: {what}, without a message: `create` returned {}",
                         law.description().id,
-                        name(mute.status)
+                        status_name(mute.status)
                     )));
                 }
             }
@@ -289,12 +279,12 @@ fn integrate_works(subject: &Subject) -> Found {
                 Outcome::CutStep | Outcome::Domain | Outcome::Numeric
             );
             if !expected {
-                return Err(specimen.fails(format!("a small step gave {}: {text}", name(*status))));
+                let why = refusal(*status, Some(text));
+                return Err(specimen.fails(format!("a small step gave {why}")));
             }
         }
         if walk.successes.is_empty() {
-            let why = walk.refusals.first().map_or("", |(_, text)| text);
-            return Err(specimen.fails(format!("no step succeeded: {why}")));
+            return Err(specimen.fails(format!("no step succeeded: {}", walk.why())));
         }
         n_successes += walk.successes.len();
         n += walk.successes.len() + walk.refusals.len();
@@ -308,8 +298,8 @@ fn integrate_works(subject: &Subject) -> Found {
         if worst != answer.status {
             return Err(specimen.fails(format!(
                 "the call returned {}, its most severe outcome is {}",
-                name(answer.status),
-                name(worst)
+                status_name(answer.status),
+                status_name(worst)
             )));
         }
     }
@@ -325,7 +315,7 @@ fn unknown_requests_are_refused(subject: &Subject) -> Found {
             if answer.status != raw::PILUM_E_UNSUPPORTED {
                 return Err(specimen.fails(format!(
                     "request bit {bit}: `integrate` returned {}",
-                    name(answer.status)
+                    status_name(answer.status)
                 )));
             }
             if answer.points.iter().any(|end| end.status != NO_OUTCOME) {
@@ -345,7 +335,9 @@ fn empty_batch_is_accepted(subject: &Subject) -> Found {
             if let Some(Answer { status, .. }) = answer
                 && status != raw::PILUM_OK
             {
-                return Err(specimen.fails(format!("`{function}` returned {}", name(status))));
+                return Err(
+                    specimen.fails(format!("`{function}` returned {}", status_name(status)))
+                );
             }
         }
     }
@@ -435,7 +427,7 @@ fn longer_structs_are_accepted(subject: &Subject) -> Found {
         let Some(probe) = created.probe else {
             return Err(specimen.fails(format!(
                 "`create` returned {} to a host with a longer description",
-                name(created.status)
+                status_name(created.status)
             )));
         };
         let answer = probe.integrate(&points, &longer)?;
@@ -459,7 +451,7 @@ fn shorter_batch_is_refused(subject: &Subject) -> Found {
             if answer.status != raw::PILUM_E_ARGUMENT {
                 return Err(specimen.fails(format!(
                     "a batch of {batch_bytes} bytes: `integrate` returned {}",
-                    name(answer.status)
+                    status_name(answer.status)
                 )));
             }
         }

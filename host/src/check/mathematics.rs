@@ -104,7 +104,13 @@ fn flux_scale(step: &Step) -> f64 {
 enum Slope {
     Right,
     Kink,
-    Wrong { component: usize, error: f64 },
+    /// An entry of the tangent, as the law has it and as differences do.
+    Wrong {
+        row: usize,
+        column: usize,
+        by_law: f64,
+        by_differences: f64,
+    },
 }
 
 fn tangent_matches_differences(subject: &Subject) -> Found {
@@ -126,10 +132,19 @@ fn tangent_matches_differences(subject: &Subject) -> Found {
             match slope(&specimen, step, scale)? {
                 Slope::Right => {}
                 Slope::Kink => n_kinks += 1,
-                Slope::Wrong { component, error } => {
+                Slope::Wrong {
+                    row,
+                    column,
+                    by_law,
+                    by_differences,
+                } => {
+                    let names = specimen.hypothesis.components();
                     return Err(specimen.fails(format!(
-                        "the tangent for component {component} of the gradient is wrong by \
-                         {error:.1e} of the stiffness, at {:?}",
+                        "row `{}`, column `{}` of the tangent is {by_law:.6e}, differences give \
+                         {by_differences:.6e}: wrong by {:.1e} of the stiffness, at {:?}",
+                        names[row],
+                        names[column],
+                        (by_law - by_differences).abs() / scale,
                         step.start
                     )));
                 }
@@ -163,7 +178,7 @@ fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slope, Verdict>
     let ends = specimen.call(&moved, raw::PILUM_REQ_FLUX)?.points;
     let mut verdict = Slope::Kink;
     for (l, _) in LENGTHS.iter().enumerate() {
-        let (mut error, mut disagreement, mut worst) = (0.0_f64, 0.0_f64, 0);
+        let (mut error, mut disagreement, mut worst) = (0.0_f64, 0.0_f64, Slope::Right);
         for (k, &c) in columns.iter().enumerate() {
             let first = 2 * (l * columns.len() + k);
             let [plus, minus] = [first, first + 1].map(|i| &ends[i]);
@@ -178,12 +193,20 @@ fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slope, Verdict>
             for row in 0..n {
                 let [above, here, below] =
                     [&plus.flux, &step.end.flux, &minus.flux].map(|f| f[row]);
-                let wrong = ((above - below) / (up - down) - step.end.tangent[row * n + c]).abs();
+                let by_differences = (above - below) / (up - down);
+                let by_law = step.end.tangent[row * n + c];
+                let wrong = (by_differences - by_law).abs();
                 let forward = (above - here) / up;
                 let backward = (here - below) / -down;
                 disagreement = disagreement.max((forward - backward).abs());
                 if wrong > error {
-                    (error, worst) = (wrong, c);
+                    error = wrong;
+                    worst = Slope::Wrong {
+                        row,
+                        column: c,
+                        by_law,
+                        by_differences,
+                    };
                 }
             }
         }
@@ -191,10 +214,7 @@ fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slope, Verdict>
             return Ok(Slope::Right);
         }
         if disagreement <= 0.1 * error {
-            verdict = Slope::Wrong {
-                component: worst,
-                error: error / scale,
-            };
+            verdict = worst;
         }
     }
     Ok(verdict)
@@ -213,12 +233,13 @@ fn tangent_symmetry_as_declared(subject: &Subject) -> Found {
             let bound = ROUND_OFF * largest(k).max(step.stiffness);
             for row in 0..n {
                 for column in 0..row {
+                    let names = specimen.hypothesis.components();
                     let (lower, upper) = (k[row * n + column], k[column * n + row]);
                     if (lower - upper).abs() > bound {
                         return Err(specimen.fails(format!(
-                            "the tangent is declared symmetric, but its entries ({row}, {column}) \
-                             are {lower:e} and {upper:e}, at {:?}",
-                            step.start
+                            "the tangent is declared symmetric, but row `{0}`, column `{1}` is \
+                             {lower:.6e}, row `{1}`, column `{0}` {upper:.6e}, at {2:?}",
+                            names[row], names[column], step.start
                         )));
                     }
                 }

@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::specimen::{first_difference, is_finite, is_success};
-use super::{Check, Family, Found, Subject};
+use super::{Check, Family, Found, Subject, status_name};
 use crate::plugin::probe::PointStart;
 use abi::raw;
 use abi::status::Outcome;
@@ -56,8 +56,8 @@ fn bad_numbers_are_refused(subject: &Subject) -> Found {
                     let answer = specimen.call(&[broken], UPDATE)?;
                     if Outcome::from_code(answer.status) != Outcome::Numeric {
                         return Err(specimen.fails(format!(
-                            "{bad} as component {c} of `{input}` gave {:?}",
-                            Outcome::from_code(answer.status)
+                            "{bad} as component {c} of `{input}` gave {}",
+                            status_name(answer.status)
                         )));
                     }
                     n += 1;
@@ -79,8 +79,8 @@ fn failing_points_stay_alone(subject: &Subject) -> Found {
             let mut found = specimen.call(&some, UPDATE)?.points;
             if found[at].status != raw::PILUM_E_NUMERIC {
                 return Err(specimen.fails(format!(
-                    "point {at} is not finite, its outcome is {:?}",
-                    Outcome::from_code(found[at].status)
+                    "point {at} is not finite, its outcome is {}",
+                    status_name(found[at].status)
                 )));
             }
             found[at] = expected[at].clone();
@@ -121,7 +121,7 @@ fn huge_steps_end_well(subject: &Subject) -> Found {
                     Some(format!("the step factor is {}", end.step_factor))
                 }
                 Outcome::CutStep | Outcome::Domain | Outcome::Numeric => None,
-                other => Some(format!("the outcome is {other:?}")),
+                _ => Some(format!("the outcome is {}", status_name(end.status))),
             };
             if let Some(why) = why {
                 return Err(specimen.fails(format!("{why}, for {huge:?}")));

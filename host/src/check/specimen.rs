@@ -1,8 +1,9 @@
 //! Laws with sample parameters, led along random paths.
 
 use super::random::Random;
-use super::{Subject, Verdict, failed, skipped};
-use crate::plugin::probe::{Answer, CreateForm, Form, PointEnd, PointStart, Probe};
+use super::{Found, Subject, Verdict, failed, refusal, skipped};
+use crate::error::suggestion;
+use crate::plugin::probe::{Answer, CreateForm, Form, NO_OUTCOME, PointEnd, PointStart, Probe};
 use crate::plugin::{FormulationDescription, LoadedLaw, ParameterDescription};
 use abi::Hypothesis;
 use abi::raw;
@@ -40,6 +41,14 @@ pub(super) struct Walk {
     pub(super) refusals: Vec<(raw::Status, String)>,
     /// Starts of the points that are said to have succeeded, finite or not.
     pub(super) successes: Vec<PointStart>,
+}
+
+impl Walk {
+    /// Why a part of the path ended first; empty if none did.
+    pub(super) fn why(&self) -> String {
+        let first = self.refusals.first();
+        first.map_or(String::new(), |(status, text)| refusal(*status, Some(text)))
+    }
 }
 
 /// Hypotheses a law offers, in the order of its library.
@@ -189,36 +198,120 @@ impl Subject {
         draws: impl Iterator<Item = Draw>,
         random: &mut Random,
     ) -> Result<Specimen, Verdict> {
-        let mut why = String::new();
+        self.accepted(law, formulation, hypothesis, draws, random)?
+            .map_err(|(_, why)| {
+                let hint = if self.settings.is_empty() {
+                    "; `--set ID=VALUE` fixes some"
+                } else {
+                    ""
+                };
+                failed(format!(
+                    "`{}` under {}: `create` accepted no parameters: {why}{hint}",
+                    law.description().id,
+                    hypothesis.name()
+                ))
+            })
+    }
+
+    /// The first set of parameters that a law accepts; otherwise the last answer of `create`, in
+    /// words too.
+    fn accepted(
+        &self,
+        law: &LoadedLaw,
+        formulation: &FormulationDescription,
+        hypothesis: Hypothesis,
+        draws: impl Iterator<Item = Draw>,
+        random: &mut Random,
+    ) -> Result<Result<Specimen, (raw::Status, String)>, Verdict> {
+        let mut last = (raw::PILUM_E_PARAMETER, String::new());
         for how in draws.take(MOST_DRAWS) {
             let values = draw_all(self, law, random, how);
             let created = law.probe(&create_form(formulation, hypothesis, &values))?;
             if let (raw::PILUM_OK, Some(probe)) = (created.status, created.probe) {
-                return Ok(Specimen {
+                return Ok(Ok(Specimen {
                     law: law.clone(),
                     formulation: formulation.clone(),
                     hypothesis,
                     values,
                     probe,
-                });
+                }));
             }
-            why = created
-                .message
-                .split(|&b| b == 0)
-                .next()
-                .map_or(String::new(), |text| {
-                    String::from_utf8_lossy(text).into_owned()
-                });
+            let why = if created.status == raw::PILUM_OK {
+                "PILUM_OK (0), but no instance is written".to_owned()
+            } else {
+                let text = created.message.split(|&b| b == 0).next();
+                let text = text.map(String::from_utf8_lossy);
+                refusal(created.status, text.as_deref())
+            };
+            last = (created.status, why);
             if created.status != raw::PILUM_E_PARAMETER {
                 break;
             }
         }
-        Err(failed(format!(
-            "`{}` under {}: `create` accepted no parameters: {why}; `--set ID=VALUE` fixes some",
-            law.description().id,
-            hypothesis.name()
-        )))
+        Ok(Err(last))
     }
+}
+
+/// Whether the subject's settings name parameters of its laws, with values that these accept.
+pub(super) fn settings_fit(subject: &Subject) -> Found {
+    // What else is wrong with the library is for the checks to say.
+    let Ok(laws) = subject.laws() else {
+        return Ok(String::new());
+    };
+    for (id, value) in &subject.settings {
+        let parameters = laws.iter().flat_map(|law| &law.description().parameters);
+        let declared: Vec<_> = parameters.clone().filter(|p| p.id == *id).collect();
+        if declared.is_empty() {
+            let mut ids: Vec<&str> = parameters.map(|p| p.id.as_str()).collect();
+            ids.sort_unstable();
+            ids.dedup();
+            return Err(failed(format!(
+                "--set {id}={value}: no law of this library has a parameter `{id}`: {}",
+                suggestion(id, ids)
+            )));
+        }
+        let admits = |p: &&ParameterDescription| {
+            let is_choice = value.fract() == 0.0 && *value < p.choices.len() as f64;
+            let is_left_out = p.optional && value.is_nan();
+            is_left_out || p.bounds.contain(*value) && (p.choices.is_empty() || is_choice)
+        };
+        if let Some(p) = declared.into_iter().find(|p| !admits(p)) {
+            let allowed = if p.choices.is_empty() {
+                let unit = p.unit.trim_matches('-');
+                format!("{} {unit}", p.bounds)
+            } else {
+                let numbered = p.choices.iter().enumerate();
+                let choices: Vec<String> = numbered.map(|(i, c)| format!("{i} ({c})")).collect();
+                format!("the choices {}", choices.join(", "))
+            };
+            let why = format!("--set {id}={value}: {value} is outside {allowed}");
+            return Err(failed(why.trim_end()));
+        }
+    }
+    let free = Subject {
+        path: subject.path.clone(),
+        seed: subject.seed,
+        settings: Vec::new(),
+    };
+    for law in laws {
+        for (formulation, hypothesis) in hypotheses(&law) {
+            let create = |subject: &Subject| {
+                let mut random = Random::new(subject.seed, "settings");
+                let draws = std::iter::once(Draw::Ordinary).chain(std::iter::repeat(Draw::Any));
+                subject.accepted(&law, &formulation, hypothesis, draws, &mut random)
+            };
+            if let Err((raw::PILUM_E_PARAMETER, why)) = create(subject)?
+                && create(&free)?.is_ok()
+            {
+                return Err(failed(format!(
+                    "--set: `{}` under {} accepts no parameters with these values: {why}",
+                    law.description().id,
+                    hypothesis.name()
+                )));
+            }
+        }
+    }
+    Ok(String::new())
 }
 
 impl Specimen {
@@ -252,18 +345,21 @@ impl Specimen {
         self.hypothesis != Hypothesis::PlaneStrain || component != 2
     }
 
-    /// Internal variables of a point with this flux; none if the law cannot start there.
-    pub(super) fn initial_state(&self, flux: &[f64]) -> Result<Option<Vec<f64>>, Verdict> {
+    /// Internal variables of a point with this flux; in words why the law cannot start there.
+    fn initial_state(&self, flux: &[f64]) -> Result<Result<Vec<f64>, String>, Verdict> {
         let answer = self.probe.init_state(&[flux.to_vec()], &Form::of(0))?;
         Ok(match answer {
             None => {
                 let variables = self.formulation.internal_variables.iter();
-                Some(variables.map(|v| v.initial_value).collect())
+                Ok(variables.map(|v| v.initial_value).collect())
             }
-            Some(answer) if answer.status == raw::PILUM_OK => {
-                answer.points.into_iter().next().map(|point| point.state)
+            Some(answer) => {
+                let why = refusal(answer.status, answer.text().as_deref());
+                let state = answer.points.into_iter().next().map(|point| point.state);
+                state
+                    .filter(|_| answer.status == raw::PILUM_OK)
+                    .ok_or_else(|| format!("`init_state` gave {why}"))
             }
-            Some(_) => None,
         })
     }
 
@@ -282,8 +378,12 @@ impl Specimen {
             let flux: Vec<f64> = (0..n)
                 .map(|c| if c < n_normal { -pressure } else { 0.0 })
                 .collect();
-            let Some(state0) = self.initial_state(&flux)? else {
-                continue;
+            let state0 = match self.initial_state(&flux)? {
+                Ok(state0) => state0,
+                Err(refused) => {
+                    why = why.or(Some(refused));
+                    continue;
+                }
             };
             let start = PointStart {
                 gradient0: vec![0.0; n],
@@ -299,11 +399,24 @@ impl Specimen {
                 .tangent
                 .iter()
                 .fold(0.0, |most: f64, k| most.max(k.abs()));
-            if is_success(answer.points[0].status) && stiffness > 0.0 && stiffness.is_finite() {
+            let status = answer.points[0].status;
+            if is_success(status) && stiffness > 0.0 && stiffness.is_finite() {
                 return Ok((start, stiffness, pressure.max(10.0) / stiffness));
             }
-            // The first message, since a law that has panicked says no more why.
-            why = why.or_else(|| answer.text());
+            // The first reason, since a law that has panicked says no more why.
+            why = why.or_else(|| {
+                Some(if is_success(status) {
+                    format!("the largest entry of the elastic operator is {stiffness}")
+                } else {
+                    // Where a call is refused as a whole, no outcomes are written.
+                    let status = if status == NO_OUTCOME {
+                        answer.status
+                    } else {
+                        status
+                    };
+                    refusal(status, answer.text().as_deref())
+                })
+            });
         }
         Err(skipped(format!(
             "{}: no initial stress was accepted: {}",
@@ -377,12 +490,16 @@ impl Specimen {
     /// Starts of steps that succeed together, at most so many.
     pub(super) fn points(&self, n: usize, random: &mut Random) -> Result<Vec<PointStart>, Verdict> {
         let walk = self.walk(n.div_ceil(WALKERS) + STRAIGHT, random)?;
+        let why = walk.why();
         let mut starts = walk.successes;
         // The last ones are the farthest from the elastic beginning.
         starts.reverse();
         starts.truncate(n);
         if starts.is_empty() {
-            return Err(skipped(format!("{}: no increment succeeded", self.name())));
+            return Err(skipped(format!(
+                "{}: no increment succeeded: {why}",
+                self.name()
+            )));
         }
         Ok(starts)
     }

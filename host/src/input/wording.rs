@@ -2,6 +2,7 @@
 
 use crate::error::{InputError, Source, suggestion};
 use std::ops::Range;
+use toml::de::DeValue;
 
 /// The error with its place, the key where one is concerned, and a hint where one is known.
 pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
@@ -54,6 +55,38 @@ pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
             Some(hint) => at(message.to_owned()).hint(hint),
             None => at(message.to_owned()),
         },
+    }
+}
+
+/// Whether the value is of no type that a choice can be written as.
+pub(super) fn expects_choice(error: &toml::de::Error) -> bool {
+    let message = error.message().trim();
+    message.starts_with("wanted string") || message.starts_with("wanted exactly 1 element")
+}
+
+/// A value that is no text, in words.
+pub(super) fn value_in_words(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::Integer(number) => format!("the number {}", number.as_str()),
+        DeValue::Float(number) => format!("the number {}", number.as_str()),
+        DeValue::Boolean(value) => format!("`{value}`"),
+        DeValue::Array(_) => "a list".to_owned(),
+        DeValue::Table(_) => "a table".to_owned(),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::String(_) => "a text".to_owned(),
+    }
+}
+
+/// The error of what was found in place of a choice, from the one of a text that is no choice.
+pub(super) fn no_choice(source: &Source, refused: &toml::de::Error, found: &str) -> InputError {
+    let span = refused.span().unwrap_or(0..0);
+    let key = key_before(source.text(), span.start);
+    let key = key.map_or(String::new(), |key| format!("`{key}`: "));
+    let message = format!("{key}found {found}, expected a text in quotes");
+    let error = source.error(span, message);
+    match unknown(refused.message().trim(), "unknown variant ") {
+        Some((name, known)) => error.hint(suggestion(name, known)),
+        None => error,
     }
 }
 

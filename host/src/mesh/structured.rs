@@ -90,14 +90,50 @@ fn insert_joints(source: &Source, file: &CaseFile, mesh: &mut Mesh) -> Result<()
         }
     }
     for cuts in straight.values() {
-        split(mesh, cuts).map_err(|why| wrong(&cuts[0], &why))?;
+        split(mesh, cuts).map_err(|fault| match fault {
+            Fault::OnBoundary => wrong(&cuts[0], "the line lies on the boundary: nothing to split"),
+            Fault::Meets { group, other, at } => {
+                let other = file.groups.get_index(other).map(|(name, _)| name);
+                let other = other.map_or("", |name| name.get_ref().as_str());
+                let cut = cuts.iter().find(|cut| cut.group == group);
+                wrong(
+                    cut.unwrap_or(&cuts[0]),
+                    &format!(
+                        "the line meets the line of the `zero_thickness` group `{other}` at ({}, {}) \
+                         and one of them ends there: such lines may cross or go on from one \
+                         another, but not end on each other",
+                        at[0], at[1]
+                    ),
+                )
+            }
+        })?;
     }
     Ok(())
 }
 
+/// Why elements cannot be inserted along a straight line.
+enum Fault {
+    /// All of it lies on the boundary.
+    OnBoundary,
+    /// A group's line meets that of an earlier group, and one of them ends there.
+    Meets {
+        group: usize,
+        other: usize,
+        at: [f64; 2],
+    },
+}
+
+/// Number of a quad and of its edge.
+type Edge = (usize, usize);
+
 /// The coordinate that is the same all along an edge.
-fn across(mesh: &Mesh, edge: (usize, usize)) -> usize {
+fn across(mesh: &Mesh, edge: Edge) -> usize {
     let [a, b, _] = mesh.edge(edge).map(|node| mesh.nodes[node]);
+    perpendicular(a, b)
+}
+
+/// The coordinate that two points of a grid line have in common.
+fn perpendicular(a: [f64; 2], b: [f64; 2]) -> usize {
     usize::from((a[0] - b[0]).abs() >= (a[1] - b[1]).abs())
 }
 
@@ -406,15 +442,25 @@ fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, 
     }
 }
 
-/// Refuses a line that ends on an earlier one across it, or on which an earlier one ends: which quads stay
-/// joined there would depend on the order. Lines may cross. `uses`: in how many edges of the new
-/// line its nodes are.
-fn refuse_meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Result<(), String> {
+/// Refuses a line that ends on an earlier one across it, or on which an earlier one ends: which
+/// quads stay joined there would depend on the order. Lines may cross, also where lines go on from
+/// one another. `pairs`: edges of the new line, `group_of`: their groups by mid-side node, `uses`:
+/// in how many of them a node is.
+fn refuse_meeting(
+    mesh: &Mesh,
+    pairs: &[(Edge, Edge)],
+    group_of: &HashMap<usize, usize>,
+    uses: &HashMap<usize, usize>,
+) -> Result<(), Fault> {
     let key = |node: usize| mesh.nodes[node].map(f64::to_bits);
-    let mut earlier: HashMap<(usize, [u64; 2]), usize> = HashMap::new();
+    // By direction and place: in how many elements, the first of them of which group.
+    let mut earlier: IndexMap<(usize, [u64; 2]), (usize, usize)> = IndexMap::new();
     for joint in &mesh.joints {
+        let [a, b, _] = joint.minus.map(|node| mesh.nodes[node]);
+        let direction = perpendicular(a, b);
         for &node in &joint.minus {
-            *earlier.entry((joint.group, key(node))).or_default() += 1;
+            let entry = earlier.entry((direction, key(node)));
+            entry.or_insert((0, joint.group)).0 += 1;
         }
     }
     // A node that the earlier line has doubled counts once. Mid-side nodes are in one edge too,
@@ -423,23 +469,29 @@ fn refuse_meeting(mesh: &Mesh, uses: &HashMap<usize, usize>) -> Result<(), Strin
     for (&node, count) in uses {
         *new.entry(key(node)).or_default() += count;
     }
-    for ((_, at), &others) in &earlier {
-        if new.get(at).is_some_and(|&count| count == 1 || others == 1) {
-            let [x, y] = at.map(f64::from_bits);
-            return Err(format!(
-                "the line meets the line of another `zero_thickness` group at ({x}, {y}) and one \
-                 of them ends there: such lines may cross or go on from one another, but not end \
-                 on each other"
-            ));
-        }
-    }
-    Ok(())
+    let ends = |at: &[u64; 2], others| {
+        let count = new.get(at);
+        count.is_some_and(|&count| count == 1 || others == 1)
+    };
+    let mut meetings = earlier
+        .into_iter()
+        .filter(|((_, at), (others, _))| ends(at, *others));
+    let Some(((_, at), (_, other))) = meetings.next() else {
+        return Ok(());
+    };
+    let mut edges = pairs.iter().map(|&(minus, _)| mesh.edge(minus));
+    let edge = edges.find(|edge| edge.iter().any(|&node| key(node) == at));
+    Err(Fault::Meets {
+        group: edge.map_or(other, |edge| group_of[&edge[2]]),
+        other,
+        at: at.map(f64::from_bits),
+    })
 }
 
 /// Doubles the nodes of lines along one straight line and inserts zero-thickness elements between
 /// the two sides. Where the lines end inside the mesh the last node stays single, so the two sides
 /// stay joined there.
-fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), String> {
+fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), Fault> {
     let mut edges = Vec::new();
     let mut group_of = HashMap::new();
     for cut in cuts {
@@ -454,7 +506,7 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), String> {
         let nodes = mesh.quads[q].nodes;
         [0, 1].map(|c| nodes[..4].iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / 4.0)
     };
-    let mut sides: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
+    let mut sides: HashMap<usize, Vec<Edge>> = HashMap::new();
     for &(q, e) in &edges {
         sides.entry(mesh.edge((q, e))[2]).or_default().push((q, e));
     }
@@ -464,7 +516,7 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), String> {
     for middle in middles {
         let side = &sides[&middle];
         let &[a, b] = side.as_slice() else {
-            return Err("the line lies on the boundary: nothing to split".to_owned());
+            return Err(Fault::OnBoundary);
         };
         let (ca, cb) = (centre(a.0), centre(b.0));
         pairs.push(if ca[0] + ca[1] < cb[0] + cb[1] {
@@ -482,7 +534,7 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), String> {
             *uses.entry(node).or_default() += 1;
         }
     }
-    refuse_meeting(mesh, &uses)?;
+    refuse_meeting(mesh, &pairs, &group_of, &uses)?;
     let mut copy: HashMap<usize, usize> = HashMap::new();
     let mut joints = Vec::new();
     for &(minus, _) in &pairs {

@@ -19,6 +19,15 @@ pub struct SearchPath {
     opened: Mutex<BTreeMap<PathBuf, Arc<Library>>>,
 }
 
+/// The folder of the program and its `deps`; both exist in a build folder.
+pub(super) fn beside_program() -> Vec<PathBuf> {
+    let program = std::env::current_exe().ok();
+    let folder = program.as_deref().and_then(Path::parent);
+    folder.map_or(Vec::new(), |folder| {
+        vec![folder.to_owned(), folder.join("deps")]
+    })
+}
+
 impl SearchPath {
     /// First the given folders (from a case file), then those of `PILUM_LAW_PATH`, then the
     /// folder of the program and its `deps`.
@@ -27,18 +36,7 @@ impl SearchPath {
         if let Some(list) = std::env::var_os("PILUM_LAW_PATH") {
             folders.extend(std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty()));
         }
-        if let Some(program) = std::env::current_exe()
-            .ok()
-            .and_then(|p| p.parent().map(Path::to_owned))
-        {
-            folders.push(program.join("deps"));
-            folders.push(program);
-        }
-        // Beside the program comes first; both exist in a build folder.
-        let n = folders.len();
-        if n >= 2 {
-            folders.swap(n - 2, n - 1);
-        }
+        folders.extend(beside_program());
         Self {
             folders,
             pins: Pins::default(),
