@@ -24,7 +24,9 @@ use std::path::Path;
 /// Name of the file in a results folder.
 pub const FILE_NAME: &str = "checkpoint.bin";
 
-/// First bytes of the file: the format and its version.
+/// First bytes of the file: the format.
+const NAME: &[u8] = b"pilum checkpoint ";
+/// The same with its version.
 const HEAD: &[u8] = b"pilum checkpoint 3\n";
 
 /// Bytes that are summed and written at a time: they stay in the processor's cache.
@@ -82,6 +84,8 @@ pub struct PhaseCourse {
     pub domain: Option<Standing>,
     /// A matrix of the groups' tangents is in use.
     pub has_matrix: bool,
+    /// Largest entry of the last matrix, whether it is in use or not.
+    pub largest: f64,
     /// The phase so far.
     pub record: PhaseRecord,
 }
@@ -158,7 +162,13 @@ impl<'c> Checkpoint<'c> {
                 path.display()
             ))
         };
-        let checkpoint = decode(&bytes).ok_or_else(|| refused("the file is damaged"))?;
+        let is_other = !bytes.starts_with(HEAD) && bytes.starts_with(NAME);
+        let broken = if is_other {
+            "it was written by another version of the program"
+        } else {
+            "the file is damaged"
+        };
+        let checkpoint = decode(&bytes).ok_or_else(|| refused(broken))?;
         if checkpoint.identity != identity {
             return Err(refused(
                 "it belongs to another case, another version of the program, or other libraries or \

@@ -629,9 +629,9 @@ impl Group {
         &self.tangent[start..start + length]
     }
 
-    /// What the group keeps for its points.
+    /// What the group keeps for its points. A trial state as large comes and goes.
     pub fn bytes(&self) -> Bytes {
-        let field = |field: &Field| size_of_val(&*field.committed) + size_of_val(&*field.trial);
+        let field = |field: &Field| size_of_val(&*field.committed);
         let jumps = self.layer.as_ref().map_or(0, |layer| field(&layer.jump));
         Bytes {
             strain: field(&self.strain) + jumps,

@@ -361,6 +361,7 @@ impl<'a> Run<'a> {
                 history: History::default(),
                 domain: None,
                 has_matrix: false,
+                largest: 0.0,
                 record: PhaseRecord::new(name, equations.n(), imbalance),
             }
         });
@@ -463,6 +464,7 @@ impl<'a> Run<'a> {
             if stops || keeper.is_due() {
                 course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
                 course.has_matrix = equations.matrix.is_kept(self.file().solver.method);
+                course.largest = equations.matrix.largest();
                 course.record = equations.counted_in(record);
                 keeper.keep(self.state(number, &course), results, &observer.warnings)?;
                 course.domain = None;
@@ -881,7 +883,7 @@ impl<'a> Run<'a> {
             system,
             domain,
             solver,
-            matrix: Matrix::default(),
+            matrix: Matrix::resumed(course.map_or(0.0, |course| course.largest)),
             out_of_balance,
             n_unknowns: unknowns.len(),
             counted: [0; 2],

@@ -181,6 +181,65 @@ fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
     }
 }
 
+/// A block pulled off another one. No force ever acts: residuals are measured against the largest
+/// entry of the last matrix, which may be that of a run before.
+const FORCELESS: &str = r#"
+analysis = "plane_strain"
+[mesh]
+columns = [{ n = 2, to = 1.0 }]
+rows = [{ n = 2, to = 1.0 }, { n = 1, to = 1.01 }, { n = 2, to = 2.0 }]
+[[mesh.region]]
+group = "soil"
+[[mesh.region]]
+group = "layer"
+y = [1.0, 1.01]
+[mesh.lines]
+bottom = { y = 0.0 }
+top = { y = 2.0 }
+[laws.soil]
+law = "elastic"
+parameters = { young_modulus = 1e8, poisson_ratio = 0.3 }
+[laws.joint]
+law = "coulomb_joint"
+[laws.joint.parameters]
+normal_stiffness = 1e3
+shear_stiffness = 1e3
+cohesion = 0.0
+friction_angle = 30.0
+dilatancy_angle = 0.0
+[groups.soil]
+formulation = "solid"
+law = "soil"
+[groups.layer]
+formulation = "thin_layer"
+in_plane = "none"
+integration = "mean"
+law = "joint"
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "lift"
+increments = 1500
+displacement = [{ line = "top", y = 0.1, x = 0.3 }]
+[probes]
+q = { line = "top", quantity = "reaction_x" }
+[solver]
+equations = "sparse"
+"#;
+
+#[test]
+fn a_run_without_any_force_resumes_to_the_same_bits() {
+    for method in ["auto", "newton"] {
+        let text = format!("{FORCELESS}method = \"{method}\"\n");
+        let undisturbed = Place::new();
+        undisturbed.write("block.toml", &text);
+        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
+    }
+}
+
 /// Interrupts a run as Ctrl-C does, resumes it, and compares.
 fn stopped_and_resumed(text: &str, expected: &BTreeMap<String, Vec<u8>>, what: &str) {
     let place = Place::new();

@@ -6,7 +6,8 @@ use std::collections::VecDeque;
 
 /// Highest degree of the polynomial that displacement increments are extrapolated by.
 const DEGREE: usize = 3;
-/// A polynomial is used if its error would have been at most this fraction of the error without.
+/// A polynomial is used if its error in the latest step would have been at most this fraction of
+/// that of the increments as they were.
 const BETTER: f64 = 0.5;
 /// Errors below this fraction of the increments are noise, which polynomials amplify.
 const NOISE: f64 = 1e-10;
@@ -18,7 +19,8 @@ const EQUAL: f64 = 1e-9;
 pub struct History {
     /// The latest first.
     steps: VecDeque<Step>,
-    /// What the first correction of the latest step left of the residual, as a fraction.
+    /// What the first correction of the latest step that needed one left of the residual, as a
+    /// fraction.
     contraction: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Sparse linear equations: which factorisation, and the check of every solution.
+//! Sparse linear equations: which factorisation, and the check of solutions.
 
 use super::dense::{self, Exchanges};
 use super::multifrontal::{Kind, Multifrontal};
@@ -49,7 +49,9 @@ impl Block {
     }
 }
 
-/// Sparse equations of one pattern, with a dense block on some of them. A multifrontal factorisation does the work; where its
+/// Sparse equations of one pattern, with a dense block on some of them.
+///
+/// A multifrontal factorisation does the work; where its
 /// restricted row exchanges lose accuracy, `faer`'s LU with full row exchanges takes over.
 #[derive(Debug)]
 pub struct LinearSolver {
@@ -61,7 +63,7 @@ pub struct LinearSolver {
     values: Vec<f64>,
     /// The last matrix has been factorised by the multifrontal method.
     factorised: bool,
-    /// A solution with the last matrix has been accurate at once.
+    /// A solution with the last matrix was accurate at once; those that follow are not checked.
     proven: bool,
     row_exchanges: Option<RowExchanges>,
     /// Numerical factorisations so far.
@@ -172,6 +174,16 @@ impl LinearSolver {
         }
     }
 
+    /// Lets the next solution be checked, whatever the last ones were like.
+    pub fn check_next(&mut self) {
+        self.proven = false;
+    }
+
+    /// Whether the last matrix needed full row exchanges.
+    pub fn has_fallen_back(&self) -> bool {
+        !self.factorised
+    }
+
     /// Factorises with row exchanges inside supernodes only, and among the equations of the block.
     fn factorise_fast(&mut self) -> Result<(), Singular> {
         let Some(block) = &self.block else {
@@ -267,7 +279,7 @@ impl LinearSolver {
                 return Err(Singular);
             }
             if error <= BACKWARD_ERROR {
-                self.proven = refinements == 0;
+                self.proven = refinements == 0 && right.iter().any(|value| value.abs() > 0.0);
                 return Ok(x);
             }
             let correction = self.solve_once(&residual)?;
@@ -383,6 +395,51 @@ mod tests {
         solver.factorise(values).unwrap();
         let x = solver.solve(&vec![1.0; n]).unwrap();
         assert!(x.iter().all(|x| (x - 0.5).abs() < 1e-15));
+    }
+
+    /// Solves with a block of two equations, the Schur complement of [[4, 1, 1], [1, 3, 0],
+    /// [1, 0, 3]] without its first equation, on the equations 1 and 2 of three; the first one has
+    /// this pivot and is coupled with equation 1 by 2.
+    fn beside_a_block(pivot: f64) -> (Vec<f64>, u64) {
+        let domain = Pattern {
+            column_start: vec![0, 3, 5, 7],
+            rows: vec![0, 1, 2, 0, 1, 0, 2],
+        };
+        let kept = [false, true, true];
+        let mut factors = Multifrontal::new(&domain, Kind::Symmetric, &kept, None).unwrap();
+        let values = [4.0, 1.0, 1.0, 1.0, 3.0, 1.0, 3.0];
+        factors.factorise(&values).unwrap();
+        let block = Block::new(vec![1, 2], &Arc::new(factors));
+        let pattern = Pattern {
+            column_start: vec![0, 2, 4, 5],
+            rows: vec![0, 1, 0, 1, 2],
+        };
+        let mut solver = LinearSolver::with_block(&Arc::new(pattern), None, block).unwrap();
+        solver
+            .factorise_with(vec![pivot, 2.0, 2.0, 0.5, 0.25], 2.0)
+            .unwrap();
+        // Twice for the solution that is checked and one that need not be.
+        let x = solver.solve(&[1.0, 2.0, 3.0]).unwrap();
+        assert_eq!(solver.solve(&[1.0, 2.0, 3.0]).unwrap(), x);
+        (x, solver.fallbacks)
+    }
+
+    #[test]
+    fn solves_beside_a_block() {
+        for (pivot, fallbacks) in [(5.0, 0), (0.0, 1)] {
+            let (x, fallen_back) = beside_a_block(pivot);
+            // Twice S = [[3 − 1/4, −1/4], [−1/4, 3 − 1/4]], and the entries beside it.
+            let a = [
+                [pivot, 2.0, 0.0],
+                [2.0, 5.5 + 0.5, -0.5],
+                [0.0, -0.5, 5.5 + 0.25],
+            ];
+            for (row, b) in a.iter().zip([1.0, 2.0, 3.0]) {
+                let product: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();
+                assert!((product - b).abs() < 1e-14, "{pivot:e}: {x:?}");
+            }
+            assert_eq!(fallen_back, fallbacks);
+        }
     }
 
     #[test]

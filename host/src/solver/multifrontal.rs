@@ -10,8 +10,8 @@
 //! condensation.
 //!
 //! Symmetric matrices are factorised as L Lᵀ and have to be positive definite; others as L U with
-//! row exchanges inside a supernode only. The caller checks solutions by their residual and has
-//! another method at hand for matrices that need more.
+//! row exchanges inside a supernode only. The caller checks the first solution by its residual and
+//! has another method at hand for matrices that need more.
 
 use super::{Singular, dense, dissection};
 use crate::assembly::Pattern;
@@ -883,7 +883,8 @@ impl Supernodes {
         let n = eliminated.len();
         let matrix = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &rows);
         let settings = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            // Also of equations that are not coupled, which cost nothing.
+            supernodal_flop_ratio_threshold: SupernodalThreshold(f64::NEG_INFINITY),
             ..Default::default()
         };
         // Chains of unknowns between kept ones: minimum degree would not see those.

@@ -28,6 +28,9 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 const EXACT: f64 = 1e-3;
+/// Share of the displacement tolerance that a correction with the matrix of an earlier step must
+/// not exceed; the criterion is not waived then.
+const STALE: f64 = 0.1;
 /// A quasi-Newton matrix is renewed where this many iterations (the state before them included)
 /// have not brought the residual down to this fraction.
 const PATIENCE: usize = 6;
@@ -121,6 +124,16 @@ impl Iteration {
             residual: balance.relative,
             correction: None,
             step_length: 1.0,
+            viscosity: 0.0,
+        }
+    }
+
+    /// The state after this fraction of a correction of this relative size.
+    fn of(balance: &Balance, correction: f64, step_length: f64) -> Self {
+        Self {
+            residual: balance.relative,
+            correction: Some(correction),
+            step_length,
             viscosity: 0.0,
         }
     }
@@ -222,7 +235,7 @@ pub struct Newton<'a> {
     renewed: bool,
     /// The kept matrix makes too little progress.
     stalls: bool,
-    /// Fraction of the residual that the next correction will probably leave if the matrix is kept.
+    /// Fraction of the residual that the next correction will probably leave.
     contraction: f64,
     /// Forces of the domain at the end of the step if its boundary stays where it is.
     domain_forces: Vec<f64>,
@@ -236,7 +249,7 @@ pub struct Newton<'a> {
 struct Task<'t> {
     /// External forces.
     external: &'t [f64],
-    /// Norm of those on all degrees of freedom.
+    /// Norm of those on all degrees of freedom, or of the forces at the start of the phase.
     imposed: f64,
     /// Increments of prescribed displacements.
     prescribed: &'t [f64],
@@ -325,6 +338,7 @@ impl<'a> Newton<'a> {
             guess,
             &mut iterations,
         );
+        self.end(outcome.is_ok());
         outcome.map_err(|failure| StepFailure {
             iterations,
             ..failure
@@ -421,28 +435,52 @@ impl<'a> Newton<'a> {
                 since = iterations.len() - 1;
                 acceleration = quasi.then(Acceleration::default);
             }
-            let mut correction = self.solve(&balance.residual, None)?;
-            if let Some(acceleration) = &mut acceleration {
-                correction = acceleration.improve(correction);
-            }
-            let relative = norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE);
-            let ends = self.probably_ends(balance.relative, relative);
-            let (step_length, next, at) =
-                self.search(&increment, &correction, &balance, &task, ends)?;
-            if let Some(acceleration) = &mut acceleration {
-                acceleration.took(&correction, step_length);
-            }
-            increment = next;
-            balance = at;
-            iterations.push(Iteration {
-                residual: balance.relative,
-                correction: Some(norm(&correction) / norm(&increment).max(f64::MIN_POSITIVE)),
-                step_length,
-                viscosity: 0.0,
-            });
+            let (last, next, at) = self.correct(&increment, &balance, &task, &mut acceleration)?;
+            iterations.push(last);
+            (increment, balance) = (next, at);
         }
         let relaxed_in_vain = relaxes != may_relax;
         Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
+    }
+
+    /// One correction, as far as it does not make the residual grow. Where one with the matrix of
+    /// an earlier step does, the matrix of this state takes its place.
+    fn correct(
+        &mut self,
+        increment: &[f64],
+        before: &Balance,
+        task: &Task<'_>,
+        acceleration: &mut Option<Acceleration>,
+    ) -> Result<(Iteration, Vec<f64>, Balance), StepFailure> {
+        let size = |vector: &[f64]| norm(vector).max(f64::MIN_POSITIVE);
+        if self.is_stale() {
+            let correction = self.solve(&before.residual, None)?;
+            let moved = moved_by(increment, 1.0, &correction);
+            let operator = self.operator();
+            match self.evaluate(&moved, task, operator) {
+                Ok(at) if at.relative <= before.relative.max(self.settings.force_tolerance) => {
+                    let taken = Iteration::of(&at, norm(&correction) / size(&moved), 1.0);
+                    return Ok((taken, moved, at));
+                }
+                _ => {
+                    // The groups hold another state.
+                    self.tangents = Operator::None;
+                    self.contraction = f64::INFINITY;
+                    self.prepare(increment, task)?;
+                }
+            }
+        }
+        let mut correction = self.solve(&before.residual, None)?;
+        if let Some(acceleration) = acceleration {
+            correction = acceleration.improve(correction);
+        }
+        let ends = self.probably_ends(before.relative, norm(&correction) / size(increment));
+        let (length, moved, at) = self.search(increment, &correction, before, task, ends)?;
+        if let Some(acceleration) = acceleration {
+            acceleration.took(&correction, length);
+        }
+        let taken = Iteration::of(&at, norm(&correction) / size(&moved), length);
+        Ok((taken, moved, at))
     }
 
     /// Takes up what the last correction achieved, and renews the matrix where the method wants it.
@@ -483,13 +521,16 @@ impl<'a> Newton<'a> {
     /// Whether an iteration has ended in equilibrium.
     fn is_equilibrium(&self, balance: &Balance, last: &Iteration) -> bool {
         let tolerance = self.settings.force_tolerance;
+        // To a matrix of an earlier step a part that has yielded since still looks stiff: its
+        // corrections are smaller than what is left.
+        let is_stale = last.correction.is_some() && self.is_stale();
+        let enough = if is_stale { STALE } else { 1.0 } * self.settings.displacement_tolerance;
         let small_correction = last.step_length >= 1.0
             && last.viscosity <= 0.0
-            && last
-                .correction
-                .is_some_and(|c| c <= self.settings.displacement_tolerance);
+            && last.correction.is_some_and(|c| c <= enough);
         let small_residual = balance.relative <= tolerance;
-        balance.relative <= EXACT * tolerance || (small_residual && small_correction)
+        let is_exact = !is_stale && balance.relative <= EXACT * tolerance;
+        is_exact || (small_residual && small_correction)
     }
 
     /// Whether a small residual is one that the last bit of the displacement increments makes, so
@@ -594,11 +635,7 @@ impl<'a> Newton<'a> {
             1
         };
         for &length in &STEP_LENGTHS[..tries] {
-            let moved: Vec<f64> = increment
-                .iter()
-                .zip(correction)
-                .map(|(u, d)| u + length * d)
-                .collect();
+            let moved = moved_by(increment, length, correction);
             let operator = if ends {
                 Operator::None
             } else {
@@ -713,11 +750,18 @@ fn achieved(iterations: &[Iteration]) -> Option<f64> {
         return None;
     };
     let is_whole = last.step_length >= 1.0 && last.viscosity <= 0.0;
-    Some(if is_whole {
-        last.residual / before.residual
+    let ratio = last.residual / before.residual;
+    Some(if is_whole && ratio.is_finite() {
+        ratio
     } else {
         f64::INFINITY
     })
+}
+
+/// u + length · δ.
+fn moved_by(increment: &[f64], length: f64, correction: &[f64]) -> Vec<f64> {
+    let pairs = increment.iter().zip(correction);
+    pairs.map(|(u, d)| u + length * d).collect()
 }
 
 /// Whether iterations with one matrix make too little progress.

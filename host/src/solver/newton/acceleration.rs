@@ -18,7 +18,7 @@ const INDEPENDENT: f64 = 1e-6;
 /// Moves so far, the last one at the end.
 #[derive(Debug, Default)]
 pub(super) struct Acceleration {
-    /// s_i and y_i, by degree of freedom.
+    /// s_i and y_i, by place.
     moves: Vec<[Vec<f64>; 2]>,
     /// f, and the move taken from there.
     last: Option<[Vec<f64>; 2]>,

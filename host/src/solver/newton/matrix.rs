@@ -19,11 +19,24 @@ pub struct Matrix {
     has_tangents: bool,
     /// There is only one: all groups are linear.
     pub(super) is_constant: bool,
-    /// Largest entry.
+    /// Largest entry of the last one.
     pub(super) largest: f64,
 }
 
 impl Matrix {
+    /// That of a run that goes on.
+    pub fn resumed(largest: f64) -> Self {
+        Self {
+            largest,
+            ..Self::default()
+        }
+    }
+
+    /// Largest entry; residuals are measured against it where no force has ever acted.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
     pub(super) fn hold(&mut self) {
         self.held = true;
         self.has_tangents = true;
@@ -41,6 +54,24 @@ impl Newton<'_> {
     pub(super) fn begin(&mut self) {
         self.renewed = false;
         self.matrix.held &= self.matrix.has_tangents;
+        self.solver.check_next();
+    }
+
+    /// Ends a step. What a failed one leaves behind belongs to no state; and a matrix that was
+    /// factorised another way would not be so again.
+    pub(super) fn end(&mut self, is_equilibrium: bool) {
+        if !self.matrix.is_constant {
+            let may_stay = is_equilibrium || self.settings.method != Method::Auto;
+            self.matrix.has_tangents &= may_stay && !self.solver.has_fallen_back();
+        }
+    }
+
+    /// Whether corrections come from the matrix of an earlier step, though others could be had.
+    pub(super) fn is_stale(&self) -> bool {
+        self.settings.method == Method::Auto
+            && !self.matrix.is_constant
+            && !self.renewed
+            && !self.renews()
     }
 
     /// Whether the next correction needs another matrix.
