@@ -28,8 +28,8 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 const EXACT: f64 = 1e-3;
-/// Share of the displacement tolerance that a correction with the matrix of an earlier step must
-/// not exceed; the criterion is not waived then.
+/// Share of the tolerances that a correction with the matrix of an earlier step, and the residual
+/// it leaves, must not exceed; none is waived then.
 const STALE: f64 = 0.1;
 /// A quasi-Newton matrix is renewed where this many iterations (the state before them included)
 /// have not brought the residual down to this fraction.
@@ -520,11 +520,12 @@ impl<'a> Newton<'a> {
 
     /// Whether an iteration has ended in equilibrium.
     fn is_equilibrium(&self, balance: &Balance, last: &Iteration) -> bool {
-        let tolerance = self.settings.force_tolerance;
-        // To a matrix of an earlier step a part that has yielded since still looks stiff: its
+        // To the matrix of an earlier step a part that has yielded since still looks stiff: its
         // corrections are smaller than what is left.
         let is_stale = last.correction.is_some() && self.is_stale();
-        let enough = if is_stale { STALE } else { 1.0 } * self.settings.displacement_tolerance;
+        let share = if is_stale { STALE } else { 1.0 };
+        let tolerance = share * self.settings.force_tolerance;
+        let enough = share * self.settings.displacement_tolerance;
         let small_correction = last.step_length >= 1.0
             && last.viscosity <= 0.0
             && last.correction.is_some_and(|c| c <= enough);

@@ -8,7 +8,7 @@ use std::time::Instant;
 /// A matrix is kept as long as each correction leaves no more than this fraction of the residual:
 /// of equations beside a condensed domain, and of all others. Found by trial: a few iterations more
 /// are cheap where the laws of an interface are all there is to evaluate.
-const FAST: [f64; 2] = [0.1, 0.01];
+const FAST: [f64; 2] = [0.03, 0.01];
 
 /// What the solver of a phase holds factorised.
 #[derive(Debug, Default)]
@@ -66,12 +66,9 @@ impl Newton<'_> {
         }
     }
 
-    /// Whether corrections come from the matrix of an earlier step, though others could be had.
+    /// Whether the matrix is that of an earlier step, though another could be had.
     pub(super) fn is_stale(&self) -> bool {
-        self.settings.method == Method::Auto
-            && !self.matrix.is_constant
-            && !self.renewed
-            && !self.renews()
+        self.settings.method == Method::Auto && !self.matrix.is_constant && !self.renewed
     }
 
     /// Whether the next correction needs another matrix.
