@@ -5,7 +5,9 @@ Problem   De Gennaro & Frank, "Modelisation de l'interaction sol-pieu par la met
           mesh 1, elastic sand, thin layer (t = 2 mm) with the interface law MEPI without softening on the shaft.
           Axisymmetric, small strains, units kN, m, kPa; finite-element stresses tension positive; forces are
           for the whole turn (2 pi).  Phase 1: confinement, one increment, everything elastic (layer = sand).
-          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head pushed 5 mm in 50 increments.
+          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head pushed 5 mm in 50 increments.  What MEPI
+          returns at the strain it starts from is the stress it starts from; the force that this leaves out of balance is
+          taken off in proportion to the phase's course.
 Source    MEPI: equations (6)-(10), (12)-(17); thin layer: (18)-(19); parameters: Tables III and IV, p_0 = 100 kPa.
 Method    8-node quads, 3x3 Gauss points (--points 2: 2x2), full Newton with the consistent tangent, backtracking
           line search, start from the last increment (else from the tangent), relative residual 1e-10 over the free
@@ -210,17 +212,22 @@ class Chamber:
         K = sp.csc_matrix((ke.ravel(), (self.rows, self.cols)), shape=(self.ndof,) * 2)
         return f, K, fe, new, sig
 
-    def newton(self, u0, state, law, in_plane, fixed, dfixed, guess=None):
+    def take_over(self, u, state, law, in_plane):
+        """what the law makes of the stresses it finds, at the same strain, and the force this leaves out of balance"""
+        _, _, _, state, _ = self.evaluate(u, u, state, law, in_plane)
+        return state, self.evaluate(u, u, state, law, in_plane)[0] - self.load
+
+    def newton(self, u0, state, law, in_plane, fixed, dfixed, load, guess=None):
         """one (sub)increment -> u, state, results, log.  guess: displacement increment to start from (None: tangent)"""
         free = np.setdiff1d(np.arange(self.ndof), fixed)
         u = u0 if guess is None else u0 + guess
         step = u0[fixed] + dfixed - u[fixed]                               # imposed by the first iteration
-        size = lambda out: np.linalg.norm((self.load - out[0])[free]) / np.linalg.norm(out[0])
+        size = lambda out: np.linalg.norm((load - out[0])[free]) / np.linalg.norm(out[0])
         out, log = self.evaluate(u, u0, state, law, in_plane), []
         while len(log) < MAXIT:
             K, du = out[1].tocsr()[free], np.zeros(self.ndof)
             du[fixed] = step
-            du[free] = splu(K[:, free].tocsc()).solve((self.load - out[0])[free] - K[:, fixed] @ step)
+            du[free] = splu(K[:, free].tocsc()).solve((load - out[0])[free] - K[:, fixed] @ step)
             trials = []
             for a in 0.5 ** np.arange(6 if log and log[-1] > 1e-8 else 1):  # backtracking line search
                 trials.append((size(o := self.evaluate(u + a * du, u0, state, law, in_plane)), a, o))
@@ -264,26 +271,31 @@ def run(args):
 
     # phase 1, confinement
     fixed = np.concatenate([ch.axis, ch.top])
-    u, _, (f, fe, sig), log = ch.newton(np.zeros(ch.ndof), None, None, True, fixed, np.zeros(fixed.size))
+    u, _, (f, fe, sig), log = ch.newton(np.zeros(ch.ndof), None, None, True, fixed, np.zeros(fixed.size), ch.load)
     record("confinement", 1, f, fe, sig, 0.0, [log])
     print("confinement: head u_z [mm], per node:", u[ch.head] * 1000, "layer: max |tau|/sn",
           np.max(np.abs(sig[ch.is_layer][..., 3]) / -sig[ch.is_layer][..., 0]))
     # phase 2, loading
     s0 = sig[ch.is_layer]
     state = (s0, -s0[:, :, 0], np.zeros(s0.shape[:2]))
+    state, rest = ch.take_over(u, state, law, not args.no_in_plane)
     fixed = np.concatenate([ch.axis, ch.top, ch.head])
+    rest[fixed] = 0.0
     prescribed = np.concatenate([np.zeros(ch.axis.size + ch.top.size), -np.ones(ch.head.size)])
 
     last = [None, 1.0]                                                     # last increment of u, and of the head
+    done = [0.0]                                                           # displacement of the head
 
     def advance(u, state, d, depth, logs):
         err = None
         for guess in ([] if last[0] is None else [last[0] * (d / last[1])]) + [None]:
             try:
-                u1, st1, out, log = ch.newton(u, state, law, not args.no_in_plane, fixed, prescribed * d, guess)
+                u1, st1, out, log = ch.newton(u, state, law, not args.no_in_plane, fixed, prescribed * d,
+                                               ch.load + (1.0 - (done[0] + d) / 0.005) * rest, guess)
                 logs.append(log)
                 total[0] += len(log)
                 last[:] = u1 - u, d
+                done[0] += d
                 return u1, st1, out
             except (FloatingPointError, RuntimeError) as e:
                 err = e

@@ -208,6 +208,11 @@ impl StepFailure {
             culprit: None,
         }
     }
+
+    /// The failure of a law.
+    pub fn of_law(failure: PointFailure) -> Self {
+        failed_law(failure)
+    }
 }
 
 /// What iterations work on.
