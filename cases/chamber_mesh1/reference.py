@@ -54,13 +54,18 @@ class Mepi:
         st, tt = sn0 + self.kn * dun, tau0 + self.kt * dut
         if st <= 0.0:
             return st, 0.0, xi0, np.zeros((2, 2))                           # separation
+        dst, dtt = np.array([self.kn, 0.0]), np.array([0.0, self.kt])
+        if sn0 < 0.0:            # contact re-forms: only the part of the (straight) increment after that acts
+            part = st / (st - sn0)
+            tt = self.kt * dut * part
+            dtt = np.array([-self.kt * dut * self.kn * sn0 / (st - sn0) ** 2, self.kt * part])
         s, at = np.sign(tt), abs(tt)
 
         def f(dl):
             mu, _, g, _ = self.functions(xi0 + dl)
             return at - self.kt * dl - mu * (st - self.kn * dl * g)
         if f(0.0) <= 0.0:
-            return st, tt, xi0, np.diag([self.kn, self.kt])
+            return st, tt, xi0, np.array([dst, dtt])
         grid = np.linspace(0.0, at / self.kt, 129)                          # |tau| >= 0 bounds d lambda
         neg = np.nonzero(f(grid) <= 0.0)[0]
         if neg.size == 0:        # contraction uses up sn before slip ends: separation reached during the increment
@@ -72,9 +77,8 @@ class Mepi:
         mu, dmu, g, dg = (float(v) for v in self.functions(xi0 + dl))
         sn, tau = st - self.kn * dl * g, s * (at - self.kt * dl)
         slope = -self.kt - dmu * sn + mu * self.kn * (g + dl * dg)          # dF/d(d lambda)
-        ddl = np.array([mu * self.kn, -s * self.kt]) / slope                # d(d lambda)/d(un, ut)
-        tangent = np.array([np.array([self.kn, 0.0]) - self.kn * (g + dl * dg) * ddl,
-                            np.array([0.0, self.kt]) - s * self.kt * ddl])
+        ddl = (mu * dst - s * dtt) / slope                                  # d(d lambda)/d(un, ut)
+        tangent = np.array([dst - self.kn * (g + dl * dg) * ddl, dtt - s * self.kt * ddl])
         return sn, tau, xi0 + dl, tangent
 
 

@@ -338,8 +338,13 @@ impl Group {
         self.tangent = vec![0.0; n_points * element_n * element_n];
         if self.uses_layer() {
             let mut operator = vec![0.0; n_points * n * n];
-            self.run_law(Operator::Elastic, self.moment.step_start, 0.0, &mut operator)
-                .map_err(|failure| self.locate(&failure))?;
+            self.run_law(
+                Operator::Elastic,
+                self.moment.step_start,
+                0.0,
+                &mut operator,
+            )
+            .map_err(|failure| self.locate(&failure))?;
             if let Some(layer) = &mut self.layer {
                 layer.start(&operator, starts_anew);
             }

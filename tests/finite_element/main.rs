@@ -22,5 +22,6 @@ mod relaxation;
 mod setup;
 mod sliding_block;
 mod snap_back;
+mod swap;
 mod thick_cylinder;
 mod thin_layer;
