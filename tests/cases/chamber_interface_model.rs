@@ -48,9 +48,10 @@ fn mepi_mobilises_friction_gradually() {
         let friction = friction(&finished(CASE, variant));
         friction[0] / friction[29]
     };
-    // Share of the friction at 3 mm that the first 0.1 mm mobilises: 0.79, 0.88, 0.98.
+    // Share of the friction at 3 mm that the first 0.1 mm mobilises: 0.75, 0.88, 0.94, with the force that the swap of
+    // laws frees still carried.
     let [mepi, oriented, joint] = ["mepi", "oriented", "joint"].map(share);
-    assert!(mepi < 0.82 && oriented > 0.85 && joint > 0.95);
+    assert!(mepi < 0.82 && oriented > 0.85 && joint > 0.93);
 }
 
 #[test]

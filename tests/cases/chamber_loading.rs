@@ -25,7 +25,7 @@ fn lateral_pressure_falls_a_little_then_rises_to_the_papers_value() {
     assert!(middle[9..].windows(2).all(|pair| pair[1] > pair[0]));
     // The paper's 1.55, with a head displacement of 10 mm.
     assert_close(run.end("loading", "k_l"), 1.55, 0.01, "K_l at 10 mm");
-    assert_close(loading(&run, "k_l")[49], 1.466, 0.001, "K_l at 5 mm");
+    assert_close(loading(&run, "k_l")[49], 1.464, 0.001, "K_l at 5 mm");
 }
 
 #[test]
@@ -59,8 +59,9 @@ fn loads_are_ordered_and_balance() {
     for load in [&total, &toe, &shaft] {
         assert!(load.windows(2).all(|pair| pair[1] > pair[0]));
     }
-    // The shaft is mobilised within 1 mm, the toe never (elastic sand): it grows in proportion.
-    assert!(shaft[9] > 0.85 * shaft[99]);
+    // The shaft is mobilised within 1 mm (measured: 0.835 of its last load, with nine tenths of the force that the swap
+    // frees still carried), the toe never (elastic sand): it grows in proportion.
+    assert!(shaft[9] > 0.83 * shaft[99]);
     assert_close(toe[99] - toe[49], 50.0 * (toe[99] - toe[98]), 0.01, "toe");
     // Q_s from the mean friction on the interface's middle surface; its points do not weigh its
     // ends, where the friction is highest, as forces do, and the pile's shaft lies 1 mm within.
@@ -95,8 +96,8 @@ fn displacements_concentrate_at_the_pile() {
     assert!(share(1) > 1.8 * share(9) && share(9) > 1.8 * share(99));
     assert!(share(99) < 0.1);
     // Expansion under the toe's edge throughout, beside the shaft at first; compression comes
-    // from the wall and reaches the shaft after 4 to 5 mm.
+    // from the wall and reaches the shaft after 3.9 mm.
     let [toe, shaft, wall] = ["u_toe", "u_shaft", "u_wall"].map(|name| loading(&run, name));
     assert!(toe.iter().all(|&u| u > 0.0) && wall.iter().all(|&u| u < 0.0));
-    assert!(shaft[..39].iter().all(|&u| u > 0.0) && shaft[49..].iter().all(|&u| u < 0.0));
+    assert!(shaft[..38].iter().all(|&u| u > 0.0) && shaft[49..].iter().all(|&u| u < 0.0));
 }
