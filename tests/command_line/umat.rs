@@ -2,7 +2,6 @@
 #![expect(
     clippy::unwrap_used,
     clippy::float_cmp,
-    clippy::print_stdout,
     reason = "part of the tests; values that are compared are exact"
 )]
 
@@ -17,8 +16,7 @@ use std::sync::{Mutex, PoisonError};
 use tempfile::TempDir;
 use tests::case::table;
 
-/// A folder with a routine and its sidecar. `None`, with a remark, where there is no compiler; that
-/// is an error where tests must not be skipped.
+/// A folder with a routine and its sidecar. `None`, with a remark, where there is no compiler.
 fn place(name: &str) -> Option<Place> {
     static COMPILED: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -42,17 +40,13 @@ fn source(name: &str) -> PathBuf {
 }
 
 fn gfortran(arguments: &[&str], sources: &[PathBuf], out: &Path) -> Option<Output> {
-    let output = Command::new("gfortran")
+    let mut compiler = Command::new("gfortran");
+    compiler
         .args(["-O1", "-o"])
         .arg(out)
         .args(arguments)
-        .args(sources)
-        .output();
-    let Ok(output) = output else {
-        assert!(std::env::var_os("CI").is_none(), "there is no gfortran");
-        println!("skipped: there is no gfortran");
-        return None;
-    };
+        .args(sources);
+    let output = tests::needs::output(&mut compiler)?;
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     Some(output)
