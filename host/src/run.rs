@@ -16,9 +16,9 @@ use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figure
 use crate::plugin::{Library, Moment};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    Costs, Guess, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
-    StepFailure, StepSuccess, mesh_lines,
+    Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, Reuse, StepFailure, StepSuccess,
 };
+use algebra::{LinearSolver, Singular, mesh_lines};
 pub(crate) use history::History;
 use keeper::Keeper;
 use path::PathEnd;
