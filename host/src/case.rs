@@ -14,6 +14,13 @@ use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
+/// What a driver file looks like among case files.
+const DRIVER: base::OtherKind = base::OtherKind {
+    keys: &["hypothesis", "segment"],
+    message: "this is a driver file, which leads a law at one point; expected a case file",
+    command: "pilum point",
+};
+
 /// A case file and its text.
 #[derive(Clone, Debug)]
 pub struct Case {
@@ -44,7 +51,7 @@ impl Case {
     /// # Errors
     /// [`Error::Input`] at the place that does not fit.
     pub(crate) fn of(source: Source) -> Result<Vec<Self>, Error> {
-        let (source, files) = base::read(source)?;
+        let (source, files) = base::read_kind(source, &DRIVER)?;
         let case = |(variant, file)| Self {
             source: source.clone(),
             file,
@@ -337,7 +344,8 @@ pub struct GroupInput {
     #[schemars(with = "Option<InPlane>")]
     pub in_plane: Option<Spanned<InPlane>>,
     /// Stress before the first phase, components 11 22 33 12, tension positive.
-    pub initial_stress: Option<StressInput>,
+    #[schemars(with = "Option<StressInput>")]
+    pub initial_stress: Option<Spanned<StressInput>>,
 }
 
 /// What the elements of a group do.
@@ -531,6 +539,12 @@ pub struct ProbeInput {
 pub enum Reduce {
     /// Arithmetic mean.
     Mean,
+    /// Mean weighted by what each integration point stands for: area, in axisymmetry of the whole
+    /// turn; of interfaces their own area.
+    Average,
+    /// The sum of values times what they stand for: over the area, in axisymmetry over the volume
+    /// of the whole turn; of interfaces over their own area.
+    Integral,
     /// Smallest.
     Min,
     /// Largest.

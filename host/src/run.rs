@@ -1,5 +1,6 @@
 //! Running a case: phases, increments, cut-back and regrowth, results.
 
+mod beyond;
 mod history;
 mod keeper;
 mod path;
@@ -19,6 +20,7 @@ use crate::solver::{
     Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, Reuse, StepFailure, StepSuccess,
 };
 use algebra::{LinearSolver, Singular, mesh_lines};
+use beyond::Beyond;
 pub(crate) use history::History;
 use keeper::Keeper;
 use path::PathEnd;
@@ -123,16 +125,20 @@ pub fn run_reusing(
         let results = Results::resume(folder, case, &model, &probes, checkpoint.results)?;
         (results, Some(state))
     } else {
-        for law in model.laws.values() {
-            for warning in &law.warnings {
-                observer.warning(warning);
-            }
+        let of_laws = model.laws.values().flat_map(|law| &law.warnings);
+        for warning in of_laws.chain(&model.warnings) {
+            observer.warning(warning);
         }
         (Results::create(folder, case, &model, &probes)?, None)
     };
     let mut run = Run::new(case, model, probes, reuse);
     let outcome = run.phases(state, &mut results, &mut observer, &mut keeper);
-    for warning in results.unreliable() {
+    for warning in run
+        .beyond
+        .warnings()
+        .into_iter()
+        .chain(results.unreliable())
+    {
         observer.warning(&warning);
     }
     let error = outcome.as_ref().err();
@@ -198,6 +204,8 @@ struct Run<'a> {
     time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     largest_force: f64,
+    /// Results that the theory does not cover.
+    beyond: Beyond,
     /// Factors of linear parts.
     reuse: &'a mut Reuse,
 }
@@ -273,8 +281,10 @@ impl<'a> Run<'a> {
             force: vec![0.0; n_dofs],
             time: 0.0,
             largest_force: 0.0,
+            beyond: Beyond::default(),
             reuse,
         };
+        run.beyond.knows(&run.groups);
         for support in &case.file.supports {
             for dof in run.dofs(support.line.get_ref(), &support.fixed) {
                 run.prescribed.insert(dof, 0.0);
@@ -387,6 +397,9 @@ impl<'a> Run<'a> {
             ));
         }
         self.time += 1.0;
+        let (mesh, analysis) = (&self.mesh, self.file().analysis);
+        self.beyond
+            .look(mesh, analysis, &self.groups, &self.displacement);
         results.phase(equations.counted_in(&record));
         outcome
     }

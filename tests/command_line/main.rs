@@ -9,6 +9,7 @@ mod loading;
 mod mesh;
 mod names;
 mod parameters;
+mod plausible;
 mod point;
 mod program;
 mod results;

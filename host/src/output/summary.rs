@@ -427,6 +427,10 @@ fn measured_unit(case: &Case, model: &Model, input: &ProbeInput) -> Option<Strin
     let quantity = input.quantity.as_ref()?.get_ref().as_str();
     let kind = quantity.split('_').next().unwrap_or_default();
     let of_points = input.line.is_none();
+    if of_points && input.reduce == Some(Reduce::Integral) {
+        // Over an interface's area a traction is a force.
+        return (kind == "traction").then(|| force_unit(case).to_owned());
+    }
     if of_points && input.reduce == Some(Reduce::Sum) {
         return None;
     }
@@ -440,13 +444,18 @@ fn measured_unit(case: &Case, model: &Model, input: &ProbeInput) -> Option<Strin
         ("stress" | "traction", None) => "kPa",
         ("strain", None) => "-",
         ("jump" | "displacement", None) => "m",
-        ("reaction" | "force", None) => match case.file.analysis {
-            Analysis::Axisymmetric => "kN",
-            Analysis::PlaneStrain => "kN/m",
-        },
+        ("reaction" | "force", None) => force_unit(case),
         _ => return None,
     };
     Some(unit.to_owned())
+}
+
+/// The unit of a force.
+fn force_unit(case: &Case) -> &'static str {
+    match case.file.analysis {
+        Analysis::Axisymmetric => "kN",
+        Analysis::PlaneStrain => "kN/m",
+    }
 }
 
 /// The unit of a quantity times a factor.

@@ -20,6 +20,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
+/// What a case file looks like among driver files.
+const CASE: base::OtherKind = base::OtherKind {
+    keys: &["analysis", "mesh", "groups", "laws", "supports", "phase"],
+    message: "this is a case file; expected a driver file, which leads a law at one point",
+    command: "pilum run",
+};
+
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 100_000_000;
 
@@ -211,7 +218,7 @@ impl Driver {
     }
 
     pub(crate) fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
-        let (source, files) = base::read(source)?;
+        let (source, files) = base::read_kind(source, &CASE)?;
         let driver = |(variant, file)| Self::build(&source, variant, file, locked);
         files.into_iter().map(driver).collect()
     }
