@@ -1,7 +1,6 @@
 //! Opening a library with an Abaqus user subroutine, and calling it.
 
 use super::super::image::Image;
-use crate::child;
 use std::ffi::c_void;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -100,7 +99,7 @@ fn supply(
     if !traps {
         return Err(missing.refusal());
     }
-    if !child::is_child() {
+    if !crate::child::is_child() {
         return Err(format!(
             "{}; traps need a worker process, which `in_process` does without",
             missing.refusal()
