@@ -148,6 +148,8 @@ impl Worker {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(failed)?;
+        // It holds the worker's end of the socket, which must close with the worker.
+        drop(command);
         let output = printed.follow(child.stderr.take());
         let memory = SharedMemory::new(file).map_err(failed)?;
         let mut worker = Self {
