@@ -5,7 +5,7 @@ pub(crate) mod base;
 
 use crate::error::{Error, Source};
 use crate::input::{ForeignKeys, Named, ParameterTable, ParameterValue};
-use crate::plugin::adapter::{Adapter, Foreign};
+use crate::plugin::adapter::{Adapter, Externals, Foreign, Scratch};
 use crate::schema;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
@@ -295,6 +295,12 @@ pub struct LawInput {
     /// Write the arguments of one call here.
     #[schemars(with = "Option<PathBuf>")]
     pub record: Option<Spanned<PathBuf>>,
+    /// What becomes of routines that it calls and nobody supplies.
+    #[schemars(with = "Option<Externals>")]
+    pub externals: Option<Spanned<Externals>>,
+    /// What becomes of its scratch files.
+    #[schemars(with = "Option<Scratch>")]
+    pub scratch: Option<Spanned<Scratch>>,
     /// Its parameters.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
@@ -317,6 +323,8 @@ impl LawInput {
             sidecar: self.sidecar.as_ref(),
             in_process: self.in_process.as_ref(),
             record: self.record.as_ref(),
+            externals: self.externals.as_ref(),
+            scratch: self.scratch.as_ref(),
         };
         keys.read(source)
     }

@@ -403,6 +403,7 @@ impl Driver {
                 self.law.description().id
             ));
         }
+        warnings.extend(self.law.take_notes());
         let Point {
             gradient,
             flux,
@@ -454,13 +455,23 @@ impl Driver {
                     .collect();
                 values.join(", ")
             };
-            warnings.push(format!(
-                "the initial {word} {} lies outside the surface of law `{}`, which returns it to \
-                 {}",
+            let (id, given, found) = (
+                &self.law.description().id,
                 list(&self.flux),
-                self.law.description().id,
-                list(&returned)
-            ));
+                list(&returned),
+            );
+            // Those of other programs are given a time in this call, in which they may creep.
+            warnings.push(if self.law.library().foreign().is_some() {
+                format!(
+                    "the initial {word} {given} does not last: law `{id}`, called without any \
+                     change, returns {found}"
+                )
+            } else {
+                format!(
+                    "the initial {word} {given} lies outside the surface of law `{id}`, which \
+                     returns it to {found}"
+                )
+            });
         }
         Ok((point, search, warnings))
     }

@@ -3,11 +3,12 @@
 mod beyond;
 mod history;
 mod keeper;
+mod method;
 mod path;
 
 use crate::assembly::{Places, System, fold};
 use crate::capsule::{self, Capsule};
-use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput};
+use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput, SolverInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
@@ -157,6 +158,15 @@ struct Noting<'a> {
     warnings: Vec<String>,
 }
 
+impl Noting<'_> {
+    /// A warning, unless it has been given.
+    fn warning_once(&mut self, message: &str) {
+        if !self.warnings.iter().any(|given| given == message) {
+            self.warning(message);
+        }
+    }
+}
+
 impl Observer for Noting<'_> {
     fn phase(&mut self, name: &str, increments: usize) {
         self.observer.phase(name, increments);
@@ -297,6 +307,24 @@ impl<'a> Run<'a> {
         &self.case.file
     }
 
+    /// The settings of the solver, with the method that suits the laws of the present phase.
+    fn solver(&self) -> SolverInput {
+        let given = self.file().solver;
+        SolverInput {
+            method: method::resolved(given.method, &self.groups),
+            ..given
+        }
+    }
+
+    /// Passes on what laws have to say beside their answers.
+    fn pass_on_notes(&self, observer: &mut Noting<'_>) {
+        for group in &self.groups {
+            for note in group.law.built.law.take_notes() {
+                observer.warning(&note);
+            }
+        }
+    }
+
     /// Degrees of freedom of a line's nodes.
     fn dofs(&self, line: &str, components: &[Axis]) -> Vec<usize> {
         let nodes = self
@@ -372,9 +400,15 @@ impl<'a> Run<'a> {
                 domain: None,
                 has_matrix: false,
                 largest: 0.0,
-                record: PhaseRecord::new(name, equations.n(), imbalance),
+                record: PhaseRecord {
+                    method: self.solver().method,
+                    ..PhaseRecord::new(name, equations.n(), imbalance)
+                },
             }
         });
+        if let Some(why) = method::reason(self.file().solver.method, &self.groups) {
+            observer.warning_once(&why);
+        }
         let mut record = course.record.clone();
         let outcome = self.increments(
             number,
@@ -384,6 +418,7 @@ impl<'a> Run<'a> {
             results,
             (observer, keeper),
         );
+        self.pass_on_notes(observer);
         let of_domain = equations
             .domain
             .as_ref()
@@ -476,7 +511,7 @@ impl<'a> Run<'a> {
             let stops = observer.wants_to_stop();
             if stops || keeper.is_due() {
                 course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
-                course.has_matrix = equations.matrix.is_kept(self.file().solver.method);
+                course.has_matrix = equations.matrix.is_kept(self.solver().method);
                 course.largest = equations.matrix.largest();
                 course.record = equations.counted_in(record);
                 keeper.keep(self.state(number, &course), results, &observer.warnings)?;
@@ -536,7 +571,7 @@ impl<'a> Run<'a> {
         results: &mut Results,
         observer: &mut Noting<'_>,
     ) -> Result<IncrementRecord, Error> {
-        let settings = &self.file().solver;
+        let settings = self.solver();
         let easy = EASY * settings.method.max_iterations() as f64;
         let smallest = 1.0 / n as f64 / f64::powi(2.0, settings.max_halvings as i32);
         let target = if place.increment == n {
@@ -666,7 +701,7 @@ impl<'a> Run<'a> {
     /// Where to look if a law of the user's own may have kept the iterations from converging: a
     /// wrong tangent does that.
     fn suspicion(&self, failure: &StepFailure) -> Option<String> {
-        let asks_for_tangents = self.file().solver.method != Method::InitialStress;
+        let asks_for_tangents = self.solver().method != Method::InitialStress;
         let iterates = failure.failed.is_none() && !failure.iterations.is_empty();
         let mut libraries: Vec<&Path> = self
             .groups
@@ -699,13 +734,13 @@ impl<'a> Run<'a> {
         equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
     ) -> Result<StepSuccess, StepFailure> {
-        let settings = &self.case.file.solver;
+        let settings = self.solver();
         let mut newton = Newton::new(
             (&equations.system, &equations.places),
             equations.domain.as_ref(),
             (&mut equations.solver, &mut equations.matrix),
             &mut self.groups,
-            settings,
+            &settings,
             &mut record.costs,
         );
         newton.step(loads, from, to, self.time + from, guess)
@@ -903,12 +938,13 @@ impl<'a> Run<'a> {
         };
         if let Some(course) = course {
             if course.has_matrix {
+                let settings = self.solver();
                 let restored = Newton::new(
                     (&equations.system, &equations.places),
                     equations.domain.as_ref(),
                     (&mut equations.solver, &mut equations.matrix),
                     &mut self.groups,
-                    &self.case.file.solver,
+                    &settings,
                     &mut Costs::default(),
                 )
                 .restore_matrix();

@@ -7,6 +7,7 @@
 
 mod incremental_driver;
 mod mohr_coulomb;
+mod tolerance;
 
 use crate::program::{BAD_INPUT, CASE, DONE, Edit, PLUGIN_TROUBLE, Place, edited};
 use std::collections::BTreeMap;
@@ -23,7 +24,9 @@ fn place(name: &str) -> Option<Place> {
     if !compiled.contains_key(name) {
         let folder = TempDir::new().unwrap();
         let out = folder.path().join("library");
-        let sources = [source(&format!("{name}.f"))];
+        let endings = ["f", "c"];
+        let sources = endings.map(|ending| source(&format!("{name}.{ending}")));
+        let sources: Vec<PathBuf> = sources.into_iter().filter(|path| path.is_file()).collect();
         gfortran(&["-shared", "-fPIC"], &sources, &out)?;
         compiled.insert(name.to_owned(), std::fs::read(out).unwrap());
     }
@@ -412,11 +415,15 @@ fn what_is_overwritten_is_named() {
         return;
     };
     for (what, says) in [
-        (1, "overwrites DSTRAN, which is an input"),
+        (1, "overwrites CMNAME, which is an input"),
         (2, "overwrites PROPS, which is an input"),
         (3, "writes beyond the end of STATEV, which has 1 entries"),
         (4, "writes between STRAN and DSTRAN"),
         (5, "overwrites KINC, which is an input"),
+        // Arithmetic on what stands there shows too, even if it changes no number.
+        (6, "writes beyond the end of STATEV, which has 1 entries"),
+        (7, "writes beyond the end of STATEV, which has 1 entries"),
+        (8, "writes beyond the end of STATEV, which has 1 entries"),
     ] {
         place.write(
             "driver.toml",

@@ -197,6 +197,8 @@ fn bounds_and_defaults_of_our_laws_are_exported() {
             in_process: true,
             record: None,
             records_once: false,
+            externals: None,
+            scratch: None,
         };
         let foreign = Library::open_foreign(&foreign, |_| Ok(())).unwrap();
         let mut n = 0;

@@ -7,7 +7,7 @@ use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
 use crate::input::{self, BuiltLaw, ForeignKeys, Named, ParameterTable, ParameterValue};
 use crate::lock::Pins;
-use crate::plugin::adapter::Adapter;
+use crate::plugin::adapter::{Adapter, Externals, Scratch};
 use crate::plugin::{Law, SearchPath, Strided};
 use crate::schema;
 use abi::Hypothesis;
@@ -55,6 +55,12 @@ pub(crate) struct File {
     /// Write the arguments of one call here.
     #[schemars(with = "Option<PathBuf>")]
     record: Option<Spanned<PathBuf>>,
+    /// What becomes of routines that it calls and nobody supplies.
+    #[schemars(with = "Option<Externals>")]
+    externals: Option<Spanned<Externals>>,
+    /// What becomes of its scratch files.
+    #[schemars(with = "Option<Scratch>")]
+    scratch: Option<Spanned<Scratch>>,
     /// What the driver is.
     #[serde(default)]
     title: String,
@@ -260,6 +266,8 @@ impl Driver {
             sidecar: file.sidecar.as_ref(),
             in_process: file.in_process.as_ref(),
             record: file.record.as_ref(),
+            externals: file.externals.as_ref(),
+            scratch: file.scratch.as_ref(),
         };
         let foreign = keys.read(source)?;
         let loaded = input::find_law(source, &search, &file.law, foreign.as_ref())?;
@@ -299,6 +307,8 @@ impl Driver {
             sidecar: None,
             in_process: None,
             record: None,
+            externals: None,
+            scratch: None,
             title: String::new(),
             law_path: Vec::new(),
             parameters: ParameterTable::new(),
