@@ -330,8 +330,9 @@ fn law() -> impl Strategy<Value = Law> {
     let cohesion = prop_oneof![Just(0.0), Just(1.0), 1.0..60.0_f64];
     let angles = prop_oneof![
         1 => Just((0.0, 0.0)),
-        3 => (1.0..45.0_f64, prop_oneof![Just(0.0), Just(1.0), 0.0..1.0_f64])
-            .prop_map(|(phi, share)| (phi, phi * share)),
+        3 => (5.0..45.0_f64, prop_oneof![Just(0.0), Just(1.0), 0.0..1.0_f64])
+            // Angles below π/2 are taken for radians, and refused.
+            .prop_map(|(phi, share)| (phi, if phi * share < 2.0 { 0.0 } else { phi * share })),
     ];
     let tensile = prop_oneof![2 => Just(None), 1 => Just(Some(0.0)), 1 => Just(Some(0.5))];
     let elastic = (solid.clone(), modulus.clone(), 0.0..0.45_f64).prop_map(|(h, e, nu)| Law {
