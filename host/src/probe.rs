@@ -4,7 +4,7 @@ mod section;
 
 use crate::assembly::{Tie, fold};
 use crate::case::{Case, ProbeInput, Reduce};
-use crate::error::{Error, Source, suggestion};
+use crate::error::{Error, Place, Source, suggestion};
 use crate::group::Group;
 use crate::input::Named;
 use crate::model::Model;
@@ -138,6 +138,30 @@ impl Probes {
             }
         }
         (looked, dofs)
+    }
+
+    /// Refuses values that are too large for a number.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the first probe with one.
+    pub fn check(&self, case: &Case, place: &Place, values: &[Option<f64>]) -> Result<(), Error> {
+        let overflows = |value: &Option<f64>| value.is_some_and(|value| !value.is_finite());
+        let Some(number) = values.iter().position(overflows) else {
+            return Ok(());
+        };
+        let (name, _) = &self.probes[number];
+        let mut inputs = case.file.probes.keys();
+        let span = inputs.find(|key| key.get_ref() == name);
+        let message = format!(
+            "probe `{name}`: in {place} what it sums and multiplies comes to more than {:.1e}, the \
+             largest number there is",
+            f64::MAX
+        );
+        Err(case
+            .source
+            .error(span.map_or(0..0, Spanned::span), message)
+            .hint("a smaller `scale`, or smaller factors in `combine`; rows before are written")
+            .into())
     }
 
     /// Values, in order. `None`: the quantity does not exist now (an internal variable of another
@@ -307,17 +331,25 @@ impl Resolver<'_> {
         }
         let names: Vec<&str> = earlier.iter().map(|(name, _)| name.as_str()).collect();
         let terms = combine.iter().map(|(name, factor)| {
+            let product = self.input.scale * factor.get_ref();
+            if !product.is_finite() {
+                let message = format!(
+                    "`scale` × `{}` = {:e} × {:e} is too large for a number",
+                    name.get_ref(),
+                    self.input.scale,
+                    factor.get_ref()
+                );
+                return Err(self.source().error(factor.span(), message).into());
+            }
             let found = names.iter().position(|n| n == name.get_ref());
-            found
-                .map(|i| (i, self.input.scale * factor.get_ref()))
-                .ok_or_else(|| {
-                    let message = format!("there is no probe `{}` before this one", name.get_ref());
-                    let names = names.clone();
-                    self.source()
-                        .error(name.span(), message)
-                        .hint(suggestion(name.get_ref(), names))
-                        .into()
-                })
+            found.map(|i| (i, product)).ok_or_else(|| {
+                let message = format!("there is no probe `{}` before this one", name.get_ref());
+                let names = names.clone();
+                self.source()
+                    .error(name.span(), message)
+                    .hint(suggestion(name.get_ref(), names))
+                    .into()
+            })
         });
         terms.collect::<Result<_, Error>>().map(Probe::Combination)
     }

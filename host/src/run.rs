@@ -502,6 +502,7 @@ impl<'a> Run<'a> {
                 })?;
             let snapshot = self.snapshot(&reaction);
             done.probes = self.probes.values(&snapshot);
+            self.probes.check(self.case, &place, &done.probes)?;
             done.time = self.time + lambda;
             record.iterations += done.iterations;
             record.increments += 1;

@@ -8,6 +8,7 @@ mod libraries;
 mod loading;
 mod mesh;
 mod names;
+mod overflow;
 mod parameters;
 mod plausible;
 mod point;
