@@ -368,24 +368,48 @@ fn exports(library: &Path) -> Outcome<Vec<String>> {
     Ok(names)
 }
 
-/// The program named by the variable, or else `default`; `None`, with a note, if there is none.
-/// Where `CI` or `PILUM_REQUIRE_COMPILERS` is set, a missing compiler is a failure.
+/// The program named by the variable, or else `default`; `None`, with a remark, if there is none.
+/// Where `PILUM_REQUIRE_ALL` or `CI` is set, a missing compiler is a failure.
 fn compiler(variable: &str, default: &str) -> Option<String> {
     let name = env::var(variable).unwrap_or_else(|_| default.to_owned());
     if Command::new(&name).arg("--version").output().is_ok() {
         return Some(name);
     }
-    let required = ["CI", "PILUM_REQUIRE_COMPILERS"];
+    let required = ["PILUM_REQUIRE_ALL", "CI"];
     assert!(
         required.iter().all(|name| env::var_os(name).is_none()),
-        "no compiler `{name}`; install one or name it in {variable}"
+        "`{name}` is missing, and {} is set",
+        required.join(" or ")
     );
     // Past the capture of the test harness, so that it is seen.
-    let _ = writeln!(
-        std::io::stderr(),
-        "note: skipped: no compiler `{name}`; name one in {variable}"
-    );
+    let _ = writeln!(std::io::stderr(), "SKIPPED: `{name}` is missing");
     None
+}
+
+/// A test without its compiler passes with a remark, or fails where nothing may be passed over.
+#[test]
+fn a_missing_compiler_is_named() -> Outcome {
+    for (test, variable) in [
+        ("c_and_rust_agree_on_every_field", "CC"),
+        ("the_header_and_its_macros_compile_as_cpp", "CXX"),
+        ("fortran_and_rust_agree_on_every_field", "FC"),
+    ] {
+        for strict in [false, true] {
+            let mut command = Command::new(env::current_exe()?);
+            command.args(["--exact", test, "--nocapture"]);
+            command.env(variable, "no_such_compiler");
+            command.env_remove("CI").env_remove("PILUM_REQUIRE_ALL");
+            command.envs(strict.then_some(("PILUM_REQUIRE_ALL", "1")));
+            let output = command.output()?;
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.success(), !strict, "{test}\n{said}");
+            assert!(
+                said.contains("`no_such_compiler` is missing"),
+                "{test}\n{said}"
+            );
+        }
+    }
+    Ok(())
 }
 
 fn compile(compiler: &str, standard: &str) -> Command {

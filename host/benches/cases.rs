@@ -3,6 +3,7 @@
 //! coarsest mesh. Wall-clock time.
 #![allow(clippy::expect_used, reason = "a bench stops at the first fault")]
 
+use algebra::{LinearSolver, mesh_lines};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use host::assembly::{Places, System};
@@ -13,7 +14,7 @@ use host::input::parse;
 use host::model::Model;
 use host::plugin::Operator;
 use host::run::{Observer, run};
-use host::solver::{Costs, LinearDomain, LinearSolver, Loads, Matrix, Newton, mesh_lines};
+use host::solver::{Costs, LinearDomain, Loads, Matrix, Newton};
 use std::path::Path;
 
 fn main() {

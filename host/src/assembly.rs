@@ -5,8 +5,8 @@
 //! or tied: a combination of others, as the mid-thickness nodes of a thin layer with mean strain.
 
 use crate::group::Group;
+use algebra::Pattern;
 use rayon::prelude::*;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Elements that one thread takes at a time.
@@ -21,47 +21,6 @@ pub struct Tie {
     pub dof: usize,
     /// Those it follows, and their weights.
     pub masters: [(usize, f64); 2],
-}
-
-/// Compressed columns: row numbers, sorted, of every column.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Pattern {
-    /// Start of every column, and the end.
-    pub column_start: Vec<u32>,
-    /// Row numbers.
-    pub rows: Vec<u32>,
-}
-
-impl Pattern {
-    /// Number of rows and columns.
-    pub fn n(&self) -> usize {
-        self.column_start.len() - 1
-    }
-
-    /// Where the entries of a column stand.
-    pub fn places(&self, column: usize) -> Range<usize> {
-        self.column_start[column] as usize..self.column_start[column + 1] as usize
-    }
-
-    /// Rows of a column.
-    pub fn column(&self, column: usize) -> &[u32] {
-        &self.rows[self.places(column)]
-    }
-
-    /// For every entry the place of the one across the diagonal, in a symmetric pattern.
-    pub fn transposed_places(&self) -> Vec<u32> {
-        // Columns are visited in ascending order, so entry after entry of a row is met.
-        let mut next = self.column_start.clone();
-        let mut across = vec![0; self.rows.len()];
-        for column in 0..self.n() {
-            for at in self.places(column) {
-                let next = &mut next[self.rows[at] as usize];
-                across[at] = *next;
-                *next += 1;
-            }
-        }
-        across
-    }
 }
 
 /// Moves forces at tied degrees of freedom to those they follow.
@@ -490,56 +449,6 @@ fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> 
         }
     }
     slots
-}
-
-impl Pattern {
-    fn new<'a>(
-        n: usize,
-        equation: &[Option<usize>],
-        elements: impl Iterator<Item = &'a [usize]>,
-    ) -> Self {
-        // Elements by equation, then the rows of every column, sorted and each once.
-        let elements: Vec<Vec<u32>> = elements
-            .map(|dofs| {
-                let equations = dofs.iter().filter_map(|&dof| equation[dof]);
-                equations.map(|equation| equation as u32).collect()
-            })
-            .collect();
-        let mut start = vec![0_usize; n + 1];
-        for &column in elements.iter().flatten() {
-            start[column as usize + 1] += 1;
-        }
-        for column in 0..n {
-            start[column + 1] += start[column];
-        }
-        let mut next = start.clone();
-        let mut of_column = vec![0_u32; start[n]];
-        for (number, equations) in elements.iter().enumerate() {
-            for &column in equations {
-                of_column[next[column as usize]] = number as u32;
-                next[column as usize] += 1;
-            }
-        }
-        let mut pattern = Self {
-            column_start: vec![0],
-            rows: Vec::new(),
-        };
-        let mut met_in = vec![u32::MAX; n];
-        for column in 0..n {
-            let first = pattern.rows.len();
-            for &element in &of_column[start[column]..start[column + 1]] {
-                for &row in &elements[element as usize] {
-                    if met_in[row as usize] != column as u32 {
-                        met_in[row as usize] = column as u32;
-                        pattern.rows.push(row);
-                    }
-                }
-            }
-            pattern.rows[first..].sort_unstable();
-            pattern.column_start.push(pattern.rows.len() as u32);
-        }
-        pattern
-    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ pub use replay::replay;
 
 use crate::error::{Error, Source, suggestion};
 use crate::input::toml_error;
-use crate::plugin::adapter::Adapter;
+use crate::plugin::adapter::{Adapter, Externals};
 use crate::plugin::{BatchFailure, Law, Moment, Operator, PointCall, Request, Site};
 use crate::point::words;
 use abi::Hypothesis;
@@ -54,6 +54,7 @@ struct LawPart {
     sha256: String,
     adapter: Option<Adapter>,
     sidecar: Option<PathBuf>,
+    externals: Option<Externals>,
 }
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -144,6 +145,7 @@ impl Capsule {
                 sha256: law.library().sha256().to_owned(),
                 adapter: foreign.map(|foreign| foreign.adapter),
                 sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
+                externals: foreign.and_then(|foreign| foreign.externals),
             },
             origin: origin
                 .into_iter()
@@ -324,6 +326,9 @@ impl std::fmt::Display for Capsule {
         }
         if let Some(sidecar) = &law.sidecar {
             writeln!(f, "sidecar = {}", text(&sidecar.to_string_lossy()))?;
+        }
+        if let Some(externals) = law.externals {
+            writeln!(f, "externals = {}", text(externals.name()))?;
         }
         writeln!(f)?;
         writeln!(f, "[where]")?;

@@ -5,7 +5,7 @@ pub(crate) mod base;
 
 use crate::error::{Error, Source};
 use crate::input::{ForeignKeys, Named, ParameterTable, ParameterValue};
-use crate::plugin::adapter::{Adapter, Foreign};
+use crate::plugin::adapter::{Adapter, Externals, Foreign, Scratch};
 use crate::schema;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
@@ -13,6 +13,13 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
+
+/// What a driver file looks like among case files.
+const DRIVER: base::OtherKind = base::OtherKind {
+    keys: &["hypothesis", "segment"],
+    message: "this is a driver file, which leads a law at one point; expected a case file",
+    command: "pilum point",
+};
 
 /// A case file and its text.
 #[derive(Clone, Debug)]
@@ -44,7 +51,7 @@ impl Case {
     /// # Errors
     /// [`Error::Input`] at the place that does not fit.
     pub(crate) fn of(source: Source) -> Result<Vec<Self>, Error> {
-        let (source, files) = base::read(source)?;
+        let (source, files) = base::read_kind(source, &DRIVER)?;
         let case = |(variant, file)| Self {
             source: source.clone(),
             file,
@@ -288,6 +295,12 @@ pub struct LawInput {
     /// Write the arguments of one call here.
     #[schemars(with = "Option<PathBuf>")]
     pub record: Option<Spanned<PathBuf>>,
+    /// What becomes of routines that it calls and nobody supplies.
+    #[schemars(with = "Option<Externals>")]
+    pub externals: Option<Spanned<Externals>>,
+    /// What becomes of its scratch files.
+    #[schemars(with = "Option<Scratch>")]
+    pub scratch: Option<Spanned<Scratch>>,
     /// Its parameters.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
@@ -310,6 +323,8 @@ impl LawInput {
             sidecar: self.sidecar.as_ref(),
             in_process: self.in_process.as_ref(),
             record: self.record.as_ref(),
+            externals: self.externals.as_ref(),
+            scratch: self.scratch.as_ref(),
         };
         keys.read(source)
     }
@@ -337,7 +352,8 @@ pub struct GroupInput {
     #[schemars(with = "Option<InPlane>")]
     pub in_plane: Option<Spanned<InPlane>>,
     /// Stress before the first phase, components 11 22 33 12, tension positive.
-    pub initial_stress: Option<StressInput>,
+    #[schemars(with = "Option<StressInput>")]
+    pub initial_stress: Option<Spanned<StressInput>>,
 }
 
 /// What the elements of a group do.
@@ -531,6 +547,12 @@ pub struct ProbeInput {
 pub enum Reduce {
     /// Arithmetic mean.
     Mean,
+    /// Mean weighted by what each integration point stands for: area, in axisymmetry of the whole
+    /// turn; of interfaces their own area.
+    Average,
+    /// The sum of values times what they stand for: over the area, in axisymmetry over the volume
+    /// of the whole turn; of interfaces over their own area.
+    Integral,
     /// Smallest.
     Min,
     /// Largest.

@@ -716,6 +716,19 @@ impl Group {
         force
     }
 
+    /// Nodal forces of some of this group's elements (committed), by degree of freedom.
+    pub fn forces_of(&self, elements: &[usize], n_dofs: usize) -> Vec<f64> {
+        let length = self.kinematics.points_per_element() * self.kinematics.n_components();
+        let mut stress = vec![0.0; self.stress.committed.len()];
+        for &element in elements {
+            let own = element * length..(element + 1) * length;
+            stress[own.clone()].copy_from_slice(&self.stress.committed[own]);
+        }
+        let mut force = vec![0.0; n_dofs];
+        self.kinematics.add_forces(&stress, &mut force);
+        force
+    }
+
     /// Jump and traction (normal, tangential) of a point of a thin layer or zero-thickness
     /// element (committed); `None` for solids.
     pub fn jump_and_traction(&self, point: usize) -> Option<([f64; 2], [f64; 2])> {

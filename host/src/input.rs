@@ -4,7 +4,7 @@
 mod wording;
 
 use crate::error::{Error, Source, suggestion};
-use crate::plugin::adapter::{Adapter, Foreign};
+use crate::plugin::adapter::{Adapter, Externals, Foreign, Scratch};
 use crate::plugin::{Law, LawDescription, LoadedLaw, ParameterDescription, SearchPath};
 use abi::Hypothesis;
 use indexmap::IndexMap;
@@ -301,6 +301,10 @@ pub(crate) struct ForeignKeys<'a> {
     pub(crate) in_process: Option<&'a Spanned<bool>>,
     /// The key `record`.
     pub(crate) record: Option<&'a Spanned<PathBuf>>,
+    /// The key `externals`.
+    pub(crate) externals: Option<&'a Spanned<Externals>>,
+    /// The key `scratch`.
+    pub(crate) scratch: Option<&'a Spanned<Scratch>>,
 }
 
 impl ForeignKeys<'_> {
@@ -331,6 +335,8 @@ impl ForeignKeys<'_> {
                 ("sidecar", self.sidecar.map(Spanned::span)),
                 ("in_process", self.in_process.map(Spanned::span)),
                 ("record", self.record.map(Spanned::span)),
+                ("externals", self.externals.map(Spanned::span)),
+                ("scratch", self.scratch.map(Spanned::span)),
             ];
             return match alone
                 .into_iter()
@@ -351,6 +357,7 @@ impl ForeignKeys<'_> {
             let message = "`adapter` needs the `library` that it is for";
             return Err(source.error(adapter.span(), message).into());
         };
+        self.refuse_without_worker(source, *adapter.get_ref())?;
         Ok(Some(Foreign {
             adapter: *adapter.get_ref(),
             library: existing("library", library)?,
@@ -361,7 +368,43 @@ impl ForeignKeys<'_> {
             in_process: self.in_process.is_some_and(|written| *written.get_ref()),
             record: self.record.map(path),
             records_once: false,
+            externals: self.externals.map(|written| *written.get_ref()),
+            scratch: self.scratch.map(|written| *written.get_ref()),
         }))
+    }
+
+    /// Traps and scratch folders are a matter of the workers of UMATs.
+    fn refuse_without_worker(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
+        let is_trap = |written: &&Spanned<Externals>| *written.get_ref() == Externals::Trap;
+        let is_kept = |written: &&Spanned<Scratch>| *written.get_ref() == Scratch::Keep;
+        let keys = [
+            (
+                "externals",
+                self.externals.map(Spanned::span),
+                self.externals.filter(is_trap).is_some(),
+            ),
+            (
+                "scratch",
+                self.scratch.map(Spanned::span),
+                self.scratch.filter(is_kept).is_some(),
+            ),
+        ];
+        let in_process = self.in_process.is_some_and(|written| *written.get_ref());
+        for (key, at, needs_worker) in keys {
+            let Some(at) = at else { continue };
+            if adapter != Adapter::Umat {
+                let message = format!("`{key}` is for `adapter = \"umat\"`");
+                return Err(source.error(at, message).into());
+            }
+            if needs_worker && in_process {
+                let message = format!("`{key}` needs a worker process");
+                return Err(source
+                    .error(at, message)
+                    .hint("leave out `in_process`")
+                    .into());
+            }
+        }
+        Ok(())
     }
 }
 

@@ -2,6 +2,9 @@
 //! constraints by degree of freedom.
 
 mod constraints;
+mod held;
+mod plausible;
+mod tension;
 
 use crate::assembly::Tie;
 use crate::case::{
@@ -18,8 +21,13 @@ use crate::plugin::{End, LoadedLaw, Moment, Operator, SearchPath, Start, Strided
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
+pub(crate) use plausible::implausible_stiffness;
+use std::collections::HashMap;
 use std::sync::Arc;
 use toml::Spanned;
+
+/// A layer whose one side is so many times the other has no doubt about its normal.
+const CLEARLY: f64 = 2.0;
 
 /// A case ready to run.
 #[derive(Debug)]
@@ -34,6 +42,8 @@ pub struct Model {
     pub swaps: Vec<Vec<(usize, GroupLaw)>>,
     /// All laws used, by name and hypothesis.
     pub laws: IndexMap<(String, &'static str), Arc<BuiltLaw>>,
+    /// What is plausible but seldom meant, in words.
+    pub warnings: Vec<String>,
 }
 
 impl Model {
@@ -90,8 +100,10 @@ impl Model {
             };
             groups.push(builder.build(law, &mut ties)?);
         }
-        constraints::check(source, file, &mesh, &ties)?;
+        let mut warnings = constraints::check(source, file, &mesh, &ties)?;
+        warnings.extend(plausible::warnings(case, &mesh, &groups, &swaps));
         Ok(Self {
+            warnings,
             mesh,
             groups,
             ties,
@@ -484,6 +496,7 @@ impl GroupBuilder<'_> {
             let message = format!("no element belongs to group `{name}`");
             return Err(self.source.error(self.name.span(), message).into());
         }
+        self.refuse_turned_signs(&law)?;
         let stress = self.initial_stress(&*kinematics);
         Group::new(name, formulation, kinematics, stress, thickness, law)
             .map_err(|failure| cannot_start(self.source, self.file, &failure))
@@ -577,6 +590,7 @@ impl GroupBuilder<'_> {
             across.push(direction);
             thickness.push(t);
         }
+        self.refuse_normal_along()?;
         let integration = self.integration(Integration::Full);
         if integration == Integration::Mean {
             for (nodes, across) in nodes.iter().zip(&across) {
@@ -592,6 +606,98 @@ impl GroupBuilder<'_> {
         let (analysis, coordinates) = (self.file.analysis, &self.mesh.nodes);
         let elements = Quad8::new(analysis, coordinates, nodes, axes, rule);
         Ok((Box::new(elements.map_err(|_| self.bad_shape())?), thickness))
+    }
+
+    /// Refuses a `normal` in whose direction the layer is longer than along it: clearly so, since a
+    /// square is a layer too, and whatever the shape of its elements.
+    fn refuse_normal_along(&self) -> Result<(), Error> {
+        let Some(normal) = &self.group.normal else {
+            return Ok(());
+        };
+        for [width, height] in self.extents() {
+            let (across, along, other) = match normal.get_ref() {
+                Axis::X => (width, height, "y"),
+                Axis::Y => (height, width, "x"),
+            };
+            if across > CLEARLY * along {
+                let name = self.name.get_ref();
+                let message = format!(
+                    "`normal`: group `{name}` is {width:.6} by {height:.6} m, its longer side \
+                     would be its thickness"
+                );
+                return Err(self
+                    .source
+                    .error(normal.span(), message)
+                    .hint(format!(
+                        "the normal goes across the layer: `normal = \"{other}\"`, or leave it out"
+                    ))
+                    .into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Width and height of each connected part of the group.
+    fn extents(&self) -> Vec<[f64; 2]> {
+        let mut of_node: HashMap<usize, usize> = HashMap::new();
+        // Lower and upper corner of each part, and the part that it has become one with.
+        let mut parts: Vec<([[f64; 2]; 2], usize)> = Vec::new();
+        let root = |parts: &[([[f64; 2]; 2], usize)], mut part: usize| {
+            while parts[part].1 != part {
+                part = parts[part].1;
+            }
+            part
+        };
+        for quad in self.quads() {
+            let new = parts.len();
+            let corners = quad.nodes.map(|node| self.mesh.nodes[node]);
+            let end = |c: usize, f: fn(f64, f64) -> f64| {
+                corners.iter().map(|at| at[c]).fold(corners[0][c], f)
+            };
+            let lower = [end(0, f64::min), end(1, f64::min)];
+            parts.push(([lower, [end(0, f64::max), end(1, f64::max)]], new));
+            for node in quad.nodes {
+                let other = *of_node.entry(node).or_insert(new);
+                let (a, b) = (root(&parts, other), root(&parts, new));
+                if a != b {
+                    let [low, high] = parts[b].0;
+                    let into = &mut parts[a].0;
+                    for c in 0..2 {
+                        into[0][c] = into[0][c].min(low[c]);
+                        into[1][c] = into[1][c].max(high[c]);
+                    }
+                    parts[b].1 = a;
+                }
+            }
+        }
+        let own = parts.iter().enumerate();
+        own.filter(|(number, (_, root))| number == root)
+            .map(|(_, ([low, high], _))| [high[0] - low[0], high[1] - low[1]])
+            .collect()
+    }
+
+    /// Refuses an initial stress that the law cannot stand, though it stands it with compression as
+    /// a negative number.
+    fn refuse_turned_signs(&self, law: &GroupLaw) -> Result<(), Error> {
+        let Some(given) = &self.group.initial_stress else {
+            return Ok(());
+        };
+        let stress = components(Some(*given.get_ref()));
+        match tension::turned(&law.built.law, self.group.formulation, stress) {
+            None => Ok(()),
+            Some(refusal) => {
+                let message = format!(
+                    "`initial_stress` of group `{}`: law `{}` cannot stand it: {refusal}",
+                    self.name.get_ref(),
+                    law.name
+                );
+                Err(self
+                    .source
+                    .error(given.span(), message)
+                    .hint("tension is positive: compression is written as a negative number")
+                    .into())
+            }
+        }
     }
 
     /// The direction across a layer, and the thickness: the distance between its two faces.
@@ -629,15 +735,16 @@ impl GroupBuilder<'_> {
     /// Initial stress of all points, in axes of the elements. A zero-thickness element without
     /// one of its own starts with that of the ground on its two sides, projected on its facet.
     fn initial_stress(&self, kinematics: &dyn Kinematics) -> Vec<f64> {
+        let given = self.group.initial_stress.as_ref().map(|s| *s.get_ref());
         let mut stress = Vec::with_capacity(kinematics.n_components() * kinematics.n_points());
         for point in 0..kinematics.n_points() {
             let element = point / kinematics.points_per_element();
             let axes = kinematics.axes(element);
             if kinematics.n_components() == 4 {
-                stress.extend(axes.stress_from_global(components(self.group.initial_stress)));
+                stress.extend(axes.stress_from_global(components(given)));
             } else {
-                let global = match self.group.initial_stress {
-                    Some(_) => components(self.group.initial_stress),
+                let global = match given {
+                    Some(_) => components(given),
                     None => self.stress_beside(kinematics.nodes(element)),
                 };
                 let [_, normal, _, shear] = axes.stress_from_global(global);
@@ -657,7 +764,8 @@ impl GroupBuilder<'_> {
                 .iter()
                 .find(|quad| quad.nodes.contains(&middle));
             let group = quad.and_then(|quad| self.file.groups.get_index(quad.group));
-            components(group.and_then(|(_, group)| group.get_ref().initial_stress))
+            let stress = group.and_then(|(_, group)| group.get_ref().initial_stress.as_ref());
+            components(stress.map(|stress| *stress.get_ref()))
         });
         std::array::from_fn(|c| f64::midpoint(beside[0][c], beside[1][c]))
     }

@@ -11,7 +11,7 @@ mod trust;
 pub mod vetting;
 
 pub use description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
 #[doc(hidden)]
 pub use library::describe_memory;
@@ -156,6 +156,12 @@ impl Library {
         }
         let foreign = &foreign.completed();
         let opened = adapter::open(foreign, &image)?;
+        let (externals, scratch) = opened.wishes;
+        let foreign = Foreign {
+            externals: foreign.externals.or(externals),
+            scratch: foreign.scratch.or(scratch),
+            ..foreign.clone()
+        };
         #[cfg(unix)]
         let apart = !foreign.in_process || Trust::current().isolate.is_some();
         let origin = |law: Arc<dyn ForeignLaw>| {
@@ -177,7 +183,7 @@ impl Library {
                 .map(|(description, law)| (description, origin(law)))
                 .collect(),
             sidecar: opened.sidecar,
-            foreign: Some(foreign.clone()),
+            foreign: Some(foreign),
         }))
     }
 
@@ -385,6 +391,15 @@ impl LawInstance {
             Self::Apart(instance) => instance.integrate(call),
         }
     }
+
+    fn take_overwritten(&self) -> Vec<String> {
+        match self {
+            Self::Here(_) => Vec::new(),
+            Self::Foreign(instance) => instance.take_overwritten(),
+            #[cfg(unix)]
+            Self::Apart(instance) => instance.take_overwritten(),
+        }
+    }
 }
 
 /// Which operator a call computes beside the fluxes.
@@ -586,6 +601,20 @@ impl Law {
     /// Whether the law is told where its points lie.
     pub fn asks_for_sites(&self) -> bool {
         self.library().foreign().is_some()
+    }
+
+    /// What the user should know of the calls since the last time that this was asked.
+    pub fn take_notes(&self) -> Vec<String> {
+        let names = self.instance.take_overwritten();
+        let note = || {
+            format!(
+                "law `{}`: the routine overwrites {}, which it is given to read; here that is a \
+                 copy, and what is left there is not used",
+                self.description().id,
+                names.join(", ")
+            )
+        };
+        (!names.is_empty()).then(note).into_iter().collect()
     }
 
     /// Number of components of gradient and flux.

@@ -4,12 +4,14 @@
 //! traction or stress, or a stiffness. [`Driver`] is the checked file, [`Driver::run`] follows its
 //! path. An increment lasts one unit of time.
 
+mod anchor;
 mod equilibrium;
 mod figure;
 mod file;
 mod frame;
 mod incremental_driver;
 mod restrictions;
+mod silence;
 mod table;
 
 pub use file::Driver;
@@ -26,6 +28,7 @@ use equilibrium::{Fatal, Goal, Miss, Obstacle, Point, Search, Step};
 pub(crate) use file::words;
 use file::{Control, Segment};
 use frame::Frame;
+use silence::Silence;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Write};
@@ -252,6 +255,8 @@ fn with_suffix(csv: &Path, variant: &str) -> PathBuf {
 struct Shortfall {
     /// Fraction of the increment that was reached.
     reached: f64,
+    /// Fluxes asked for at its end.
+    asked: Vector,
     obstacle: Obstacle,
 }
 
@@ -337,7 +342,10 @@ impl Driver {
             rate: None,
             first_step: 1.0,
             cut_backs: 0,
+            is_ignored: false,
+            silence: Silence::default(),
         };
+        let mut strayed = None;
         let n = self.law.n_components();
         let row = |point: &Point, increment, iterations, sink: &mut dyn FnMut(&Row<'_>) -> _| {
             sink(&Row {
@@ -367,20 +375,35 @@ impl Driver {
                     increment: (segment.first + k) as u32,
                     step_start,
                 };
-                walk.advance(&goal, &next, (time, segment.time_increment))
-                    .map_err(|stop| {
-                        let place = format!(
-                            "segment {}, increment {k} of {} ({} of the file)",
-                            number + 1,
-                            segment.increments,
-                            increment + 1
-                        );
-                        *failed = self.capsule(&stop, &place);
-                        self.explain(stop, &place, &warnings)
-                    })?;
+                let place = || {
+                    format!(
+                        "segment {}, increment {k} of {} ({} of the file)",
+                        number + 1,
+                        segment.increments,
+                        increment + 1
+                    )
+                };
+                let reached = walk.advance(&goal, &next, (time, segment.time_increment));
+                let point = walk.cartesian();
+                if walk.is_ignored {
+                    walk.silence.ignored(place, &point.flux);
+                }
+                if let Err(stop) = reached {
+                    warnings.extend(strayed);
+                    warnings.extend(walk.silence.warning(self));
+                    if walk.search.is_without_stiffness() {
+                        let id = &self.law.description().id;
+                        warnings.push(format!("law `{id}` has no stiffness in the initial state"));
+                    }
+                    let place = place();
+                    *failed = self.capsule(&stop, &place);
+                    return Err(self.explain(stop, &place, &warnings));
+                }
+                if strayed.is_none() {
+                    strayed = self.strayed(&walk, &place);
+                }
                 increment += 1;
                 time += segment.time_increment;
-                let point = walk.cartesian();
                 row(&point, increment, walk.search.calls - calls, &mut sink)?;
                 goal = next;
             }
@@ -395,6 +418,8 @@ impl Driver {
                 };
             }
         }
+        warnings.extend(strayed);
+        warnings.extend(walk.silence.warning(self));
         walk.change_frame(Frame::Cartesian, &mut held);
         let (times, words) = &walk.search.unreliable;
         if *times > 0 {
@@ -403,6 +428,7 @@ impl Driver {
                 self.law.description().id
             ));
         }
+        warnings.extend(self.law.take_notes());
         let Point {
             gradient,
             flux,
@@ -454,15 +480,48 @@ impl Driver {
                     .collect();
                 values.join(", ")
             };
-            warnings.push(format!(
-                "the initial {word} {} lies outside the surface of law `{}`, which returns it to \
-                 {}",
+            let (id, given, found) = (
+                &self.law.description().id,
                 list(&self.flux),
-                self.law.description().id,
-                list(&returned)
-            ));
+                list(&returned),
+            );
+            // Those of other programs are given a time in this call, in which they may creep.
+            warnings.push(if self.law.library().foreign().is_some() {
+                format!(
+                    "the initial {word} {given} does not last: law `{id}`, called without any \
+                     change, returns {found}"
+                )
+            } else {
+                format!(
+                    "the initial {word} {given} lies outside the surface of law `{id}`, which \
+                     returns it to {found}"
+                )
+            });
         }
         Ok((point, search, warnings))
+    }
+
+    /// What to say of a point that went farther than what it was led to explains.
+    fn strayed(&self, walk: &Walk<'_>, place: &dyn Fn() -> String) -> Option<String> {
+        let component = walk.search.strayed(&walk.point)?;
+        let (gradient, flux) = words(self.law.hypothesis());
+        Some(format!(
+            "{}: {gradient} `{}` has to come to {:.3e} to meet its {flux}, which is all but the \
+             strength of law `{}`",
+            place(),
+            self.component(component, walk.search.frame()),
+            walk.point.gradient[component],
+            self.law.description().id
+        ))
+    }
+
+    /// Name of a component.
+    fn component(&self, number: usize, frame: Frame) -> &'static str {
+        let names = frame.components();
+        names.map_or_else(
+            || self.law.hypothesis().components()[number],
+            |names| names[number],
+        )
     }
 
     /// The call of the law behind a stop.
@@ -497,7 +556,11 @@ impl Driver {
                 ))
             }
             Stop::Shortfall(shortfall) => {
-                let Shortfall { reached, obstacle } = *shortfall;
+                let Shortfall {
+                    reached,
+                    asked,
+                    obstacle,
+                } = *shortfall;
                 let broken = obstacle.refusal.as_ref();
                 if obstacle.miss.is_none()
                     && let Some(failure) = broken.filter(|failure| self.law.breaks_down(failure))
@@ -509,6 +572,7 @@ impl Driver {
                     ));
                 }
                 let (gradient, flux) = words(self.law.hypothesis());
+                let mut end = String::new();
                 let (why, hint) = if let Some(miss) =
                     obstacle.miss.filter(|_| obstacle.is_restricted)
                 {
@@ -520,11 +584,13 @@ impl Driver {
                     );
                     (why, None)
                 } else if let Some(miss) = obstacle.miss {
-                    let frame = obstacle.frame.components();
-                    let name = frame.as_ref().map_or_else(
-                        || self.law.hypothesis().components()[miss.component],
-                        |names| names[miss.component],
-                    );
+                    let name = self.component(miss.component, obstacle.frame);
+                    if !obstacle.is_sprung(miss.component) {
+                        end = format!(
+                            ", at whose end {flux} `{name}` is to be {:.9e} kPa",
+                            asked[miss.component]
+                        );
+                    }
                     let hint = format!(
                         "a {flux} beyond strength has no equilibrium; control the {gradient} of \
                          `{name}` instead"
@@ -535,7 +601,7 @@ impl Driver {
                 };
                 let mut lines = vec![
                     format!("{place}: no equilibrium: {why}"),
-                    format!("reached: {reached:.6} of the increment"),
+                    format!("reached: {reached:.6} of the increment{end}"),
                 ];
                 lines.extend(obstacle.law.map(|words| format!("law `{id}`: {words}")));
                 lines.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
@@ -590,6 +656,9 @@ struct Walk<'a> {
     /// Fraction of the increment that the first step tries.
     first_step: f64,
     cut_backs: usize,
+    /// The law took no notice of a step of the last increment.
+    is_ignored: bool,
+    silence: Silence,
 }
 
 impl Walk<'_> {
@@ -652,11 +721,21 @@ impl Walk<'_> {
         Ramp { from, to }
     }
 
+    fn shortfall(&self, reached: f64, to: &Goal, obstacle: Obstacle) -> Stop {
+        Stop::Shortfall(Box::new(Shortfall {
+            reached,
+            asked: to.flux,
+            obstacle,
+        }))
+    }
+
     /// Carries the point over one increment, in as many steps as it takes.
     /// `period`: its start and its length.
     fn advance(&mut self, from: &Goal, to: &Goal, period: (f64, f64)) -> Result<(), Stop> {
         let (time, time_increment) = period;
         let first_call = self.search.calls;
+        self.search.anchor(to);
+        self.is_ignored = false;
         let mut done = 0.0;
         let mut size = self.first_step;
         let mut may_grow = true;
@@ -680,6 +759,11 @@ impl Walk<'_> {
             };
             let guess = self.rate.map(|rate| rate.map(|rate| rate * length));
             if self.search.find(&step, guess.as_ref())? {
+                match self.search.is_ignored(&step)? {
+                    Some(true) => self.is_ignored = true,
+                    Some(false) => self.silence.answered(),
+                    None => {}
+                }
                 let before = self.point.gradient;
                 self.search.commit(&mut self.point);
                 let after = &self.point.gradient;
@@ -697,13 +781,17 @@ impl Walk<'_> {
             may_grow = false;
             self.cut_backs += 1;
             if size < SMALLEST_STEP || self.search.calls - first_call > MAX_CALLS {
-                return Err(Stop::Shortfall(Box::new(Shortfall {
-                    reached: done,
-                    obstacle,
-                })));
+                return Err(self.shortfall(done, to, obstacle));
             }
         }
         self.first_step = size;
-        Ok(())
+        match self.search.unmet(&self.point, to) {
+            None => Ok(()),
+            Some(miss) => {
+                let mut obstacle = self.search.take_obstacle();
+                obstacle.miss = Some(miss);
+                Err(self.shortfall(1.0, to, obstacle))
+            }
+        }
     }
 }

@@ -1,11 +1,14 @@
 //! Probes: numbers that a case asks for after every increment.
 
+mod section;
+
 use crate::assembly::{Tie, fold};
 use crate::case::{Case, ProbeInput, Reduce};
-use crate::error::{Error, Source, suggestion};
+use crate::error::{Error, Place, Source, suggestion};
 use crate::group::Group;
 use crate::input::Named;
 use crate::model::Model;
+use section::section;
 use toml::Spanned;
 
 /// Components of stress and strain by the name they have in quantities.
@@ -26,6 +29,8 @@ enum Probe {
     Points {
         group: usize,
         points: Vec<usize>,
+        /// What each point stands for; empty where all count alike.
+        weights: Vec<f64>,
         quantity: PointQuantity,
         reduce: Reduce,
         scale: f64,
@@ -37,11 +42,13 @@ enum Probe {
         reduce: Reduce,
         scale: f64,
     },
-    /// Sum of internal forces at nodes: of all elements (the reaction), or of one group.
+    /// Sum of internal forces at nodes: of all elements (the reaction), of one group, or of some of
+    /// its elements.
     Force {
         nodes: Vec<usize>,
         component: usize,
         group: Option<usize>,
+        elements: Option<Vec<usize>>,
         scale: f64,
     },
     /// Sum of earlier probes with factors.
@@ -133,6 +140,30 @@ impl Probes {
         (looked, dofs)
     }
 
+    /// Refuses values that are too large for a number.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the first probe with one.
+    pub fn check(&self, case: &Case, place: &Place, values: &[Option<f64>]) -> Result<(), Error> {
+        let overflows = |value: &Option<f64>| value.is_some_and(|value| !value.is_finite());
+        let Some(number) = values.iter().position(overflows) else {
+            return Ok(());
+        };
+        let (name, _) = &self.probes[number];
+        let mut inputs = case.file.probes.keys();
+        let span = inputs.find(|key| key.get_ref() == name);
+        let message = format!(
+            "probe `{name}`: in {place} what it sums and multiplies comes to more than {:.1e}, the \
+             largest number there is",
+            f64::MAX
+        );
+        Err(case
+            .source
+            .error(span.map_or(0..0, Spanned::span), message)
+            .hint("a smaller `scale`, or smaller factors in `combine`; rows before are written")
+            .into())
+    }
+
     /// Values, in order. `None`: the quantity does not exist now (an internal variable of another
     /// law).
     pub fn values(&self, snapshot: &Snapshot<'_>) -> Vec<Option<f64>> {
@@ -150,13 +181,14 @@ impl Probe {
             Self::Points {
                 group,
                 points,
+                weights,
                 quantity,
                 reduce,
                 scale,
             } => {
                 let group = &snapshot.groups[*group];
                 let values = points.iter().map(|&point| quantity.at(group, point));
-                reduced(*reduce, values).map(|value| scale * value)
+                reduced(*reduce, values, weights).map(|value| scale * value)
             }
             Self::Displacement {
                 nodes,
@@ -167,20 +199,25 @@ impl Probe {
                 let values = nodes
                     .iter()
                     .map(|&n| Some(snapshot.displacement[2 * n + component]));
-                reduced(*reduce, values).map(|value| scale * value)
+                reduced(*reduce, values, &[]).map(|value| scale * value)
             }
             Self::Force {
                 nodes,
                 component,
                 group,
+                elements,
                 scale,
             } => {
                 let of_group;
                 let forces = match group {
                     None => snapshot.reaction,
                     Some(group) => {
-                        let mut forces =
-                            snapshot.groups[*group].forces(snapshot.displacement.len());
+                        let n_dofs = snapshot.displacement.len();
+                        let group = &snapshot.groups[*group];
+                        let mut forces = match elements {
+                            None => group.forces(n_dofs),
+                            Some(elements) => group.forces_of(elements, n_dofs),
+                        };
                         fold(snapshot.ties, &mut forces);
                         of_group = forces;
                         &of_group
@@ -214,14 +251,33 @@ impl PointQuantity {
             Self::Internal(id) => group.internal_variable(point, id),
         }
     }
+
+    /// What a point stands for: its volume; of tractions, jumps and internal variables of a layer
+    /// or interface its area (in axisymmetry of the whole turn).
+    fn weight(&self, group: &Group, point: usize) -> f64 {
+        let weight = group.kinematics.weight(point);
+        match (self, group.thickness(point)) {
+            (Self::Jump(_) | Self::Traction(_) | Self::Internal(_), Some(thickness)) => {
+                weight / thickness
+            }
+            _ => weight,
+        }
+    }
 }
 
 /// `None` if there is no value or one of them is missing.
-fn reduced(reduce: Reduce, values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+fn reduced(
+    reduce: Reduce,
+    values: impl Iterator<Item = Option<f64>>,
+    weights: &[f64],
+) -> Option<f64> {
     let values: Option<Vec<f64>> = values.collect();
     let values = values.filter(|v| !v.is_empty())?;
     let sum: f64 = values.iter().sum();
+    let integral = || values.iter().zip(weights).map(|(v, w)| v * w).sum::<f64>();
     Some(match reduce {
+        Reduce::Average => integral() / weights.iter().sum::<f64>(),
+        Reduce::Integral => integral(),
         Reduce::Sum => sum,
         Reduce::Mean => sum / values.len() as f64,
         Reduce::Min => values.iter().copied().fold(f64::INFINITY, f64::min),
@@ -275,17 +331,25 @@ impl Resolver<'_> {
         }
         let names: Vec<&str> = earlier.iter().map(|(name, _)| name.as_str()).collect();
         let terms = combine.iter().map(|(name, factor)| {
+            let product = self.input.scale * factor.get_ref();
+            if !product.is_finite() {
+                let message = format!(
+                    "`scale` × `{}` = {:e} × {:e} is too large for a number",
+                    name.get_ref(),
+                    self.input.scale,
+                    factor.get_ref()
+                );
+                return Err(self.source().error(factor.span(), message).into());
+            }
             let found = names.iter().position(|n| n == name.get_ref());
-            found
-                .map(|i| (i, self.input.scale * factor.get_ref()))
-                .ok_or_else(|| {
-                    let message = format!("there is no probe `{}` before this one", name.get_ref());
-                    let names = names.clone();
-                    self.source()
-                        .error(name.span(), message)
-                        .hint(suggestion(name.get_ref(), names))
-                        .into()
-                })
+            found.map(|i| (i, product)).ok_or_else(|| {
+                let message = format!("there is no probe `{}` before this one", name.get_ref());
+                let names = names.clone();
+                self.source()
+                    .error(name.span(), message)
+                    .hint(suggestion(name.get_ref(), names))
+                    .into()
+            })
         });
         terms.collect::<Result<_, Error>>().map(Probe::Combination)
     }
@@ -324,9 +388,11 @@ impl Resolver<'_> {
         group: Option<&Spanned<String>>,
         quantity: &Spanned<String>,
     ) -> Result<Probe, Error> {
-        let nodes = self.model.mesh.line(self.source(), line)?.nodes.clone();
-        let nodes: Vec<usize> = nodes
-            .into_iter()
+        let of_line = self.model.mesh.line(self.source(), line)?;
+        let nodes: Vec<usize> = of_line
+            .nodes
+            .iter()
+            .copied()
             .filter(|&n| self.inside(self.model.mesh.nodes[n]))
             .collect();
         if nodes.is_empty() {
@@ -344,6 +410,12 @@ impl Resolver<'_> {
         match (what, group) {
             ("displacement", None) => {
                 let reduce = self.input.reduce.unwrap_or(Reduce::Mean);
+                if matches!(reduce, Reduce::Average | Reduce::Integral) {
+                    return Err(self.wrong(
+                        "`average` and `integral` are over the integration points of a group; \
+                         over the nodes of a line there is `mean`",
+                    ));
+                }
                 Ok(Probe::Displacement {
                     nodes,
                     component,
@@ -360,10 +432,19 @@ impl Resolver<'_> {
                     return Err(self.wrong("forces are summed"));
                 }
                 let group = group.map(|name| self.group_number(name)).transpose()?;
+                let inside = group.and_then(|number| section(&self.model.mesh, of_line, number));
+                let (nodes, elements) = match inside {
+                    None => (nodes, None),
+                    Some(part) => {
+                        let of_part = nodes.into_iter().filter(|node| part.nodes.contains(node));
+                        (of_part.collect(), Some(part.elements))
+                    }
+                };
                 Ok(Probe::Force {
                     nodes,
                     component,
                     group,
+                    elements,
                     scale,
                 })
             }
@@ -441,11 +522,21 @@ impl Resolver<'_> {
         if points.is_empty() {
             return Err(self.wrong("no integration point lies inside the extent"));
         }
+        let reduce = self.input.reduce.unwrap_or(Reduce::Mean);
+        let weights = if matches!(reduce, Reduce::Average | Reduce::Integral) {
+            points
+                .iter()
+                .map(|&point| point_quantity.weight(group, point))
+                .collect()
+        } else {
+            Vec::new()
+        };
         Ok(Probe::Points {
             group: number,
             points,
+            weights,
             quantity: point_quantity.clone(),
-            reduce: self.input.reduce.unwrap_or(Reduce::Mean),
+            reduce,
             scale: self.input.scale,
         })
     }

@@ -1,13 +1,15 @@
 //! Running a case: phases, increments, cut-back and regrowth, results.
 
+mod beyond;
 mod history;
 mod keeper;
+mod method;
 mod path;
 mod start;
 
 use crate::assembly::{Places, System, fold};
 use crate::capsule::{self, Capsule};
-use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput};
+use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput, SolverInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
@@ -17,9 +19,10 @@ use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figure
 use crate::plugin::{Library, Moment};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    Costs, Guess, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
-    StepFailure, StepSuccess, mesh_lines,
+    Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, Reuse, StepFailure, StepSuccess,
 };
+use algebra::{LinearSolver, Singular, mesh_lines};
+use beyond::Beyond;
 pub(crate) use history::History;
 use keeper::Keeper;
 use path::PathEnd;
@@ -124,16 +127,20 @@ pub fn run_reusing(
         let results = Results::resume(folder, case, &model, &probes, checkpoint.results)?;
         (results, Some(state))
     } else {
-        for law in model.laws.values() {
-            for warning in &law.warnings {
-                observer.warning(warning);
-            }
+        let of_laws = model.laws.values().flat_map(|law| &law.warnings);
+        for warning in of_laws.chain(&model.warnings) {
+            observer.warning(warning);
         }
         (Results::create(folder, case, &model, &probes)?, None)
     };
     let mut run = Run::new(case, model, probes, reuse);
     let outcome = run.phases(state, &mut results, &mut observer, &mut keeper);
-    for warning in results.unreliable() {
+    for warning in run
+        .beyond
+        .warnings()
+        .into_iter()
+        .chain(results.unreliable())
+    {
         observer.warning(&warning);
     }
     let error = outcome.as_ref().err();
@@ -150,6 +157,15 @@ pub fn run_reusing(
 struct Noting<'a> {
     observer: &'a mut dyn Observer,
     warnings: Vec<String>,
+}
+
+impl Noting<'_> {
+    /// A warning, unless it has been given.
+    fn warning_once(&mut self, message: &str) {
+        if !self.warnings.iter().any(|given| given == message) {
+            self.warning(message);
+        }
+    }
 }
 
 impl Observer for Noting<'_> {
@@ -199,6 +215,8 @@ struct Run<'a> {
     time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     largest_force: f64,
+    /// Results that the theory does not cover.
+    beyond: Beyond,
     /// Factors of linear parts.
     reuse: &'a mut Reuse,
 }
@@ -274,8 +292,10 @@ impl<'a> Run<'a> {
             force: vec![0.0; n_dofs],
             time: 0.0,
             largest_force: 0.0,
+            beyond: Beyond::default(),
             reuse,
         };
+        run.beyond.knows(&run.groups);
         for support in &case.file.supports {
             for dof in run.dofs(support.line.get_ref(), &support.fixed) {
                 run.prescribed.insert(dof, 0.0);
@@ -286,6 +306,24 @@ impl<'a> Run<'a> {
 
     fn file(&self) -> &'a CaseFile {
         &self.case.file
+    }
+
+    /// The settings of the solver, with the method that suits the laws of the present phase.
+    fn solver(&self) -> SolverInput {
+        let given = self.file().solver;
+        SolverInput {
+            method: method::resolved(given.method, &self.groups),
+            ..given
+        }
+    }
+
+    /// Passes on what laws have to say beside their answers.
+    fn pass_on_notes(&self, observer: &mut Noting<'_>) {
+        for group in &self.groups {
+            for note in group.law.built.law.take_notes() {
+                observer.warning(&note);
+            }
+        }
     }
 
     /// Degrees of freedom of a line's nodes.
@@ -363,9 +401,15 @@ impl<'a> Run<'a> {
                 domain: None,
                 has_matrix: false,
                 largest: 0.0,
-                record: PhaseRecord::new(name, equations.n(), imbalance),
+                record: PhaseRecord {
+                    method: self.solver().method,
+                    ..PhaseRecord::new(name, equations.n(), imbalance)
+                },
             }
         });
+        if let Some(why) = method::reason(self.file().solver.method, &self.groups) {
+            observer.warning_once(&why);
+        }
         let mut record = course.record.clone();
         let outcome = self.increments(
             number,
@@ -375,6 +419,7 @@ impl<'a> Run<'a> {
             results,
             (observer, keeper),
         );
+        self.pass_on_notes(observer);
         let of_domain = equations
             .domain
             .as_ref()
@@ -388,6 +433,9 @@ impl<'a> Run<'a> {
             ));
         }
         self.time += 1.0;
+        let (mesh, analysis) = (&self.mesh, self.file().analysis);
+        self.beyond
+            .look(mesh, analysis, &self.groups, &self.displacement);
         results.phase(equations.counted_in(&record));
         outcome
     }
@@ -439,6 +487,7 @@ impl<'a> Run<'a> {
                 })?;
             let snapshot = self.snapshot(&reaction);
             done.probes = self.probes.values(&snapshot);
+            self.probes.check(self.case, &place, &done.probes)?;
             done.time = self.time + lambda;
             record.iterations += done.iterations;
             record.increments += 1;
@@ -448,7 +497,7 @@ impl<'a> Run<'a> {
             let stops = observer.wants_to_stop();
             if stops || keeper.is_due() {
                 course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
-                course.has_matrix = equations.matrix.is_kept(self.file().solver.method);
+                course.has_matrix = equations.matrix.is_kept(self.solver().method);
                 course.largest = equations.matrix.largest();
                 course.record = equations.counted_in(record);
                 keeper.keep(self.state(number, &course), results, &observer.warnings)?;
@@ -508,7 +557,7 @@ impl<'a> Run<'a> {
         results: &mut Results,
         observer: &mut Noting<'_>,
     ) -> Result<IncrementRecord, Error> {
-        let settings = &self.file().solver;
+        let settings = self.solver();
         let easy = EASY * settings.method.max_iterations() as f64;
         let smallest = 1.0 / n as f64 / f64::powi(2.0, settings.max_halvings as i32);
         let target = if place.increment == n {
@@ -638,7 +687,7 @@ impl<'a> Run<'a> {
     /// Where to look if a law of the user's own may have kept the iterations from converging: a
     /// wrong tangent does that.
     fn suspicion(&self, failure: &StepFailure) -> Option<String> {
-        let asks_for_tangents = self.file().solver.method != Method::InitialStress;
+        let asks_for_tangents = self.solver().method != Method::InitialStress;
         let iterates = failure.failed.is_none() && !failure.iterations.is_empty();
         let mut libraries: Vec<&Path> = self
             .groups
@@ -671,13 +720,13 @@ impl<'a> Run<'a> {
         equations: &mut PhaseEquations,
         record: &mut PhaseRecord,
     ) -> Result<StepSuccess, StepFailure> {
-        let settings = &self.case.file.solver;
+        let settings = self.solver();
         let mut newton = Newton::new(
             (&equations.system, &equations.places),
             equations.domain.as_ref(),
             (&mut equations.solver, &mut equations.matrix),
             &mut self.groups,
-            settings,
+            &settings,
             &mut record.costs,
         );
         newton.step(loads, from, to, self.time + from, guess)
@@ -875,12 +924,13 @@ impl<'a> Run<'a> {
         };
         if let Some(course) = course {
             if course.has_matrix {
+                let settings = self.solver();
                 let restored = Newton::new(
                     (&equations.system, &equations.places),
                     equations.domain.as_ref(),
                     (&mut equations.solver, &mut equations.matrix),
                     &mut self.groups,
-                    &self.case.file.solver,
+                    &settings,
                     &mut Costs::default(),
                 )
                 .restore_matrix();

@@ -1,29 +1,9 @@
 //! The system's compilers, where there are any.
 
-use std::env;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-/// The program named by the variable, or else `default`; `None`, with a note, if there is none.
-pub(crate) fn compiler(variable: &str, default: &str) -> Option<String> {
-    let name = env::var(variable).unwrap_or_else(|_| default.to_owned());
-    if Command::new(&name).arg("--version").output().is_ok() {
-        return Some(name);
-    }
-    let required = ["CI", "PILUM_REQUIRE_COMPILERS"];
-    assert!(
-        required.iter().all(|name| env::var_os(name).is_none()),
-        "no compiler `{name}`; install one or name it in {variable}"
-    );
-    // Past the capture of the test harness, so that it is seen.
-    let _ = writeln!(
-        std::io::stderr(),
-        "note: skipped: no compiler `{name}`; name one in {variable}"
-    );
-    None
-}
+use tests::needs::compiler;
 
 /// Runs a command that has to succeed.
 pub(crate) fn run(command: &mut Command) {

@@ -4,7 +4,7 @@
 //! Set-up      random parameters and paths, through the point driver and call by call
 //! Asserts     every column of every row, and every tangent, to round-off
 
-use crate::compilers::{compiler, library, repository};
+use crate::compilers::{library, repository};
 use crate::guides::commands;
 use crate::program::{pilum, shell};
 use abi::Hypothesis;
@@ -15,6 +15,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
+use tests::needs::compiler;
 use tests::tolerance::ROUND_OFF;
 
 /// Suffix of the source, id of the law.

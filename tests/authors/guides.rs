@@ -1,7 +1,7 @@
 //! `pilum new-law` in every language and kind: the commands of the README that a project carries are
 //! run as they stand there, and all languages give the same, which is the closed form.
 
-use crate::compilers::{compiler, repository};
+use crate::compilers::repository;
 use crate::program::{pilum, shell};
 use approx::assert_relative_eq;
 use std::collections::BTreeSet;
@@ -9,6 +9,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use tests::case::column;
+use tests::needs::compiler;
 
 /// Languages, with the compilers they need.
 const LANGUAGES: [(&str, &[(&str, &str)]); 4] = [

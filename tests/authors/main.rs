@@ -1,7 +1,7 @@
 //! From an idea to a finite-element run, in any language: `pilum new-law` with the commands of the
 //! README that it writes, one law in four languages, what `pilum laws` says, and the schemas of
-//! input files. Compilers that are missing are noted and passed over; where
-//! `PILUM_REQUIRE_COMPILERS` or `CI` is set, they are required.
+//! input files. What needs a compiler that is missing is passed over with a
+//! remark, or fails where nothing may be passed over (`tests::needs`). What CI leaves out is listed.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests panic to fail")]
 
 mod compilers;
@@ -9,6 +9,7 @@ mod foreign;
 mod guides;
 mod laws;
 mod names;
+mod on_request;
 mod program;
 mod schema;
 mod supply_chain;

@@ -10,9 +10,7 @@ use host::point::run_file_variants;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::column;
-
-/// The point driver's tolerance 1e-10 with a margin, relative.
-const DRIVER: f64 = 1e-9;
+use tests::tolerance::DRIVER;
 
 fn driver(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))

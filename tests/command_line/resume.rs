@@ -144,11 +144,6 @@ fn killed_and_resumed(solver: &str, kills: u32) {
 }
 
 #[test]
-fn a_killed_run_resumes_to_the_same_bits() {
-    killed_and_resumed("", 12);
-}
-
-#[test]
 fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
     // 20 iterations are too few for the slow ones, and far beyond the layer's strength even 500.
     for method in ["auto", "quasi_newton", "modified_newton", "initial_stress"] {
@@ -286,7 +281,6 @@ fn interrupt(process: u32) {
 }
 
 #[test]
-#[ignore = "200 kills take minutes: cargo test --release -p tests --test command_line -- --ignored kills"]
 fn two_hundred_kills_lose_nothing() {
     killed_and_resumed("", 100);
     killed_and_resumed("equations = \"sparse\"", 100);

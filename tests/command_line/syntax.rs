@@ -57,6 +57,19 @@ fn says_what_was_probably_meant() {
                 &["`10000.0`, not `10000,0`"],
             ),
             (
+                "decimal comma and a power of ten",
+                &[("young_modulus = 1e4,", "young_modulus = 1,05e4^,")],
+                &[
+                    "`1,05e4` has a decimal comma",
+                    "is a decimal point meant? `1.05e4`, not `1,05e4`",
+                ],
+            ),
+            (
+                "decimal comma at the end of an inline table",
+                &[("value = 10.0 }", "value = 10,5^ }")],
+                &["`10.5`, not `10,5`"],
+            ),
+            (
                 "single brackets, once",
                 &[
                     (

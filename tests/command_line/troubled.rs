@@ -1,9 +1,5 @@
 //! A law that misbehaves on request, compiled once for each way of compiling it.
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "part of the tests"
-)]
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{CASE, Place, edited};
 use std::collections::BTreeMap;
@@ -19,7 +15,7 @@ pub(crate) fn library() -> String {
 }
 
 /// A folder with the law, compiled with this definition if it is not empty. `None`, with a remark,
-/// where there is no compiler; that is an error where tests must not be skipped.
+/// where there is no compiler.
 pub(crate) fn place(define: &'static str) -> Option<Place> {
     static COMPILED: Mutex<BTreeMap<&str, Vec<u8>>> = Mutex::new(BTreeMap::new());
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -35,19 +31,15 @@ fn compile(define: &str) -> Option<Vec<u8>> {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("library");
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let output = Command::new("cc")
+    let mut compiler = Command::new("cc");
+    compiler
         .args(["-shared", "-fPIC", "-fvisibility=hidden", "-o"])
         .arg(&out)
         .args((!define.is_empty()).then(|| format!("-D{define}")))
         .arg("-I")
         .arg(here.join("../abi/include"))
-        .arg(here.join("command_line/fixtures/troubled.c"))
-        .output();
-    let Ok(output) = output else {
-        assert!(std::env::var_os("CI").is_none(), "there is no C compiler");
-        println!("skipped: there is no C compiler");
-        return None;
-    };
+        .arg(here.join("command_line/fixtures/troubled.c"));
+    let output = tests::needs::output(&mut compiler)?;
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     Some(std::fs::read(out).unwrap())
@@ -75,4 +67,15 @@ pub(crate) fn case(how: &str) -> String {
     let own = format!("parameters = {{ limit = 1.0e-6, how = \"{how}\" }}\n\n");
     text.replacen(parameters, &own, 1)
         .replacen("x = 1e-5 }", "x = 1e-3 }", 1)
+}
+
+#[test]
+fn a_missing_compiler_is_named() {
+    for (test, compiler) in [
+        ("capsule::a_failed_driver_leaves_its_call", "`cc`"),
+        ("libraries::refuses_other_libraries", "`cc`"),
+        ("umat::an_elastic_umat_is_the_elastic_law", "`gfortran`"),
+    ] {
+        tests::needs::assert_named(test, compiler);
+    }
 }

@@ -101,7 +101,7 @@ fn cycles_of_each_law() -> Vec<Cycle> {
 }
 
 #[test]
-#[ignore = "run in a process of its own by the test above"]
+#[ignore = "work for a child"]
 fn cycles() {
     let mut all = cycles_of_each_law();
     let n = CALLS / all.len() as u32;

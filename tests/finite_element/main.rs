@@ -19,6 +19,7 @@ mod patch_layer;
 mod patch_solid;
 mod phases;
 mod relaxation;
+mod sections;
 mod setup;
 mod sliding_block;
 mod snap_back;

@@ -3,7 +3,7 @@
 # reports to libFuzzer which edges it takes and what it compares. With SANITIZE=address
 # AddressSanitizer watches its memory too; sanitizers are not stable yet, whence RUSTC_BOOTSTRAP.
 case " $* " in
-*" --crate-name abi "* | *" --crate-name host "* | *" --crate-name fuzz "*)
+*" --crate-name abi "* | *" --crate-name host "* | *" --crate-name algebra "* | *" --crate-name fuzz "*)
   if [ -n "${SANITIZE:-}" ]; then
     export RUSTC_BOOTSTRAP=1
     set -- "$@" -Z sanitizer="$SANITIZE"

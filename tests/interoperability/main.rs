@@ -1,7 +1,7 @@
 //! Laws in other programs, and laws of other programs here. Routes and traps: abi/interoperability.md.
 //!
-//! What needs other programs is left out unless asked for: `install.sh` beside this file installs
-//! them and says how to run these tests.
+//! What needs OpenGeoSys or Kratos is passed over with a remark where they are not installed, or
+//! fails (`tests::needs`): `install.sh` beside this file installs them.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 mod entries;
@@ -13,6 +13,7 @@ mod zone;
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use tests::needs;
 
 /// The library of a law, where the test program was built.
 fn library(law: &str) -> PathBuf {
@@ -27,19 +28,40 @@ fn beside(name: &str) -> PathBuf {
         .join(name)
 }
 
+/// Programs of others, in the folder of `install.sh`.
+const OPENGEOSYS: &str = "opengeosys/bin/ogs";
+const KRATOS: &str = "kratos/bin/python";
+
 /// A file of an installed program.
 fn installed(name: &str) -> PathBuf {
     let folder = env::var_os("PILUM_INTEROPERABILITY").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/interoperability"),
         PathBuf::from,
     );
-    let path = folder.join(name);
-    assert!(
-        path.is_file(),
-        "{} is missing: run tests/interoperability/install.sh",
-        path.display()
-    );
-    path
+    folder.join(name)
+}
+
+/// Whether a program is installed; if not, a remark, or a failure where nothing may be passed over.
+#[track_caller]
+fn is_there(program: &str) -> bool {
+    let there = installed(program).is_file();
+    if !there {
+        let (name, _) = program.split_once('/').unwrap();
+        needs::missing(&format!("{name} (tests/interoperability/install.sh)"));
+    }
+    there
+}
+
+#[test]
+fn a_missing_program_is_named() {
+    for (test, program) in [
+        ("opengeosys::elastic_gives_our_stresses", "opengeosys"),
+        ("mfront::other_behaviours_of_opengeosys_run", "opengeosys"),
+        ("kratos::mohr_coulomb_gives_our_head_force", "kratos"),
+    ] {
+        let what = format!("{program} (tests/interoperability/install.sh)");
+        needs::assert_named(test, &what);
+    }
 }
 
 /// The last line that a program prints.
@@ -67,6 +89,10 @@ struct BondedPile {
     points: Vec<[f64; 6]>,
 }
 
+/// What an iteration leaves of the residual is a difference of the stresses of about its size, up to
+/// twice as much here: at the default of 1e-9 that is more than what is compared.
+const SOLVER: &str = "[solver]\nforce_tolerance = 1e-12\ndisplacement_tolerance = 1e-9\n";
+
 impl BondedPile {
     fn run(changes: &str) -> Self {
         let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/bonded_pile/case.toml");
@@ -75,7 +101,7 @@ impl BondedPile {
         let base = toml::Value::from(case.to_str().unwrap());
         std::fs::write(
             &file,
-            format!("base = {base}\n{changes}\n[output]\npoints = \"phases\"\n"),
+            format!("base = {base}\n{changes}\n{SOLVER}[output]\npoints = \"phases\"\n"),
         )
         .unwrap();
         let cases = host::case::Case::load(&file).unwrap();

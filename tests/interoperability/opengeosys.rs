@@ -1,11 +1,12 @@
 //! The unmodified OpenGeoSys with laws of ours, by MFront's generic interface.
 
-use crate::{BondedPile, assert_close, beside, installed, last_line, library};
+use crate::{
+    BondedPile, OPENGEOSYS, assert_close, beside, installed, is_there, last_line, library,
+};
 use std::process::Command;
 
-const NEEDED: &str = "opengeosys/bin/ogs";
-/// Both programs iterate until the displacements change by 1e-12; Newton's iteration is then at the
-/// rounding of the sums.
+/// OpenGeoSys iterates until the displacements change by 1e-12, this program until the residual is 1e-12 of
+/// the forces; the rest is a margin for other machines' sums.
 const AGREEMENT: f64 = 1e-10;
 
 pub(crate) struct Answer {
@@ -18,7 +19,9 @@ pub(crate) struct Answer {
 pub(crate) fn run(analysis: &str, tolerance: &str, law: &str, behaviour: Option<&str>) -> Answer {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(installed("opengeosys/bin/python"));
-    command.arg(beside("opengeosys.py")).arg(installed(NEEDED));
+    command
+        .arg(beside("opengeosys.py"))
+        .arg(installed(OPENGEOSYS));
     command.arg(folder.path()).args([analysis, tolerance, law]);
     if let Some(behaviour) = behaviour {
         command.arg(library(law)).arg(behaviour);
@@ -63,16 +66,20 @@ fn assert_agrees(analysis: &str, law: &str, behaviour: &str, changes: &str) {
 }
 
 #[test]
-#[ignore = "needs OpenGeoSys: tests/interoperability/install.sh"]
 fn mohr_coulomb_gives_our_stresses() {
+    if !is_there(OPENGEOSYS) {
+        return;
+    }
     for analysis in ["axisymmetric", "plane_strain"] {
         assert_agrees(analysis, "mohr_coulomb", "MohrCoulomb", "");
     }
 }
 
 #[test]
-#[ignore = "needs OpenGeoSys: tests/interoperability/install.sh"]
 fn elastic_gives_our_stresses() {
+    if !is_there(OPENGEOSYS) {
+        return;
+    }
     let changes = "[groups.soil]\nlaw = \"elastic_soil\"";
     for analysis in ["axisymmetric", "plane_strain"] {
         assert_agrees(analysis, "elastic", "Elastic", changes);
@@ -80,8 +87,10 @@ fn elastic_gives_our_stresses() {
 }
 
 #[test]
-#[ignore = "needs OpenGeoSys: tests/interoperability/install.sh"]
 fn mohr_coulomb_takes_no_more_iterations_than_the_programs_own() {
+    if !is_there(OPENGEOSYS) {
+        return;
+    }
     for analysis in ["axisymmetric", "plane_strain"] {
         let ours = run(analysis, "1e-7", "mohr_coulomb", Some("MohrCoulomb"));
         let own = run(analysis, "1e-7", "mohr_coulomb", None);

@@ -8,8 +8,9 @@
 //! With a spring K behind the joint, σ_n = σ_0 + K_s tan ψ ξ, K_s = K K_n/(K + K_n), and ξ follows from
 //! K_t (u − ξ) = c + σ_n tan φ: ξ = (K_t u − c − σ_0 tan φ)/(K_t + K_s tan φ tan ψ).
 
-use crate::driver::{DRIVER, Run, follow};
+use crate::driver::{Run, follow};
 use approx::assert_relative_eq;
+use tests::tolerance::DRIVER;
 
 const K_N: f64 = 1e6;
 const K_T: f64 = 4e5;

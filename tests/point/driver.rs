@@ -74,6 +74,3 @@ impl Run {
         self.result.as_ref().unwrap_err()
     }
 }
-
-/// Relative to a stress of 100 kPa or a strain of 1 %: what tolerance 1e-10 of the driver leaves.
-pub(crate) const DRIVER: f64 = 1e-9;

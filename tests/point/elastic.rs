@@ -5,8 +5,9 @@
 //! Law         elastic: E = 34 MPa, ν = 0.3
 //! Asserts     E, ν, M, G and plane strain against Hooke's law, in every row
 
-use crate::driver::{DRIVER, Run, follow};
+use crate::driver::{Run, follow};
 use approx::assert_relative_eq;
+use tests::tolerance::DRIVER;
 
 const E: f64 = 34e3;
 const NU: f64 = 0.3;

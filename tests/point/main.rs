@@ -18,4 +18,5 @@ mod mepi_truth;
 mod mohr_coulomb;
 mod oriented_mohr_coulomb;
 mod rules;
+mod runaway;
 mod singular;

@@ -7,9 +7,10 @@
 //!
 //! At constant normal stress [u_t] = ξ + μ(ξ) σ_n/K_t is a quadratic in ξ with (10).
 
-use crate::driver::{DRIVER, Run, follow};
+use crate::driver::{Run, follow};
 use crate::mepi_truth::Mepi;
 use approx::assert_relative_eq;
+use tests::tolerance::DRIVER;
 
 pub(crate) const PARAMETERS: &str = "[parameters]\nk_n = 0.86e5\nk_t = 0.37e5\nn = 0.55\n\
     mu_0 = 0.27\nmu_p = 0.7\nmu_c0 = 0.46\na = 0.008\nc_0 = 40\nt = 0.002\np_0 = 100\n";

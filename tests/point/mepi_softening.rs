@@ -5,10 +5,11 @@
 //! Law         mepi_softening: Fontainebleau sand of Table I of De Gennaro & Frank, u_tp in m
 //! Asserts     τ = μ(ξ) σ_n in closed form; [u_n] and σ_n by quadrature, first order
 
-use crate::driver::{DRIVER, Run, follow};
+use crate::driver::{Run, follow};
 use crate::mepi::converges_linearly;
 use crate::mepi_truth::{Mepi, Softening};
 use approx::assert_relative_eq;
+use tests::tolerance::DRIVER;
 
 const U_TP: f64 = 1.4e-3;
 

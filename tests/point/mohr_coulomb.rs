@@ -9,8 +9,9 @@
 //! masses: τ = (σ_n + c cot φ) sin φ cos ψ/(1 − sin φ sin ψ) once the stresses are steady, where
 //! lines of no extension are horizontal.
 
-use crate::driver::{DRIVER, Run, follow};
+use crate::driver::{Run, follow};
 use approx::assert_relative_eq;
+use tests::tolerance::DRIVER;
 
 const E: f64 = 34e3;
 const C: f64 = 10.0;

@@ -8,8 +8,9 @@
 //! After yield at constant normal stress τ = c + σ_n tan φ and dε_22 = tan ψ dγ. At constant volume
 //! G (γ − γ_p) = c + (σ_0 + M tan ψ γ_p) tan φ.
 
-use crate::driver::{DRIVER, Run, follow};
+use crate::driver::{Run, follow};
 use approx::assert_relative_eq;
+use tests::tolerance::DRIVER;
 
 const E: f64 = 34e3;
 const NU: f64 = 0.3;

@@ -1,12 +1,11 @@
 //! The page in a real browser: headless Chromium opens it with `?selftest`, the page tries itself
 //! out and writes the outcome at its end, and the browser prints the document.
 //!
-//! Where there is no Chromium the tests say so and do nothing; with `CI` set they fail.
+//! Where there is no browser the tests say so and do nothing, or fail (`tests::needs`).
 
 use crate::folders::folders;
 use serde_json::Value;
 use std::ffi::OsStr;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -20,34 +19,27 @@ const NAMES: [&str; 4] = [
 /// It takes a few seconds.
 const PATIENCE: Duration = Duration::from_mins(2);
 
+/// The browser; `None`, with a remark, where there is none.
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path)
+    let found = std::env::split_paths(&path)
         .flat_map(|folder| NAMES.map(|name| folder.join(name)))
-        .find(|program| program.is_file())
+        .find(|program| program.is_file());
+    if found.is_none() {
+        tests::needs::missing(&format!("a browser ({})", NAMES.join(", ")));
+    }
+    found
 }
 
-/// What the page says of itself; `None` without a browser.
-fn selftest(page: &Path) -> Option<Value> {
-    let Some(program) = chromium() else {
-        assert!(
-            std::env::var_os("CI").is_none(),
-            "no Chromium on the path, and CI is set"
-        );
-        // Past the test harness, which keeps what passing tests print to itself.
-        let _ = writeln!(
-            std::io::stderr(),
-            "SKIPPED: no Chromium on the path, the page is not tried in a browser"
-        );
-        return None;
-    };
+/// What the page says of itself in the browser.
+fn selftest(browser: &Path, page: &Path) -> Value {
     let place = tempfile::tempdir().unwrap();
     let (document, messages) = (place.path().join("document"), place.path().join("messages"));
     let mut profile = OsStr::new("--user-data-dir=").to_owned();
     profile.push(place.path().join("profile"));
     let page = page.display().to_string();
     let address = format!("file://{}?selftest", page.replace(' ', "%20"));
-    let mut browser = Command::new(program)
+    let mut browser = Command::new(browser)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"])
         .args(["--enable-logging=stderr", "--virtual-time-budget=20000"])
         .args([profile.as_os_str(), OsStr::new(&address)])
@@ -86,7 +78,7 @@ fn selftest(page: &Path) -> Option<Value> {
     }
     assert_eq!(outcome["chooser_changes"], true);
     assert!(outcome["png_bytes"].as_u64().unwrap() > 2000);
-    Some(outcome)
+    outcome
 }
 
 fn text(value: &Value) -> &str {
@@ -95,9 +87,8 @@ fn text(value: &Value) -> &str {
 
 #[test]
 fn a_report_works() {
-    let Some(outcome) = selftest(&folders().layer.join("report.html")) else {
-        return;
-    };
+    let Some(browser) = chromium() else { return };
+    let outcome = selftest(&browser, &folders().layer.join("report.html"));
     // Two figures, the chooser, three profiles, the contours, the residuals.
     assert_eq!(outcome["canvases"].as_array().unwrap().len(), 8);
     for figure in outcome["figures"].as_array().unwrap() {
@@ -138,17 +129,23 @@ fn a_report_works() {
 
 #[test]
 fn a_run_without_equilibrium_has_a_report_that_works() {
-    selftest(&folders().overloaded.join("report.html"));
+    let Some(browser) = chromium() else { return };
+    selftest(&browser, &folders().overloaded.join("report.html"));
 }
 
 #[test]
 fn a_comparison_works() {
-    let Some(outcome) = selftest(&folders().comparison) else {
-        return;
-    };
+    let Some(browser) = chromium() else { return };
+    let outcome = selftest(&browser, &folders().comparison);
     let hover = text(&outcome["figures"][0]["hover"]);
     assert!(hover.starts_with("layer & more: force\n"), "{hover}");
     // At the end two of the runs have a profile, at the start all three.
     assert!(text(&outcome["profile"]["first"][1]).starts_with("3:"));
     assert!(text(&outcome["profile"]["last"][1]).starts_with("2:"));
+}
+
+#[test]
+fn a_missing_browser_is_named() {
+    let what = format!("a browser ({})", NAMES.join(", "));
+    tests::needs::assert_named("browser::a_comparison_works", &what);
 }

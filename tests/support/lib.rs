@@ -1,4 +1,5 @@
-//! What the tests share: running cases from a text, reading results, tolerances.
+//! What the tests share: running cases from a text, reading results, tolerances, programs of others.
 
 pub mod case;
+pub mod needs;
 pub mod tolerance;

@@ -4,3 +4,5 @@
 pub const ROUND_OFF: f64 = 1e-12;
 /// Equilibrium: the solver's default force tolerance with a margin for its norm.
 pub const EQUILIBRIUM: f64 = 1e-8;
+/// What the point driver's tolerance of 1e-10 leaves, relative to the stress or strain in play.
+pub const DRIVER: f64 = 1e-9;

@@ -66,32 +66,39 @@ pub(crate) fn repeat(
         .collect();
     say(&format!("from {}", origin.join(", ")));
     let law = build(capsule, loaded)?;
-    let call = capsule.point_call(&law)?;
+    let outcome = compare(capsule, &law, say);
+    law.take_notes().iter().for_each(|note| say(note));
+    outcome
+}
+
+/// Repeats the call and says what came out.
+fn compare(capsule: &Capsule, law: &Law, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
+    let call = capsule.point_call(law)?;
     if call.request == Request::InitialState {
         return match law.initial_state(1, (&call.flux, Strided::rows(call.flux.len()))) {
             Ok(state) => {
                 say("the law starts from this state");
-                say(&values(&law, &[], &state));
+                say(&values(law, &[], &state));
                 Ok(())
             }
-            Err(failure) => outcome(capsule, &law, &failure, say),
+            Err(failure) => outcome(capsule, law, &failure, say),
         };
     }
-    let failure = match update(&law, &call, call.request, 1.0) {
+    let failure = match update(law, &call, call.request, 1.0) {
         Ok((flux, state, _)) => {
             say(&format!(
                 "the call succeeds; it is recorded as `{}`: {}",
                 capsule.outcome.status, capsule.outcome.message
             ));
-            say(&values(&law, &flux, &state));
-            say(&tangent(&law, &call, 1.0));
+            say(&values(law, &flux, &state));
+            say(&tangent(law, &call, 1.0));
             return Ok(());
         }
         Err(failure) => failure,
     };
-    let outcome = outcome(capsule, &law, &failure, say);
-    if let Some(fraction) = bisect(&law, &call, say) {
-        say(&tangent(&law, &call, fraction));
+    let outcome = outcome(capsule, law, &failure, say);
+    if let Some(fraction) = bisect(law, &call, say) {
+        say(&tangent(law, &call, fraction));
     }
     outcome
 }
@@ -112,6 +119,8 @@ fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
             in_process: true,
             record: None,
             records_once: false,
+            externals: part.externals,
+            scratch: None,
         };
         return search.foreign_law(&part.id, &foreign);
     }

@@ -20,6 +20,50 @@ const LONGEST_CHAIN: usize = 8;
 /// The contents of a file, by the name of the variant if there are any.
 pub(crate) type Variants<T> = Vec<(Option<String>, T)>;
 
+/// A file of another kind, told by a key that only that one has.
+pub(crate) struct OtherKind {
+    /// Top-level keys that give it away.
+    pub(crate) keys: &'static [&'static str],
+    /// What the file is and what was expected.
+    pub(crate) message: &'static str,
+    /// The command that takes it.
+    pub(crate) command: &'static str,
+}
+
+/// As [`read`]; a file of the other kind is called so instead of the first key that does not fit.
+pub(crate) fn read_kind<T: DeserializeOwned>(
+    source: Source,
+    other: &OtherKind,
+) -> Result<(Source, Variants<T>), Error> {
+    let given = source.clone();
+    read(source).map_err(|error| {
+        let Ok(source) = with_bases(given, LONGEST_CHAIN) else {
+            return error;
+        };
+        let texts = source.files();
+        let spans = texts.filter_map(|range| {
+            let text = "\n".repeat(range.start) + &source.text()[range];
+            let table = DeTable::parse(&text).ok()?;
+            let keys = table.get_ref().keys();
+            let mut found = keys.filter(|key| other.keys.contains(&key.get_ref().as_ref()));
+            let key = found.next()?;
+            Some((key.get_ref().to_string(), key.span()))
+        });
+        // The file itself comes after those it is based on.
+        match spans.last() {
+            None => error,
+            Some((key, span)) => source
+                .error(span, format!("`{key}`: {}", other.message))
+                .hint(format!(
+                    "`{} {}` takes it",
+                    other.command,
+                    source.path().display()
+                ))
+                .into(),
+        }
+    })
+}
+
 /// Reads a file with what it is based on.
 pub(crate) fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Variants<T>), Error> {
     let source = with_bases(source, LONGEST_CHAIN)?;

@@ -51,6 +51,13 @@ pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
         None if message.starts_with("expected") || message.contains(" is outside ") => {
             of_key(message.to_owned())
         }
+        None if comma_at(source, span.start).is_some() => {
+            let number = comma_at(source, span.start).unwrap_or_default();
+            let point = number.replace(',', ".");
+            at(format!("`{number}` has a decimal comma")).hint(format!(
+                "is a decimal point meant? `{point}`, not `{number}`"
+            ))
+        }
         None => match meant(source, span.start, message) {
             Some(hint) => at(message.to_owned()).hint(hint),
             None => at(message.to_owned()),
@@ -90,15 +97,14 @@ pub(super) fn no_choice(source: &Source, refused: &toml::de::Error, found: &str)
     }
 }
 
+/// A number with a decimal comma where the syntax breaks.
+fn comma_at(source: &Source, at: usize) -> Option<String> {
+    decimal_comma(source.text().get(..at)?, source.text().get(at..)?)
+}
+
 /// What was probably meant where the syntax breaks.
 fn meant(source: &Source, at: usize, message: &str) -> Option<String> {
     let before = source.text().get(..at)?;
-    if let Some(number) = decimal_comma(before, &source.text()[at..]) {
-        let point = number.replace(',', ".");
-        return Some(format!(
-            "is a decimal point meant? `{point}`, not `{number}`"
-        ));
-    }
     if message.contains("basic string") || message.contains("literal string, expected `'`") {
         return Some("a quotation mark is missing at the end of the text".to_owned());
     }
@@ -130,23 +136,29 @@ fn meant(source: &Source, at: usize, message: &str) -> Option<String> {
     })
 }
 
-/// A number such as `1,5` that ends where the text is divided, or has its comma there.
+/// A number such as `1,5` or `1,5e-3` that ends where the text is divided, or has its comma there.
 fn decimal_comma(before: &str, after: &str) -> Option<String> {
-    let last = |text: &str| {
-        let is_digit = |c: char| c.is_ascii_digit();
-        let start = text.trim_end_matches(is_digit).len();
-        (start < text.len()).then(|| (text[..start].to_owned(), text[start..].to_owned()))
+    let is_part = |c: char| c.is_ascii_digit() || "eE_+-".contains(c);
+    // What stands behind the comma.
+    let decimals = |text: &str| {
+        let is_number = text.starts_with(|c: char| c.is_ascii_digit())
+            && text.replace('_', "").parse::<f64>().is_ok();
+        is_number.then(|| text.to_owned())
     };
-    let decimals = after.strip_prefix(',').map(|rest| {
-        let end = rest.find(|c: char| !c.is_ascii_digit());
-        &rest[..end.unwrap_or(rest.len())]
-    });
-    if let Some(decimals) = decimals.filter(|decimals| !decimals.is_empty()) {
-        let (_, whole) = last(before)?;
-        return Some(format!("{whole},{decimals}"));
+    let whole = |text: &str| {
+        let start = text.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+        (start < text.len()).then(|| text[start..].to_owned())
+    };
+    if let Some(rest) = after.strip_prefix(',') {
+        let end = rest.find(|c| !is_part(c)).unwrap_or(rest.len());
+        if let Some(decimals) = decimals(&rest[..end]) {
+            return Some(format!("{},{decimals}", whole(before)?));
+        }
     }
-    let (rest, decimals) = last(before.trim_end())?;
-    let (_, whole) = last(rest.strip_suffix(',')?)?;
+    let before = before.trim_end();
+    let start = before.trim_end_matches(is_part).len();
+    let decimals = decimals(&before[start..])?;
+    let whole = whole(before[..start].strip_suffix(',')?)?;
     Some(format!("{whole},{decimals}"))
 }
 
@@ -242,7 +254,11 @@ mod tests {
         assert_eq!(text("E = 1", ",5\n").as_deref(), Some("1,5"));
         assert_eq!(text("p = { E = 21,5", ", nu").as_deref(), Some("21,5"));
         assert_eq!(text("p = { E = 1,5 ", "}").as_deref(), Some("1,5"));
+        assert_eq!(text("p = { E = 1,5e3", ", nu").as_deref(), Some("1,5e3"));
+        assert_eq!(text("p = { z = -0,5e-3 ", "}").as_deref(), Some("0,5e-3"));
+        assert_eq!(text("z = -0", ",5e-3\n").as_deref(), Some("0,5e-3"));
         assert_eq!(text("p = { E = 1, ", "}"), None);
+        assert_eq!(text("p = { E = 1,e3", ", nu"), None);
         assert_eq!(text("E = 1", "\n"), None);
     }
 

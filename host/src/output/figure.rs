@@ -336,9 +336,11 @@ fn cut_points(cut: &CutInput, quantities: [&str; 2], groups: &[Group]) -> Vec<(f
                 "stress_12" => stress[3],
                 _ => stress[0] / stress[1],
             };
-            let pair = quantities.map(value);
-            if inside(cut.x, x) && inside(cut.y, y) && pair.iter().all(|v| v.is_finite()) {
-                points.push((pair[0], cut.scale * pair[1]));
+            let [across, up] = quantities.map(value);
+            let pair = (across, cut.scale * up);
+            let is_number = pair.0.is_finite() && pair.1.is_finite();
+            if inside(cut.x, x) && inside(cut.y, y) && is_number {
+                points.push(pair);
             }
         }
     }

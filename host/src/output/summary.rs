@@ -1,7 +1,7 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
 use super::IncrementRecord;
-use crate::case::{Analysis, Case, FigureInput, GroupInput, ProbeInput, Reduce};
+use crate::case::{Analysis, Case, FigureInput, GroupInput, Method, ProbeInput, Reduce};
 use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::input::BuiltLaw;
@@ -20,6 +20,8 @@ use toml::Spanned;
 pub struct PhaseRecord {
     /// Name.
     pub name: String,
+    /// Which matrix the iterations used.
+    pub method: Method,
     /// Unknowns.
     pub equations: usize,
     /// Forces out of balance at its start, relative to the forces in play.
@@ -53,6 +55,7 @@ impl PhaseRecord {
     pub fn new(name: &str, equations: usize, out_of_balance: f64) -> Self {
         Self {
             name: name.to_owned(),
+            method: Method::default(),
             equations,
             out_of_balance,
             increments: 0,
@@ -243,6 +246,7 @@ impl Summary {
             .map(|p| {
                 json!({
                     "name": p.name,
+                    "method": p.method.name(),
                     "equations": p.equations,
                     "out_of_balance": p.out_of_balance,
                     "increments": p.increments,
@@ -427,6 +431,10 @@ fn measured_unit(case: &Case, model: &Model, input: &ProbeInput) -> Option<Strin
     let quantity = input.quantity.as_ref()?.get_ref().as_str();
     let kind = quantity.split('_').next().unwrap_or_default();
     let of_points = input.line.is_none();
+    if of_points && input.reduce == Some(Reduce::Integral) {
+        // Over an interface's area a traction is a force.
+        return (kind == "traction").then(|| force_unit(case).to_owned());
+    }
     if of_points && input.reduce == Some(Reduce::Sum) {
         return None;
     }
@@ -440,13 +448,18 @@ fn measured_unit(case: &Case, model: &Model, input: &ProbeInput) -> Option<Strin
         ("stress" | "traction", None) => "kPa",
         ("strain", None) => "-",
         ("jump" | "displacement", None) => "m",
-        ("reaction" | "force", None) => match case.file.analysis {
-            Analysis::Axisymmetric => "kN",
-            Analysis::PlaneStrain => "kN/m",
-        },
+        ("reaction" | "force", None) => force_unit(case),
         _ => return None,
     };
     Some(unit.to_owned())
+}
+
+/// The unit of a force.
+fn force_unit(case: &Case) -> &'static str {
+    match case.file.analysis {
+        Analysis::Axisymmetric => "kN",
+        Analysis::PlaneStrain => "kN/m",
+    }
 }
 
 /// The unit of a quantity times a factor.

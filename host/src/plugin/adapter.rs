@@ -48,6 +48,38 @@ impl Adapter {
     }
 }
 
+/// What becomes of a UMAT that calls routines which nobody supplies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Externals {
+    /// Its library is refused, with their names.
+    #[default]
+    Refuse,
+    /// Traps stand in their place: a call ends the worker process and names the routine.
+    Trap,
+}
+
+impl Externals {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Refuse => "refuse",
+            Self::Trap => "trap",
+        }
+    }
+}
+
+/// What becomes of the files that a UMAT leaves in its working folder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scratch {
+    /// They are removed with the folder.
+    #[default]
+    Remove,
+    /// They stay, and the program says where.
+    Keep,
+}
+
 /// A library that is made for another program, as a file names it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Foreign {
@@ -63,6 +95,10 @@ pub struct Foreign {
     pub record: Option<PathBuf>,
     /// Not if they are there already.
     pub records_once: bool,
+    /// What becomes of routines that it calls and nobody supplies; else the sidecar says it.
+    pub externals: Option<Externals>,
+    /// What becomes of its scratch files; else the sidecar says it.
+    pub scratch: Option<Scratch>,
 }
 
 static RECORD: OnceLock<PathBuf> = OnceLock::new();
@@ -117,6 +153,12 @@ pub(super) trait ForeignInstance: Debug + Send + Sync {
 
     /// Carries the points over the increment. Returns the most severe status and a message.
     fn integrate(&self, call: Call<'_>) -> (Status, String);
+
+    /// Arguments that the routine has overwritten though it is given them to read, those that were
+    /// not told before.
+    fn take_overwritten(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// What a foreign library offers.
@@ -126,6 +168,8 @@ pub(super) struct ForeignLaws {
     pub(super) laws: Vec<(LawDescription, Arc<dyn ForeignLaw>)>,
     /// SHA-256 of the file that describes them, where the library does not.
     pub(super) sidecar: Option<String>,
+    /// What that file says of routines that nobody supplies, and of scratch files.
+    pub(super) wishes: (Option<Externals>, Option<Scratch>),
 }
 
 /// Describes the laws of a foreign library. Nothing of it runs.

@@ -115,6 +115,25 @@ impl std::fmt::Display for Bounds {
     }
 }
 
+/// What the tangents of a law are worth to a solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tangent {
+    /// They are the derivatives of the update.
+    #[default]
+    Consistent,
+    /// They are near them, such as elastic ones: Newton's method gains nothing by renewing them.
+    Approximate,
+}
+
+impl Tangent {
+    /// Whether they are the derivatives of the update.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+    fn is_consistent(&self) -> bool {
+        *self == Self::Consistent
+    }
+}
+
 /// By this name it is not taken for a text to borrow from the input.
 type HypothesisName = &'static str;
 
@@ -131,6 +150,9 @@ pub struct FormulationDescription {
     pub symmetric: bool,
     /// One constant tangent, no internal variables.
     pub linear: bool,
+    /// What its tangents are worth.
+    #[serde(default, skip_serializing_if = "Tangent::is_consistent")]
+    pub tangent: Tangent,
     /// Components are in axes of the layer.
     pub local_axes: bool,
     /// Internal variables in the order of their values, one entry per component.

@@ -36,7 +36,11 @@ impl Image {
         let warnings = trust::check_permissions(path)?;
         let mut file = file::open_regular(path).map_err(unreadable)?;
         #[cfg(target_os = "linux")]
-        let mut memory = memory_file();
+        let mut memory = if loads_in_place() {
+            None
+        } else {
+            memory_file("pilum_law").ok()
+        };
         #[cfg(not(target_os = "linux"))]
         let mut memory: Option<File> = None;
         let mut read = 0;
@@ -99,19 +103,24 @@ impl Image {
     }
 }
 
-/// An empty file in memory that may be sealed and executed; `None` where the system has none.
+/// Whether the user wants the file itself to be opened.
 #[cfg(target_os = "linux")]
-fn memory_file() -> Option<File> {
+fn loads_in_place() -> bool {
+    std::env::var_os("PILUM_LOAD_IN_PLACE").is_some_and(|value| value != "0")
+}
+
+/// An empty file in memory that may be sealed and executed.
+///
+/// # Errors
+/// The system has none.
+#[cfg(target_os = "linux")]
+pub(super) fn memory_file(name: &str) -> io::Result<File> {
     use rustix::fs::{MemfdFlags, memfd_create};
-    if std::env::var_os("PILUM_LOAD_IN_PLACE").is_some_and(|value| value != "0") {
-        return None;
-    }
     let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
     // Kernels before 6.3 do not know the flag, and need none.
-    memfd_create("pilum_law", flags | MemfdFlags::EXEC)
-        .or_else(|_| memfd_create("pilum_law", flags))
-        .ok()
-        .map(File::from)
+    let memory =
+        memfd_create(name, flags | MemfdFlags::EXEC).or_else(|_| memfd_create(name, flags))?;
+    Ok(memory.into())
 }
 
 #[cfg(target_os = "linux")]

@@ -10,24 +10,30 @@
 //! | inputs | gradients at start and end, fluxes, internal variables, point by point; places of the points |
 //! | outputs | fluxes, internal variables, operators if wanted, step factors, status codes |
 
-use super::adapter::Foreign;
+mod printed;
+mod scratch;
+
+use super::adapter::{self, Adapter, Foreign};
 use super::description::LawDescription;
-use super::library::{Call, SharedMemory, Strided};
+use super::library::{Call, SharedMemory, Strided, abaqus};
 use super::{LawInstance, Library, Moment, Origin, Site, Trust};
 use crate::child::{self, Ending};
 use crate::error::Error;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
+use printed::{Output, Printed};
+use scratch::Scratch;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, Read, Write};
+use std::net::Shutdown;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::UnixStream;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// The hidden command of a worker.
 pub const COMMAND: &str = "law-worker";
@@ -35,6 +41,10 @@ pub const COMMAND: &str = "law-worker";
 const START: Duration = Duration::from_secs(20);
 /// How long one call may take if nothing is said of it.
 const CALL: Duration = Duration::from_secs(10);
+/// How long a worker that is done with may take to write what it still keeps in buffers.
+const LEAVE: Duration = Duration::from_secs(1);
+/// Makes gfortran pass on at once what is printed.
+const UNBUFFERED: &str = "GFORTRAN_UNBUFFERED_PRECONNECTED";
 /// Longest message on the socket, in bytes: descriptions of laws.
 const LONGEST: u32 = 1 << 24;
 /// Words that are shared at first.
@@ -51,6 +61,8 @@ struct Start {
     sha256: String,
     foreign: Option<Foreign>,
     build: Option<Build>,
+    /// The working directory of the law.
+    folder: Option<PathBuf>,
 }
 
 /// The law that a worker builds.
@@ -93,35 +105,60 @@ struct Worker {
     child: Child,
     socket: UnixStream,
     memory: SharedMemory,
+    output: Output,
+    /// Arguments that its routine has overwritten, beside the last answers.
+    overwritten: Vec<String>,
+    /// It does not answer, or not any more.
+    is_silent: bool,
 }
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // It may hang; it has nothing to save.
+        // What its law has printed or written to files may still stand in buffers.
+        let _ = self.socket.shutdown(Shutdown::Both);
+        let until = Instant::now() + LEAVE;
+        while !self.is_silent && matches!(self.child.try_wait(), Ok(None)) {
+            if Instant::now() > until {
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
         let _ = self.child.kill();
         let _ = self.child.wait();
+        self.output.last_words();
     }
 }
 
 impl Worker {
-    fn start(start: &Start) -> Result<(Self, Started), Silence> {
+    fn start(start: &Start, printed: &Arc<Printed>) -> Result<(Self, Started), Silence> {
         let failed = |why: io::Error| format!("its worker process cannot be started: {why}");
         let (socket, theirs) = UnixStream::pair().map_err(failed)?;
         let file = memory_file().map_err(failed)?;
         file.set_len((FIRST_WORDS * size_of::<u64>()) as u64)
             .map_err(failed)?;
         let shared = file.try_clone().map_err(failed)?;
-        let child = Command::new(std::env::current_exe().map_err(failed)?)
+        let mut command = Command::new(std::env::current_exe().map_err(failed)?);
+        if std::env::var_os(UNBUFFERED).is_none() {
+            command.env(UNBUFFERED, "y");
+        }
+        let mut child = command
             .arg(COMMAND)
             .stdin(Stdio::from(OwnedFd::from(theirs)))
             .stdout(Stdio::from(shared))
+            .stderr(Stdio::piped())
             .spawn()
             .map_err(failed)?;
+        // It holds the worker's end of the socket, which must close with the worker.
+        drop(command);
+        let output = printed.follow(child.stderr.take());
         let memory = SharedMemory::new(file).map_err(failed)?;
         let mut worker = Self {
             child,
             socket,
             memory,
+            output,
+            overwritten: Vec::new(),
+            is_silent: false,
         };
         let started = worker
             .introduce(start)
@@ -137,6 +174,7 @@ impl Worker {
 
     /// Why the socket gave no answer.
     fn silence(&mut self, why: &io::Error, limit: Duration) -> Silence {
+        self.is_silent = true;
         if matches!(
             why.kind(),
             io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
@@ -149,7 +187,11 @@ impl Worker {
             Ok(Ending::Signal(number)) => {
                 format!("the law crashed: {}", Ending::Signal(number))
             }
-            Ok(ending) => format!("the law ended its process: {ending}"),
+            Ok(ending) => {
+                let last = self.output.last_words();
+                let last = last.map_or(String::new(), |line| format!("; it last printed: {line}"));
+                format!("the law ended its process: {ending}{last}")
+            }
             Err(_) => format!("its worker process cannot be heard: {why}"),
         }
     }
@@ -211,11 +253,16 @@ impl Worker {
         ];
         self.socket.set_read_timeout(Some(limit))?;
         self.socket.write_all(&bytes(&request))?;
-        let mut answer = [0; 2 * size_of::<u64>()];
+        let mut answer = [0; 3 * size_of::<u64>()];
         self.socket.read_exact(&mut answer)?;
-        let [status, length] = words(&answer);
-        let mut message = vec![0; (length as usize).min(LONGEST as usize)];
-        self.socket.read_exact(&mut message)?;
+        let [status, length, names] = words(&answer);
+        let [message, names] = [length, names].map(|length| {
+            let mut text = vec![0; (length as usize).min(LONGEST as usize)];
+            self.socket.read_exact(&mut text).map(|()| text)
+        });
+        let (message, names) = (message?, names?);
+        let names = String::from_utf8_lossy(&names);
+        self.overwritten.extend(names.lines().map(str::to_owned));
 
         let mut at = sizes.outputs();
         let numbers = |at: usize, n: usize| memory.read(at, n).map(f64::from_bits);
@@ -381,8 +428,10 @@ pub(super) fn describe(path: &Path, sha256: &str) -> Result<Vec<(LawDescription,
         sha256: sha256.to_owned(),
         foreign: None,
         build: None,
+        folder: None,
     };
-    let text = match Worker::start(&start)?.1 {
+    let printed = Printed::by(format!("library {}", path.display()));
+    let text = match Worker::start(&start, &printed)?.1 {
         Started::Described(text) => text,
         Started::Unusable(why) => return Err(why),
         Started::Refused(..) | Started::Built => return Err("its worker is confused".to_owned()),
@@ -409,6 +458,11 @@ pub(super) struct IsolatedInstance {
     idle: Mutex<Vec<Worker>>,
     /// Whose turn it is, if calls must follow one another. They then share one worker.
     turn: Option<Mutex<()>>,
+    /// Arguments that its routine has overwritten in any worker, and how many of them are told.
+    overwritten: Mutex<(Vec<String>, usize)>,
+    /// Where they work, if not where the program does.
+    scratch: Option<Scratch>,
+    printed: Arc<Printed>,
 }
 
 impl IsolatedInstance {
@@ -422,6 +476,8 @@ impl IsolatedInstance {
         parameters: &[f64],
         is_serial: bool,
     ) -> Result<Self, (Status, String)> {
+        let id = &library.laws[law].0.id;
+        let scratch = Self::scratch(id, library.foreign.as_ref())?;
         let instance = Self {
             start: Start {
                 path: library.path.as_os_str().to_owned(),
@@ -432,14 +488,37 @@ impl IsolatedInstance {
                     formulation,
                     parameters: parameters.iter().map(|value| value.to_bits()).collect(),
                 }),
+                folder: None,
             },
             limit: Trust::current().isolate.unwrap_or(CALL),
             idle: Mutex::default(),
             turn: is_serial.then(Mutex::default),
+            overwritten: Mutex::default(),
+            scratch,
+            printed: Printed::by(format!("law `{id}`")),
         };
         let worker = instance.worker()?;
         instance.give_back(worker);
         Ok(instance)
+    }
+
+    /// A routine of Abaqus writes files where it stands.
+    fn scratch(id: &str, foreign: Option<&Foreign>) -> Result<Option<Scratch>, (Status, String)> {
+        let Some(foreign) = foreign.filter(|foreign| foreign.adapter == Adapter::Umat) else {
+            return Ok(None);
+        };
+        let is_kept = foreign.scratch == Some(adapter::Scratch::Keep);
+        Scratch::new(id, is_kept).map(Some).map_err(no_folder)
+    }
+
+    /// Arguments that the routine has overwritten, those that were not told before.
+    pub(super) fn take_overwritten(&self) -> Vec<String> {
+        let lock = self.overwritten.lock();
+        let mut overwritten = lock.unwrap_or_else(PoisonError::into_inner);
+        let (all, n_told) = &mut *overwritten;
+        let new = all[*n_told..].to_vec();
+        *n_told = all.len();
+        new
     }
 
     fn worker(&self) -> Result<Worker, (Status, String)> {
@@ -452,7 +531,12 @@ impl IsolatedInstance {
             return Ok(worker);
         }
         let internal = |why| (raw::PILUM_E_INTERNAL, why);
-        match Worker::start(&self.start).map_err(internal)? {
+        let folder = self.scratch.as_ref().map(Scratch::of_worker);
+        let start = Start {
+            folder: folder.transpose().map_err(no_folder)?,
+            ..self.start.clone()
+        };
+        match Worker::start(&start, &self.printed).map_err(internal)? {
             (worker, Started::Built) => Ok(worker),
             (_, Started::Refused(status, message)) => Err((status, message)),
             (_, Started::Unusable(why)) => Err(internal(why)),
@@ -460,7 +544,14 @@ impl IsolatedInstance {
         }
     }
 
-    fn give_back(&self, worker: Worker) {
+    fn give_back(&self, mut worker: Worker) {
+        for name in worker.overwritten.drain(..) {
+            let lock = self.overwritten.lock();
+            let all = &mut lock.unwrap_or_else(PoisonError::into_inner).0;
+            if !all.contains(&name) {
+                all.push(name);
+            }
+        }
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         idle.push(worker);
     }
@@ -524,6 +615,11 @@ impl IsolatedInstance {
     }
 }
 
+fn no_folder(why: io::Error) -> (Status, String) {
+    let message = format!("there is no folder for its scratch files: {why}");
+    (raw::PILUM_E_INTERNAL, message)
+}
+
 /// Stands for a law without `init_state`: no status code of the contract.
 const NO_INIT_STATE: Status = Status::MIN;
 
@@ -539,7 +635,7 @@ fn serve() -> io::Result<()> {
     child::enter()?;
     let mut socket = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
     let file = File::from(io::stdout().as_fd().try_clone_to_owned()?);
-    // What the law prints goes to the error stream, and it has nothing to read.
+    // What the law prints goes to the error stream, which the host reads; it has nothing to read.
     rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
     rustix::stdio::dup2_stdout(io::stderr())?;
     let start: Start = receive(&mut socket)?;
@@ -576,6 +672,10 @@ fn serve() -> io::Result<()> {
         Ok(bench) => bench,
         Err(answer) => return send(&mut socket, &answer),
     };
+    if let Some(folder) = start.folder {
+        abaqus::out_dir_is(std::env::current_dir().unwrap_or_default());
+        std::env::set_current_dir(folder)?;
+    }
     send(&mut socket, &Started::Built)?;
     bench.answer(&mut socket)
 }
@@ -633,8 +733,11 @@ impl Bench {
         let mut request = [0; REQUEST * size_of::<u64>()];
         while let Ok(()) = socket.read_exact(&mut request) {
             let (status, message) = self.call(words(&request))?;
-            let mut answer = bytes(&[u64::from(status as u32), message.len() as u64]);
+            let names = self.instance.take_overwritten().join("\n");
+            let lengths = [message.len() as u64, names.len() as u64];
+            let mut answer = bytes(&[u64::from(status as u32), lengths[0], lengths[1]]);
             answer.extend(message.as_bytes());
+            answer.extend(names.as_bytes());
             socket.write_all(&answer)?;
         }
         Ok(())

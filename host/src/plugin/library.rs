@@ -10,7 +10,9 @@
     reason = "the host's side of the C boundary; offset and access are one operation"
 )]
 
-mod abaqus;
+pub(super) mod abaqus;
+#[cfg(unix)]
+mod externals;
 pub(super) mod mfront;
 pub mod probe;
 #[cfg(unix)]
@@ -21,7 +23,7 @@ pub(super) mod umat;
 pub(super) use shared::SharedMemory;
 
 use super::description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
 use super::image::Image;
 use super::{Moment, Site};
@@ -488,6 +490,7 @@ fn describe_formulation(
         hypothesis: name,
         index,
         symmetric: formulation.flags & raw::PILUM_T_SYMMETRIC != 0,
+        tangent: Tangent::default(),
         linear: formulation.flags & raw::PILUM_T_LINEAR != 0 && internal_variables.is_empty(),
         local_axes: formulation.flags & raw::PILUM_T_LOCAL_AXES != 0,
         internal_variables,

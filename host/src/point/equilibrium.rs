@@ -16,7 +16,11 @@
 //! an apex, over an open gap. Then a search along the elastic direction leaves that zone. Where
 //! this ends too, fixed-point iterations with the elastic operator go on, accelerated after
 //! Anderson (type II).
+//!
+//! Tolerances are relative to fluxes and gradients, as far as what the path was given explains
+//! them ([`Anchor`]).
 
+use super::anchor::Anchor;
 use super::frame::Frame;
 use super::restrictions::Restrictions;
 use super::{N_MAX, Vector};
@@ -91,7 +95,7 @@ struct Sample {
 }
 
 /// The controlled component that missed its goal by most, in the best attempt.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Miss {
     pub(super) component: usize,
     pub(super) flux: f64,
@@ -115,7 +119,16 @@ pub(super) struct Obstacle {
     pub(super) frame: Frame,
     /// Its components are restrictions.
     pub(super) is_restricted: bool,
+    /// Their stiffness control.
+    stiffness: Vector,
     norm: f64,
+}
+
+impl Obstacle {
+    /// Whether the stiffness of a component is controlled, not its flux.
+    pub(super) fn is_sprung(&self, component: usize) -> bool {
+        self.stiffness[component] > 0.0
+    }
 }
 
 /// Failures that no smaller step mends.
@@ -135,6 +148,7 @@ pub(super) struct Search<'a> {
     /// The same in the components themselves.
     elastic_cartesian: Vec<f64>,
     elastic_norm: f64,
+    anchor: Anchor,
     tangent: Operator,
     relaxation: Operator,
     base: Sample,
@@ -154,6 +168,8 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     pub(super) fn new(law: &'a Law, start: &Point) -> Self {
         let n = law.n_components();
+        let mut anchor = Anchor::default();
+        start.flux.iter().for_each(|flux| anchor.flux(*flux));
         let sample = Sample {
             point: start.clone(),
             operator: vec![0.0; n * n],
@@ -171,6 +187,7 @@ impl<'a> Search<'a> {
             elastic: vec![0.0; n * n],
             elastic_cartesian: vec![0.0; n * n],
             elastic_norm: 0.0,
+            anchor,
             tangent: Operator::Consistent,
             relaxation: Operator::Elastic,
             base: sample.clone(),
@@ -212,6 +229,56 @@ impl<'a> Search<'a> {
         let change = scaled.change;
         self.restricted = Some((scaled, from.clone()));
         change
+    }
+
+    /// Anchors the tolerances of the increment that ends at this goal.
+    pub(super) fn anchor(&mut self, goal: &Goal) {
+        let controlled = &self.free[..self.n_free];
+        for i in 0..self.n {
+            if controlled.contains(&i) {
+                self.anchor.flux(goal.flux[i]);
+                self.anchor.modulus(self.stiffness[i]);
+            } else {
+                self.anchor.reach(goal.gradient[i]);
+            }
+        }
+        self.anchor.modulus(self.elastic_norm);
+    }
+
+    /// The controlled component of a point that is farthest from its goal, if one is farther than it
+    /// may be at the end of an increment: whatever the iterations found.
+    pub(super) fn unmet(&self, point: &Point, goal: &Goal) -> Option<Miss> {
+        let answer = self.answer(point);
+        let found = largest(&point.flux[..self.n]);
+        let missed = self.free[..self.n_free].iter().filter_map(|&i| {
+            let spring = self.stiffness[i] * (point.gradient[i] - self.origin[i]);
+            let residual = answer[i] + spring - goal.flux[i];
+            let tolerance = self.anchor.bound(goal.flux[i], found, ROUND_OFF);
+            // Not met, too, if it is not a number.
+            let is_met = residual.abs() <= tolerance;
+            (!is_met).then_some(Miss {
+                component: i,
+                flux: answer[i],
+                goal: goal.flux[i] - spring,
+                residual,
+                tolerance,
+            })
+        });
+        missed.max_by(|a, b| a.residual.abs().total_cmp(&b.residual.abs()))
+    }
+
+    /// The controlled component that went farther than its goal explains.
+    pub(super) fn strayed(&self, point: &Point) -> Option<usize> {
+        let mut controlled = self.free[..self.n_free].iter().copied();
+        controlled.find(|&i| {
+            let gradient = point.gradient[i].abs();
+            gradient > self.anchor.reach_of(gradient)
+        })
+    }
+
+    /// Whether the elastic operator of the initial state is zero.
+    pub(super) fn is_without_stiffness(&self) -> bool {
+        largest(&self.elastic_cartesian) == 0.0
     }
 
     /// What is compared with the goal F.
@@ -262,6 +329,7 @@ impl<'a> Search<'a> {
         let frame = self.frame;
         Obstacle {
             frame,
+            stiffness: self.stiffness,
             is_restricted: self.restricted.is_some(),
             ..std::mem::take(&mut self.obstacle)
         }
@@ -291,7 +359,46 @@ impl<'a> Search<'a> {
 
     /// Hands over the end of the step found; the point becomes the start of the next.
     pub(super) fn commit(&mut self, point: &mut Point) {
+        if self.n_free > 0 {
+            self.anchor.modulus(largest(&self.base.operator));
+        }
         swap(point, &mut self.base.point);
+    }
+
+    /// Whether the law took no notice of the step found: the gradient moved, flux and internal
+    /// variables stayed to the last bit, and its operator is zero or says that they should not have.
+    /// `None`: the gradient did not move.
+    pub(super) fn is_ignored(&mut self, step: &Step<'_>) -> Result<Option<bool>, Fatal> {
+        let (start, end) = (step.start, &self.base.point);
+        if same(&start.gradient, &end.gradient) {
+            return Ok(None);
+        }
+        if !same(&start.flux, &end.flux) || !same(&start.internal, &end.internal) {
+            return Ok(Some(false));
+        }
+        let gradient = end.gradient;
+        // What the law says of the same step now must not be counted twice.
+        let unreliable = self.unreliable.0;
+        let answers = self.evaluate(step, gradient, self.tangent);
+        self.unreliable.0 = unreliable;
+        if !answers? {
+            return Ok(Some(false));
+        }
+        let operator = &self.trial.operator;
+        if largest(operator) == 0.0 {
+            return Ok(Some(true));
+        }
+        let moved: Vector = std::array::from_fn(|i| gradient[i] - start.gradient[i]);
+        let expected = operator.chunks_exact(self.n).map(|row| {
+            let terms = row.iter().zip(&moved);
+            f64::abs(terms.map(|(c, d)| c * d).sum())
+        });
+        let expected = expected.fold(0.0, f64::max);
+        // Perfect plasticity stays where it is, and so does what round-off swallows.
+        let plain = 1e-3 * largest(operator) * largest(&moved[..self.n]);
+        Ok(Some(
+            expected > plain && expected > 1e-9 * largest(&start.flux),
+        ))
     }
 
     /// Calls the law. `false`: it refuses this gradient.
@@ -387,16 +494,21 @@ impl<'a> Search<'a> {
         let sample = &mut self.trial;
         let (flux, gradient) = (&sample.point.flux[..self.n], &sample.point.gradient);
         let start_reach = largest(&step.start.gradient[..self.n]);
-        let mut scale = largest(flux).max(largest(&step.start.flux[..self.n]));
+        let mut found = largest(flux).max(largest(&step.start.flux[..self.n]));
+        let mut asked = 0.0_f64;
         let mut springs = [0.0; N_MAX];
         for (k, &i) in self.free[..self.n_free].iter().enumerate() {
             springs[k] = self.stiffness[i] * (gradient[i] - self.origin[i]);
-            scale = scale.max(f64::abs(springs[k])).max(step.goal.flux[i].abs());
+            found = found.max(f64::abs(springs[k]));
+            asked = asked.max(step.goal.flux[i].abs());
         }
-        // A free component that runs away must not widen its own tolerance.
+        // A free component that runs away must not widen its own tolerance: neither in this step
+        // nor, by what each lets the next one do, over many.
+        let scale = asked.max(self.anchor.flux_of(found));
         let likely = 10.0 * (start_reach + largest(&step.goal.gradient[..self.n]))
             + 1e3 * scale / self.elastic_norm.max(f64::MIN_POSITIVE);
         let reach = start_reach.max(largest(&gradient[..self.n]).min(likely));
+        let reach = self.anchor.reach_of(reach);
         let mut verdict = Verdict::Tight;
         let mut worst = 0.0;
         let mut miss = None;
@@ -722,6 +834,11 @@ fn solve(a: &SMatrix<f64, N_MAX, N_MAX>, b: &Vector, m: usize, flat: f64) -> Vec
         5 => sized!(5),
         _ => sized!(6),
     }
+}
+
+fn same(a: &[f64], b: &[f64]) -> bool {
+    let mut pairs = a.iter().zip(b);
+    pairs.all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
 fn largest(values: &[f64]) -> f64 {

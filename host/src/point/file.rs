@@ -7,7 +7,7 @@ use crate::case::{FigureInput, base};
 use crate::error::{Error, Source, suggestion};
 use crate::input::{self, BuiltLaw, ForeignKeys, Named, ParameterTable, ParameterValue};
 use crate::lock::Pins;
-use crate::plugin::adapter::Adapter;
+use crate::plugin::adapter::{Adapter, Externals, Scratch};
 use crate::plugin::{Law, SearchPath, Strided};
 use crate::schema;
 use abi::Hypothesis;
@@ -19,6 +19,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
+
+/// What a case file looks like among driver files.
+const CASE: base::OtherKind = base::OtherKind {
+    keys: &["analysis", "mesh", "groups", "laws", "supports", "phase"],
+    message: "this is a case file; expected a driver file, which leads a law at one point",
+    command: "pilum run",
+};
 
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 100_000_000;
@@ -48,6 +55,12 @@ pub(crate) struct File {
     /// Write the arguments of one call here.
     #[schemars(with = "Option<PathBuf>")]
     record: Option<Spanned<PathBuf>>,
+    /// What becomes of routines that it calls and nobody supplies.
+    #[schemars(with = "Option<Externals>")]
+    externals: Option<Spanned<Externals>>,
+    /// What becomes of its scratch files.
+    #[schemars(with = "Option<Scratch>")]
+    scratch: Option<Spanned<Scratch>>,
     /// What the driver is.
     #[serde(default)]
     title: String,
@@ -211,7 +224,7 @@ impl Driver {
     }
 
     pub(crate) fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
-        let (source, files) = base::read(source)?;
+        let (source, files) = base::read_kind(source, &CASE)?;
         let driver = |(variant, file)| Self::build(&source, variant, file, locked);
         files.into_iter().map(driver).collect()
     }
@@ -253,6 +266,8 @@ impl Driver {
             sidecar: file.sidecar.as_ref(),
             in_process: file.in_process.as_ref(),
             record: file.record.as_ref(),
+            externals: file.externals.as_ref(),
+            scratch: file.scratch.as_ref(),
         };
         let foreign = keys.read(source)?;
         let loaded = input::find_law(source, &search, &file.law, foreign.as_ref())?;
@@ -292,6 +307,8 @@ impl Driver {
             sidecar: None,
             in_process: None,
             record: None,
+            externals: None,
+            scratch: None,
             title: String::new(),
             law_path: Vec::new(),
             parameters: ParameterTable::new(),

@@ -150,6 +150,8 @@ impl Driver {
             in_process: false,
             record: None,
             records_once: false,
+            externals: None,
+            scratch: None,
         };
         let library = crate::plugin::Library::open_foreign(&foreign, |_| Ok(()))?;
         let id = library.laws().next().map(|law| law.id.clone());

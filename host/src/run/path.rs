@@ -241,6 +241,7 @@ impl Run<'_> {
                 hint: None,
             })?;
         let probes = self.probes.values(&self.snapshot(&reaction));
+        self.probes.check(self.case, place, &probes)?;
         results.step(place, lambda, &probes, iterations)
     }
 }

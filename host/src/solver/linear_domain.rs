@@ -17,13 +17,11 @@
 //! alone are brought to the state in question, counted from the one before it; the others wait for
 //! the next complete one.
 
-use super::Singular;
-use super::linear::Block;
-use super::multifrontal::{Kind, Multifrontal};
 use super::newton::{ACCEPTED_ROUND_OFF, Loads, STILL_SMALL, last_bit_scattered, norm};
-use crate::assembly::{Pattern, System, Tie};
+use crate::assembly::{System, Tie};
 use crate::group::Group;
 use crate::plugin::Operator;
+use algebra::{Block, Kind, Multifrontal, Pattern, Singular};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -12,13 +12,13 @@ pub use matrix::Matrix;
 pub use path::Measure;
 
 use super::diagnosis::{self, Snapshot};
-use super::linear::LinearSolver;
 use super::linear_domain::LinearDomain;
 use crate::assembly::{Places, System};
 use crate::case::{Control, Method, SolverInput};
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
 use acceleration::Acceleration;
+use algebra::LinearSolver;
 use relaxation::Relaxation;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};

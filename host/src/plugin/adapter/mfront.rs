@@ -14,7 +14,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::plugin::description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
 use crate::plugin::image::Image;
 use crate::plugin::library::mfront::{Behaviour, Point, Sizes};
@@ -74,6 +74,7 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
     Ok(ForeignLaws {
         laws: laws.collect(),
         sidecar: None,
+        wishes: (None, None),
     })
 }
 
@@ -341,6 +342,7 @@ impl Reader<'_> {
             }));
         }
         let formulation = FormulationDescription {
+            tangent: Tangent::default(),
             hypothesis: hypothesis.name(),
             index,
             symmetric: false,

@@ -1,9 +1,10 @@
 //! The sidecar of a library that cannot describe itself: `NAME.law.toml` beside `libNAME.so`.
 
+use super::{Externals, Scratch};
 use crate::error::{Error, Source, suggestion};
 use crate::input;
 use crate::plugin::description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
 use crate::plugin::hexadecimal_sha256;
 use abi::Hypothesis;
@@ -44,6 +45,12 @@ struct File {
     #[serde(default)]
     symmetric: bool,
     #[serde(default)]
+    tangent: Tangent,
+    #[serde(default)]
+    tangent_order: Order,
+    externals: Option<Externals>,
+    scratch: Option<Scratch>,
+    #[serde(default)]
     parameter: Vec<Parameter>,
     #[serde(default)]
     internal: Vec<Internal>,
@@ -80,6 +87,17 @@ struct Internal {
     components: Option<Spanned<usize>>,
 }
 
+/// How DDSDDE stands in memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Order {
+    /// As Fortran keeps matrices.
+    #[default]
+    Columns,
+    /// As C keeps them.
+    Rows,
+}
+
 /// What a sidecar says.
 #[derive(Clone, Debug)]
 pub(super) struct Sidecar {
@@ -93,6 +111,10 @@ pub(super) struct Sidecar {
     pub(super) ntens: Vec<usize>,
     /// Calls need not follow one another.
     pub(super) is_thread_safe: bool,
+    /// How DDSDDE stands in memory.
+    pub(super) order: Order,
+    /// What becomes of routines that nobody supplies, and of scratch files.
+    pub(super) wishes: (Option<Externals>, Option<Scratch>),
     /// SHA-256 of the file.
     pub(super) sha256: String,
 }
@@ -140,6 +162,7 @@ impl Sidecar {
                 index: formulations.len() as u32,
                 symmetric: file.symmetric,
                 linear: false,
+                tangent: file.tangent,
                 local_axes: false,
                 internal_variables: variables.clone(),
             });
@@ -164,6 +187,8 @@ impl Sidecar {
             symbol: file.symbol,
             ntens,
             is_thread_safe: file.thread_safe,
+            order: file.tangent_order,
+            wishes: (file.externals, file.scratch),
             sha256: hexadecimal_sha256(source.text().as_bytes()),
             law: LawDescription {
                 name: or(file.name, &id),

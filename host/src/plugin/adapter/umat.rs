@@ -3,9 +3,10 @@
 //! All arguments of a call stand in one block of words, apart from each other by guard words. A
 //! point gets a fresh block; after the call every word that is no output must be what it was.
 
-use super::sidecar::Sidecar;
+use super::sidecar::{Order, Sidecar};
 use super::{
-    Foreign, ForeignInstance, ForeignLaw, ForeignLaws, PointEnd, PointStart, Refusal, each_point,
+    Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, PointEnd, PointStart, Refusal,
+    each_point,
 };
 use crate::error::Error;
 use crate::plugin::image::Image;
@@ -15,7 +16,7 @@ use abi::Hypothesis;
 use abi::raw::{self, Status};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Names by which compilers know the routine, in the order in which they are looked for.
@@ -25,8 +26,11 @@ const N_CMNAME: usize = 80;
 /// Guard words on each side of an argument: a DDSDDE of six components where there is room for
 /// four ends 20 words too far.
 const N_GUARD: usize = 24;
-/// What guard words hold: not a number, so that what is read there shows.
-const GUARD: u64 = 0x7ff8_dead_beef_dead;
+/// What guard words hold: a signalling NaN. What is read there shows in the results, and what is
+/// computed with it and written back shows in the word, since every operation makes it a quiet one.
+const GUARD: u64 = 0x7ff4_dead_beef_dead;
+/// DTIME of calls that are no increment: at the start of a law, and for its elastic operator.
+const TIME_AT_REST: f64 = 1.0;
 /// Words of PREDEF and DPRED: no predefined fields, but room to read.
 const N_FIELDS: usize = 8;
 /// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
@@ -50,23 +54,37 @@ enum A {
     Pnewdt, Celent, Dfgrd0, Dfgrd1, Noel, Npt, Layer, Kspt, Jstep, Kinc,
 }
 
-/// Name, kind, and whether the routine writes it.
+/// What a routine may do with an argument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Role {
+    /// Write it.
+    Output,
+    /// Read it. Abaqus computes it anew for every call, as is done here, so that nobody sees what a
+    /// routine leaves there; some use it as their own.
+    Copy,
+    /// Read it: sizes, names and numbers, and the parameters, which all points share in Abaqus.
+    Fixed,
+}
+
+use Role::{Copy as C, Fixed as F, Output as O};
+
+/// Name, kind and role.
 #[rustfmt::skip]
-const ARGUMENTS: [(&str, Kind, bool); N_ARGUMENTS] = [
-    ("STRESS", Kind::Real, true), ("STATEV", Kind::Real, true), ("DDSDDE", Kind::Real, true),
-    ("SSE", Kind::Real, true), ("SPD", Kind::Real, true), ("SCD", Kind::Real, true),
-    ("RPL", Kind::Real, true), ("DDSDDT", Kind::Real, true), ("DRPLDE", Kind::Real, true),
-    ("DRPLDT", Kind::Real, true), ("STRAN", Kind::Real, false), ("DSTRAN", Kind::Real, false),
-    ("TIME", Kind::Real, false), ("DTIME", Kind::Real, false), ("TEMP", Kind::Real, false),
-    ("DTEMP", Kind::Real, false), ("PREDEF", Kind::Real, false), ("DPRED", Kind::Real, false),
-    ("CMNAME", Kind::Text, false), ("NDI", Kind::Integer, false), ("NSHR", Kind::Integer, false),
-    ("NTENS", Kind::Integer, false), ("NSTATV", Kind::Integer, false),
-    ("PROPS", Kind::Real, false), ("NPROPS", Kind::Integer, false),
-    ("COORDS", Kind::Real, false), ("DROT", Kind::Real, false), ("PNEWDT", Kind::Real, true),
-    ("CELENT", Kind::Real, false), ("DFGRD0", Kind::Real, false), ("DFGRD1", Kind::Real, false),
-    ("NOEL", Kind::Integer, false), ("NPT", Kind::Integer, false),
-    ("LAYER", Kind::Integer, false), ("KSPT", Kind::Integer, false),
-    ("JSTEP", Kind::Integer, false), ("KINC", Kind::Integer, false),
+const ARGUMENTS: [(&str, Kind, Role); N_ARGUMENTS] = [
+    ("STRESS", Kind::Real, O), ("STATEV", Kind::Real, O), ("DDSDDE", Kind::Real, O),
+    ("SSE", Kind::Real, O), ("SPD", Kind::Real, O), ("SCD", Kind::Real, O),
+    ("RPL", Kind::Real, O), ("DDSDDT", Kind::Real, O), ("DRPLDE", Kind::Real, O),
+    ("DRPLDT", Kind::Real, O), ("STRAN", Kind::Real, C), ("DSTRAN", Kind::Real, C),
+    ("TIME", Kind::Real, C), ("DTIME", Kind::Real, C), ("TEMP", Kind::Real, C),
+    ("DTEMP", Kind::Real, C), ("PREDEF", Kind::Real, C), ("DPRED", Kind::Real, C),
+    ("CMNAME", Kind::Text, F), ("NDI", Kind::Integer, F), ("NSHR", Kind::Integer, F),
+    ("NTENS", Kind::Integer, F), ("NSTATV", Kind::Integer, F),
+    ("PROPS", Kind::Real, F), ("NPROPS", Kind::Integer, F),
+    ("COORDS", Kind::Real, C), ("DROT", Kind::Real, C), ("PNEWDT", Kind::Real, O),
+    ("CELENT", Kind::Real, C), ("DFGRD0", Kind::Real, C), ("DFGRD1", Kind::Real, C),
+    ("NOEL", Kind::Integer, F), ("NPT", Kind::Integer, F),
+    ("LAYER", Kind::Integer, F), ("KSPT", Kind::Integer, F),
+    ("JSTEP", Kind::Integer, F), ("KINC", Kind::Integer, F),
 ];
 
 /// Describes the law of a library by its sidecar. Nothing of it runs.
@@ -76,16 +94,19 @@ const ARGUMENTS: [(&str, Kind, bool); N_ARGUMENTS] = [
 pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
     let sidecar = Sidecar::read(&foreign.library, foreign.sidecar.as_deref())?;
     let (law, sha256) = (sidecar.law.clone(), sidecar.sha256.clone());
+    let wishes = sidecar.wishes;
     let umat = Umat {
         library: foreign.library.clone(),
         sha256: image.sha256.clone(),
         record: foreign.record.clone(),
         records_once: foreign.records_once,
+        traps: foreign.externals.or(wishes.0) == Some(Externals::Trap),
         sidecar,
     };
     Ok(ForeignLaws {
         laws: vec![(law, Arc::new(umat))],
         sidecar: Some(sha256),
+        wishes,
     })
 }
 
@@ -96,6 +117,8 @@ struct Umat {
     sha256: String,
     record: Option<PathBuf>,
     records_once: bool,
+    /// Traps stand for what it calls and nobody supplies.
+    traps: bool,
     sidecar: Sidecar,
 }
 
@@ -124,7 +147,7 @@ impl ForeignLaw for Umat {
             Some(name) => vec![name],
             None => SYMBOLS.to_vec(),
         };
-        let routine = Routine::open(&self.library, image, &names).map_err(unusable)?;
+        let routine = Routine::open(&self.library, image, &names, self.traps).map_err(unusable)?;
         let sizes = Sizes {
             n: hypothesis.n_components(),
             n_tens: self.sidecar.ntens[number],
@@ -141,6 +164,9 @@ impl ForeignLaw for Umat {
             routine,
             template: Block::new(sizes, &self.sidecar.cmname, parameters),
             sizes,
+            order: self.sidecar.order,
+            overwritten: AtomicU64::new(0),
+            told: AtomicU64::new(0),
             turn: self.is_serial().then(Mutex::default),
             record: self.record.clone(),
             records_once: self.records_once,
@@ -267,33 +293,40 @@ impl Block {
             .map(|result| ARGUMENTS[result as usize].0)
     }
 
-    /// The first argument that a call has written to without right, in words.
-    fn damage(&self, before: &Self) -> Option<String> {
-        for (i, (name, kind, is_output)) in ARGUMENTS.iter().enumerate() {
+    /// Which copies a call has written to, by bits.
+    ///
+    /// # Errors
+    /// The first argument that it has written to without right, in words.
+    fn overwritten(&self, before: &Self) -> Result<u64, String> {
+        let mut copies = 0;
+        for (i, (name, kind, role)) in ARGUMENTS.iter().enumerate() {
             let (first, n) = (self.at[i], n_words(*kind, self.entries[i]));
             let differs = |from: usize, to: usize| self.words[from..to] != before.words[from..to];
-            if !is_output && differs(first, first + n) {
-                return Some(format!("the routine overwrites {name}, which is an input"));
+            if *role != Role::Output && differs(first, first + n) {
+                if *role == Role::Fixed {
+                    return Err(format!("the routine overwrites {name}, which is an input"));
+                }
+                copies |= 1 << i;
             }
             let end = first + n;
             let next = ARGUMENTS.get(i + 1).map_or("", |(name, ..)| *name);
             if differs(end, end + N_GUARD / 2) {
                 let size = self.entries[i];
-                return Some(format!(
+                return Err(format!(
                     "the routine writes beyond the end of {name}, which has {size} entries"
                 ));
             }
             if differs(end + N_GUARD / 2, end + N_GUARD) {
-                return Some(format!(
+                return Err(format!(
                     "the routine writes between {name} and {next}, in front of one or beyond the \
                      end of the other"
                 ));
             }
             if i == 0 && differs(0, first) {
-                return Some(format!("the routine writes in front of {name}"));
+                return Err(format!("the routine writes in front of {name}"));
             }
         }
-        None
+        Ok(copies)
     }
 
     /// All arguments as TOML.
@@ -350,6 +383,11 @@ struct Instance {
     routine: Routine,
     template: Block,
     sizes: Sizes,
+    /// How DDSDDE stands in memory.
+    order: Order,
+    /// Which of its copies the routine has overwritten, by bits, and which of them have been told.
+    overwritten: AtomicU64,
+    told: AtomicU64,
     /// Whose turn it is, unless the routine says that it may be called by several threads.
     turn: Option<Mutex<()>>,
     record: Option<PathBuf>,
@@ -365,6 +403,13 @@ impl ForeignInstance for Instance {
             .map(|turn| turn.lock().unwrap_or_else(PoisonError::into_inner));
         let mut block = self.template.clone();
         each_point(call, |start, end| self.update(&mut block, start, end))
+    }
+
+    fn take_overwritten(&self) -> Vec<String> {
+        let overwritten = self.overwritten.load(Ordering::Relaxed);
+        let told = self.told.swap(overwritten, Ordering::Relaxed);
+        let new = (0..N_ARGUMENTS).filter(|i| (overwritten & !told) >> i & 1 == 1);
+        new.map(|i| ARGUMENTS[i].0.to_owned()).collect()
     }
 }
 
@@ -423,8 +468,11 @@ impl Instance {
         let first = block.at[A::Ddsdde as usize];
         for i in 0..n {
             for j in 0..n {
-                let word = block.words[first + i + j * self.sizes.n_tens];
-                end.operator[i * n + j] = f64::from_bits(word);
+                let entry = match self.order {
+                    Order::Columns => i + j * self.sizes.n_tens,
+                    Order::Rows => i * self.sizes.n_tens + j,
+                };
+                end.operator[i * n + j] = f64::from_bits(block.words[first + entry]);
             }
         }
         Ok(())
@@ -443,7 +491,9 @@ impl Instance {
         block.set(A::Stran, start.gradient);
         block.set(A::Dstran, increment);
         block.set(A::Time, &[start.time - start.moment.step_start, start.time]);
-        block.set(A::Dtime, &[start.time_increment]);
+        let is_increment = start.time_increment > 0.0;
+        let time_increment = Some(start.time_increment).filter(|_| is_increment);
+        block.set(A::Dtime, &[time_increment.unwrap_or(TIME_AT_REST)]);
         block.set(A::Coords, &start.site.position);
         block.set(A::Celent, &[start.site.length]);
         block.set_integers(A::Noel, &[start.site.element as i32]);
@@ -465,8 +515,11 @@ impl Instance {
         if let Some(path) = recorded {
             record(path, &before, Some(block))?;
         }
-        if let Some(damage) = block.damage(&before) {
-            return Err(Refusal::error(raw::PILUM_E_INTERNAL, damage));
+        let overwritten = block
+            .overwritten(&before)
+            .map_err(|damage| Refusal::error(raw::PILUM_E_INTERNAL, damage))?;
+        if overwritten != 0 {
+            self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
         }
         let factor = block.reals(A::Pnewdt).next().unwrap_or(1.0);
         if factor >= 1.0 {

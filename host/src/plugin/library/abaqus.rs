@@ -9,6 +9,8 @@ use std::ffi::{c_char, c_int};
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::io::Write as _;
+use std::path::PathBuf;
+use std::sync::OnceLock;
 
 /// Exit code of a process in which a routine called `XIT`.
 pub(super) const XIT: i32 = 70;
@@ -127,13 +129,23 @@ unsafe extern "C" fn getjobname_(name: *mut c_char, length: *mut c_int, n: usize
     unsafe { put("pilum", name, length, n) }
 }
 
-/// `CALL GETOUTDIR(OUTDIR, LENOUTDIR)`: the working directory.
+/// The working directory of the program, where that of the routine is another.
+static OUTDIR: OnceLock<PathBuf> = OnceLock::new();
+
+/// The routine gets a working directory of its own from now on; `GETOUTDIR` keeps this one.
+#[cfg(unix)]
+pub(in crate::plugin) fn out_dir_is(folder: PathBuf) {
+    let _ = OUTDIR.set(folder);
+}
+
+/// `CALL GETOUTDIR(OUTDIR, LENOUTDIR)`: the working directory of the program.
 ///
 /// # Safety
 /// As [`getjobname_`].
 #[unsafe(no_mangle)]
 unsafe extern "C" fn getoutdir_(name: *mut c_char, length: *mut c_int, n: usize) {
-    let folder = std::env::current_dir().unwrap_or_default();
+    let own = || std::env::current_dir().unwrap_or_default();
+    let folder = OUTDIR.get().cloned().unwrap_or_else(own);
     // SAFETY: passed on to the caller.
     unsafe { put(&folder.to_string_lossy(), name, length, n) }
 }

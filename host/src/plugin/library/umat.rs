@@ -26,7 +26,8 @@ pub(in crate::plugin) struct Routine {
 
 impl Routine {
     /// Opens another image of the library, with variables (`SAVE`, `COMMON`) of its own, and finds
-    /// the routine by the first of the names it has.
+    /// the routine by the first of the names it has. Where `traps` are wanted, they stand for what
+    /// it calls and nobody supplies.
     ///
     /// # Errors
     /// What is wrong with the library, in words.
@@ -34,13 +35,16 @@ impl Routine {
         path: &Path,
         image: Image,
         names: &[&str],
+        traps: bool,
     ) -> Result<Self, String> {
         let _guard = super::ONE_AT_A_TIME
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
+        let sha256 = image.sha256.clone();
         // SAFETY: running the library's initialisers is what loading means; the user named it.
-        let library: &'static libloading::Library =
-            Box::leak(Box::new(unsafe { load_private(path, image) }?));
+        let loaded = unsafe { load_private(path, image) };
+        let library = loaded.or_else(|why| supply(path, &sha256, traps, why))?;
+        let library: &'static libloading::Library = Box::leak(Box::new(library));
         names
             .iter()
             .find_map(|name| {
@@ -79,6 +83,44 @@ impl Routine {
         };
         call();
     }
+}
+
+/// Tries once more to load a library that could not be, `why`; with traps if those are what it lacks.
+#[cfg(unix)]
+fn supply(
+    path: &Path,
+    sha256: &str,
+    traps: bool,
+    why: String,
+) -> Result<libloading::Library, String> {
+    let Some(missing) = super::externals::missing(path) else {
+        return Err(why);
+    };
+    if !traps {
+        return Err(missing.refusal());
+    }
+    if !crate::child::is_child() {
+        return Err(format!(
+            "{}; traps need a worker process, which `in_process` does without",
+            missing.refusal()
+        ));
+    }
+    super::externals::trap(&missing)?;
+    let image = Image::read(path)?;
+    if image.sha256 != sha256 {
+        return Err("it was changed while it was opened".to_owned());
+    }
+    // SAFETY: as the first time.
+    unsafe { load_private(path, image) }
+}
+
+#[cfg(not(unix))]
+fn supply(_: &Path, _: &str, traps: bool, why: String) -> Result<libloading::Library, String> {
+    Err(if traps {
+        why + "; there are no traps on this system"
+    } else {
+        why
+    })
 }
 
 /// Loads the hashed bytes once more. Where that fails (no files in memory, a library that looks

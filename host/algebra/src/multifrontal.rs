@@ -13,8 +13,8 @@
 //! row exchanges inside a supernode only. The caller checks the first solution by its residual and
 //! has another method at hand for matrices that need more.
 
-use super::{Singular, dense, dissection};
-use crate::assembly::Pattern;
+use crate::Pattern;
+use crate::{Singular, dense, dissection};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor as cholesky_kernel;
 use faer::linalg::matmul::matmul;
@@ -44,7 +44,7 @@ const PIECE: usize = 256;
 
 /// Which half of the matrix counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub enum Kind {
     /// L Lᵀ of a positive definite matrix, of which the lower half is read.
     Symmetric,
     /// L U.
@@ -114,11 +114,11 @@ enum Values<'v> {
 
 /// Values of a matrix that count, in the order in which the fronts take them.
 #[derive(Debug)]
-pub(super) struct Gathered(Vec<f64>);
+pub struct Gathered(Vec<f64>);
 
 /// A factorised matrix.
 #[derive(Debug)]
-pub(super) struct Multifrontal {
+pub struct Multifrontal {
     analysis: Analysis,
     fronts: Vec<Mutex<Front>>,
     schur: Vec<f64>,
@@ -127,7 +127,7 @@ pub(super) struct Multifrontal {
 impl Multifrontal {
     /// Analyses a pattern. `kept` says of every equation whether it is kept, `lines` on which mesh
     /// lines it lies; without them the order of elimination is found from the pattern alone.
-    pub(super) fn new(
+    pub fn new(
         pattern: &Pattern,
         kind: Kind,
         kept: &[bool],
@@ -143,18 +143,18 @@ impl Multifrontal {
     }
 
     /// Kept equations, in the order of the Schur complement.
-    pub(super) fn kept(&self) -> &[u32] {
+    pub fn kept(&self) -> &[u32] {
         &self.analysis.kept
     }
 
     /// The Schur complement of the kept equations, column-major; of a symmetric matrix both
     /// halves.
-    pub(super) fn schur(&self) -> &[f64] {
+    pub fn schur(&self) -> &[f64] {
         &self.schur
     }
 
     /// As [`Self::schur`], to be worked on.
-    pub(super) fn schur_mut(&mut self) -> &mut [f64] {
+    pub fn schur_mut(&mut self) -> &mut [f64] {
         &mut self.schur
     }
 
@@ -162,7 +162,7 @@ impl Multifrontal {
     ///
     /// # Errors
     /// [`Singular`]: a pivot vanishes, or a symmetric matrix is not positive definite.
-    pub(super) fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
+    pub fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
         self.clear_schur();
         self.add_kept(values);
         self.eliminate_all(Values::OfPattern(values))
@@ -173,7 +173,7 @@ impl Multifrontal {
     ///
     /// # Errors
     /// As [`Self::factorise`].
-    pub(super) fn factorise_onto(
+    pub fn factorise_onto(
         &mut self,
         block: impl Iterator<Item = f64>,
         values: &[f64],
@@ -186,7 +186,7 @@ impl Multifrontal {
 
     /// Takes what counts of the values of the last matrix there will be, and gives up what only
     /// another one would need.
-    pub(super) fn gather(&mut self, values: &[f64]) -> Gathered {
+    pub fn gather(&mut self, values: &[f64]) -> Gathered {
         self.clear_schur();
         self.add_kept(values);
         self.analysis.kept_entries = Vec::new();
@@ -198,7 +198,7 @@ impl Multifrontal {
     ///
     /// # Errors
     /// As [`Self::factorise`].
-    pub(super) fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
+    pub fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
         self.eliminate_all(Values::OfFronts(&values.0))?;
         self.analysis.targets = Vec::new();
         self.analysis.relative = Vec::new();
@@ -381,7 +381,7 @@ impl Multifrontal {
     }
 
     /// The supernodes that give the values of some equations: theirs, and all above them.
-    pub(super) fn fronts_of(&self, wanted: &[bool]) -> Vec<bool> {
+    pub fn fronts_of(&self, wanted: &[bool]) -> Vec<bool> {
         let analysis = &self.analysis;
         let mut fronts: Vec<bool> = Vec::with_capacity(analysis.fronts.len());
         // Children come before their parents.
@@ -398,7 +398,7 @@ impl Multifrontal {
     /// Eliminates the right-hand side (by equation): L y = b for the eliminated equations, and
     /// what is left for the kept ones. Where it vanishes outside some supernodes, those and the
     /// ones above them suffice.
-    pub(super) fn forward(&self, right: &[f64], fronts: Option<&[bool]>) -> (Vec<f64>, Vec<f64>) {
+    pub fn forward(&self, right: &[f64], fronts: Option<&[bool]>) -> (Vec<f64>, Vec<f64>) {
         let analysis = &self.analysis;
         let n_eliminated = analysis.order.len();
         let all = analysis.order.iter().chain(&analysis.kept);
@@ -445,7 +445,7 @@ impl Multifrontal {
 
     /// Values of all equations from `y` of [`Self::forward`] and those of the kept ones.
     /// Only those of some supernodes, see [`Self::fronts_of`]; the others mean nothing.
-    pub(super) fn backward(&self, y: &[f64], kept: &[f64], fronts: Option<&[bool]>) -> Vec<f64> {
+    pub fn backward(&self, y: &[f64], kept: &[f64], fronts: Option<&[bool]>) -> Vec<f64> {
         let analysis = &self.analysis;
         let mut x = [y, kept].concat();
         let mut own = Vec::new();

@@ -1,6 +1,6 @@
 //! Dense matrices as L U, with row exchanges.
 
-use super::Singular;
+use crate::Singular;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor as kernel;
 use faer::linalg::triangular_solve as triangular;
@@ -9,8 +9,8 @@ use faer::{MatMut, MatRef, Par, Spec};
 
 /// Row exchanges, and their inverse.
 #[derive(Debug, Default)]
-pub(super) struct Exchanges {
-    pub(super) forward: Vec<usize>,
+pub(crate) struct Exchanges {
+    pub(crate) forward: Vec<usize>,
     inverse: Vec<usize>,
 }
 
@@ -18,7 +18,7 @@ pub(super) struct Exchanges {
 ///
 /// # Errors
 /// [`Singular`]: a pivot vanishes.
-pub(super) fn factorise(
+pub(crate) fn factorise(
     mut matrix: MatMut<'_, f64>,
     exchanges: &mut Exchanges,
 ) -> Result<(), Singular> {
@@ -42,7 +42,7 @@ pub(super) fn factorise(
 }
 
 /// Solves with the factors (column-major) of a matrix.
-pub(super) fn solve(factors: &[f64], exchanges: &Exchanges, right: &[f64]) -> Vec<f64> {
+pub(crate) fn solve(factors: &[f64], exchanges: &Exchanges, right: &[f64]) -> Vec<f64> {
     let n = right.len();
     let mut x: Vec<f64> = exchanges.forward.iter().map(|&from| right[from]).collect();
     let factors = MatRef::from_column_major_slice(factors, n, n);

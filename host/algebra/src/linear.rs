@@ -1,8 +1,8 @@
 //! Sparse linear equations: which factorisation, and the check of solutions.
 
-use super::dense::{self, Exchanges};
-use super::multifrontal::{Kind, Multifrontal};
-use crate::assembly::Pattern;
+use crate::Pattern;
+use crate::dense::{self, Exchanges};
+use crate::multifrontal::{Kind, Multifrontal};
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -28,7 +28,7 @@ pub struct Block {
 
 impl Block {
     /// The Schur complement of these factors on these equations, which are as many as it keeps.
-    pub(super) fn new(equations: Vec<usize>, factors: &Arc<Multifrontal>) -> Self {
+    pub fn new(equations: Vec<usize>, factors: &Arc<Multifrontal>) -> Self {
         let mut row_sums = vec![0.0; equations.len()];
         for column in factors.schur().chunks_exact(equations.len().max(1)) {
             for (sum, value) in row_sums.iter_mut().zip(column) {
@@ -87,7 +87,7 @@ pub struct Singular;
 
 impl LinearSolver {
     /// Analyses a pattern. Matrices that are `symmetric` have to be positive definite. `lines` are
-    /// the mesh lines on which the unknowns lie, see [`super::mesh_lines`].
+    /// the mesh lines on which the unknowns lie, see [`crate::mesh_lines`].
     ///
     /// # Errors
     /// [`Singular`] if the pattern alone makes the matrix singular, or memory runs out.

@@ -27,7 +27,7 @@ pub fn mesh_lines(positions: &[[f64; 2]]) -> Vec<[u32; 2]> {
 }
 
 /// An order of elimination of unknowns that lie on these mesh lines.
-pub(super) fn order(lines: &[[u32; 2]]) -> Vec<u32> {
+pub(crate) fn order(lines: &[[u32; 2]]) -> Vec<u32> {
     let mut all: Vec<u32> = (0..lines.len() as u32).collect();
     let mut order = Vec::with_capacity(all.len());
     dissect(lines, &mut all, &mut order);

@@ -1,0 +1,269 @@
+//! Input that can be computed but is seldom meant, in words and with numbers.
+
+use super::unit_pressure;
+use crate::case::{Analysis, Case, Formulation, PhaseInput};
+use crate::group::{Group, GroupLaw};
+use crate::mesh::{EDGES, Mesh};
+use crate::plugin::ParameterDescription;
+use std::collections::{HashMap, HashSet};
+
+/// Largest difference between a layer's thickness and a parameter that stands for it, as a
+/// fraction: more than what a rounded number makes.
+const SAME_THICKNESS: f64 = 0.01;
+/// A body that takes less of a full turn than this about a node has a corner there, radians; half a
+/// turn is a straight side.
+const CORNER: f64 = 170.0 / 180.0 * std::f64::consts::PI;
+/// Below this fraction of a load, the part of it in one direction is round-off.
+const NOTHING: f64 = 1e-9;
+
+/// What is to be said of a model before it runs. `swaps`: the groups that take another law, by
+/// phase.
+pub(super) fn warnings(
+    case: &Case,
+    mesh: &Mesh,
+    groups: &[Group],
+    swaps: &[Vec<(usize, GroupLaw)>],
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (number, group) in groups.iter().enumerate() {
+        match group.formulation {
+            Formulation::ThinLayer => {
+                warnings.extend(stacked(mesh, group));
+                let later = swaps.iter().flatten().filter(|(g, _)| *g == number);
+                let laws = std::iter::once(&group.law).chain(later.map(|(_, law)| law));
+                let mut seen = HashSet::new();
+                for law in laws.filter(|law| seen.insert(&law.name)) {
+                    warnings.extend(other_thickness(group, law));
+                }
+            }
+            Formulation::ZeroThickness => warnings.extend(hung(mesh, groups, number)),
+            Formulation::Solid if group.is_linear() => {
+                warnings.extend(implausible_stiffness(group));
+            }
+            Formulation::Solid => {}
+        }
+    }
+    warnings.extend(reactions(case, mesh));
+    warnings
+}
+
+/// Stiffness that no material has, in words. Diamond, the stiffest, has 1.08e9 kPa; jelly has 1 kPa.
+pub(crate) fn implausible_stiffness(group: &Group) -> Option<String> {
+    const RANGE: [f64; 2] = [1.0, 1.2e9];
+    let elements = if group.is_linear() {
+        1
+    } else {
+        group.kinematics.n_elements()
+    };
+    let largest = (0..elements).flat_map(|element| {
+        let tangents = group.element_tangents(element).chunks_exact(16);
+        tangents.flat_map(|d| [0, 5, 10, 15].map(|i| d[i]))
+    });
+    let largest = largest.fold(0.0, f64::max);
+    let about = if largest > RANGE[1] {
+        "diamond has 1.08e9: are moduli typed in Pa?"
+    } else if largest > 0.0 && largest < RANGE[0] {
+        "softer than jelly: are moduli typed in MPa or GPa?"
+    } else {
+        return None;
+    };
+    Some(format!(
+        "group `{}`, law `{}`: its stiffness is {largest:.3e} kPa, {about} Units are kN, m, kPa",
+        group.name, group.law.name
+    ))
+}
+
+/// Elements of a thin layer that lie upon one another, or do not agree on what is across it.
+fn stacked(mesh: &Mesh, group: &Group) -> Option<String> {
+    // Of every edge inside the layer, by its middle: for how many of its elements it is a face of
+    // the layer, and how many elements there are.
+    let mut edges: HashMap<usize, (usize, usize)> = HashMap::new();
+    for element in 0..group.kinematics.n_elements() {
+        let nodes = group.kinematics.nodes(element);
+        let along = group.kinematics.axes(element).along;
+        let reach = EDGES.map(|[a, b, _]| {
+            let [a, b] = [a, b].map(|i| mesh.nodes[nodes[i]]);
+            let step = [b[0] - a[0], b[1] - a[1]];
+            (step[0] * along[0] + step[1] * along[1]).abs() / step[0].hypot(step[1])
+        });
+        // Faces are the pair of sides that follow the layer.
+        let first_pair = reach[0] + reach[2] > reach[1] + reach[3];
+        for (number, [_, _, middle]) in EDGES.iter().enumerate() {
+            let is_face = (number % 2 == 0) == first_pair;
+            let entry = edges.entry(nodes[*middle]).or_default();
+            entry.0 += usize::from(is_face);
+            entry.1 += 1;
+        }
+    }
+    let between = |faces: usize| {
+        let found = edges.iter().filter(|(_, (f, n))| *n == 2 && *f == faces);
+        let mut nodes: Vec<usize> = found.map(|(&node, _)| node).collect();
+        nodes.sort_unstable();
+        nodes
+    };
+    let (stacked, turned) = (between(2), between(1));
+    let place = |nodes: &[usize]| {
+        let [x, y] = mesh.nodes[nodes[0]];
+        format!("the first between them at ({x:.6}, {y:.6})")
+    };
+    let name = &group.name;
+    if !turned.is_empty() {
+        return Some(format!(
+            "group `{name}`: {} of the thin layer's elements stand across their neighbours, {}: their \
+             shorter sides lie in different directions. Say `normal = …` for the group",
+            turned.len(),
+            place(&turned)
+        ));
+    }
+    (!stacked.is_empty()).then(|| {
+        format!(
+            "group `{name}`: the thin layer is more than one element thick: {} elements lie on \
+             another, {}. Each counts as a layer of its own, of its own thickness",
+            stacked.len(),
+            place(&stacked)
+        )
+    })
+}
+
+/// A parameter of an interface law that stands for the layer's thickness.
+fn means_thickness(parameter: &ParameterDescription) -> bool {
+    let says_so = || {
+        let doc = parameter.doc.to_lowercase();
+        let thickness_of = ["thickness of the interface", "thickness of the layer"];
+        parameter.id.to_lowercase().contains("thickness")
+            || thickness_of.iter().any(|words| doc.contains(words))
+    };
+    parameter.unit == "m" && says_so()
+}
+
+/// A law that is told of another thickness than the elements have.
+fn other_thickness(group: &Group, law: &GroupLaw) -> Option<String> {
+    let built = &law.built;
+    if built.law.n_components() != 2 {
+        return None;
+    }
+    let description = built.law.description();
+    let declared = description.parameters.iter().zip(&built.parameters);
+    let (parameter, used) = declared.into_iter().find(|(p, _)| means_thickness(p))?;
+    let per_element = group.kinematics.points_per_element();
+    let elements = 0..group.kinematics.n_elements();
+    let thickness = elements.filter_map(|element| group.thickness(element * per_element));
+    let off = |t: &f64| (used.value / t - 1.0).abs();
+    let worst = thickness.max_by(|a, b| off(a).total_cmp(&off(b)))?;
+    (off(&worst) > SAME_THICKNESS).then(|| {
+        format!(
+            "group `{}`: law `{}` has {} = {} m ({}), the layer of elements is {worst:.6} m thick",
+            group.name,
+            law.name,
+            parameter.id,
+            used.value,
+            parameter.doc.trim_end_matches('.')
+        )
+    })
+}
+
+/// Ends of an interface without thickness inside the mesh, at the corner of a body: the two sides
+/// stay joined there, and the body hangs on that node.
+fn hung(mesh: &Mesh, groups: &[Group], number: usize) -> Vec<String> {
+    // Groups with one law are one body.
+    let law = |group: usize| groups[group].law.name.as_str();
+    let mut warnings = Vec::new();
+    for joint in mesh.joints.iter().filter(|joint| joint.group == number) {
+        for end in (0..2).filter(|&end| joint.minus[end] == joint.plus[end]) {
+            let node = joint.minus[end];
+            let mut turns: HashMap<&str, f64> = HashMap::new();
+            let mut beside: Vec<usize> = Vec::new();
+            for quad in &mesh.quads {
+                let Some(corner) = quad.nodes[..4].iter().position(|&n| n == node) else {
+                    continue;
+                };
+                *turns.entry(law(quad.group)).or_default() += angle(mesh, &quad.nodes, corner);
+                let middles = [joint.minus[2], joint.plus[2]];
+                if middles.iter().any(|middle| quad.nodes.contains(middle)) {
+                    beside.push(quad.group);
+                }
+            }
+            let corner = beside.iter().find(|group| turns[law(**group)] < CORNER);
+            if let Some(&corner) = corner.filter(|_| turns.len() > 1) {
+                let [x, y] = mesh.nodes[node];
+                warnings.push(format!(
+                    "group `{}` ends inside the mesh at ({x:.6}, {y:.6}), at a corner of group \
+                     `{}`: both sides stay joined at that node, which carries what the interface \
+                     would not (tension, and more than its friction)",
+                    groups[number].name, groups[corner].name
+                ));
+            }
+        }
+    }
+    warnings
+}
+
+/// Angle of a quad at a corner, radians.
+fn angle(mesh: &Mesh, nodes: &[usize], corner: usize) -> f64 {
+    let at = |i: usize| mesh.nodes[nodes[i % 4]];
+    let side = |to: [f64; 2]| [to[0] - at(corner)[0], to[1] - at(corner)[1]];
+    let (a, b) = (side(at(corner + 1)), side(at(corner + 3)));
+    let sine = a[0] * b[1] - a[1] * b[0];
+    sine.atan2(a[0] * b[0] + a[1] * b[1]).abs()
+}
+
+/// Probes of the reaction of a line that is also under pressure: the reaction is what the support
+/// adds to it.
+fn reactions(case: &Case, mesh: &Mesh) -> Vec<String> {
+    let middles = |line: &str| -> HashSet<[u64; 2]> {
+        let edges = mesh.lines.get(line).map_or(&[][..], |line| &line.edges);
+        let middle = |&edge: &(usize, usize)| mesh.nodes[mesh.edge(edge)[2]].map(f64::to_bits);
+        edges.iter().map(middle).collect()
+    };
+    let axisymmetric = case.file.analysis == Analysis::Axisymmetric;
+    let unit = if axisymmetric { "kN" } else { "kN/m" };
+    let mut warnings = Vec::new();
+    for (name, probe) in &case.file.probes {
+        let probe = probe.get_ref();
+        let (Some(line), Some(quantity)) = (&probe.line, &probe.quantity) else {
+            continue;
+        };
+        let component = match quantity.get_ref().strip_prefix("reaction_") {
+            Some("x" | "r") => 0,
+            Some("y" | "z") => 1,
+            _ => continue,
+        };
+        let read = middles(line.get_ref());
+        // The largest share of a pressure, with its phase and line.
+        let mut largest: Option<(f64, &PhaseInput, &str)> = None;
+        for phase in &case.file.phases {
+            for pressure in &phase.pressure {
+                let under = pressure.line.get_ref().as_str();
+                let edges = mesh.lines.get(under).map_or(&[][..], |line| &line.edges);
+                let shared = edges.iter().copied().filter(|&edge| {
+                    read.contains(&mesh.nodes[mesh.edge(edge)[2]].map(f64::to_bits))
+                });
+                let shared: Vec<(usize, usize)> = shared.collect();
+                if shared.is_empty() || pressure.value == 0.0 {
+                    continue;
+                }
+                let force = unit_pressure(case.file.analysis, mesh, &shared);
+                let sum = |c: usize| force.iter().skip(c).step_by(2).sum::<f64>();
+                let size: f64 = force.iter().map(|f| f.abs()).sum();
+                let share = pressure.value * sum(component);
+                let is_more = largest.is_none_or(|(other, _, _)| share.abs() > other.abs());
+                if sum(component).abs() > NOTHING * size && is_more {
+                    largest = Some((share, phase, under));
+                }
+            }
+        }
+        if let Some((share, phase, under)) = largest {
+            let force = quantity.get_ref().replacen("reaction", "force", 1);
+            warnings.push(format!(
+                "probe `{}`: `{}` of line `{}` is what its support adds to the pressure on line \
+                 `{under}`: {share:.6e} {unit} of pressure (phase `{}`) are not in it. `{force}` with \
+                 a `group` is the whole",
+                name.get_ref(),
+                quantity.get_ref(),
+                line.get_ref(),
+                phase.name.get_ref(),
+            ));
+        }
+    }
+    warnings
+}

@@ -1,0 +1,470 @@
+//! Input that is plausible nonsense: refused where it cannot be meant, else said with its number.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, CASE, DONE, Edit, JOINT, Place, edited, refuses};
+
+const PUSH: &str = "displacement = [{ line = \"top\", x = 1e-5 }]";
+const PRESSURE: &str = "pressure = [{ line = \"top\", value = 10.0 }]";
+const LINES: &str = "corner = { x = 0.0, y = 0.5 }\n";
+
+/// The layer as strong as the soil.
+const ELASTIC: Edit = ("law = \"joint\"", "law = \"soil\"");
+
+/// The warnings of the case after some edits, which must run.
+fn warnings(edits: &[Edit]) -> Vec<String> {
+    let place = Place::new();
+    let outcome = place.run_case(edited(edits));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let warnings = summary["warnings"].as_array().unwrap();
+    let warnings: Vec<String> = warnings
+        .iter()
+        .map(|warning| warning.as_str().unwrap().to_owned())
+        .collect();
+    for warning in &warnings {
+        assert!(outcome.says(warning), "{warning}\n{}", outcome.stderr);
+    }
+    warnings
+}
+
+/// One of the warnings says all of this.
+#[track_caller]
+fn warns(edits: &[Edit], says: &[&str]) {
+    let warnings = warnings(edits);
+    let found = |warning: &String| says.iter().all(|text| warning.contains(text));
+    assert!(warnings.iter().any(found), "{says:?}\n{warnings:#?}");
+}
+
+/// There is no warning at all.
+#[track_caller]
+fn runs_quietly(edits: &[Edit]) {
+    let warnings = warnings(edits);
+    assert!(warnings.is_empty(), "{warnings:#?}");
+}
+
+#[test]
+fn refuses_a_normal_along_the_layer() {
+    refuses(
+        BAD_INPUT,
+        &[(
+            "the long side across",
+            &[(
+                "formulation = \"thin_layer\"",
+                "formulation = \"thin_layer\"\nnormal = ^\"y\"",
+            )],
+            &[
+                "group `layer` is 0.010000 by 1.000000 m",
+                "`normal = \"x\"`, or leave it out",
+            ],
+        )],
+    );
+    // Elements may be shorter than the layer is thick, and a layer a little so.
+    let normal = (
+        "formulation = \"thin_layer\"",
+        "formulation = \"thin_layer\"\nnormal = \"x\"",
+    );
+    runs_quietly(&[normal]);
+    runs_quietly(&[
+        normal,
+        ELASTIC,
+        (
+            "{ n = 2, to = 1.0 }",
+            "{ n = 1, to = 0.99 }, { n = 4, to = 1.0 }",
+        ),
+        ("middle = { y = 0.5 }\ncorner = { x = 0.0, y = 0.5 }\n", ""),
+    ]);
+    runs_quietly(&[
+        normal,
+        ELASTIC,
+        ("to = 1.01", "to = 1.9"),
+        ("x = [1.0, 1.01]", "x = [1.0, 1.9]"),
+    ]);
+}
+
+#[test]
+fn refuses_a_model_that_can_turn() {
+    refuses(
+        BAD_INPUT,
+        &[(
+            "held in one point",
+            &[
+                ("line = \"bottom\"", "line = \"corner\""),
+                ("\"weight\"", "^\"weight\""),
+            ],
+            &["phase `weight`: nothing holds the model against turning"],
+        )],
+    );
+    // Two points on a line hold it.
+    runs_quietly(&[
+        ELASTIC,
+        ("line = \"bottom\"", "line = \"corner\""),
+        (
+            "[[phase]]",
+            "[[supports]]\nline = \"other\"\nfixed = [\"y\"]\n[[phase]]",
+        ),
+        (
+            LINES,
+            "corner = { x = 0.0, y = 0.5 }\nother = { x = 2.0, y = 0.5 }\n",
+        ),
+        ("young_modulus = 1e4", "young_modulus = 1e6"),
+    ]);
+}
+
+#[test]
+fn refuses_pressures_without_effect() {
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "on a support",
+                &[(
+                    PRESSURE,
+                    "pressure = [{ line = ^\"bottom\", value = 10.0 }]",
+                )],
+                &[
+                    "the pressure on line `bottom` has no effect",
+                    "held or prescribed",
+                ],
+            ),
+            (
+                "on a line that is moved",
+                &[(
+                    PUSH,
+                    "displacement = [{ line = \"top\", y = -1e-5 }]\n\
+                     pressure = [{ line = ^\"top\", value = 20.0 }]",
+                )],
+                &["the pressure on line `top` has no effect"],
+            ),
+        ],
+    );
+    // A pressure that acted before its line was held, one that acts once it is free, one whose
+    // line only ends on a support, and one along the support.
+    runs_quietly(&[(PUSH, "displacement = [{ line = \"top\", y = -1e-3 }]")]);
+    let outcome = Place::new().run_case(edited(&[(
+        PUSH,
+        "displacement = [{ line = \"top\", y = -1e-3 }]\n\
+         pressure = [{ line = \"top\", value = 20.0 }]\n\
+         [[phase]]\nname = \"free\"\nincrements = 1\n\
+         free = [{ line = \"top\", components = [\"y\"] }]",
+    )]));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    runs_quietly(&[(PRESSURE, "pressure = [{ line = \"left\", value = 1.0 }]")]);
+    runs_quietly(&[
+        ELASTIC,
+        ("[\"x\", \"y\"]", "[\"x\"]"),
+        ("line = \"bottom\"", "line = \"left\""),
+        (
+            "[[phase]]",
+            "[[supports]]\nline = \"bottom\"\nfixed = [\"y\"]\n[[phase]]",
+        ),
+        (PUSH, ""),
+    ]);
+}
+
+#[test]
+fn says_how_much_of_a_pressure_is_lost() {
+    // 1.0 of 2.0 m are held.
+    warns(
+        &[
+            ELASTIC,
+            (
+                LINES,
+                "corner = { x = 0.0, y = 0.5 }\nhead = { y = 1.0, x = [0.0, 1.0] }\n",
+            ),
+            (
+                PRESSURE,
+                "pressure = [{ line = \"top\", value = 1.0 }]\ndisplacement = [{ line = \"head\", y = 0.0 }]",
+            ),
+            (PUSH, ""),
+        ],
+        &["phase `weight`: 50.000 % of the pressure on line `top` (1.0000e0 kN/m)"],
+    );
+}
+
+#[test]
+fn refuses_a_line_that_is_freed_and_prescribed_at_once() {
+    const HOLD: &str = "[[phase]]\nname = \"hold\"\nincrements = 1\n\
+                        displacement = [{ line = \"middle\", x = 1e-6 }]\n\n\
+                        [[phase]]\nname = \"push\"\n";
+    refuses(
+        BAD_INPUT,
+        &[(
+            "the same line",
+            &[(
+                "[[phase]]\nname = \"push\"\nincrements = 2\ndisplacement = [",
+                "[[phase]]\nname = \"hold\"\nincrements = 1\n\
+                 displacement = [{ line = \"middle\", x = 1e-6 }]\n\n\
+                 [[phase]]\nname = \"push\"\nincrements = 2\n\
+                 free = [{ line = ^\"middle\", components = [\"x\"] }]\n\
+                 displacement = [{ line = \"middle\", x = 2e-6 }, ",
+            )],
+            &[
+                "`free` of line `middle` has no effect in x",
+                "`displacement` of line `middle`",
+            ],
+        )],
+    );
+    // Freed in one direction and moved in the other; and a support that is given up to be moved.
+    let place = Place::new();
+    let text = edited(&[
+        ("[[phase]]\nname = \"push\"\n", HOLD),
+        (
+            PUSH,
+            "free = [{ line = \"middle\", components = [\"x\"] }]\n\
+                displacement = [{ line = \"middle\", y = -1e-6 }]",
+        ),
+    ]);
+    assert_eq!(place.run_case(text).code, Some(DONE));
+    let text = edited(&[(
+        PUSH,
+        "free = [{ line = \"bottom\", components = [\"x\"] }]\n\
+         displacement = [{ line = \"bottom\", x = 1e-6 }]",
+    )]);
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}
+
+#[test]
+fn refuses_compression_typed_as_positive_where_the_law_cannot_stand_it() {
+    const SAND: Edit = (
+        "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }",
+        "law = \"mohr_coulomb\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3, \
+         cohesion = 1.0, friction_angle = 30.0, dilatancy_angle = 0.0 }",
+    );
+    const STRESS: Edit = (
+        "law = \"soil\"\n\n[groups.layer]",
+        "law = \"soil\"\ninitial_stress = ^{ 11 = 50.0, 22 = 100.0, 33 = 50.0 }\n\n[groups.layer]",
+    );
+    refuses(
+        BAD_INPUT,
+        &[(
+            "pressure as positive",
+            &[SAND, STRESS],
+            &[
+                "`initial_stress` of group `soil`: law `soil` cannot stand it",
+                "tension is positive",
+            ],
+        )],
+    );
+    // An elastic body stands tension.
+    let place = Place::new();
+    let outcome = place.run_case(edited(&[ELASTIC, STRESS]).replace('^', ""));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}
+
+#[test]
+fn says_what_a_reaction_leaves_out() {
+    // 10 kPa on 2 m.
+    warns(
+        &[(
+            "tau = {",
+            "head = { line = \"top\", quantity = \"reaction_y\" }\ntau = {",
+        )],
+        &[
+            "probe `head`",
+            "-2.000000e1 kN/m of pressure",
+            "`force_y` with a `group`",
+        ],
+    );
+    runs_quietly(&[(
+        "tau = {",
+        "head = { line = \"top\", quantity = \"reaction_x\" }\ntau = {",
+    )]);
+    runs_quietly(&[(
+        "tau = {",
+        "foot = { line = \"bottom\", quantity = \"reaction_y\" }\ntau = {",
+    )]);
+}
+
+#[test]
+fn warns_of_stiffness_that_no_material_has() {
+    warns(
+        &[("young_modulus = 1e4", "young_modulus = 210e9")],
+        &["law `soil`: its stiffness is 2.827e11 kPa", "typed in Pa"],
+    );
+    warns(
+        &[
+            ("young_modulus = 1e4", "young_modulus = 0.5"),
+            (PRESSURE, ""),
+            (PUSH, ""),
+        ],
+        &["law `soil`: its stiffness is 6.731e-1 kPa", "typed in MPa"],
+    );
+    // A law that is not linear is looked at once it has been called.
+    warns(
+        &[(
+            "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }",
+            "law = \"mohr_coulomb\"\nparameters = { young_modulus = 210e9, poisson_ratio = 0.3, \
+             cohesion = 100.0, friction_angle = 30.0, dilatancy_angle = 0.0 }",
+        )],
+        &["law `soil`: its stiffness is 2.827e11 kPa"],
+    );
+}
+
+#[test]
+fn warns_of_results_beyond_small_strains() {
+    // Half of the modulus as a pressure.
+    warns(
+        &[("value = 10.0", "value = 5000.0"), (PUSH, "")],
+        &[
+            "beyond the theory of small strains",
+            "of the bodies are strained by more than 0.2",
+        ],
+    );
+    warns(
+        &[(PUSH, "displacement = [{ line = \"top\", x = 0.5 }]")],
+        &["a node moves by 5.0000e-1 m, the model is 2.0000 m long"],
+    );
+    let opened = [
+        JOINT,
+        &[
+            (PRESSURE, ""),
+            (PUSH, "displacement = [{ line = \"above\", y = 0.9 }]"),
+            (
+                LINES,
+                "corner = { x = 0.0, y = 0.5 }\nabove = { y = 1.0 }\n",
+            ),
+        ],
+    ]
+    .concat();
+    warns(
+        &opened,
+        &[
+            "the two sides of group `layer` move against each other by 9.",
+            "2.0000 m long",
+        ],
+    );
+}
+
+#[test]
+fn warns_of_a_layer_that_is_no_layer() {
+    warns(
+        &[("{ n = 1, to = 1.01 }", "{ n = 2, to = 1.01 }")],
+        &["group `layer`: the thin layer is more than one element thick: 2 elements"],
+    );
+    warns(
+        &[
+            (
+                "{ n = 2, to = 1.0 }",
+                "{ n = 1, to = 0.99 }, { n = 4, to = 1.0 }",
+            ),
+            ("middle = { y = 0.5 }\ncorner = { x = 0.0, y = 0.5 }\n", ""),
+        ],
+        &[
+            "group `layer`: 1 of the thin layer's elements stand across their neighbours",
+            "`normal = …`",
+        ],
+    );
+}
+
+const MEPI: &str = "law = \"mepi\"\n[laws.joint.parameters]\nk_n = 1e6\nk_t = 4e5\nn = 0.5\n\
+                    mu_0 = 0.3\nmu_p = 0.7\nmu_c0 = 0.5\na = 0.01\nc_0 = 20.0\np_0 = 100.0\n";
+
+#[test]
+fn warns_of_a_thickness_that_differs_from_the_layers() {
+    const JOINT_LAW: &str = "law = \"coulomb_joint\"\n[laws.joint.parameters]\n\
+        normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
+        dilatancy_angle = 5.0\n";
+    let with = |t: &str| {
+        let text = edited(&[(
+            "formulation = \"thin_layer\"\n",
+            "formulation = \"thin_layer\"\ninitial_stress = { 11 = -100.0, 22 = -50.0, 33 = -50.0 }\n",
+        )]);
+        let place = Place::new();
+        let outcome = place.run_case(text.replace(JOINT_LAW, &format!("{MEPI}t = {t}\n")));
+        assert!(outcome.says("phase weight"), "{}", outcome.stderr);
+        outcome.says("the layer of elements is 0.010000 m thick")
+    };
+    assert!(with("0.02"));
+    assert!(!with("0.01"));
+}
+
+#[test]
+fn warns_of_an_interface_that_ends_at_a_corner() {
+    const BLOCK: Edit = (
+        "[[mesh.region]]\ngroup = \"layer\"\nx = [1.0, 1.01]\n",
+        "[[mesh.region]]\ngroup = \"block\"\nx = [0.0, 1.0]\ny = [0.5, 1.0]\n",
+    );
+    const INTERFACE: Edit = (
+        "formulation = \"thin_layer\"\n",
+        "formulation = \"zero_thickness\"\nline = \"base\"\n",
+    );
+    const BASE: Edit = (
+        LINES,
+        "corner = { x = 0.0, y = 0.5 }\nbase = { y = 0.5, x = [0.0, 1.0] }\n",
+    );
+    let group = |law: &'static str| {
+        let text = edited(&[BLOCK, INTERFACE, BASE]);
+        text.replace(
+            "[groups.soil]",
+            &format!("[groups.block]\nformulation = \"solid\"\nlaw = \"{law}\"\n\n[groups.soil]"),
+        )
+        .replace(
+            "[laws.joint]",
+            "[laws.concrete]\nlaw = \"elastic\"\nparameters = { young_modulus = 3e7, poisson_ratio \
+             = 0.2 }\n\n[laws.joint]",
+        )
+    };
+    let place = Place::new();
+    let said = "group `layer` ends inside the mesh at (1.000000, 0.500000), at a corner of group \
+                `block`";
+    let outcome = place.run_case(group("concrete"));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says(said), "{}", outcome.stderr);
+    // Groups of one law are one body: the interface ends inside it.
+    let outcome = place.run_case(group("soil"));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(!outcome.says("ends inside the mesh"), "{}", outcome.stderr);
+}
+
+#[test]
+fn warns_of_an_axis_that_is_free() {
+    let about = ("\"plane_strain\"", "\"axisymmetric\"");
+    warns(
+        &[about],
+        &["phase `weight`: 4 of 5 nodes on the axis r = 0 are free in r, the first at z = 0.25"],
+    );
+    runs_quietly(&[
+        about,
+        (
+            "[[phase]]",
+            "[[supports]]\nline = \"left\"\nfixed = [\"x\"]\n\n[[phase]]",
+        ),
+        (PUSH, ""),
+    ]);
+}
+
+#[test]
+fn tells_drivers_from_cases() {
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    place.write(
+        "driver.toml",
+        "law = \"coulomb_joint\"\nhypothesis = \"interface_2d\"\n[[segment]]\nincrements = 1\n",
+    );
+    place.write("other.toml", "base = \"driver.toml\"\n");
+    let says = |arguments: &[&str], texts: &[&str]| {
+        let outcome = place.run(arguments);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        for text in texts {
+            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+        }
+    };
+    let driver = ["driver.toml:2:1", "`hypothesis`: this is a driver file"];
+    says(&["run", "driver.toml"], &driver);
+    says(
+        &["run", "driver.toml"],
+        &["`pilum point driver.toml` takes it"],
+    );
+    says(&["run", "other.toml"], &driver);
+    let case = [
+        "case.toml:2:1",
+        "`analysis`: this is a case file",
+        "`pilum run case.toml`",
+    ];
+    says(&["point", "case.toml"], &case);
+    // A case with a mistake of its own is still a case.
+    place.write("case.toml", CASE.replace("fixed =", "fixt ="));
+    says(&["run", "case.toml"], &["unknown key `fixt`"]);
+}

@@ -1,0 +1,428 @@
+//! Routines that are right and were refused: with habits of their own, with much to say, with calls
+//! that are never reached, with tangents by rows or of elasticity.
+
+use super::{driver, gfortran, number, place, rows, soil, source};
+use crate::program::{BAD_INPUT, DONE, Outcome, PLUGIN_TROUBLE, Place};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::Command;
+use tests::case::table;
+
+/// Runs a driver without looking at how it ends.
+fn point(place: &Place, text: &str) -> Outcome {
+    place.write("driver.toml", text);
+    place.run(&["point", "driver.toml", "--csv", "out.csv"])
+}
+
+fn summary(place: &Place) -> serde_json::Value {
+    let text = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+#[test]
+fn copies_may_be_used_up_and_that_is_noted_once() {
+    let Some(place) = place("habits") else {
+        return;
+    };
+    let stress = |what: f64| {
+        let outcome = point(&place, &driver("habits", "", &format!("what = {what}")));
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let rows = table(&place.path("out.csv"));
+        let end = rows.last().unwrap();
+        let stress = ["11", "22", "33", "12"].map(|c| number(end, &format!("stress_{c}")));
+        (stress.map(f64::to_bits), outcome.stderr)
+    };
+    let (neat, said) = stress(0.0);
+    assert!(!said.contains("overwrites"), "{said}");
+    for (what, names) in [
+        (1.0, "overwrites DSTRAN, which"),
+        (
+            2.0,
+            "overwrites STRAN, TIME, DTIME, TEMP, PREDEF, COORDS, DROT, CELENT, DFGRD1, which",
+        ),
+    ] {
+        for keys in ["", "in_process = true"] {
+            let text = driver("habits", keys, &format!("what = {what}"));
+            let outcome = point(&place, &text);
+            assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+            let said = &outcome.stderr;
+            assert_eq!(
+                said.matches("law `umat_habits`: the routine").count(),
+                1,
+                "{said}"
+            );
+            assert!(said.contains(names), "{names}\n{said}");
+        }
+        assert_eq!(stress(what).0, neat, "what it leaves there is not used");
+    }
+    // A run says it, too, and keeps it.
+    let case = soil("habits", "").replacen(
+        "poisson_ratio = 0.3 }",
+        "poisson_ratio = 0.3, what = 1 }",
+        1,
+    );
+    let outcome = place.run_case(case);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let warnings = summary(&place)["warnings"].to_string();
+    assert_eq!(
+        warnings.matches("overwrites DSTRAN, which").count(),
+        1,
+        "{warnings}"
+    );
+    assert!(outcome.says("warning: law `umat_habits`: the routine overwrites DSTRAN"));
+}
+
+#[test]
+fn time_increments_are_positive_in_every_call() {
+    let Some(place) = place("habits") else {
+        return;
+    };
+    // The first call of all, in which nothing moves, is checked too: 0/0 would be refused.
+    let all = rows(&place, &driver("habits", "", "what = 3"));
+    assert!(all[1..].iter().all(|row| number(row, "dtime") == 1.0));
+    let text = soil("habits", "").replacen(
+        "poisson_ratio = 0.3 }",
+        "poisson_ratio = 0.3, what = 3 }",
+        1,
+    );
+    // The elastic operator is asked for, and is that of a call without strain.
+    for method in ["newton", "initial_stress"] {
+        let text = text.replacen("[solver]", &format!("[solver]\nmethod = \"{method}\""), 1);
+        let outcome = place.run_case(text);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    }
+}
+
+/// Lines of a text that say this.
+fn lines<'a>(text: &'a str, what: &str) -> Vec<&'a str> {
+    text.lines().filter(|line| line.contains(what)).collect()
+}
+
+#[test]
+fn what_is_printed_is_passed_on_and_counted() {
+    let Some(place) = place("talks") else {
+        return;
+    };
+    // Little: all of it, and nothing in the table on the standard output.
+    place.write("driver.toml", driver("talks", "", "lines = 0"));
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let here = place.path("").canonicalize().unwrap();
+    let outdir = format!("law `umat_talks` prints:  OUTDIR IS {}", here.display());
+    assert!(
+        outcome.says(outdir.trim_end_matches('/')),
+        "{}",
+        outcome.stderr
+    );
+    assert!(!outcome.stdout.contains("OUTDIR"), "{}", outcome.stdout);
+    // Much: the first lines, and how many there were. 3 a call, 10 increments and the start.
+    let text = driver("talks", "", "lines = 3");
+    let outcome = point(&place, &text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_eq!(
+        lines(&outcome.stderr, "umat_talks` prints: ").len(),
+        20,
+        "{}",
+        outcome.stderr
+    );
+    let total = lines(&outcome.stderr, "law `umat_talks` printed ");
+    let [total] = total[..] else {
+        panic!("{}", outcome.stderr)
+    };
+    let n: usize = total.split_whitespace().nth(3).unwrap().parse().unwrap();
+    assert_eq!((n - 1) % 3, 0, "{total}");
+    assert!(n >= 1 + 3 * 11, "{total}");
+    assert!(
+        total.ends_with("lines, of which the first 20 are shown"),
+        "{total}"
+    );
+
+    let case = soil("talks", "").replacen(
+        "poisson_ratio = 0.3 }",
+        "poisson_ratio = 0.3, lines = 1 }",
+        1,
+    );
+    let outcome = place.run_case(case);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_eq!(lines(&outcome.stderr, "umat_talks` prints: ").len(), 20);
+    assert!(!outcome.stdout.contains("LINE"), "{}", outcome.stdout);
+}
+
+#[test]
+fn scratch_files_are_removed_or_kept() {
+    let Some(place) = place("talks") else {
+        return;
+    };
+    let scratch = place.path("scratch");
+    std::fs::create_dir(&scratch).unwrap();
+    let left = || -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(&scratch).unwrap();
+        entries.map(|entry| entry.unwrap().path()).collect()
+    };
+    let run = |keys: &str| {
+        place.write("driver.toml", driver("talks", keys, "lines = 0"));
+        let arguments = ["point", "driver.toml", "--csv", "out.csv"];
+        let outcome = place.run_with(&arguments, &[("TMPDIR", scratch.to_str().unwrap())]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        for name in ["fort.7", "notes.dat"] {
+            assert!(!place.path(name).exists(), "{name} beside the driver");
+        }
+        outcome
+    };
+    run("");
+    assert_eq!(left(), Vec::<PathBuf>::new());
+    let outcome = run("scratch = \"keep\"");
+    let [folder] = &left()[..] else {
+        panic!("{:?}", left())
+    };
+    let says = format!("scratch files of law `umat_talks` in {}", folder.display());
+    assert!(outcome.says(&says), "{says}\n{}", outcome.stderr);
+    // Ten increments and the start, to the last line.
+    let text = std::fs::read_to_string(folder.join("worker_1/fort.7")).unwrap();
+    assert!(text.lines().count() >= 11, "{text}");
+    assert_eq!(
+        text.lines().last().unwrap().split_whitespace().last(),
+        Some("10")
+    );
+    assert!(folder.join("worker_1/notes.dat").is_file());
+    // The sidecar may say it, for the IncrementalDriver, whose input has no such key.
+    std::fs::remove_dir_all(folder).unwrap();
+    let sidecar = std::fs::read_to_string(place.path("talks.law.toml")).unwrap();
+    place.write("talks.law.toml", format!("scratch = \"keep\"\n{sidecar}"));
+    run("");
+    assert_eq!(left().len(), 1);
+    std::fs::remove_dir_all(&left()[0]).unwrap();
+    run("scratch = \"remove\"");
+    assert_eq!(left(), Vec::<PathBuf>::new());
+    for (keys, says) in [
+        (
+            "in_process = true\nscratch = \"keep\"",
+            "`scratch` needs a worker process",
+        ),
+        (
+            "in_process = true\nexternals = \"trap\"",
+            "`externals` needs a worker process",
+        ),
+        (
+            "externals = \"ignore\"",
+            "`externals`: there is no `ignore`",
+        ),
+    ] {
+        let outcome = point(&place, &driver("talks", keys, "lines = 0"));
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn what_nobody_supplies_is_named_at_once_or_trapped() {
+    let Some(place) = place("externals") else {
+        return;
+    };
+    let names = "linked with nor Pilum supply: `getvrm_`, `mutexlock_`.";
+    for keys in ["", "in_process = true"] {
+        let outcome = point(&place, &driver("externals", keys, ""));
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        for text in [names, "`externals = \"trap\"`"] {
+            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+        }
+    }
+    let trap = "externals = \"trap\"";
+    let bound = ["-shared", "-fPIC", "-Wl,-z,now,-z,relro"];
+    for linked_now in [false, true] {
+        if linked_now {
+            let library = place.path("libexternals.so");
+            std::fs::remove_file(&library).unwrap();
+            gfortran(&bound, &[source("externals.f")], &library).unwrap();
+        }
+        for now in [&[][..], &[("LD_BIND_NOW", "1")]] {
+            place.write("driver.toml", driver("externals", trap, ""));
+            let arguments = ["point", "driver.toml", "--csv", "out.csv"];
+            let outcome = place.run_with(&arguments, now);
+            assert_eq!(
+                outcome.code,
+                Some(DONE),
+                "{linked_now} {now:?}\n{}",
+                outcome.stderr
+            );
+        }
+        // One that is called ends the increment and is named.
+        let outcome = point(&place, &driver("externals", trap, "limit = 1.1e-3"));
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        for text in [
+            "segment 1, increment 7 of 10",
+            "exit code 71",
+            "calls `mutexlock_`, which nobody supplies",
+        ] {
+            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+        }
+        let outcome = place.run(&["replay", "out.failure.toml"]);
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        assert!(outcome.stdout.contains("as recorded"), "{}", outcome.stdout);
+    }
+}
+
+#[test]
+fn no_trap_stands_for_data() {
+    let Some(place) = place("externals") else {
+        return;
+    };
+    place.write(
+        "data.c",
+        "extern double table_[3]; extern void other_(void);\n\
+         double read_table(int i) { other_(); return table_[i]; }\n",
+    );
+    let library = place.path("libexternals.so");
+    std::fs::remove_file(&library).unwrap();
+    let sources = [source("externals.f"), place.path("data.c")];
+    gfortran(&["-shared", "-fPIC"], &sources, &library).unwrap();
+    let outcome = point(&place, &driver("externals", "externals = \"trap\"", ""));
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    assert!(
+        outcome.says("no trap can stand for: `table_`"),
+        "{}",
+        outcome.stderr
+    );
+    let outcome = point(&place, &driver("externals", "", ""));
+    for text in ["`getvrm_`, `mutexlock_`, `other_`", "`table_`"] {
+        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn a_tangent_may_stand_row_by_row() {
+    let Some(place) = place("rows") else {
+        return;
+    };
+    let text = "law = \"umat_rows\"\nadapter = \"umat\"\nlibrary = \"librows.so\"\n\
+        hypothesis = \"plane_strain\"\n\
+        [parameters]\nstiffness = 1e4\ncoupling = 8e3\n\
+        [[segment]]\nincrements = 3\ncontrol = { 11 = { stress = 30.0 }, \
+        22 = { stress = -20.0 }, 12 = { strain = 0.0 } }\n";
+    let calls = |rows: &[BTreeMap<String, String>]| -> f64 {
+        rows[1..].iter().map(|row| number(row, "iterations")).sum()
+    };
+    let by_rows = rows(&place, text);
+    let end = by_rows.last().unwrap();
+    // ε₂₂ = σ₂₂/K, ε₁₁ = (σ₁₁ − C ε₂₂)/K.
+    assert!((number(end, "strain_22") + 20.0 / 1e4).abs() < 1e-14);
+    assert!((number(end, "strain_11") - (30.0 + 8e3 * 20.0 / 1e4) / 1e4).abs() < 1e-14);
+    let sidecar = std::fs::read_to_string(place.path("rows.law.toml")).unwrap();
+    let columns = sidecar.replacen("\"rows\"", "\"columns\"", 1);
+    assert_ne!(columns, sidecar);
+    place.write("rows.law.toml", columns);
+    let by_columns = rows(&place, text);
+    let (by_rows, by_columns) = (calls(&by_rows), calls(&by_columns));
+    assert!(by_rows <= 6.0, "one correction of a linear law: {by_rows}");
+    assert!(by_columns > by_rows, "{by_columns} {by_rows}");
+    place.write("rows.law.toml", sidecar.replacen("\"rows\"", "\"c\"", 1));
+    let outcome = point(&place, text);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("`tangent_order`: there is no `c`"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+/// The cone with elastic tangents, in a soil that flows.
+fn flowing(place: &Place, method: &str) -> Outcome {
+    let text = soil("elastic_tangent", "")
+        .replacen(
+            "parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }",
+            "parameters = { young_modulus = 1e4, alpha = 0.3, beta = 0.05, k = 4.0 }",
+            1,
+        )
+        .replacen(
+            "cohesion = 10.0\n",
+            "cohesion = 1000.0\ntensile_strength = 1000.0\n",
+            1,
+        )
+        .replacen("x = 1e-5 }", "x = 3e-3 }", 1)
+        .replacen(
+            "name = \"push\"\nincrements = 2",
+            "name = \"push\"\nincrements = 10",
+            1,
+        )
+        .replacen("max_iterations = 20", method, 1);
+    place.run_case(text)
+}
+
+#[test]
+fn an_approximate_tangent_chooses_its_method() {
+    let Some(place) = place("drucker_prager") else {
+        return;
+    };
+    let sources = ["elastic_tangent.f", "drucker_prager.f"].map(source);
+    let library = place.path("libelastic_tangent.so");
+    gfortran(&["-shared", "-fPIC"], &sources, &library).unwrap();
+    let sidecar = std::fs::read_to_string(source("elastic_tangent.law.toml")).unwrap();
+    place.write("elastic_tangent.law.toml", &sidecar);
+    let outcome = flowing(&place, "");
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let says = "the tangents of law `umat_elastic_tangent` are approximate: method \
+                `quasi_newton` stands for `auto`";
+    assert_eq!(
+        outcome.stderr.matches(says).count(),
+        1,
+        "{}",
+        outcome.stderr
+    );
+    let found = summary(&place);
+    assert_eq!(found["solver"]["method"], "auto");
+    let of_phases = |value: &serde_json::Value, key: &str| -> Vec<serde_json::Value> {
+        let phases = value["phases"].as_array().unwrap().iter();
+        phases.map(|phase| phase[key].clone()).collect()
+    };
+    assert_eq!(
+        of_phases(&found, "method"),
+        ["quasi_newton", "quasi_newton"]
+    );
+    let total = |value: &serde_json::Value, key: &str| -> u64 {
+        of_phases(value, key)
+            .iter()
+            .map(|n| n.as_u64().unwrap())
+            .sum()
+    };
+    // The same as if it had been asked for.
+    let outcome = flowing(&place, "method = \"quasi_newton\"");
+    assert!(!outcome.says("stands for"), "{}", outcome.stderr);
+    let asked = summary(&place);
+    assert_eq!(total(&found, "iterations"), total(&asked, "iterations"));
+    // Without the word, or with Newton's method, it takes many more, or smaller steps.
+    place.write(
+        "elastic_tangent.law.toml",
+        sidecar.replacen("tangent = \"approximate\"", "", 1),
+    );
+    let _ = flowing(&place, "max_iterations = 1000\nrelaxation = false");
+    let newton = summary(&place);
+    let (quasi, newton) = (total(&found, "iterations"), total(&newton, "iterations"));
+    println!("quasi-Newton {quasi}, auto {newton}");
+    assert!(2 * quasi < newton, "{quasi} {newton}");
+}
+
+/// That gfortran's own libraries are there is no reason to believe that a name is.
+#[test]
+fn a_library_that_needs_a_missing_library_is_refused_for_that() {
+    let Some(place) = place("externals") else {
+        return;
+    };
+    let needed = place.path("libneeded.so");
+    gfortran(&["-shared", "-fPIC"], &[source("joint.f")], &needed).unwrap();
+    let library = place.path("libexternals.so");
+    std::fs::remove_file(&library).unwrap();
+    let here = format!("-L{}", place.path("").display());
+    let arguments = ["-shared", "-fPIC", "-Wl,--no-as-needed", &here, "-lneeded"];
+    let status = Command::new("gfortran")
+        .arg("-o")
+        .arg(&library)
+        .arg(source("externals.f"))
+        .args(arguments)
+        .status()
+        .unwrap();
+    assert!(status.success());
+    std::fs::remove_file(needed).unwrap();
+    let outcome = point(&place, &driver("externals", "externals = \"trap\"", ""));
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    assert!(outcome.says("libneeded.so"), "{}", outcome.stderr);
+}

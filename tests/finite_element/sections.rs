@@ -1,0 +1,237 @@
+//! Forces through sections, and sums over areas, held against equilibrium.
+//!
+//! Goal      probes that mean what they say
+//! Geometry  a column of 3 × 4 unequal quads under an end pressure, standing and lying; a round pile
+//!           in a ring of soil with an interface along its whole shaft
+//! Asserts   the force through every section is the end load; through part of one its share; the
+//!           integral of the friction is what equilibrium leaves to the shaft
+
+use crate::setup::{Results, assert_close, run};
+use std::f64::consts::PI;
+
+const EXACT: f64 = 1e-9;
+
+/// A column 1 m by 4 m under 10 kPa at its end, along y or x.
+fn column(standing: bool, probes: &str, joint: bool) -> crate::setup::Finished {
+    let (long, short) = if standing { ("y", "x") } else { ("x", "y") };
+    let parts = [
+        "{ n = 1, to = 0.2 }, { n = 2, to = 1.0 }",
+        "{ n = 4, to = 4.0, ratio = 1.3 }",
+    ];
+    let [columns, rows] = if standing {
+        parts
+    } else {
+        [parts[1], parts[0]]
+    };
+    let foot = "foot";
+    let joint = if joint {
+        "joint = { formulation = \"zero_thickness\", line = \"cut\", law = \"joint\" }"
+    } else {
+        ""
+    };
+    // The second grid line of four lengths 1, 1.3, 1.3², 1.3³ that make 4 m.
+    let sum: f64 = (0..4).map(|i| 1.3_f64.powi(i)).sum();
+    let cut = 4.0 * 2.3 / sum;
+    run(&format!(
+        r#"analysis = "plane_strain"
+[mesh]
+columns = [{columns}]
+rows = [{rows}]
+[[mesh.region]]
+group = "column"
+[mesh.lines]
+foot = {{ {long} = 0.0 }}
+side = {{ {short} = 0.0 }}
+head = {{ {long} = 4.0 }}
+cut = {{ {long} = {cut:.17} }}
+part = {{ {long} = {cut:.17}, {short} = [0.0, 0.2] }}
+along = {{ {short} = 0.2 }}
+[laws.column]
+law = "elastic"
+parameters = {{ young_modulus = 1e4, poisson_ratio = 0.3 }}
+[laws.joint]
+law = "coulomb_joint"
+parameters = {{ normal_stiffness = 1e6, shear_stiffness = 4e5, cohesion = 10.0, friction_angle = 30.0, dilatancy_angle = 5.0 }}
+[groups]
+column = {{ formulation = "solid", law = "column" }}
+{joint}
+[[supports]]
+line = "{foot}"
+fixed = ["{long}"]
+[[supports]]
+line = "side"
+fixed = ["{short}"]
+[[phase]]
+name = "load"
+increments = 1
+pressure = [{{ line = "head", value = 10.0 }}]
+[probes]
+{probes}
+"#
+    ))
+}
+
+#[test]
+fn the_force_through_a_section_is_the_load_beyond_it() {
+    for (standing, axis) in [(true, "y"), (false, "x")] {
+        let probe = |line: &str| {
+            format!(
+                "{line} = {{ line = \"{line}\", group = \"column\", quantity = \"force_{axis}\" }}\n"
+            )
+        };
+        let probes: String = ["foot", "cut", "part", "head", "along"].map(probe).concat();
+        let finished = column(standing, &probes, false);
+        let close = |line: &str, expected: f64| {
+            assert_close(
+                &format!("{axis} {line}"),
+                finished.last(line),
+                expected,
+                EXACT,
+                10.0,
+            );
+        };
+        // Through the section, and through a part of it that ends inside; compression positive.
+        close("cut", 10.0);
+        close("part", 2.0);
+        // On the outline, what the nodes there need: the foot pushes up, the head down.
+        close("foot", 10.0);
+        close("head", -10.0);
+        // Nothing passes sideways along the column but its own stress: no shear.
+        close("along", 0.0);
+    }
+}
+
+#[test]
+fn bodies_and_the_interface_between_them_pass_on_one_force() {
+    for (standing, axis) in [(true, "y"), (false, "x")] {
+        let probe = |group: &str| {
+            format!(
+                "{group} = {{ line = \"cut\", group = \"{group}\", quantity = \"force_{axis}\" }}\n"
+            )
+        };
+        let probes: String = ["column", "joint"].map(probe).concat();
+        let finished = column(standing, &probes, true);
+        for group in ["column", "joint"] {
+            assert_close(
+                &format!("{axis} {group}"),
+                finished.last(group),
+                10.0,
+                EXACT,
+                10.0,
+            );
+        }
+    }
+}
+
+/// A pile of 0.6 m in a ring of soil, 2 m long, pushed by 1 mm; with an interface or a thin layer
+/// along all of its shaft, and elements that grow upward.
+fn pile(layer: bool) -> crate::setup::Finished {
+    let (columns, group, region) = if layer {
+        (
+            "{ n = 2, to = 0.3 }, { n = 1, to = 0.31 }, { n = 4, to = 2.0, ratio = 1.5 }",
+            "{ formulation = \"thin_layer\", law = \"skin\", integration = \"mean\" }",
+            "[[mesh.region]]\ngroup = \"skin\"\nr = [0.3, 0.31]\n",
+        )
+    } else {
+        (
+            "{ n = 2, to = 0.3 }, { n = 4, to = 2.0, ratio = 1.5 }",
+            "{ formulation = \"zero_thickness\", line = \"shaft\", law = \"skin\" }",
+            "",
+        )
+    };
+    run(&format!(
+        r#"analysis = "axisymmetric"
+[mesh]
+columns = [{columns}]
+rows = [{{ n = 6, to = 2.0, ratio = 1.6 }}]
+[[mesh.region]]
+group = "soil"
+[[mesh.region]]
+group = "pile"
+r = [0.0, 0.3]
+{region}
+[mesh.lines]
+axis = {{ r = 0.0 }}
+wall = {{ r = 2.0 }}
+shaft = {{ r = 0.3 }}
+head = {{ z = 2.0, r = [0.0, 0.3] }}
+base = {{ z = 0.0, r = [0.0, 0.3] }}
+[laws.soil]
+law = "elastic"
+parameters = {{ young_modulus = 20e3, poisson_ratio = 0.3 }}
+[laws.pile]
+law = "elastic"
+parameters = {{ young_modulus = 1e5, poisson_ratio = 0.2 }}
+[laws.skin]
+law = "coulomb_joint"
+parameters = {{ normal_stiffness = 1e6, shear_stiffness = 3e5, cohesion = 5.0, friction_angle = 20.0, dilatancy_angle = 0.0 }}
+[groups]
+soil = {{ formulation = "solid", law = "soil" }}
+pile = {{ formulation = "solid", law = "pile" }}
+skin = {group}
+[[supports]]
+line = "axis"
+fixed = ["r"]
+[[supports]]
+line = "wall"
+fixed = ["r", "z"]
+[[supports]]
+line = "base"
+fixed = ["z"]
+[[phase]]
+name = "push"
+increments = 5
+displacement = [{{ line = "head", z = -0.001 }}]
+[probes]
+head = {{ line = "head", quantity = "reaction_z", scale = -1.0 }}
+base = {{ line = "base", quantity = "reaction_z" }}
+mean = {{ group = "skin", quantity = "traction_t" }}
+average = {{ group = "skin", quantity = "traction_t", reduce = "average" }}
+integral = {{ group = "skin", quantity = "traction_t", reduce = "integral" }}
+volume = {{ group = "pile", quantity = "stress_22", reduce = "integral" }}
+stress = {{ group = "pile", quantity = "stress_22", reduce = "average" }}
+lower = {{ group = "skin", quantity = "traction_t", reduce = "integral", z = [-0.1, 0.5] }}
+upper = {{ group = "skin", quantity = "traction_t", reduce = "integral", z = [0.5, 2.1] }}
+"#
+    ))
+}
+
+#[test]
+fn the_integral_of_the_friction_is_what_the_shaft_carries() {
+    let finished = pile(false);
+    let shaft = finished.last("head") - finished.last("base");
+    let (mean, integral) = (finished.last("mean"), finished.last("integral"));
+    assert!(shaft > 1.0, "the shaft carries {shaft} kN");
+    assert_close("integral", integral, shaft, EXACT, shaft);
+    // The whole turn times the length.
+    let area = 2.0 * PI * 0.3 * 2.0;
+    assert_close(
+        "average",
+        finished.last("average"),
+        integral / area,
+        EXACT,
+        shaft / area,
+    );
+    // Points are close where elements are small, so their arithmetic mean is another number.
+    assert!((mean * area / shaft - 1.0).abs() > 0.01, "{}", mean * area);
+    let parts = finished.last("lower") + finished.last("upper");
+    assert_close("parts", parts, integral, EXACT, shaft);
+    let volume = PI * 0.3 * 0.3 * 2.0;
+    let stress = finished.last("stress");
+    assert_close(
+        "volume",
+        finished.last("volume"),
+        stress * volume,
+        EXACT,
+        stress.abs() * volume,
+    );
+    assert_eq!(finished.summary()["probe_units"]["integral"], "kN");
+}
+
+#[test]
+fn so_it_is_of_a_layer() {
+    let finished = pile(true);
+    let shaft = finished.last("head") - finished.last("base");
+    // Strains linear across the layer do exactly the work of its faces' slip.
+    assert_close("integral", finished.last("integral"), shaft, EXACT, shaft);
+}
