@@ -5,9 +5,9 @@ Problem   De Gennaro & Frank, "Modelisation de l'interaction sol-pieu par la met
           mesh 1, elastic sand, thin layer (t = 2 mm) with the interface law MEPI without softening on the shaft.
           Axisymmetric, small strains, units kN, m, kPa; finite-element stresses tension positive; forces are
           for the whole turn (2 pi).  Phase 1: confinement, one increment, everything elastic (layer = sand).
-          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head pushed 5 mm in 50 increments.  What MEPI
-          returns at the strain it starts from is the stress it starts from; the force that this leaves out of balance is
-          taken off in proportion to the phase's course.
+          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head free, 5 increments.  What MEPI returns at
+          the strain it starts from is the stress it starts from; the force that this leaves out of balance is taken off
+          in proportion to the phase's course.  Phase 3: head pushed 5 mm in 50 increments; displacements from its start.
 Source    MEPI: equations (6)-(10), (12)-(17); thin layer: (18)-(19); parameters: Tables III and IV, p_0 = 100 kPa.
 Method    8-node quads, 3x3 Gauss points (--points 2: 2x2), full Newton with the consistent tangent, backtracking
           line search, start from the last increment (else from the tangent), relative residual 1e-10 over the free
@@ -27,7 +27,7 @@ from scipy.sparse.linalg import splu
 
 TAU2 = 2.0 * np.pi
 STEEL, SAND = (210e6, 0.28), (34e3, 0.30)                    # E [kPa], nu
-TOL, MAXIT, PRESSURE = 1e-10, 25, 100.0
+TOL, MAXIT, PRESSURE, SWAP = 1e-10, 25, 100.0, 5
 
 
 # ---------------------------------------------------------------- MEPI (compression and contraction positive)
@@ -276,30 +276,28 @@ def run(args):
     # phase 1, confinement
     fixed = np.concatenate([ch.axis, ch.top])
     u, _, (f, fe, sig), log = ch.newton(np.zeros(ch.ndof), None, None, True, fixed, np.zeros(fixed.size), ch.load)
-    record("confinement", 1, f, fe, sig, 0.0, [log])
+    record("confinement", 1, f, fe, sig, -u[ch.head].mean() * 1000, [log])
     print("confinement: head u_z [mm], per node:", u[ch.head] * 1000, "layer: max |tau|/sn",
           np.max(np.abs(sig[ch.is_layer][..., 3]) / -sig[ch.is_layer][..., 0]))
-    # phase 2, loading
+    # phase 2, the interface: nothing moves but what the law sets free
     s0 = sig[ch.is_layer]
     state = (s0, -s0[:, :, 0], np.zeros(s0.shape[:2]))
     state, rest = ch.take_over(u, state, law, not args.no_in_plane)
-    fixed = np.concatenate([ch.axis, ch.top, ch.head])
     rest[fixed] = 0.0
-    prescribed = np.concatenate([np.zeros(ch.axis.size + ch.top.size), -np.ones(ch.head.size)])
+    head = ch.head
 
-    last = [None, 1.0]                                                     # last increment of u, and of the head
-    done = [0.0]                                                           # displacement of the head
+    last = [None, 1.0]                                                     # last increment of u, and of the phase's course
 
-    def advance(u, state, d, depth, logs):
+    def advance(u, state, start, part, depth, logs):
+        """from `start` by `part` of the phase; `push`: displacement in the whole phase, of the degrees of freedom `fixed`"""
         err = None
-        for guess in ([] if last[0] is None else [last[0] * (d / last[1])]) + [None]:
+        for guess in ([] if last[0] is None else [last[0] * (part / last[1])]) + [None]:
             try:
-                u1, st1, out, log = ch.newton(u, state, law, not args.no_in_plane, fixed, prescribed * d,
-                                               ch.load + (1.0 - (done[0] + d) / 0.005) * rest, guess)
+                u1, st1, out, log = ch.newton(u, state, law, not args.no_in_plane, fixed, push * part,
+                                              ch.load + (1.0 - (start + part)) * rest, guess)
                 logs.append(log)
                 total[0] += len(log)
-                last[:] = u1 - u, d
-                done[0] += d
+                last[:] = u1 - u, part
                 return u1, st1, out
             except (FloatingPointError, RuntimeError) as e:
                 err = e
@@ -308,14 +306,24 @@ def run(args):
         print("  cut-back:", err)
         if depth == 12:
             raise SystemExit(f"gave up after {len(rows) - 1} increments: {err}")
-        u, state, _ = advance(u, state, d / 2, depth + 1, logs)
-        return advance(u, state, d / 2, depth + 1, logs)
+        u, state, _ = advance(u, state, start, part / 2, depth + 1, logs)
+        return advance(u, state, start + part / 2, part / 2, depth + 1, logs)
 
     worst = 0
     try:
+        push = np.zeros(fixed.size)
+        for inc in range(1, SWAP + 1):
+            logs = []
+            u, state, out = advance(u, state, (inc - 1) / SWAP, 1 / SWAP, 0, logs)
+            record("interface", inc, *out, -u[head].mean() * 1000, logs)
+        print(f"interface: {total[0]} iterations, {total[1]} cut-backs")
+        # phase 3, loading
+        fixed = np.concatenate([fixed, head])
+        push = np.where(np.isin(fixed, head), -0.005, 0.0)
+        rest[:], last[0], total[0] = 0.0, None, 0
         for inc in range(1, args.increments + 1):
             logs = []
-            u, state, out = advance(u, state, 0.005 / args.increments, 0, logs)
+            u, state, out = advance(u, state, (inc - 1) / args.increments, 1 / args.increments, 0, logs)
             worst = max(worst, max(len(l) for l in logs))
             record("loading", inc, *out, 5.0 * inc / args.increments, logs)
     finally:

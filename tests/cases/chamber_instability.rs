@@ -12,14 +12,15 @@ const CASE: &str = "chamber_instability";
 
 #[test]
 fn the_printed_parameters_are_swapped_in_at_once() {
-    for (variant, phase, increments) in [
-        ("as_printed", "loading", 50),
-        ("small_increments", "loading", 500),
-        ("no_elasticity_along_the_layer", "loading", 50),
-        ("swap_then_push", "pushing", 50),
-        ("mean", "loading", 50),
-        ("reduced", "loading", 50),
-        ("friction_in_confinement", "loading", 50),
+    for (variant, increments) in [
+        ("as_printed", 50),
+        ("small_increments", 500),
+        ("no_elasticity_along_the_layer", 50),
+        ("swap_with_head_held", 50),
+        ("swap_while_pushed", 50),
+        ("mean", 50),
+        ("reduced", 50),
+        ("friction_in_confinement", 50),
     ] {
         let run = finished(CASE, variant);
         for phase in run.summary["phases"].as_array().unwrap() {
@@ -31,13 +32,13 @@ fn the_printed_parameters_are_swapped_in_at_once() {
             warnings.contains("law `mepi` takes over group `interface` with stresses up to "),
             "{variant}: {warnings}"
         );
-        // The interface only contracts: K_l falls from 1.37 within 1.2 to 1.7 mm, the more the smaller the increments. Then
+        // The interface only contracts: K_l falls from 1.37 within 1.3 to 1.8 mm, the more the smaller the increments. Then
         // the toe, which presses elastic sand aside, brings some of it back.
-        let k_l = run.probe(phase, "k_l");
+        let k_l = run.probe("loading", "k_l");
         assert_eq!(k_l.len(), increments);
         let falls = k_l.windows(2).take_while(|pair| pair[1] < pair[0]).count();
         let at = 5.0 * (falls + 1) as f64 / increments as f64;
-        assert!((1.1..1.8).contains(&at), "{variant}: least at {at} mm");
+        assert!((1.2..1.9).contains(&at), "{variant}: least at {at} mm");
         let least = k_l.iter().copied().fold(f64::INFINITY, f64::min);
         let last = k_l[increments - 1];
         let [low, high] = if variant == "small_increments" {
@@ -75,7 +76,7 @@ fn where_the_traction_jumps_the_run_stops_at_the_last_equilibrium() {
     assert_eq!(error.exit_code(), 2, "{error}");
     let message = error.to_string();
     assert!(
-        message.contains("phase `loading`, increment 1"),
+        message.contains("phase `interface`, increment 1"),
         "{message}"
     );
     assert!(
@@ -85,5 +86,5 @@ fn where_the_traction_jumps_the_run_stops_at_the_last_equilibrium() {
     assert_eq!(run.summary["status"], "no equilibrium");
     assert_eq!(run.summary["last_equilibrium"]["phase"], "confinement");
     assert_eq!(run.probe("confinement", "k_l").len(), 1);
-    assert_eq!(run.probe("loading", "k_l").len(), 0);
+    assert_eq!(run.probe("interface", "k_l").len(), 0);
 }
