@@ -8,7 +8,7 @@ use crate::case::Case;
 use crate::error::{Error, Place};
 use crate::group::GroupState;
 use crate::model::Model;
-use crate::output::{PhaseRecord, ResultsState, unwritable};
+use crate::output::{PhaseRecord, ResultsState, begin, unwritable};
 use crate::plugin::{hexadecimal, hexadecimal_sha256};
 use crate::run::History;
 use crate::solver::{Loads, Standing};
@@ -27,7 +27,7 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of the file: the format.
 const NAME: &[u8] = b"pilum checkpoint ";
 /// The same with its version.
-const HEAD: &[u8] = b"pilum checkpoint 3\n";
+const HEAD: &[u8] = b"pilum checkpoint 4\n";
 
 /// Bytes that are summed and written at a time: they stay in the processor's cache.
 const PIECE: usize = 1 << 17;
@@ -113,7 +113,7 @@ impl<'c> Checkpoint<'c> {
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
         let path = folder.join(FILE_NAME);
         let partial = folder.join(format!("{FILE_NAME}.part"));
-        let written = File::create(&partial).and_then(|file| self.write_to(file));
+        let written = begin(&partial).and_then(|file| self.write_to(file));
         written
             .and_then(|()| std::fs::rename(&partial, &path))
             .map_err(|error| {

@@ -28,7 +28,7 @@ fn chromium() -> Option<PathBuf> {
 }
 
 /// What the page says of itself; `None` without a browser.
-fn selftest(page: &Path) -> Option<Value> {
+pub(crate) fn selftest(page: &Path) -> Option<Value> {
     let Some(program) = chromium() else {
         assert!(
             std::env::var_os("CI").is_none(),
