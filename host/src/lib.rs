@@ -25,6 +25,9 @@ pub mod input;
 pub mod inspect;
 pub mod laws;
 pub mod lock;
+#[expect(unsafe_code, reason = "the program's allocator")]
+#[cfg(unix)]
+pub mod memory;
 pub mod mesh;
 pub mod model;
 pub mod new_law;

@@ -16,13 +16,33 @@ use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// A line on the error stream. Nobody may be reading it: that does not end a run.
+/// Memory that runs out ends the program with a message.
+#[cfg(unix)]
+#[global_allocator]
+static ALLOCATOR: host::memory::Allocator = host::memory::Allocator;
+
+/// A line on the error stream. That it cannot be written does not end a run, but is said of it in
+/// the end.
 macro_rules! say {
-    ($($text:tt)*) => {{
-        let _ = writeln!(std::io::stderr(), $($text)*);
-    }};
+    ($($text:tt)*) => {
+        unsaid(writeln!(std::io::stderr(), $($text)*))
+    };
+}
+
+/// Why the error stream took no more.
+static UNSAID: Mutex<Option<std::io::Error>> = Mutex::new(None);
+
+/// Keeps why a line could not be written. Whoever reads a pipe may have read enough.
+fn unsaid(written: std::io::Result<()>) {
+    if let Err(why) = written
+        && why.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        let mut unsaid = UNSAID.lock().unwrap_or_else(PoisonError::into_inner);
+        unsaid.get_or_insert(why);
+    }
 }
 
 /// Finite elements for soil-structure interfaces, with constitutive laws as plugins.
@@ -187,6 +207,8 @@ impl Command {
 }
 
 fn main() -> ExitCode {
+    #[cfg(unix)]
+    host::memory::reserve();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -224,15 +246,35 @@ fn main() -> ExitCode {
     ended(outcome)
 }
 
-/// The exit code, after the message.
+/// The exit code, after the message. What a command came to matters more than that not all could be
+/// said of it.
 fn ended(outcome: Result<(), Error>) -> ExitCode {
-    match outcome {
+    let unsaid = UNSAID.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let outcome = outcome.and(match unsaid {
+        None => Ok(()),
+        Some(why) => Err(Error::Usage(format!(
+            "cannot write to the standard error: {why}"
+        ))),
+    });
+    match outcome.map_err(named_shortage) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();
             say!("{:?}", miette::Report::new(error));
             ExitCode::from(code)
         }
+    }
+}
+
+/// A file that the system has no memory for is no trouble with the file.
+fn named_shortage(error: Error) -> Error {
+    match &error {
+        Error::Unreadable { source, .. } | Error::Unwritable { source, .. }
+            if source.kind() == std::io::ErrorKind::OutOfMemory =>
+        {
+            cannot_start("the command", &error)
+        }
+        _ => error,
     }
 }
 
@@ -247,12 +289,7 @@ fn execute(command: Command) -> Result<(), Error> {
             threads,
             record,
         } => {
-            if let Some(n) = threads {
-                rayon::ThreadPoolBuilder::new()
-                    .num_threads(n.into())
-                    .build_global()
-                    .map_err(|error| Error::Internal(error.to_string()))?;
-            }
+            start_threads(threads)?;
             stop_on_signals()?;
             let options = Options {
                 resume,
@@ -452,7 +489,27 @@ fn stop_on_signals() -> Result<(), Error> {
         }
         say!("stopping after this increment; once more to stop at once");
     };
-    ctrlc::set_handler(stop).map_err(|error| Error::Internal(error.to_string()))
+    ctrlc::set_handler(stop).map_err(|error| match error {
+        ctrlc::Error::System(why) => cannot_start("a thread for Ctrl-C", &why),
+        error => Error::Internal(error.to_string()),
+    })
+}
+
+/// Starts the threads that a run works with; as many as there are processors, if it is not said.
+fn start_threads(n: Option<u16>) -> Result<(), Error> {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(n.map_or(0, usize::from));
+    threads
+        .build_global()
+        .map_err(|why| cannot_start("the threads of the run", &why))
+}
+
+/// What starting a thread takes is memory, above all.
+fn cannot_start(what: &str, why: &impl std::fmt::Display) -> Error {
+    #[cfg(unix)]
+    let message = host::memory::cannot_start(what, why);
+    #[cfg(not(unix))]
+    let message = format!("not enough memory to start {what}: {why}");
+    Error::Usage(message)
 }
 
 /// A time in seconds.

@@ -20,7 +20,7 @@ pub use table::{Row, Table};
 
 use crate::capsule::{self, Capsule};
 use crate::error::{Error, suggestion};
-use crate::output::Figures;
+use crate::output::{Figures, is_same};
 use crate::plugin::Moment;
 use crate::plugin::adapter::{self, Adapter};
 use abi::status::Outcome;
@@ -205,8 +205,7 @@ fn run_all(
     };
     for driver in &drivers {
         let csv = target(driver);
-        let same = path.canonicalize().ok().zip(csv.canonicalize().ok());
-        if same.is_some_and(|(driver, csv)| driver == csv) {
+        if is_same(path, &csv) {
             return Err(Error::Usage(format!(
                 "--csv {} would overwrite the driver file",
                 csv.display()

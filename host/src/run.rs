@@ -118,6 +118,7 @@ pub fn run_reusing(
     let (mut results, state) = if let Some(checkpoint) = found {
         let from = checkpoint.place(case);
         let Some(state) = checkpoint.run else {
+            checkpoint.results.check(folder)?;
             observer.resumed(None);
             return Ok(checkpoint.results.figures(case, &probes));
         };

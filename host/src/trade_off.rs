@@ -25,6 +25,7 @@ pub use study::{Measurement, Reference, Row, Study};
 
 use crate::case::{Case, base};
 use crate::error::{Error, Source, suggestion};
+use crate::output::replace;
 use crate::point::Driver;
 use std::path::{Path, PathBuf};
 use trial::Scratch;
@@ -182,7 +183,7 @@ fn finish(study: &Study, folder: &Path, show: &mut dyn FnMut(&str)) -> Result<()
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Error> {
-    std::fs::write(path, text).map_err(|source| unwritable(path, source))
+    replace(path, text)
 }
 
 fn unwritable(path: &Path, source: std::io::Error) -> Error {
