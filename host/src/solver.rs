@@ -13,5 +13,6 @@ pub use dissection::mesh_lines;
 pub use linear::{Block, LinearSolver, Singular};
 pub use linear_domain::{LinearDomain, LookedAt, Reuse, Standing};
 pub use newton::{
-    Costs, Guess, Iteration, Loads, Matrix, Measure, Newton, StepFailure, StepSuccess,
+    Costs, Criterion, Guess, Iteration, Loads, Matrix, Measure, Newton, Runaway, StepFailure,
+    StepSuccess, Unmet,
 };
