@@ -6,7 +6,7 @@
 
 mod bodies;
 
-pub use bodies::{Bodies, norms};
+pub use bodies::{Bodies, SHARED, norms};
 
 use crate::group::Group;
 use rayon::prelude::*;
@@ -131,6 +131,10 @@ pub struct PlacesOfBodies {
     pub of_equation: Vec<u32>,
     /// Body of every degree of freedom.
     pub of_dof: Vec<u32>,
+    /// Body of every element, group by group.
+    pub of_element: Vec<Vec<u32>>,
+    /// Places that several bodies have in common.
+    pub shared: Vec<usize>,
     /// Largest side of every body.
     pub extents: Vec<f64>,
 }
@@ -173,9 +177,14 @@ impl Places {
     /// The same, with what belongs to which body.
     #[must_use]
     pub fn of(self, bodies: &Bodies, system: &System) -> Self {
+        let of_place = bodies.of(self.dofs.iter().copied());
         let bodies = PlacesOfBodies {
             n: bodies.n().max(1),
-            of_place: bodies.of(self.dofs.iter().copied()),
+            shared: (0..of_place.len())
+                .filter(|&place| of_place[place] == SHARED)
+                .collect(),
+            of_place,
+            of_element: bodies.of_elements().to_vec(),
             of_equation: bodies.of(system.free.iter().copied()),
             of_dof: bodies.of(0..self.n_dofs),
             extents: bodies.extents().to_vec(),

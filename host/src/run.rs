@@ -5,7 +5,7 @@ mod keeper;
 mod path;
 mod statics;
 
-use crate::assembly::{Bodies, Places, System, fold, norms};
+use crate::assembly::{Bodies, Places, System, fold};
 use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
@@ -17,8 +17,8 @@ use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figure
 use crate::plugin::{Library, Moment};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    Costs, Guess, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
-    Runaway, StepFailure, StepSuccess, mesh_lines,
+    Costs, Guess, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Runaway,
+    Singular, StepFailure, StepSuccess, mesh_lines,
 };
 pub(crate) use history::History;
 use keeper::Keeper;
@@ -199,10 +199,8 @@ struct Run<'a> {
     time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     largest_force: f64,
-    /// The same of every body, where there are several.
+    /// The same at every degree of freedom.
     largest_forces: Vec<f64>,
-    /// Parts of the model that do not touch.
-    bodies: Bodies,
     /// Rotations call forth no stresses in any group.
     turns_freely: bool,
     /// Factors of linear parts.
@@ -270,7 +268,6 @@ impl<'a> Run<'a> {
         } = model;
         let n_dofs = 2 * mesh.nodes.len();
         let looked_at = probes.looks_at(&groups);
-        let bodies = Bodies::new(&groups, &ties, &mesh.nodes);
         let turns_freely = groups.iter().all(|group| turns_freely(group, &mesh.nodes));
         let mut run = Self {
             case,
@@ -285,8 +282,7 @@ impl<'a> Run<'a> {
             force: vec![0.0; n_dofs],
             time: 0.0,
             largest_force: 0.0,
-            largest_forces: Vec::new(),
-            bodies,
+            largest_forces: vec![0.0; n_dofs],
             turns_freely,
             reuse,
         };
@@ -866,21 +862,18 @@ impl<'a> Run<'a> {
             let numbered = is_free.iter().enumerate().filter(|(_, is_free)| **is_free);
             numbered.map(|(dof, _)| (dof, external[dof]))
         };
-        let bounds: Vec<statics::Bound> = scales
-            .iter()
-            .map(|&scale| statics::Bound {
-                scale,
-                tolerance: *tolerance,
-                with_domain: equations.domain.is_some() && beside.is_empty(),
-            })
-            .collect();
+        // Supports may be those of several bodies: they are added up together.
+        let bound = statics::Bound {
+            scale: scales.iter().copied().fold(0.0, f64::max),
+            tolerance: *tolerance,
+            with_domain: equations.domain.is_some() && beside.is_empty(),
+        };
         let model = statics::Model {
             analysis: self.case.file.analysis,
             nodes: &self.mesh.nodes,
-            of_dof: &equations.places.bodies.of_dof,
             turns_freely: self.turns_freely,
         };
-        match statics::complaint(model, supports(), unknowns(), &bounds) {
+        match statics::complaint(model, supports(), unknowns(), bound) {
             None => Ok(()),
             Some(complaint) => Err(complaint),
         }
@@ -931,7 +924,7 @@ impl<'a> Run<'a> {
                 .collect(),
             out_of_balance: Vec::new(),
             scale: 0.0,
-            scales: Vec::new(),
+            largest: Vec::new(),
         }
     }
 
@@ -991,8 +984,14 @@ impl<'a> Run<'a> {
                 None => domain.start(&self.groups, &loads, &self.displacement),
             }
         }
+        let bodies = Bodies::new(
+            &self.groups,
+            &self.model.ties,
+            &self.mesh.nodes,
+            is_prescribed,
+        );
         let mut equations = PhaseEquations {
-            places: Places::new(&system, is_prescribed).of(&self.bodies, &system),
+            places: Places::new(&system, is_prescribed).of(&bodies, &system),
             system,
             domain,
             solver,
@@ -1051,7 +1050,11 @@ impl<'a> Run<'a> {
         // Where nothing is left of earlier forces, what remains of them is round-off.
         self.largest_force = self.largest_force.max(f64::sqrt(play));
         loads.scale = self.largest_force;
-        loads.scales = self.largest_of_bodies(&internal, &loads.force_start);
+        let both = internal.iter().zip(&loads.force_start);
+        for (largest, (internal, external)) in self.largest_forces.iter_mut().zip(both) {
+            *largest = largest.max(internal.abs()).max(external.abs());
+        }
+        loads.largest.clone_from(&self.largest_forces);
         // An initial stress that the loads of its own phase balance is in balance.
         let rest = rest.min(against_end);
         if play > 0.0 {
@@ -1059,23 +1062,6 @@ impl<'a> Run<'a> {
         } else {
             0.0
         }
-    }
-
-    /// Largest of the forces of every body at the start of any phase so far, this one included.
-    fn largest_of_bodies(&mut self, internal: &[f64], external: &[f64]) -> Vec<f64> {
-        let of_dof = self.bodies.of(0..internal.len());
-        let both = internal.iter().zip(external);
-        let larger: Vec<f64> = both.map(|(i, e)| i.abs().max(e.abs())).collect();
-        let now = norms(&of_dof, self.bodies.n().max(1), &larger);
-        self.largest_forces.resize(now.len(), 0.0);
-        for (largest, now) in self.largest_forces.iter_mut().zip(now) {
-            *largest = largest.max(now);
-        }
-        if of_dof.is_empty() {
-            // One body: there is but one scale.
-            self.largest_forces = vec![self.largest_force];
-        }
-        self.largest_forces.clone()
     }
 
     /// Writes the call of a law that failed for good. Returns what the user can do with it.
@@ -1160,9 +1146,14 @@ fn turns_freely(group: &Group, nodes: &[[f64; 2]]) -> bool {
         let displacement: Vec<f64> = nodes.iter().flat_map(moved).collect();
         let mut strains = vec![0.0; group.strain.committed.len()];
         group.kinematics.add_gradients(&displacement, &mut strains);
-        strains.iter().fold(0.0, |largest: f64, e| largest.max(e.abs()))
+        strains
+            .iter()
+            .fold(0.0, |largest: f64, e| largest.max(e.abs()))
     };
     // A shear of the same displacements for comparison.
-    let (turned, sheared) = (gradients([0.0, -1.0, 1.0, 0.0]), gradients([0.0, 1.0, 1.0, 0.0]));
+    let (turned, sheared) = (
+        gradients([0.0, -1.0, 1.0, 0.0]),
+        gradients([0.0, 1.0, 1.0, 0.0]),
+    );
     turned <= 1e-6 * sheared.max(1.0)
 }

@@ -1,58 +1,69 @@
 //! Two bodies in one model that do not touch.
 //!
 //! Goal        what one body carries does not loosen the tolerances of another
-//! Geometry    two blocks side by side, of two elements each, with a gap between them
-//! Boundary    each on its own base, free at its sides; pressed from above, the first 10¹¹ times
+//! Geometry    two blocks side by side with a wall between them whose sides are fixed
+//! Boundary    each on its own base, its outer side free; pressed from above, the first 10¹¹ times
 //!             as hard
-//! Law         elastic; mohr_coulomb in the second block
+//! Law         mohr_coulomb, 10⁹ times as stiff in the first block; elastic in the wall
 //! Asserts     the second block carries and settles as it does alone; of one body nothing changes
 
 use crate::setup::{Results, run};
 
 /// The two blocks, or the second alone.
 fn blocks(with_first: bool, solver: &str) -> String {
-    let first = |text: &'static str| if with_first { text } else { "" };
+    let (stiffness, cohesion, pressure) = if with_first {
+        ("34e12", "1e14", "2.5e11")
+    } else {
+        ("34e3", "1e5", "0.0")
+    };
     format!(
         r#"
 analysis = "plane_strain"
 [mesh]
 origin = [0.0, 0.0]
-columns = [{{ n = 1, to = 1.0 }}, {{ n = 1, to = 2.0 }}, {{ n = 2, to = 3.0 }}]
+columns = [{{ n = 2, to = 1.0 }}, {{ n = 1, to = 1.1 }}, {{ n = 2, to = 2.1 }}]
 rows = [{{ n = 2, to = 1.0 }}]
-{}
+[[mesh.region]]
+group = "wall"
+[[mesh.region]]
+group = "first"
+x = [0.0, 1.0]
 [[mesh.region]]
 group = "second"
-x = [2.0, 3.0]
+x = [1.1, 2.1]
 [mesh.lines]
-{}
-second_base = {{ y = 0.0, x = [2.0, 3.0] }}
-second_top = {{ y = 1.0, x = [2.0, 3.0] }}
+base = {{ y = 0.0 }}
+left = {{ x = 1.0 }}
+right = {{ x = 1.1 }}
+first_top = {{ y = 1.0, x = [0.0, 1.0] }}
+second_top = {{ y = 1.0, x = [1.1, 2.1] }}
 [laws]
-{}
+elastic = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
+rock = {{ law = "mohr_coulomb", parameters = {{ young_modulus = {stiffness}, poisson_ratio = 0.3, cohesion = {cohesion}, friction_angle = 20.0, dilatancy_angle = 10.0 }} }}
 ground = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 20.0, dilatancy_angle = 10.0 }} }}
 [groups]
-{}
+wall = {{ formulation = "solid", law = "elastic" }}
+first = {{ formulation = "solid", law = "rock" }}
 second = {{ formulation = "solid", law = "ground" }}
-{}
 [[supports]]
-line = "second_base"
+line = "base"
+fixed = ["x", "y"]
+[[supports]]
+line = "left"
+fixed = ["x", "y"]
+[[supports]]
+line = "right"
 fixed = ["x", "y"]
 [[phase]]
 name = "press"
 increments = 1
-pressure = [{}{{ line = "second_top", value = 2.5 }}]
+pressure = [{{ line = "first_top", value = {pressure} }}, {{ line = "second_top", value = 2.5 }}]
 [probes]
 settlement = {{ line = "second_top", quantity = "displacement_y" }}
 plastic = {{ group = "second", quantity = "plastic_strain", reduce = "max" }}
 [solver]
 {solver}
-"#,
-        first("[[mesh.region]]\ngroup = \"first\"\nx = [0.0, 1.0]"),
-        first("first_base = { y = 0.0, x = [0.0, 1.0] }\nfirst_top = { y = 1.0, x = [0.0, 1.0] }"),
-        first("rock = { law = \"mohr_coulomb\", parameters = { young_modulus = 34e12, poisson_ratio = 0.3, cohesion = 1e14, friction_angle = 20.0, dilatancy_angle = 10.0 } }"),
-        first("first = { formulation = \"solid\", law = \"rock\" }"),
-        first("[[supports]]\nline = \"first_base\"\nfixed = [\"x\", \"y\"]"),
-        first("{ line = \"first_top\", value = 2.5e11 }, "),
+"#
     )
 }
 

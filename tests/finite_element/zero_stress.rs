@@ -78,7 +78,11 @@ fn both_ways_up_no_force_is_left() {
         let force = finished.end_of("push", "head").abs();
         assert!(force > 1.0, "{force} kN");
         // Residuals of 1e-9 of that may be left.
-        assert!(finished.last("head").abs() < 1e-8 * force, "{mirrored}: {}", finished.last("head"));
+        assert!(
+            finished.last("head").abs() < 1e-8 * force,
+            "{mirrored}: {}",
+            finished.last("head")
+        );
         pushed.push(force);
     }
     assert!((pushed[0] / pushed[1] - 1.0).abs() < 1e-8, "{pushed:?}");

@@ -51,7 +51,10 @@ impl Group {
         let end = gradient.trial.get(n * point..n * (point + 1))?;
         let place = self.flux_place();
         let flux = place.of_point(&self.stress.committed, point, n);
-        let state = self.internal.committed.get(n_states * point..n_states * (point + 1))?;
+        let state = self
+            .internal
+            .committed
+            .get(n_states * point..n_states * (point + 1))?;
         let sites: Vec<Site> = self.sites.get(point).copied().into_iter().collect();
         let rows = Strided::rows(n);
         let answer = |end: &[f64], operator: Operator| {
@@ -80,13 +83,20 @@ impl Group {
             Some((flux_end, matrix))
         };
         let (here, matrix) = answer(end, Operator::Consistent)?;
-        let reach = start.iter().zip(end).fold(0.0_f64, |r, (a, b)| r.max((b - a).abs()));
+        let reach = start
+            .iter()
+            .zip(end)
+            .fold(0.0_f64, |r, (a, b)| r.max((b - a).abs()));
         let reach = if reach > 0.0 { reach } else { 1e-6 };
         // Of every entry the slope that comes closest to the tangent: one side of a kink may be
         // all that it is the derivative of.
         let mut slopes = vec![f64::INFINITY; n * n];
         for j in 0..n {
-            for h in DIFFERENCES.iter().map(|size| size * reach).flat_map(|h| [h, -h]) {
+            for h in DIFFERENCES
+                .iter()
+                .map(|size| size * reach)
+                .flat_map(|h| [h, -h])
+            {
                 let mut moved = end.to_vec();
                 moved[j] += h;
                 let Some((there, _)) = answer(&moved, Operator::None) else {
@@ -114,14 +124,16 @@ impl Group {
 /// and no stress opposes its own strain, the smallest slope, its component, and `n`.
 fn fault(n: usize, matrix: &[f64], slopes: &[f64]) -> Option<(f64, [usize; 2])> {
     let known = |at: &usize| slopes[*at].is_finite();
-    let largest = (0..n * n)
-        .filter(known)
-        .fold(0.0_f64, |m, at| m.max(matrix[at].abs()).max(slopes[at].abs()));
+    let largest = (0..n * n).filter(known).fold(0.0_f64, |m, at| {
+        m.max(matrix[at].abs()).max(slopes[at].abs())
+    });
     if largest <= 0.0 {
         return None;
     }
     let off = |at: usize| (slopes[at] - matrix[at]).abs() / largest;
-    let worst = (0..n * n).filter(known).max_by(|&a, &b| off(a).total_cmp(&off(b)))?;
+    let worst = (0..n * n)
+        .filter(known)
+        .max_by(|&a, &b| off(a).total_cmp(&off(b)))?;
     if off(worst) > WRONG {
         return Some((off(worst), [worst / n, worst % n]));
     }

@@ -1,4 +1,4 @@
-//! The balance of all forces on a body: reactions and loads add up to nothing, in each direction
+//! The balance of all forces on a model: reactions and loads add up to nothing, in each direction
 //! and, in the plane, in their moments.
 //!
 //! The forces inside a body cancel by geometry, whatever the stresses are; so what is left of the
@@ -15,7 +15,7 @@ use crate::case::Analysis;
 /// Round-off of a sum, relative to the forces it is of; as in the residual.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
-/// Forces on a body and what may be left of their sum.
+/// Forces on a model and what may be left of their sum.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Balance {
     /// Forces x and y and their moment: of supports, and of loads.
@@ -29,7 +29,7 @@ pub(super) struct Balance {
     lever: f64,
 }
 
-/// What the residual of a body was measured against, and with what tolerance.
+/// What the residual was measured against, and with what tolerance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bound {
     pub(super) scale: f64,
@@ -40,7 +40,7 @@ pub(super) struct Bound {
 }
 
 impl Balance {
-    /// A force at a degree of freedom, with its place relative to the body's middle.
+    /// A force at a degree of freedom, with its place relative to the model's middle.
     fn add(&mut self, dof: usize, [x, y]: [f64; 2], force: f64, is_prescribed: bool) {
         let lever = if dof.is_multiple_of(2) { -y } else { x };
         let sums = if is_prescribed {
@@ -88,8 +88,6 @@ impl Balance {
 pub(super) struct Model<'m> {
     pub(super) analysis: Analysis,
     pub(super) nodes: &'m [[f64; 2]],
-    /// Body of every degree of freedom; empty if there is but one.
-    pub(super) of_dof: &'m [u32],
     /// Rotations call forth no stresses, so that moments have to balance.
     pub(super) turns_freely: bool,
 }
@@ -99,16 +97,15 @@ pub(super) fn complaint(
     model: Model<'_>,
     supports: impl Iterator<Item = (usize, f64)>,
     unknowns: impl Iterator<Item = (usize, f64)>,
-    bounds: &[Bound],
+    bound: Bound,
 ) -> Option<String> {
-    let mut balances = vec![Balance::default(); bounds.len()];
+    let mut balance = Balance::default();
     let n = model.nodes.len().max(1) as f64;
     let middle = [0, 1].map(|c| model.nodes.iter().map(|node| node[c]).sum::<f64>() / n);
     let mut add = |(dof, force): (usize, f64), is_prescribed| {
-        let body = model.of_dof.get(dof).map_or(0, |&body| body as usize);
         let node = model.nodes[dof / 2];
         let at = [node[0] - middle[0], node[1] - middle[1]];
-        balances[body].add(dof, at, force, is_prescribed);
+        balance.add(dof, at, force, is_prescribed);
     };
     supports.for_each(|support| add(support, true));
     unknowns.for_each(|unknown| add(unknown, false));
@@ -118,8 +115,7 @@ pub(super) fn complaint(
         (_, true) => &[0, 1, 2],
         (_, false) => &[0, 1],
     };
-    let mut pairs = balances.iter().zip(bounds);
-    pairs.find_map(|(balance, bound)| balance.complaint(components, *bound))
+    balance.complaint(components, bound)
 }
 
 #[cfg(test)]
@@ -138,18 +134,20 @@ mod tests {
         let model = Model {
             analysis,
             nodes: &NODES,
-            of_dof: &[],
             turns_freely: true,
         };
         let supports = [0, 1, 3].into_iter().zip(supports);
         let loads = [4, 5].into_iter().zip(load);
-        complaint(model, supports, loads, &[BOUND])
+        complaint(model, supports, loads, BOUND)
     }
 
     #[test]
     fn forces_and_moments_balance() {
         // H = 4 at height 1: the pair of supports takes its moment over the length 2.
-        assert_eq!(beam([-4.0, -2.0, 2.0], [4.0, 0.0], Analysis::PlaneStrain), None);
+        assert_eq!(
+            beam([-4.0, -2.0, 2.0], [4.0, 0.0], Analysis::PlaneStrain),
+            None
+        );
     }
 
     #[test]
@@ -161,7 +159,10 @@ mod tests {
         let off = beam([-4.0, 2.0, -2.0], [4.0, 0.0], Analysis::PlaneStrain).unwrap();
         assert!(off.starts_with("the moments do not balance"), "{off}");
         // Radial forces and their moments need not.
-        assert_eq!(beam([-5.0, 2.0, -2.0], [4.0, 0.0], Analysis::Axisymmetric), None);
+        assert_eq!(
+            beam([-5.0, 2.0, -2.0], [4.0, 0.0], Analysis::Axisymmetric),
+            None
+        );
         assert!(beam([-4.0, f64::NAN, 2.0], [4.0, 0.0], Analysis::PlaneStrain).is_some());
     }
 

@@ -346,7 +346,9 @@ impl LinearDomain {
     pub fn forces_beside(&self) -> impl Iterator<Item = (usize, f64)> {
         let forces = self.boundary.iter().zip(&self.standing.forces);
         let is_part = self.standing.part.is_some();
-        forces.filter(move |_| is_part).map(|(&dof, &force)| (dof, force))
+        forces
+            .filter(move |_| is_part)
+            .map(|(&dof, &force)| (dof, force))
     }
 
     /// Where the domain stands.

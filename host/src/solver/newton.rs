@@ -57,8 +57,8 @@ pub struct Loads {
     /// Largest of the forces (2-norms) at the start of the phase: where all forces vanish in its
     /// course, the residual is still measured against something.
     pub scale: f64,
-    /// The same of every body, where there are several.
-    pub scales: Vec<f64>,
+    /// Largest of the forces at every degree of freedom at the start of this phase or an earlier one.
+    pub largest: Vec<f64>,
 }
 
 impl Loads {
@@ -333,10 +333,12 @@ impl<'a> Newton<'a> {
 
     /// Begins a step under these loads.
     fn set_out(&mut self, loads: &Loads) {
-        self.at_start.clone_from(&loads.scales);
-        if self.at_start.len() != self.places.bodies.n {
-            self.at_start = vec![loads.scale; self.places.bodies.n];
-        }
+        let bodies = &self.places.bodies;
+        self.at_start = if bodies.n == 1 {
+            vec![loads.scale]
+        } else {
+            norms(&bodies.of_dof, bodies.n, &loads.largest)
+        };
         self.given = Given::default();
         self.changes = Vec::new();
         self.runaway = None;
@@ -473,7 +475,9 @@ impl<'a> Newton<'a> {
                     self.correct(&increment, &balance, &task, &mut acceleration)
                 });
             let (last, next, at) = match corrected {
-                Err(failure) if failure.singular && self.has_settled(&increment, &balance, &task) => {
+                Err(failure)
+                    if failure.singular && self.has_settled(&increment, &balance, &task) =>
+                {
                     return Ok(StepSuccess {
                         increment,
                         iterations: std::mem::take(iterations),
@@ -498,7 +502,10 @@ impl<'a> Newton<'a> {
         self.changes = self.changes(correction, moved);
         // Of several bodies one that is at rest has nothing to correct.
         let criteria = self.criteria(false);
-        let moving = self.measures(at, length >= 1.0).into_iter().zip(&self.changes);
+        let moving = self
+            .measures(at, length >= 1.0)
+            .into_iter()
+            .zip(&self.changes);
         let relative = moving
             .filter(|(measures, _)| self.changes.len() == 1 || !measures.is_exact(criteria))
             .map(|(_, change)| change.relative)
@@ -682,7 +689,10 @@ impl<'a> Newton<'a> {
         self.runaway = runaway;
         StepFailure {
             culprit,
-            ..StepFailure::unmet(&format!("no equilibrium after {n} iterations{tried}"), unmet)
+            ..StepFailure::unmet(
+                &format!("no equilibrium after {n} iterations{tried}"),
+                unmet,
+            )
         }
     }
 
@@ -806,7 +816,8 @@ impl<'a> Newton<'a> {
         self.will_compute(operator);
         let (mut internal, mut unreliable) = self.internal_forces(increment, task, operator)?;
         // Forces in play before those of the domain cancel them out.
-        let in_play = self.by_body(&internal);
+        let trial = |group: &Group, _: usize| group.stress.trial.clone();
+        let in_play = self.forces_by_body(&internal, &trial);
         let floors = self.floors(increment, task);
         let (scales, has_moved) = self.scales(&in_play, &floors, task);
         if has_moved {

@@ -166,6 +166,9 @@ mod tests {
             residual: 7.4e-11,
             ..unmet
         };
-        assert!(moved.to_string().starts_with("last correction 5.0e-1"), "{moved}");
+        assert!(
+            moved.to_string().starts_with("last correction 5.0e-1"),
+            "{moved}"
+        );
     }
 }

@@ -9,6 +9,7 @@ use super::acceptance::{Change, Forces, MOVES};
 use super::failure::{Runaway, Singularity};
 use super::{Newton, Task};
 use crate::assembly::norms;
+use crate::group::Group;
 use crate::plugin::Operator;
 use crate::solver::LinearSolver;
 
@@ -53,6 +54,41 @@ impl Newton<'_> {
         norms(&bodies.of_place, bodies.n, by_place)
     }
 
+    /// Sizes of internal forces, by body: `internal` by place, from these stresses by group. Where
+    /// bodies have places in common, each is given what its own elements do there.
+    pub(super) fn forces_by_body(
+        &mut self,
+        internal: &[f64],
+        stress: &dyn Fn(&Group, usize) -> Vec<f64>,
+    ) -> Vec<f64> {
+        let mut sizes = self.by_body(internal);
+        if self.places.bodies.shared.is_empty() {
+            return sizes;
+        }
+        for (body, size) in sizes.iter_mut().enumerate() {
+            for (number, group) in self.groups.iter().enumerate() {
+                if !self.system.includes(number) {
+                    continue;
+                }
+                let per_element =
+                    group.kinematics.points_per_element() * group.kinematics.n_components();
+                let mut own = stress(group, number);
+                let of_element = &self.places.bodies.of_element[number];
+                for (stress, &of) in own.chunks_exact_mut(per_element).zip(of_element) {
+                    if of as usize != body {
+                        stress.fill(0.0);
+                    }
+                }
+                group.kinematics.add_forces(&own, &mut self.force);
+            }
+            let mut forces = self.places.take(&mut self.force);
+            self.places.fold(&mut forces);
+            let shared = self.places.bodies.shared.iter().map(|&place| forces[place]);
+            *size = shared.fold(*size, f64::hypot);
+        }
+        sizes
+    }
+
     /// Takes note of where the iterations start.
     pub(super) fn starts_from(&mut self, increment: &[f64], from_tangent: bool) {
         self.given.predicted = self.by_body(increment);
@@ -65,8 +101,10 @@ impl Newton<'_> {
         let mut largest = vec![(0.0, 0); bodies.n];
         for (place, value) in increment.iter().enumerate() {
             let body = bodies.of_place.get(place).map_or(0, |&body| body as usize);
-            if value.abs() > largest[body].0 {
-                largest[body] = (value.abs(), place);
+            if let Some(largest) = largest.get_mut(body)
+                && value.abs() > largest.0
+            {
+                *largest = (value.abs(), place);
             }
         }
         largest
@@ -84,7 +122,8 @@ impl Newton<'_> {
         let sizes = self.by_body(increment);
         let largest = self.largest_moves(increment);
         let extents = &self.places.bodies.extents;
-        let leaves = |body: usize| largest[body].0 > extents.get(body).copied().unwrap_or(f64::INFINITY);
+        let leaves =
+            |body: usize| largest[body].0 > extents.get(body).copied().unwrap_or(f64::INFINITY);
         let exceeds = |given: &Given, body: usize| {
             let expected = given.expected(body);
             expected > 0.0 && sizes[body] > MOVES * expected
@@ -159,7 +198,10 @@ impl Newton<'_> {
                 forces.elastic = elastic.map(|elastic| elastic.forces[body]);
             }
         }
-        (forces.iter().map(|forces| forces.scale()).collect(), has_moved)
+        (
+            forces.iter().map(|forces| forces.scale()).collect(),
+            has_moved,
+        )
     }
 
     /// Internal forces of the last equilibrium, by body.
@@ -176,7 +218,8 @@ impl Newton<'_> {
         }
         let mut internal = self.places.take(&mut self.force);
         self.places.fold(&mut internal);
-        let last = self.by_body(&internal);
+        let committed = |group: &Group, _: usize| group.stress.committed.clone();
+        let last = self.forces_by_body(&internal, &committed);
         self.given.last = Some(last.clone());
         last
     }
@@ -184,7 +227,11 @@ impl Newton<'_> {
     /// Answers the step elastically, or with the tangents at its start if a law knows no elastic
     /// ones. The groups' tangents stay; their trial state does not.
     fn elastic_answer(&mut self, task: &Task<'_>) -> Option<Elastic> {
-        let kept: Vec<Vec<f64>> = self.groups.iter().map(|group| group.tangents().to_vec()).collect();
+        let kept: Vec<Vec<f64>> = self
+            .groups
+            .iter()
+            .map(|group| group.tangents().to_vec())
+            .collect();
         let mut answer = self.answer(Operator::Elastic, task);
         if answer.is_none() {
             answer = self.answer(Operator::Consistent, task);
@@ -217,16 +264,19 @@ impl Newton<'_> {
         }
         self.places.follow(&mut increment);
         self.places.scatter(&increment, &mut self.displacement);
-        for (number, group) in self.groups.iter().enumerate() {
+        let groups = self.groups.iter();
+        let stresses: Vec<Vec<f64>> = groups
+            .map(|group| group.linear_change(&self.displacement))
+            .collect();
+        for (number, (group, stress)) in self.groups.iter().zip(&stresses).enumerate() {
             if self.system.includes(number) {
-                let stress = group.linear_change(&self.displacement);
-                group.kinematics.add_forces(&stress, &mut self.force);
+                group.kinematics.add_forces(stress, &mut self.force);
             }
         }
         let mut forces = self.places.take(&mut self.force);
         self.places.fold(&mut forces);
         Some(Elastic {
-            forces: self.by_body(&forces),
+            forces: self.forces_by_body(&forces, &|_, number| stresses[number].clone()),
             moves: self.by_body(&increment),
         })
     }
