@@ -227,17 +227,16 @@ impl Newton<'_> {
     /// Answers the step elastically, or with the tangents at its start if a law knows no elastic
     /// ones. The groups' tangents stay; their trial state does not.
     fn elastic_answer(&mut self, task: &Task<'_>) -> Option<Elastic> {
-        let kept: Vec<Vec<f64>> = self
-            .groups
-            .iter()
-            .map(|group| group.tangents().to_vec())
-            .collect();
+        // Nor is what measures the iterations counted among them.
+        let kept = |group: &Group| (group.tangents().to_vec(), group.law_calls.clone());
+        let kept: Vec<_> = self.groups.iter().map(kept).collect();
         let mut answer = self.answer(Operator::Elastic, task);
         if answer.is_none() {
             answer = self.answer(Operator::Consistent, task);
         }
-        for (group, tangents) in self.groups.iter_mut().zip(kept) {
+        for (group, (tangents, calls)) in self.groups.iter_mut().zip(kept) {
             group.put_tangents(tangents);
+            group.law_calls = calls;
         }
         answer
     }
