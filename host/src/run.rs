@@ -850,7 +850,7 @@ impl<'a> Run<'a> {
         }
         let mut is_free = vec![false; external.len()];
         let of_domain = equations.domain.iter().filter(|_| beside.is_empty());
-        let of_domain = of_domain.flat_map(|domain| domain.unknowns());
+        let of_domain = of_domain.flat_map(LinearDomain::unknowns);
         for &dof in equations.system.free().iter().chain(of_domain) {
             is_free[dof] = true;
         }

@@ -35,7 +35,9 @@ impl Bodies {
         for group in groups {
             for element in 0..group.kinematics.n_elements() {
                 if let [first, others @ ..] = loose(group, element).as_slice() {
-                    others.iter().for_each(|&node| joined.join(*first, node));
+                    for &node in others {
+                        joined.join(*first, node);
+                    }
                 }
             }
         }

@@ -78,7 +78,7 @@ impl Balance {
         let is_off = |&&c: &&usize| {
             let lever = if c == 2 { self.lever } else { 1.0 };
             let left = self.reactions[c] + self.loads[c];
-            !(left.abs() <= lever * allowed)
+            left.is_nan() || left.abs() > lever * allowed
         };
         let c = *components.iter().find(is_off)?;
         let what = ["forces in x", "forces in y", "moments"][c];

@@ -376,6 +376,10 @@ impl<'a> Newton<'a> {
         }
     }
 
+    #[expect(
+        clippy::too_many_lines,
+        reason = "one loop, whose branches share its state"
+    )]
     fn iterate(
         &mut self,
         loads: &Loads,
@@ -982,8 +986,9 @@ fn failed_law(failure: PointFailure) -> StepFailure {
         factor: failure.failure.factor,
         failed: Some(Box::new(failure.clone())),
         ..StepFailure {
-            defect: defective.then_some(failure.clone()),
-            ..StepFailure::because(failure.to_string())
+            reason: failure.to_string(),
+            defect: defective.then_some(failure),
+            ..StepFailure::because(String::new())
         }
     }
 }

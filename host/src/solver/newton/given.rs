@@ -23,6 +23,7 @@ pub(super) struct Given {
     /// Internal forces of the last equilibrium.
     last: Option<Vec<f64>>,
     /// The elastic answer; `Some(None)` if there is none.
+    #[expect(clippy::option_option, reason = "not asked for, or asked for in vain")]
     elastic: Option<Option<Elastic>>,
 }
 
