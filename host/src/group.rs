@@ -4,6 +4,9 @@
 //! from it, so a failed increment leaves nothing behind.
 
 mod layer;
+mod tangent;
+
+pub use tangent::Fault;
 
 use crate::case::{Formulation, InPlane};
 use crate::element::Kinematics;
@@ -627,6 +630,35 @@ impl Group {
             element * length
         };
         &self.tangent[start..start + length]
+    }
+
+    /// Tangents as of the last evaluation that computed them.
+    pub fn tangents(&self) -> &[f64] {
+        &self.tangent
+    }
+
+    /// Puts tangents back that [`Self::tangents`] gave.
+    pub fn put_tangents(&mut self, tangents: Vec<f64>) {
+        debug_assert_eq!(tangents.len(), self.tangent.len());
+        self.tangent = tangents;
+    }
+
+    /// Change of the stresses under displacement increments if the tangents held: D Δε.
+    pub fn linear_change(&self, increment: &[f64]) -> Vec<f64> {
+        let n = self.kinematics.n_components();
+        let mut strain = vec![0.0; self.strain.committed.len()];
+        self.kinematics.add_gradients(increment, &mut strain);
+        let per_element = self.kinematics.points_per_element();
+        let mut change = vec![0.0; strain.len()];
+        let points = strain.chunks_exact(n).zip(change.chunks_exact_mut(n));
+        for (point, (strain, change)) in points.enumerate() {
+            let tangents = self.element_tangents(point / per_element);
+            let tangent = &tangents[point % per_element * n * n..][..n * n];
+            for (change, row) in change.iter_mut().zip(tangent.chunks_exact(n)) {
+                *change = row.iter().zip(strain).map(|(d, e)| d * e).sum();
+            }
+        }
+        change
     }
 
     /// What the group keeps for its points. A trial state as large comes and goes.

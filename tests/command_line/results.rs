@@ -137,6 +137,11 @@ fn names_the_check_of_a_law_that_may_have_a_wrong_tangent() {
     assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
     let check = format!("`pilum check {}` {CLAUSE}", troubled::library());
     assert!(outcome.says(&check), "{}", outcome.stderr);
+    // Not what contact does, but what the law says of its own stress.
+    let entry = "differs from differences of its own stress by";
+    assert!(outcome.says(entry), "{}", outcome.stderr);
+    assert!(outcome.says("in (t, t)"), "{}", outcome.stderr);
+    assert!(!outcome.says("opens and closes"), "{}", outcome.stderr);
     // With the tangent that is right, the law fails of itself.
     let place = troubled::place("").unwrap();
     let outcome = place.run_case(troubled::case("cut"));

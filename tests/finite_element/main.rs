@@ -6,6 +6,7 @@
     reason = "part of the tests"
 )]
 
+mod bodies;
 mod condensed;
 mod cut_back;
 mod cylinder;
@@ -20,8 +21,10 @@ mod patch_solid;
 mod phases;
 mod relaxation;
 mod sections;
+mod runaway;
 mod setup;
 mod sliding_block;
 mod snap_back;
 mod thick_cylinder;
 mod thin_layer;
+mod zero_stress;
