@@ -168,12 +168,24 @@ impl Table {
 /// Appends to a file of this length. What fits of a text that does not fit as a whole is taken
 /// back: it would pass for more than it is.
 fn append(file: &mut File, length: &mut u64, text: &[u8]) -> std::io::Result<()> {
+    check_own(file, *length)?;
     if let Err(error) = file.write_all(text) {
         let _ = file.set_len(*length);
         return Err(error);
     }
     *length += text.len() as u64;
     Ok(())
+}
+
+/// Refuses to write where something else than the file is by now: a law may have closed it, and
+/// its number may be that of another one.
+pub(crate) fn check_own(file: &File, length: u64) -> std::io::Result<()> {
+    let found = file.metadata();
+    if found.is_ok_and(|found| !found.is_file() || found.len() == length) {
+        return Ok(());
+    }
+    let why = "a law has closed it, or something else has written to it";
+    Err(std::io::Error::other(why))
 }
 
 /// Forgets what a file holds after `length` bytes and goes on there.
@@ -238,6 +250,20 @@ struct LogFile {
     length: u64,
 }
 
+/// Locks a file. The process of a run that was killed may take a moment to end.
+fn locked(file: &File) -> Result<(), TryLockError> {
+    const MOMENT: Duration = Duration::from_millis(500);
+    let since = std::time::Instant::now();
+    loop {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) if since.elapsed() < MOMENT => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            outcome => return outcome,
+        }
+    }
+}
+
 impl LogFile {
     /// Opens and locks the file, and goes on after its first `length` bytes.
     fn begin(path: PathBuf, length: u64) -> Result<Self, Error> {
@@ -247,7 +273,7 @@ impl LogFile {
             .open(&path)
             .map_err(|error| unwritable(&path, error))?;
         // Some file systems know no locks: an error says nothing of another run.
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+        if let Err(TryLockError::WouldBlock) = locked(&file) {
             let busy = std::io::Error::other("another run is writing into this folder");
             return Err(unwritable(&path, busy));
         }
@@ -617,6 +643,28 @@ pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
 }
 
 /// Writes the summary whole or not at all.
+/// Has the summary of a run that could not end it say how it ended. Whether there is one.
+///
+/// # Errors
+/// [`Error::Unreadable`] or [`Error::Unwritable`].
+pub fn end_summary(folder: &Path, error: &Error) -> Result<bool, Error> {
+    let path = folder.join("summary.json");
+    if !path.is_file() {
+        return Ok(false);
+    }
+    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let Ok(Value::Object(mut summary)) = serde_json::from_str(&text) else {
+        return Ok(false);
+    };
+    summary.insert("status".to_owned(), summary::status(Some(error)).into());
+    summary.insert("error".to_owned(), error.to_string().into());
+    write_summary(folder, &summary.into())?;
+    Ok(true)
+}
+
 fn write_summary(folder: &Path, summary: &Value) -> Result<(), Error> {
     let path = folder.join("summary.json");
     let partial = folder.join("summary.json.part");

@@ -8,6 +8,7 @@ use crate::assembly::{Places, System, fold};
 use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
+use crate::custody;
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
@@ -19,6 +20,7 @@ use crate::solver::{
     Costs, Guess, LinearDomain, LinearSolver, Loads, LookedAt, Matrix, Newton, Reuse, Singular,
     StepFailure, StepSuccess, mesh_lines,
 };
+use crate::stop::Stop;
 pub(crate) use history::History;
 use keeper::Keeper;
 use path::PathEnd;
@@ -38,9 +40,10 @@ pub trait Observer {
     fn warning(&mut self, message: &str);
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
-    /// Whether the run is to stop after the increment that has just been written.
-    fn wants_to_stop(&self) -> bool {
-        false
+    /// Who may want the run to stop: after the increment under way, or within it if that takes
+    /// long.
+    fn stop(&self) -> Stop {
+        Stop::never()
     }
 }
 
@@ -131,6 +134,7 @@ pub fn run_reusing(
         (Results::create(folder, case, &model, &probes)?, None)
     };
     let mut run = Run::new(case, model, probes, reuse);
+    run.stop = observer.stop();
     let outcome = run.phases(state, &mut results, &mut observer, &mut keeper);
     for warning in results.unreliable() {
         observer.warning(&warning);
@@ -173,8 +177,8 @@ impl Observer for Noting<'_> {
         self.observer.resumed(from);
     }
 
-    fn wants_to_stop(&self) -> bool {
-        self.observer.wants_to_stop()
+    fn stop(&self) -> Stop {
+        self.observer.stop()
     }
 }
 
@@ -200,6 +204,8 @@ struct Run<'a> {
     largest_force: f64,
     /// Factors of linear parts.
     reuse: &'a mut Reuse,
+    /// Who may want it to stop.
+    stop: Stop,
 }
 
 /// The equations of one phase.
@@ -274,6 +280,7 @@ impl<'a> Run<'a> {
             time: 0.0,
             largest_force: 0.0,
             reuse,
+            stop: Stop::never(),
         };
         for support in &case.file.supports {
             for dof in run.dofs(support.line.get_ref(), &support.fixed) {
@@ -435,6 +442,7 @@ impl<'a> Run<'a> {
             let mut done = match reached {
                 Ok(done) => done,
                 Err(error) => {
+                    let _ = custody::restore();
                     // What led here matters more than trouble with the state before it.
                     let _ = self.last_equilibrium(&place, equations, &course, record, results);
                     return Err(error);
@@ -452,6 +460,10 @@ impl<'a> Run<'a> {
                 .map_err(|why| {
                     Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why), None)
                 })?;
+            custody::restore()
+                .map_err(|why| Error::plugin(format!("{place}: {why}")))?
+                .iter()
+                .for_each(|change| observer.warning(&format!("{place}: {change}")));
             let snapshot = self.snapshot(&reaction);
             done.probes = self.probes.values(&snapshot);
             done.time = self.time + lambda;
@@ -460,7 +472,7 @@ impl<'a> Run<'a> {
             results.increment(&place, n, &done, &snapshot, &self.mesh)?;
             observer.increment(&place, n, done.iterations);
             course.increment = increment;
-            let stops = observer.wants_to_stop();
+            let stops = self.stop.is_asked();
             if stops || keeper.is_due() {
                 course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
                 course.has_matrix = equations.matrix.is_kept(self.file().solver.method);
@@ -559,6 +571,7 @@ impl<'a> Run<'a> {
                         success, end, place, course, equations, record, results, &mut done,
                     )?;
                 }
+                Err(failure) if failure.is_stop => return Err(Self::stopped(place)),
                 Err(failure) => {
                     results.iterations(place, end, &failure.iterations)?;
                     done.iterations += failure.iterations.len();
@@ -617,6 +630,19 @@ impl<'a> Run<'a> {
             self.write_step(place, course, equations, record, results, iterations)?;
         }
         Ok(())
+    }
+
+    /// The error of an increment that was stopped on its way.
+    fn stopped(place: &Place) -> Error {
+        Error::Stopped {
+            message: format!(
+                "{place}: stopped as asked, within the increment; everything before it is written"
+            ),
+            hint: Some(
+                "the last equilibrium is `stopped_at` in summary.json; go on with --resume"
+                    .to_owned(),
+            ),
+        }
     }
 
     /// The error of a phase that ends at load factor λ, with the call of the law that failed.
@@ -695,6 +721,7 @@ impl<'a> Run<'a> {
             settings,
             &mut record.costs,
         );
+        newton = newton.stopped_by(&self.stop);
         newton.step(loads, from, to, self.time + from, guess)
     }
 

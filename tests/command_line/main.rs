@@ -3,6 +3,7 @@
 mod arguments;
 mod bases;
 mod capsule;
+mod ended;
 mod isolate;
 mod libraries;
 mod loading;
@@ -14,6 +15,7 @@ mod program;
 mod results;
 #[cfg(unix)]
 mod resume;
+mod stopping;
 mod streams;
 mod syntax;
 mod trade_off;

@@ -18,6 +18,7 @@ use crate::assembly::{Places, System};
 use crate::case::{Control, Method, SolverInput};
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
+use crate::stop::Stop;
 use acceleration::Acceleration;
 use relaxation::Relaxation;
 use serde::{Deserialize, Serialize};
@@ -194,6 +195,8 @@ pub struct StepFailure {
     pub failed: Option<Box<PointFailure>>,
     /// What keeps the iterations from settling, if that could be found out.
     pub culprit: Option<String>,
+    /// The step was stopped as asked: it says nothing of equilibrium.
+    pub is_stop: bool,
 }
 
 impl StepFailure {
@@ -206,6 +209,15 @@ impl StepFailure {
             defect: None,
             failed: None,
             culprit: None,
+            is_stop: false,
+        }
+    }
+
+    /// A step that was stopped as asked.
+    pub fn stopped() -> Self {
+        Self {
+            is_stop: true,
+            ..Self::because("stopped as asked".to_owned())
         }
     }
 }
@@ -243,6 +255,9 @@ pub struct Newton<'a> {
     /// evaluations.
     displacement: Vec<f64>,
     force: Vec<f64>,
+    /// Who may want to stop the step, and when it was last asked for.
+    stop: Stop,
+    asked: Instant,
 }
 
 /// A step's end.
@@ -296,7 +311,27 @@ impl<'a> Newton<'a> {
             domain_forces: Vec::new(),
             displacement: vec![0.0; system.n_dofs()],
             force: vec![0.0; system.n_dofs()],
+            stop: Stop::never(),
+            asked: Instant::now(),
         }
+    }
+
+    /// The same iterations, to be stopped when asked.
+    #[must_use]
+    pub fn stopped_by(mut self, stop: &Stop) -> Self {
+        self.stop = stop.clone();
+        self
+    }
+
+    /// Ends a step that is to stop: once in every iteration, before its laws are called.
+    fn may_go_on(&mut self) -> Result<(), StepFailure> {
+        let now = Instant::now();
+        self.stop
+            .beat(now - std::mem::replace(&mut self.asked, now));
+        if self.stop.is_urgent() {
+            return Err(StepFailure::stopped());
+        }
+        Ok(())
     }
 
     /// Factorises the matrix from the tangents that the groups hold, as an interrupted run had it.
@@ -385,6 +420,7 @@ impl<'a> Newton<'a> {
         // Where the last series of Newton iterations starts.
         let mut first = 0;
         loop {
+            self.may_go_on()?;
             let series = &iterations[first..];
             let stands_still = relaxation::stands_still(series);
             let is_over = series.len() > self.settings.max_iterations();
@@ -419,6 +455,7 @@ impl<'a> Newton<'a> {
                     (increment, balance) = state;
                     first = iterations.len() - 1;
                 } else {
+                    self.may_go_on()?;
                     // Newton iterations go on where they stood, for as many as are left to them.
                     may_relax = false;
                     relaxation = None;
@@ -636,6 +673,7 @@ impl<'a> Newton<'a> {
             1
         };
         for &length in &STEP_LENGTHS[..tries] {
+            self.may_go_on()?;
             let moved = moved_by(increment, length, correction);
             let operator = if ends {
                 Operator::None
@@ -808,5 +846,6 @@ fn failed_law(failure: PointFailure) -> StepFailure {
         failed: Some(Box::new(failure.clone())),
         defect: defective.then_some(failure),
         culprit: None,
+        is_stop: false,
     }
 }
