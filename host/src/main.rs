@@ -189,7 +189,9 @@ impl Command {
             // What came through a pipe comes only once.
             Self::Run { case, .. } => Some(case.is_file() || case.is_dir()),
             Self::Point { driver, csv, .. } => {
-                let goes_into_pipe = csv.as_ref().is_some_and(|csv| csv.exists() && !csv.is_file());
+                let goes_into_pipe = csv
+                    .as_ref()
+                    .is_some_and(|csv| csv.exists() && !csv.is_file());
                 Some(driver.is_file() && !goes_into_pipe)
             }
             Self::TradeOff { .. } | Self::Laws { .. } | Self::Lock { .. } => Some(false),
@@ -281,7 +283,10 @@ fn watched(again: bool) -> Watched {
     // What the child could not write any more.
     let mend = |folder: &Path, error: &Error| {
         let mended = host::output::end_summary(folder, error);
-        let reported = || write_report(&[folder.to_owned()], None);
+        let reported = || {
+            let folders = [folder.to_owned()];
+            host::report::write(&folders, &host::report::default_path(&folders)).map(|_| ())
+        };
         if let Err(why) = mended.and_then(|is_there| if is_there { reported() } else { Ok(()) }) {
             say!("{:?}", miette::Report::new(why));
         }

@@ -617,10 +617,12 @@ impl Results {
         let summary = self
             .summary
             .finish(groups, [total, self.seconds], warnings, error);
-        self.log
-            .line(&json!({ "event": "end", "status": summary["status"] }))?;
+        let logged = self
+            .log
+            .line(&json!({ "event": "end", "status": summary["status"] }));
+        // A log that takes no more must not leave a run that seems to go on.
         write_summary(&self.folder, &summary)?;
-        drawn
+        logged.and(drawn)
     }
 }
 
@@ -642,7 +644,6 @@ pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
     })
 }
 
-/// Writes the summary whole or not at all.
 /// Has the summary of a run that could not end it say how it ended. Whether there is one.
 ///
 /// # Errors
@@ -665,6 +666,7 @@ pub fn end_summary(folder: &Path, error: &Error) -> Result<bool, Error> {
     Ok(true)
 }
 
+/// Writes the summary whole or not at all.
 fn write_summary(folder: &Path, summary: &Value) -> Result<(), Error> {
     let path = folder.join("summary.json");
     let partial = folder.join("summary.json.part");

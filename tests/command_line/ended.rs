@@ -119,7 +119,10 @@ fn rows_that_were_handed_out_come_once() {
         let driver = troubled::driver(how).replace("increments = 4", "increments = 4000");
         driver.replace("t = { jump = 2.0e-3 }", "t = { jump = 1.2e-3 }")
     };
-    place.write("good.toml", long("sleep").replace("limit = 1.0e-3", "limit = 1.0"));
+    place.write(
+        "good.toml",
+        long("sleep").replace("limit = 1.0e-3", "limit = 1.0"),
+    );
     let good = place.run(&["point", "good.toml"]);
     assert_eq!(good.code, Some(DONE), "{}", good.stderr);
     place.write("driver.toml", long("quiet_exit"));
@@ -154,7 +157,11 @@ fn a_copy_of_the_process_writes_nothing() {
     assert!(summary.contains("\"plugin trouble\""), "{summary}");
     place.write("driver.toml", troubled::driver("fork"));
     let outcome = place.run(&["point", "driver.toml"]);
-    assert_trouble(&outcome, &["law `troubled`", "increment 3", "(fork)"], "point");
+    assert_trouble(
+        &outcome,
+        &["law `troubled`", "increment 3", "(fork)"],
+        "point",
+    );
     let rows: Vec<&str> = outcome.stdout.lines().collect();
     assert!((4..=6).contains(&rows.len()), "{}", outcome.stdout);
 }
@@ -164,7 +171,10 @@ fn a_law_cannot_move_the_results() {
     let Some(place) = troubled::place("TROUBLE_IN_CREATE=FOLDER") else {
         return;
     };
-    place.write("case.toml", troubled::case("cut").replacen("1.0e-6", "1.0", 1));
+    place.write(
+        "case.toml",
+        troubled::case("cut").replacen("1.0e-6", "1.0", 1),
+    );
     let outcome = place.run(&["run", "case.toml", "--out", "out", "--no-probe"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     assert!(outcome.says("working folder"), "{}", outcome.stderr);
@@ -193,7 +203,10 @@ fn limits_and_locale_are_the_programs() {
     let Some(plain) = troubled::place("") else {
         return;
     };
-    plain.write("case.toml", troubled::case("locale").replacen("1.0e-6", "1.0", 1));
+    plain.write(
+        "case.toml",
+        troubled::case("locale").replacen("1.0e-6", "1.0", 1),
+    );
     let outcome = plain.run(&["run", "case.toml", "--out", "out"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let [a, b] = [&place, &plain].map(|p| std::fs::read(p.path("out/history.csv")).unwrap());

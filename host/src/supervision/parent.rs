@@ -278,7 +278,10 @@ fn stopped(calls: &[Seen]) -> Error {
     };
     Error::Stopped {
         message,
-        hint: Some("all rows in equilibrium are written; a run goes on with --resume".to_owned()),
+        hint: Some(
+            "a run has all its rows and goes on with --resume; a driver lacks those of the last 0.2 s"
+                .to_owned(),
+        ),
     }
 }
 
