@@ -58,7 +58,7 @@ pub(crate) fn restore() -> Result<Vec<String>, String> {
     #[cfg(unix)]
     for ((limit, before), (_, name)) in start.limits.iter().zip(LIMITS) {
         if rustix::process::getrlimit(*limit) != *before {
-            rustix::process::setrlimit(*limit, before.clone())
+            rustix::process::setrlimit(*limit, *before)
                 .map_err(|why| format!("a law has changed the limit of {name}, for good: {why}"))?;
             changes.push(format!(
                 "a law has changed the limit of {name}; it was set back"
@@ -100,8 +100,9 @@ const LIMITS: [(rustix::process::Resource, &str); 5] = {
 
 #[cfg(unix)]
 fn here() -> Option<Identity> {
-    let found = rustix::fs::stat(".").ok()?;
-    Some((found.st_dev as u64, found.st_ino as u64))
+    use std::os::unix::fs::MetadataExt;
+    let found = std::fs::metadata(".").ok()?;
+    Some((found.dev(), found.ino()))
 }
 
 #[cfg(not(unix))]
@@ -110,6 +111,10 @@ fn here() -> Option<Identity> {
 }
 
 #[cfg(unix)]
+#[allow(
+    clippy::unnecessary_cast,
+    reason = "the types are others on other systems"
+)]
 fn streams() -> [Option<Identity>; 3] {
     let (input, output, error) = (io::stdin(), io::stdout(), io::stderr());
     let of = |stream: rustix::io::Result<rustix::fs::Stat>| {

@@ -141,7 +141,9 @@ pub fn run_file_until(
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
     let mut drivers = Driver::read(path)?;
-    drivers.iter_mut().for_each(|driver| driver.stop_on(stop));
+    for driver in &mut drivers {
+        driver.stop_on(stop);
+    }
     run_all(drivers, path, variant, csv, &mut report)
 }
 

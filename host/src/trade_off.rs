@@ -95,7 +95,9 @@ fn run_drivers(
 ) -> Result<(), Error> {
     let mut drivers = Driver::read(path)?;
     let stop = &options.stop;
-    drivers.iter_mut().for_each(|driver| driver.stop_on(stop));
+    for driver in &mut drivers {
+        driver.stop_on(stop);
+    }
     let stem = path.file_stem().unwrap_or_default();
     let stem = stem.to_string_lossy().into_owned();
     let name = |driver: &Driver| driver.variant().map(str::to_owned);

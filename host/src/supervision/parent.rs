@@ -296,7 +296,7 @@ fn places(calls: &[Seen]) -> String {
     texts.truncate(3);
     let mut text = texts.join("; or ");
     if more > 0 {
-        text += &format!("; or {more} more");
+        text = format!("{text}; or {more} more");
     }
     text
 }
