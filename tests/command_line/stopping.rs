@@ -1,5 +1,6 @@
 //! Requests to stop, whatever a law does: exit code 130 within a bound, and nothing is lost.
 #![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
 
 use crate::program::{CASE, JOINT, Place, edited};
 use crate::troubled;
