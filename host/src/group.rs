@@ -11,7 +11,9 @@ pub use tangent::Fault;
 use crate::case::{Formulation, InPlane};
 use crate::element::Kinematics;
 use crate::input::BuiltLaw;
-use crate::plugin::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided};
+use crate::plugin::{
+    BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls,
+};
 use abi::status::Outcome;
 use layer::Layer;
 use rayon::prelude::*;
@@ -179,6 +181,8 @@ pub struct Group {
     layer: Option<Layer>,
     /// Where the points lie, if the law asks.
     sites: Vec<Site>,
+    /// What it is called where calls of laws are watched.
+    watched: u64,
     /// Tangents of the element, point by point; of a linear law, those of one element only.
     tangent: Vec<f64>,
     tangents_are_constant: bool,
@@ -214,6 +218,7 @@ impl Group {
             law_calls: Vec::new(),
             layer,
             sites: Vec::new(),
+            watched: 0,
             tangent: Vec::new(),
             tangents_are_constant: false,
         };
@@ -290,6 +295,7 @@ impl Group {
 
     fn start_law(&mut self, law: GroupLaw, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
         self.law = law;
+        self.watched = calls::name(&format!("group `{}`", self.name));
         let law = &self.law.built.law;
         let id = &law.description().id;
         if self.law_calls.last().is_none_or(|calls| calls.law != *id) {
@@ -309,6 +315,7 @@ impl Group {
             kept
         } else {
             let stress = (self.stress.committed.as_slice(), self.flux_place());
+            calls::of_group(self.watched, 0, self.kinematics.points_per_element());
             law.initial_state(n_points, stress)
                 .map_err(|failure| self.locate(&failure))?
         };
@@ -542,8 +549,10 @@ impl Group {
         let rows = Strided::rows(n);
         let (committed, state) = (&self.stress.committed, &self.internal.committed);
         let (moment, sites) = (self.moment, &self.sites);
+        let (watched, per_element) = (self.watched, self.kinematics.points_per_element());
         let batch = |(number, flux, state_end, operator_end): Batch<'_>| {
             let first = number * BATCH;
+            calls::of_group(watched, first, per_element);
             let n_points = flux.len() / place.point;
             let points = |values: &'_ [f64], stride: usize| {
                 first * stride..values.len().min((first + n_points) * stride)

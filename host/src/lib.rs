@@ -15,6 +15,7 @@ pub mod case;
 pub mod check;
 pub mod checkpoint;
 pub mod child;
+pub mod custody;
 pub mod element;
 pub mod error;
 mod file;
@@ -39,4 +40,7 @@ pub mod report;
 pub mod run;
 pub mod schema;
 pub mod solver;
+pub mod stop;
+#[cfg(target_os = "linux")]
+pub mod supervision;
 pub mod trade_off;

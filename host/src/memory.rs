@@ -5,6 +5,7 @@
 //! on. So the program's allocator gives back a reserve, says what there is to say, and ends the
 //! process. What is worked on says beforehand how much it will take.
 
+use crate::error::Error;
 use rustix::io::Errno;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::{Path, PathBuf};
@@ -15,12 +16,14 @@ use std::time::Duration;
 /// The last words take less than this.
 const RESERVE: usize = 4 << 20;
 /// Exit code: the limit is the user's to raise.
-const CODE: i32 = 1;
+const CODE: u8 = 1;
 
 /// What the last words are said in.
 static HELD: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 /// Bytes that what goes on was expected to take in all.
 static EXPECTED: AtomicU64 = AtomicU64::new(0);
+/// What was announced with it.
+static DOING: Mutex<&str> = Mutex::new("");
 /// Folder of the results that are being written.
 static RESULTS: Mutex<Option<PathBuf>> = Mutex::new(None);
 /// A thread is saying the last words.
@@ -69,9 +72,12 @@ pub fn reserve() {
     }
 }
 
-/// What comes next takes so many bytes beside what is in use.
-pub(crate) fn expect(bytes: u64) {
+/// What comes next, and how many bytes it takes beside what is in use.
+pub(crate) fn expect(bytes: u64, what: &'static str) {
     EXPECTED.store(in_use().unwrap_or(0) + bytes, Ordering::Relaxed);
+    if let Ok(mut doing) = DOING.lock() {
+        *doing = what;
+    }
 }
 
 /// Results are being written into a folder, or no longer.
@@ -106,7 +112,13 @@ fn shortage(size: u64) -> String {
     } else {
         format!("about {} MB needed, or more", megabytes(least))
     };
-    format!("not enough memory: {needed}")
+    let doing = DOING.try_lock().map_or("", |doing| *doing);
+    let last = if doing.is_empty() {
+        String::new()
+    } else {
+        format!("; the last large piece of work was {doing}")
+    };
+    format!("not enough memory: {needed}{last}")
 }
 
 /// The last words of the process.
@@ -136,7 +148,9 @@ fn end(size: usize) {
     if let Ok(results) = RESULTS.try_lock()
         && let Some(folder) = &*results
     {
-        let _ = crate::output::end_summary(folder, &message);
+        let _ = crate::output::end_summary(folder, &Error::Usage(message));
     }
-    std::process::exit(CODE);
+    // Who watches this process knows that no law has ended it.
+    crate::supervision::end(CODE);
+    std::process::exit(CODE.into());
 }

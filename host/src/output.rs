@@ -13,6 +13,7 @@ mod summary;
 
 pub(crate) use figure::COLOURS;
 pub use figure::{Figures, check_figures, check_table_figures};
+pub(crate) use file::check_own;
 pub use file::refuse_other;
 pub(crate) use file::{begin, is_same, replace};
 pub use summary::PhaseRecord;
@@ -532,12 +533,14 @@ impl Results {
         let summary = self
             .summary
             .finish(groups, [total, self.seconds], warnings, error);
-        self.log
-            .line(&json!({ "event": "end", "status": summary["status"] }))?;
+        let logged = self
+            .log
+            .line(&json!({ "event": "end", "status": summary["status"] }));
+        // A log that takes no more must not leave a run that seems to go on.
         write_summary(&self.folder, &summary)?;
         #[cfg(unix)]
         crate::memory::writes(None);
-        drawn
+        logged.and(drawn)
     }
 }
 
@@ -559,15 +562,26 @@ pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
     })
 }
 
-/// Says in the summary of a run that cannot go on, and has no time to say more, how it ended.
-pub(crate) fn end_summary(folder: &Path, error: &str) -> Result<(), Error> {
+/// Has the summary of a run that could not end it say how it ended. Whether there is one.
+///
+/// # Errors
+/// [`Error::Unreadable`] or [`Error::Unwritable`].
+pub fn end_summary(folder: &Path, error: &Error) -> Result<bool, Error> {
     let path = folder.join("summary.json");
-    let text = std::fs::read(&path).map_err(|error| unwritable(&path, error))?;
-    let mut summary: Value =
-        serde_json::from_slice(&text).map_err(|error| Error::Internal(error.to_string()))?;
-    summary["status"] = json!("stopped");
-    summary["error"] = json!(error);
-    write_summary(folder, &summary)
+    if !path.is_file() {
+        return Ok(false);
+    }
+    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let Ok(Value::Object(mut summary)) = serde_json::from_str(&text) else {
+        return Ok(false);
+    };
+    summary.insert("status".to_owned(), summary::status(Some(error)).into());
+    summary.insert("error".to_owned(), error.to_string().into());
+    write_summary(folder, &summary.into())?;
+    Ok(true)
 }
 
 /// Writes the summary whole or not at all.

@@ -11,6 +11,7 @@ use crate::assembly::{Bodies, Places, System, fold};
 use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput, SolverInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
+use crate::custody;
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
@@ -22,6 +23,7 @@ use crate::solver::{
     Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, Reuse, Runaway, StepFailure,
     StepSuccess,
 };
+use crate::stop::Stop;
 use algebra::{LinearSolver, Singular, mesh_lines};
 use beyond::Beyond;
 pub(crate) use history::History;
@@ -43,9 +45,10 @@ pub trait Observer {
     fn warning(&mut self, message: &str);
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
-    /// Whether the run is to stop after the increment that has just been written.
-    fn wants_to_stop(&self) -> bool {
-        false
+    /// Who may want the run to stop: after the increment under way, or within it if that takes
+    /// long.
+    fn stop(&self) -> Stop {
+        Stop::never()
     }
 }
 
@@ -136,6 +139,7 @@ pub fn run_reusing(
         (Results::create(folder, case, &model, &probes)?, None)
     };
     let mut run = Run::new(case, model, probes, reuse);
+    run.stop = observer.stop();
     let outcome = run.phases(state, &mut results, &mut observer, &mut keeper);
     for warning in run
         .beyond
@@ -192,8 +196,8 @@ impl Observer for Noting<'_> {
         self.observer.resumed(from);
     }
 
-    fn wants_to_stop(&self) -> bool {
-        self.observer.wants_to_stop()
+    fn stop(&self) -> Stop {
+        self.observer.stop()
     }
 }
 
@@ -225,6 +229,8 @@ struct Run<'a> {
     turns_freely: bool,
     /// Factors of linear parts.
     reuse: &'a mut Reuse,
+    /// Who may want it to stop.
+    stop: Stop,
 }
 
 /// The equations of one phase.
@@ -306,6 +312,7 @@ impl<'a> Run<'a> {
             largest_forces: vec![0.0; n_dofs],
             turns_freely,
             reuse,
+            stop: Stop::never(),
         };
         run.beyond.knows(&run.groups);
         for support in &case.file.supports {
@@ -496,6 +503,7 @@ impl<'a> Run<'a> {
             let mut done = match reached {
                 Ok(done) => done,
                 Err(error) => {
+                    let _ = custody::restore();
                     // What led here matters more than trouble with the state before it.
                     let _ = self.last_equilibrium(&place, equations, &course, record, results);
                     return Err(error);
@@ -513,6 +521,10 @@ impl<'a> Run<'a> {
                 .map_err(|why| {
                     Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why), None)
                 })?;
+            custody::restore()
+                .map_err(|why| Error::plugin(format!("{place}: {why}")))?
+                .iter()
+                .for_each(|change| observer.warning(&format!("{place}: {change}")));
             let snapshot = self.snapshot(&reaction);
             done.probes = self.probes.values(&snapshot);
             self.probes.check(self.case, &place, &done.probes)?;
@@ -522,7 +534,7 @@ impl<'a> Run<'a> {
             results.increment(&place, n, &done, &snapshot, &self.mesh)?;
             observer.increment(&place, n, done.iterations);
             course.increment = increment;
-            let stops = observer.wants_to_stop();
+            let stops = self.stop.is_asked();
             if stops || keeper.is_due() {
                 course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
                 course.has_matrix = equations.matrix.is_kept(self.solver().method);
@@ -624,6 +636,7 @@ impl<'a> Run<'a> {
                         success, end, place, course, equations, record, results, &mut done,
                     )?;
                 }
+                Err(failure) if failure.is_stop => return Err(Self::stopped(place)),
                 Err(failure) => {
                     results.iterations(place, end, &failure.iterations)?;
                     done.iterations += failure.iterations.len();
@@ -682,6 +695,19 @@ impl<'a> Run<'a> {
             self.write_step(place, course, equations, record, results, iterations)?;
         }
         Ok(())
+    }
+
+    /// The error of an increment that was stopped on its way.
+    fn stopped(place: &Place) -> Error {
+        Error::Stopped {
+            message: format!(
+                "{place}: stopped as asked, within the increment; everything before it is written"
+            ),
+            hint: Some(
+                "the last equilibrium is `stopped_at` in summary.json; go on with --resume"
+                    .to_owned(),
+            ),
+        }
     }
 
     /// The error of a phase that ends at load factor λ, with the call of the law that failed.
@@ -785,6 +811,7 @@ impl<'a> Run<'a> {
             &settings,
             &mut record.costs,
         );
+        newton = newton.stopped_by(&self.stop);
         newton.step(loads, from, to, self.time + from, guess)
     }
 
@@ -1020,6 +1047,8 @@ impl<'a> Run<'a> {
             }
             None => LinearSolver::new(&system.pattern, symmetric, own_lines)?,
         };
+        #[cfg(unix)]
+        crate::memory::expect(solver.bytes(), "factorising the equations");
         let mut unknowns = system.free().to_vec();
         unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
         unknowns.sort_unstable();

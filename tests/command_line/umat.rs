@@ -7,8 +7,8 @@
 
 mod incremental_driver;
 mod mohr_coulomb;
-mod tolerance;
 mod silent;
+mod tolerance;
 
 use crate::program::{BAD_INPUT, CASE, DONE, Edit, PLUGIN_TROUBLE, Place, edited};
 use std::collections::BTreeMap;

@@ -134,14 +134,17 @@ impl Multifrontal {
         lines: Option<&[[u32; 2]]>,
     ) -> Result<Self, Singular> {
         let analysis = Analysis::new(pattern, kind, kept, lines)?;
-        #[cfg(unix)]
-        crate::memory::expect(analysis.bytes());
         let fronts = analysis.fronts.iter().map(|_| Mutex::default()).collect();
         Ok(Self {
             analysis,
             fronts,
             schur: Vec::new(),
         })
+    }
+
+    /// Bytes that a factorisation takes, by the analysis.
+    pub fn bytes(&self) -> u64 {
+        self.analysis.bytes()
     }
 
     /// Kept equations, in the order of the Schur complement.

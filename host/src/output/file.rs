@@ -8,9 +8,12 @@ use serde::{Deserialize, Serialize};
 use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Bytes read at a time where a file is summed.
 const PIECE: usize = 1 << 16;
+/// Time that the process of a run that was killed may take to end.
+const MOMENT: Duration = Duration::from_millis(500);
 
 /// Refuses to write where something else than a file is: a pipe that nobody reads would keep the
 /// program waiting for ever.
@@ -230,6 +233,7 @@ impl Appended {
     /// # Errors
     /// [`Error::Unwritable`].
     pub(super) fn append(&mut self, text: &[u8]) -> Result<(), Error> {
+        check_own(&self.file, self.length).map_err(|error| unwritable(&self.path, error))?;
         if let Err(error) = self.file.write_all(text) {
             let _ = self.file.set_len(self.length);
             return Err(unwritable(&self.path, error));
@@ -250,13 +254,34 @@ impl Appended {
     }
 }
 
+/// Refuses to write where something else than the file is by now: a law may have closed it, and
+/// its number may be that of another one.
+///
+/// # Errors
+/// It is not the file of this length.
+pub(crate) fn check_own(file: &File, length: u64) -> io::Result<()> {
+    let found = file.metadata();
+    if found.is_ok_and(|found| !found.is_file() || found.len() == length) {
+        return Ok(());
+    }
+    let why = "a law has closed it, or something else has written to it";
+    Err(io::Error::other(why))
+}
+
+/// Locks a file. The process of a run that was killed may take a moment to end.
 fn lock(file: &File) -> io::Result<()> {
-    // Some file systems know no locks: an error says nothing of another run.
-    match file.try_lock() {
-        Err(TryLockError::WouldBlock) => {
-            Err(io::Error::other("another run is writing into this folder"))
+    let since = Instant::now();
+    loop {
+        // Some file systems know no locks: an error says nothing of another run.
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) if since.elapsed() < MOMENT => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            Err(TryLockError::WouldBlock) => {
+                return Err(io::Error::other("another run is writing into this folder"));
+            }
+            _ => return Ok(()),
         }
-        _ => Ok(()),
     }
 }
 

@@ -20,7 +20,7 @@ mod shared;
 pub(super) mod umat;
 
 #[cfg(unix)]
-pub(super) use shared::SharedMemory;
+pub(crate) use shared::SharedMemory;
 
 use super::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,

@@ -252,6 +252,8 @@ impl LinearDomain {
         } else {
             let lines = system.lines(lines);
             let mut factors = Multifrontal::new(&pattern, kind, &kept, Some(&lines))?;
+            #[cfg(unix)]
+            crate::memory::expect(factors.bytes(), "factorising the linear groups");
             let gathered = factors.gather(&values);
             // Where nothing may find the matrix, it is given up before its factors need the room.
             let remembered = reuse

@@ -21,6 +21,7 @@ use crate::assembly::{Places, System, norms};
 use crate::case::{Control, Method, SolverInput};
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
+use crate::stop::Stop;
 use acceleration::Acceleration;
 use acceptance::{Change, Criteria, EXACT, Measures, STALE};
 use algebra::LinearSolver;
@@ -223,6 +224,9 @@ pub struct Newton<'a> {
     /// evaluations.
     displacement: Vec<f64>,
     force: Vec<f64>,
+    /// Who may want to stop the step, and when it was last asked for.
+    stop: Stop,
+    asked: Instant,
 }
 
 /// A step's end.
@@ -285,7 +289,27 @@ impl<'a> Newton<'a> {
             domain_forces: Vec::new(),
             displacement: vec![0.0; system.n_dofs()],
             force: vec![0.0; system.n_dofs()],
+            stop: Stop::never(),
+            asked: Instant::now(),
         }
+    }
+
+    /// The same iterations, to be stopped when asked.
+    #[must_use]
+    pub fn stopped_by(mut self, stop: &Stop) -> Self {
+        self.stop = stop.clone();
+        self
+    }
+
+    /// Ends a step that is to stop: once in every iteration, before its laws are called.
+    fn may_go_on(&mut self) -> Result<(), StepFailure> {
+        let now = Instant::now();
+        self.stop
+            .beat(now - std::mem::replace(&mut self.asked, now));
+        if self.stop.is_urgent() {
+            return Err(StepFailure::stopped());
+        }
+        Ok(())
     }
 
     /// Factorises the matrix from the tangents that the groups hold, as an interrupted run had it.
@@ -422,6 +446,7 @@ impl<'a> Newton<'a> {
         // Where the last series of Newton iterations starts.
         let mut first = 0;
         loop {
+            self.may_go_on()?;
             let series = &iterations[first..];
             let stands_still = relaxation::stands_still(series);
             let is_over = series.len() > self.settings.max_iterations();
@@ -457,6 +482,7 @@ impl<'a> Newton<'a> {
                     (increment, balance) = state;
                     first = iterations.len() - 1;
                 } else {
+                    self.may_go_on()?;
                     // Newton iterations go on where they stood, for as many as are left to them.
                     may_relax = false;
                     relaxation = None;
@@ -774,6 +800,7 @@ impl<'a> Newton<'a> {
             1
         };
         for &length in &STEP_LENGTHS[..tries] {
+            self.may_go_on()?;
             let moved = moved_by(increment, length, correction);
             let operator = if ends {
                 Operator::None

@@ -92,6 +92,8 @@ pub struct StepFailure {
     pub failed: Option<Box<PointFailure>>,
     /// What keeps the iterations from settling, if that could be found out.
     pub culprit: Option<String>,
+    /// The step was stopped as asked: it says nothing of equilibrium.
+    pub is_stop: bool,
 }
 
 impl StepFailure {
@@ -107,6 +109,15 @@ impl StepFailure {
             defect: None,
             failed: None,
             culprit: None,
+            is_stop: false,
+        }
+    }
+
+    /// A step that was stopped as asked.
+    pub fn stopped() -> Self {
+        Self {
+            is_stop: true,
+            ..Self::because("stopped as asked".to_owned())
         }
     }
 

@@ -11,7 +11,7 @@ use super::{Newton, Task};
 use crate::assembly::norms;
 use crate::group::Group;
 use crate::plugin::Operator;
-use crate::solver::LinearSolver;
+use algebra::LinearSolver;
 
 /// What is known of it in the present step; by body.
 #[derive(Debug, Default)]

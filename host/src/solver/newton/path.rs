@@ -113,6 +113,7 @@ impl Newton<'_> {
         let mut balance = self.evaluate_along(loads, &rate, [from, time], &mut increment, rise)?;
         iterations.push(Iteration::first(&balance));
         for _ in 0..self.settings.max_iterations() {
+            self.may_go_on()?;
             let external = loads.external(from + rise);
             let task = Task {
                 external: &self.places.gather(&external),
@@ -150,6 +151,7 @@ impl Newton<'_> {
                 let Some(length) = lengths.next() else {
                     return Err(plain("the path ends here"));
                 };
+                self.may_go_on()?;
                 let moved = increment.iter().zip(&correction);
                 let mut moved: Vec<f64> = moved.map(|(u, d)| u + length * d).collect();
                 let risen = rise + length * more;

@@ -95,6 +95,7 @@ impl Newton<'_> {
             .map_err(failed_law)?;
         let mut largest = balance.relative;
         while relaxation.steps < MAX_STEPS {
+            self.may_go_on()?;
             relaxation.steps += 1;
             let correction = self.viscous_correction(&balance.residual, &relaxation.elastic)?;
             for (u, d) in relaxation.increment.iter_mut().zip(&correction) {
