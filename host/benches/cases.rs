@@ -189,6 +189,7 @@ impl Chamber {
             prescribed: held.map(|dof| (dof, 0.0, push(dof))).collect(),
             out_of_balance: vec![0.0; n_dofs],
             scale: 0.0,
+            largest: vec![0.0; n_dofs],
         };
         Self {
             model,

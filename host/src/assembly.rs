@@ -4,6 +4,10 @@
 //! A degree of freedom is `2 * node + component`. It is free (it has an equation), prescribed,
 //! or tied: a combination of others, as the mid-thickness nodes of a thin layer with mean strain.
 
+mod bodies;
+
+pub use bodies::{Bodies, SHARED, norms};
+
 use crate::group::Group;
 use algebra::Pattern;
 use rayon::prelude::*;
@@ -70,7 +74,28 @@ pub struct Places {
     pub boundary: Vec<usize>,
     /// Places of prescribed degrees of freedom.
     pub prescribed: Vec<usize>,
+    /// Whose they are.
+    pub bodies: PlacesOfBodies,
     ties: Vec<Tie>,
+}
+
+/// Which body things belong to; the lists are empty if there is but one.
+#[derive(Debug, Default)]
+pub struct PlacesOfBodies {
+    /// How many bodies there are.
+    pub n: usize,
+    /// Body of every place.
+    pub of_place: Vec<u32>,
+    /// Body of every equation.
+    pub of_equation: Vec<u32>,
+    /// Body of every degree of freedom.
+    pub of_dof: Vec<u32>,
+    /// Body of every element, group by group.
+    pub of_element: Vec<Vec<u32>>,
+    /// Places that several bodies have in common.
+    pub shared: Vec<usize>,
+    /// Largest side of every body.
+    pub extents: Vec<f64>,
 }
 
 impl Places {
@@ -103,8 +128,32 @@ impl Places {
                 })
                 .collect(),
             n_dofs: prescribed.len(),
+            bodies: PlacesOfBodies::default(),
             dofs,
         }
+    }
+
+    /// The same, with what belongs to which body.
+    #[must_use]
+    pub fn of(self, bodies: &Bodies, system: &System) -> Self {
+        let of_place = bodies.of(self.dofs.iter().copied());
+        let bodies = PlacesOfBodies {
+            n: bodies.n().max(1),
+            shared: (0..of_place.len())
+                .filter(|&place| of_place[place] == SHARED)
+                .collect(),
+            of_place,
+            of_element: bodies.of_elements().to_vec(),
+            of_equation: bodies.of(system.free.iter().copied()),
+            of_dof: bodies.of(0..self.n_dofs),
+            extents: bodies.extents().to_vec(),
+        };
+        Self { bodies, ..self }
+    }
+
+    /// Degree of freedom of a place.
+    pub fn dof(&self, place: usize) -> usize {
+        self.dofs[place]
     }
 
     /// Number of degrees of freedom, with those that take no part.

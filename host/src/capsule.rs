@@ -8,6 +8,7 @@ pub use replay::replay;
 
 use crate::error::{Error, Source, suggestion};
 use crate::input::toml_error;
+use crate::output::replace;
 use crate::plugin::adapter::{Adapter, Externals};
 use crate::plugin::{BatchFailure, Law, Moment, Operator, PointCall, Request, Site};
 use crate::point::words;
@@ -238,10 +239,7 @@ impl Capsule {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        std::fs::write(path, self.to_string()).map_err(|source| Error::Unwritable {
-            path: path.to_owned(),
-            source,
-        })
+        replace(path, self.to_string())
     }
 
     fn hypothesis(&self) -> Option<Hypothesis> {

@@ -8,7 +8,7 @@ use crate::case::Case;
 use crate::error::{Error, Place};
 use crate::group::GroupState;
 use crate::model::Model;
-use crate::output::{PhaseRecord, ResultsState, unwritable};
+use crate::output::{PhaseRecord, ResultsState, begin, unwritable};
 use crate::plugin::{hexadecimal, hexadecimal_sha256};
 use crate::run::History;
 use crate::solver::{Loads, Standing};
@@ -113,7 +113,7 @@ impl<'c> Checkpoint<'c> {
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
         let path = folder.join(FILE_NAME);
         let partial = folder.join(format!("{FILE_NAME}.part"));
-        let written = File::create(&partial).and_then(|file| self.write_to(file));
+        let written = begin(&partial).and_then(|file| self.write_to(file));
         written
             .and_then(|()| std::fs::rename(&partial, &path))
             .map_err(|error| {

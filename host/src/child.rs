@@ -225,9 +225,27 @@ pub fn enter() -> io::Result<()> {
             setrlimit(Resource::As, limit(bytes))?;
         }
     }
+    // Those of the terminal are the parent's, who ends its children himself.
+    #[cfg(unix)]
+    block_requests()?;
     #[cfg(target_os = "linux")]
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     Ok(())
+}
+
+/// Keeps requests to stop away from this thread, and from threads and processes that it starts from
+/// now on.
+///
+/// # Errors
+/// The system's.
+#[cfg(unix)]
+pub(crate) fn block_requests() -> io::Result<()> {
+    use nix::sys::signal::{SigSet, Signal};
+    let mut signals = SigSet::empty();
+    for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {
+        signals.add(signal);
+    }
+    signals.thread_block().map_err(io::Error::from)
 }
 
 #[cfg(test)]

@@ -283,6 +283,15 @@ pub enum Error {
         /// The last increment.
         place: Place,
     },
+    /// The user stopped the work in the middle.
+    #[error("{message}")]
+    Stopped {
+        /// Where it was stopped.
+        message: String,
+        /// How to go on.
+        #[help]
+        hint: Option<String>,
+    },
     /// A defect of the program.
     #[error("internal error: {0}")]
     Internal(String),
@@ -327,6 +336,11 @@ impl Error {
         }
     }
 
+    /// Whether the user stopped the work: nothing is wrong with it.
+    pub fn is_stop(&self) -> bool {
+        matches!(self, Self::Interrupted { .. } | Self::Stopped { .. })
+    }
+
     /// The program's exit code: 1 bad input (places that cannot be read or written included), 2 no equilibrium, 3 plugin trouble, 4 internal, 130 stopped as asked (as shells say it of Ctrl-C).
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -336,7 +350,7 @@ impl Error {
             Self::NoEquilibrium { .. } => 2,
             Self::Plugin { .. } => 3,
             Self::Internal(_) => 4,
-            Self::Interrupted { .. } => 130,
+            Self::Interrupted { .. } | Self::Stopped { .. } => 130,
         }
     }
 }

@@ -5,11 +5,16 @@
 
 mod layer;
 mod takeover;
+mod tangent;
+
+pub use tangent::Fault;
 
 use crate::case::{Formulation, InPlane};
 use crate::element::Kinematics;
 use crate::input::BuiltLaw;
-use crate::plugin::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided};
+use crate::plugin::{
+    BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls,
+};
 use abi::status::Outcome;
 use layer::Layer;
 use rayon::prelude::*;
@@ -178,6 +183,8 @@ pub struct Group {
     layer: Option<Layer>,
     /// Where the points lie, if the law asks.
     sites: Vec<Site>,
+    /// What it is called where calls of laws are watched.
+    watched: u64,
     /// Tangents of the element, point by point; of a linear law, those of one element only.
     tangent: Vec<f64>,
     tangents_are_constant: bool,
@@ -216,6 +223,7 @@ impl Group {
             law_calls: Vec::new(),
             layer,
             sites: Vec::new(),
+            watched: 0,
             tangent: Vec::new(),
             tangents_are_constant: false,
             is_asked: false,
@@ -295,6 +303,7 @@ impl Group {
     fn start_law(&mut self, law: GroupLaw, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
         self.forget_trial();
         self.law = law;
+        self.watched = calls::name(&format!("group `{}`", self.name));
         let law = &self.law.built.law;
         let id = &law.description().id;
         if self.law_calls.last().is_none_or(|calls| calls.law != *id) {
@@ -314,6 +323,7 @@ impl Group {
             kept
         } else {
             let stress = (self.stress.committed.as_slice(), self.flux_place());
+            calls::of_group(self.watched, 0, self.kinematics.points_per_element());
             law.initial_state(n_points, stress)
                 .map_err(|failure| self.locate(&failure))?
         };
@@ -552,8 +562,10 @@ impl Group {
         let rows = Strided::rows(n);
         let (committed, state) = (&self.stress.committed, &self.internal.committed);
         let (moment, sites) = (self.moment, &self.sites);
+        let (watched, per_element) = (self.watched, self.kinematics.points_per_element());
         let batch = |(number, flux, state_end, operator_end): Batch<'_>| {
             let first = number * BATCH;
+            calls::of_group(watched, first, per_element);
             let n_points = flux.len() / place.point;
             let points = |values: &'_ [f64], stride: usize| {
                 first * stride..values.len().min((first + n_points) * stride)
@@ -640,6 +652,35 @@ impl Group {
             element * length
         };
         &self.tangent[start..start + length]
+    }
+
+    /// Tangents as of the last evaluation that computed them.
+    pub fn tangents(&self) -> &[f64] {
+        &self.tangent
+    }
+
+    /// Puts tangents back that [`Self::tangents`] gave.
+    pub fn put_tangents(&mut self, tangents: Vec<f64>) {
+        debug_assert_eq!(tangents.len(), self.tangent.len());
+        self.tangent = tangents;
+    }
+
+    /// Change of the stresses under displacement increments if the tangents held: D Δε.
+    pub fn linear_change(&self, increment: &[f64]) -> Vec<f64> {
+        let n = self.kinematics.n_components();
+        let mut strain = vec![0.0; self.strain.committed.len()];
+        self.kinematics.add_gradients(increment, &mut strain);
+        let per_element = self.kinematics.points_per_element();
+        let mut change = vec![0.0; strain.len()];
+        let points = strain.chunks_exact(n).zip(change.chunks_exact_mut(n));
+        for (point, (strain, change)) in points.enumerate() {
+            let tangents = self.element_tangents(point / per_element);
+            let tangent = &tangents[point % per_element * n * n..][..n * n];
+            for (change, row) in change.iter_mut().zip(tangent.chunks_exact(n)) {
+                *change = row.iter().zip(strain).map(|(d, e)| d * e).sum();
+            }
+        }
+        change
     }
 
     /// What the group keeps for its points. A trial state as large comes and goes.

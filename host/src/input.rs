@@ -258,6 +258,8 @@ pub fn build_law(
             )
             .into()
     })?;
+    let id = &description.id;
+    warnings.extend(law.changes().iter().map(|it| format!("law `{id}`: {it}")));
     Ok(BuiltLaw {
         law,
         parameters: used,

@@ -15,6 +15,7 @@ pub mod case;
 pub mod check;
 pub mod checkpoint;
 pub mod child;
+pub mod custody;
 pub mod element;
 pub mod error;
 mod file;
@@ -25,6 +26,9 @@ pub mod input;
 pub mod inspect;
 pub mod laws;
 pub mod lock;
+#[expect(unsafe_code, reason = "the program's allocator")]
+#[cfg(unix)]
+pub mod memory;
 pub mod mesh;
 pub mod model;
 pub mod new_law;
@@ -36,4 +40,7 @@ pub mod report;
 pub mod run;
 pub mod schema;
 pub mod solver;
+pub mod stop;
+#[cfg(target_os = "linux")]
+pub mod supervision;
 pub mod trade_off;

@@ -10,19 +10,42 @@ use host::plugin::{SearchPath, Trust, vetting};
 use host::run::{Observer, Options, check, run_reusing};
 use host::schema::{self, FileKind};
 use host::solver::Reuse;
+use host::stop::Stop;
+use host::supervision;
 use host::trade_off;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// A line on the error stream. Nobody may be reading it: that does not end a run.
+/// Memory that runs out ends the program with a message.
+#[cfg(unix)]
+#[global_allocator]
+static ALLOCATOR: host::memory::Allocator = host::memory::Allocator;
+
+/// A line on the error stream. That it cannot be written does not end a run, but is said of it in
+/// the end.
 macro_rules! say {
-    ($($text:tt)*) => {{
-        let _ = writeln!(std::io::stderr(), $($text)*);
-    }};
+    ($($text:tt)*) => {
+        unsaid(writeln!(std::io::stderr(), $($text)*))
+    };
+}
+
+/// Why the error stream took no more.
+static UNSAID: Mutex<Option<std::io::Error>> = Mutex::new(None);
+
+/// Keeps why a line could not be written. Whoever reads a pipe may have read enough.
+fn unsaid(written: std::io::Result<()>) {
+    if let Err(why) = written
+        && why.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        let mut unsaid = UNSAID.lock().unwrap_or_else(PoisonError::into_inner);
+        unsaid.get_or_insert(why);
+    }
 }
 
 /// Finite elements for soil-structure interfaces, with constitutive laws as plugins.
@@ -179,6 +202,23 @@ enum Command {
 }
 
 impl Command {
+    /// Whether it calls laws in its own process, which they may end; and whether that may be done
+    /// once more with laws in processes of their own.
+    fn calls_laws(&self) -> Option<bool> {
+        match self {
+            // What came through a pipe comes only once.
+            Self::Run { case, .. } => Some(case.is_file() || case.is_dir()),
+            Self::Point { driver, csv, .. } => {
+                let goes_into_pipe = csv
+                    .as_ref()
+                    .is_some_and(|csv| csv.exists() && !csv.is_file());
+                Some(driver.is_file() && !goes_into_pipe)
+            }
+            Self::TradeOff { .. } | Self::Laws { .. } | Self::Lock { .. } => Some(false),
+            _ => None,
+        }
+    }
+
     /// A replay outlives a law that crashes again.
     fn isolates_anyway(&self) -> Option<f64> {
         let replays = matches!(self, Self::Replay { in_process, .. } if !in_process);
@@ -187,6 +227,8 @@ impl Command {
 }
 
 fn main() -> ExitCode {
+    #[cfg(unix)]
+    host::memory::reserve();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -199,11 +241,23 @@ fn main() -> ExitCode {
             return ended(Output { failure }.end(Ok(())));
         }
     };
+    let outcome = match arguments.command.calls_laws().map(watched) {
+        Some(Watched::By(code)) => return code,
+        Some(Watched::Not(failure)) => failure.map_or(Ok(()), Err),
+        None => Ok(()),
+    };
+    if outcome.is_err() {
+        return ended(outcome);
+    }
+    let apart = arguments
+        .isolate
+        .or_else(|| arguments.command.isolates_anyway());
+    host::custody::begin();
+    supervision::begin_run(apart.is_some());
     let trust = Trust {
         probe: !arguments.no_probe,
-        isolate: arguments
-            .isolate
-            .or_else(|| arguments.command.isolates_anyway())
+        isolate: apart
+            .or_else(|| supervision::is_again().then_some(AS_LONG_AS_IT_TAKES))
             .map(Duration::from_secs_f64),
     };
     trust.set();
@@ -224,15 +278,79 @@ fn main() -> ExitCode {
     ended(outcome)
 }
 
-/// The exit code, after the message.
+/// Seconds that a call may take where the user has set no limit to it.
+const AS_LONG_AS_IT_TAKES: f64 = 1e6;
+
+/// Who carries out a command that calls laws.
+enum Watched {
+    /// A child did, with this outcome.
+    By(ExitCode),
+    /// This process has to, unless something is wrong.
+    Not(Option<Error>),
+}
+
+/// Has a child carry the command out and watches it, unless this process is the child.
+fn watched(again: bool) -> Watched {
+    if std::env::var_os(supervision::ALONE).is_some() {
+        return Watched::Not(None);
+    }
+    match supervision::enter() {
+        Ok(true) => return Watched::Not(None),
+        Ok(false) => {}
+        Err(why) => {
+            let message = format!("the program cannot be watched: {why}");
+            return Watched::Not(Some(Error::Internal(message)));
+        }
+    }
+    // What the child could not write any more.
+    let mend = |folder: &Path, error: &Error| {
+        let mended = host::output::end_summary(folder, error);
+        let reported = || {
+            let folders = [folder.to_owned()];
+            host::report::write(&folders, &host::report::default_path(&folders)).map(|_| ())
+        };
+        if let Err(why) = mended.and_then(|is_there| if is_there { reported() } else { Ok(()) }) {
+            say!("{:?}", miette::Report::new(why));
+        }
+    };
+    match supervision::supervise(again, &mend) {
+        None => Watched::Not(None),
+        Some(Ok(code)) => Watched::By(ExitCode::from(code)),
+        Some(Err(error)) => Watched::By(ended(Err(error))),
+    }
+}
+
+/// The exit code, after the message. What a command came to matters more than that not all could be
+/// said of it.
 fn ended(outcome: Result<(), Error>) -> ExitCode {
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+    let unsaid = UNSAID.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let outcome = outcome.and(match unsaid {
+        None => Ok(()),
+        Some(why) => Err(Error::Usage(format!(
+            "cannot write to the standard error: {why}"
+        ))),
+    });
+    let code = match outcome.map_err(named_shortage) {
+        Ok(()) => 0,
         Err(error) => {
             let code = error.exit_code();
             say!("{:?}", miette::Report::new(error));
-            ExitCode::from(code)
+            code
         }
+    };
+    supervision::end(code);
+    ExitCode::from(code)
+}
+
+/// A file that the system has no memory for is no trouble with the file.
+fn named_shortage(error: Error) -> Error {
+    match &error {
+        Error::Unreadable { source, .. } | Error::Unwritable { source, .. }
+            if source.kind() == std::io::ErrorKind::OutOfMemory =>
+        {
+            cannot_start("the command", &error)
+        }
+        _ => error,
     }
 }
 
@@ -247,19 +365,14 @@ fn execute(command: Command) -> Result<(), Error> {
             threads,
             record,
         } => {
-            if let Some(n) = threads {
-                rayon::ThreadPoolBuilder::new()
-                    .num_threads(n.into())
-                    .build_global()
-                    .map_err(|error| Error::Internal(error.to_string()))?;
-            }
-            stop_on_signals()?;
+            start_threads(threads)?;
             let options = Options {
                 resume,
                 checkpoints: Some(Duration::from_secs_f64(checkpoint)),
             };
+            let stop = stop_on_signals()?;
             recorded(record.as_deref(), || {
-                run_cases(&case, variant.as_deref(), out.as_deref(), options)
+                run_cases(&case, variant.as_deref(), out.as_deref(), options, &stop)
             })
         }
         Command::Point {
@@ -268,9 +381,13 @@ fn execute(command: Command) -> Result<(), Error> {
             variant,
             csv,
             record,
-        } => recorded(record.as_deref(), || {
-            run_point(&driver, umat.as_deref(), variant.as_deref(), csv.as_deref())
-        }),
+        } => {
+            let stop = stop_on_signals()?;
+            recorded(record.as_deref(), || {
+                let (umat, variant) = (umat.as_deref(), variant.as_deref());
+                run_point(&driver, umat, variant, csv.as_deref(), &stop)
+            })
+        }
         Command::Report { folders, out } => write_report(&folders, out),
         Command::TradeOff {
             input,
@@ -286,6 +403,7 @@ fn execute(command: Command) -> Result<(), Error> {
                 fine,
                 most_increments: max_increments,
                 interface_stiffness,
+                stop: stop_on_signals()?,
             };
             printing(|out| {
                 let mut show = |text: &str| out.line(text);
@@ -344,7 +462,7 @@ struct Output {
 impl Output {
     fn text(&mut self, text: &str) {
         if self.failure.is_none() {
-            let mut out = std::io::stdout().lock();
+            let mut out = supervision::stdout();
             let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
             self.failure = written.err();
         }
@@ -441,18 +559,42 @@ fn check_recording(cases: &[Case]) -> Result<(), Error> {
     Err(Error::Usage(message))
 }
 
-/// The user wants the run to stop after the present increment.
-static STOPS: AtomicBool = AtomicBool::new(false);
-
-/// Ctrl-C and its like end a run after the present increment; a second one ends it at once.
-fn stop_on_signals() -> Result<(), Error> {
-    let stop = || {
-        if STOPS.swap(true, Ordering::Relaxed) {
+/// Who asks the work to stop: the process that watches this one; where none does, Ctrl-C and its
+/// like, and a second one ends the program at once.
+fn stop_on_signals() -> Result<Stop, Error> {
+    if let Some(stop) = supervision::stop() {
+        return Ok(stop);
+    }
+    let asked = Arc::new(AtomicBool::new(false));
+    let stop = Stop::flag(Arc::clone(&asked));
+    let ask = move || {
+        if asked.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        say!("stopping after this increment; once more to stop at once");
+        say!("{}", supervision::STOPPING);
     };
-    ctrlc::set_handler(stop).map_err(|error| Error::Internal(error.to_string()))
+    ctrlc::set_handler(ask).map_err(|error| match error {
+        ctrlc::Error::System(why) => cannot_start("a thread for Ctrl-C", &why),
+        error => Error::Internal(error.to_string()),
+    })?;
+    Ok(stop)
+}
+
+/// Starts the threads that a run works with; as many as there are processors, if it is not said.
+fn start_threads(n: Option<u16>) -> Result<(), Error> {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(n.map_or(0, usize::from));
+    threads
+        .build_global()
+        .map_err(|why| cannot_start("the threads of the run", &why))
+}
+
+/// What starting a thread takes is memory, above all.
+fn cannot_start(what: &str, why: &impl std::fmt::Display) -> Error {
+    #[cfg(unix)]
+    let message = host::memory::cannot_start(what, why);
+    #[cfg(not(unix))]
+    let message = format!("not enough memory to start {what}: {why}");
+    Error::Usage(message)
 }
 
 /// A time in seconds.
@@ -482,6 +624,7 @@ fn run_cases(
     variant: Option<&str>,
     out: Option<&Path>,
     options: Options,
+    stop: &Stop,
 ) -> Result<(), Error> {
     let mut cases = Case::load(path)?;
     if let Some(wanted) = variant {
@@ -525,18 +668,23 @@ fn run_cases(
         if let Some(name) = &case.variant {
             say!("variant {name}");
         }
-        let mut progress = Progress::new();
+        let mut progress = Progress::new(number, &folder, stop);
+        let options = Options {
+            resume: options.resume || supervision::was_begun(number),
+            ..options
+        };
         let run = run_accurately(case, &folder, &mut progress, &mut reuse, options);
         progress.finish();
+        supervision::end_run();
         let has_results = progress.has_begun;
         match run {
             Ok(figures) => {
-                let _ = writeln!(std::io::stdout(), "results in {}", folder.display());
+                let _ = writeln!(supervision::stdout(), "results in {}", folder.display());
                 drawn.extend(case.variant.clone().map(|variant| (variant, figures)));
             }
             Err(error) => keep_last(&mut outcome, error),
         }
-        let is_stopped = matches!(outcome, Err(Error::Interrupted { .. }));
+        let is_stopped = outcome.as_ref().is_err_and(Error::is_stop);
         if has_results {
             if let Err(error) = write_report(std::slice::from_ref(&folder), None) {
                 keep_last(&mut reports, error);
@@ -575,7 +723,8 @@ fn run_accurately(
     reuse: &mut Reuse,
     options: Options,
 ) -> Result<Figures, Error> {
-    let studied = trade_off::reach(case, folder)?;
+    let studied =
+        trade_off::reach_until(case, folder, &progress.stop, &mut |doing| say!("{doing}"))?;
     let case = studied.as_ref().unwrap_or(case);
     if let Some(chosen) = &case.file.chosen {
         let increments: Vec<String> = chosen
@@ -616,23 +765,25 @@ fn run_point(
     umat: Option<&Path>,
     variant: Option<&str>,
     csv: Option<&Path>,
+    stop: &Stop,
 ) -> Result<(), Error> {
+    let report = |report: &host::point::PointReport| say!("{report}");
     match umat {
-        Some(umat) => host::point::run_incremental(driver, umat, csv, |report| say!("{report}")),
+        Some(umat) => host::point::run_incremental(driver, umat, csv, stop, report),
         None if driver.extension().is_some_and(|ending| ending == "inp") => {
             Err(Error::Usage(format!(
                 "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
                 driver.display()
             )))
         }
-        None => host::point::run_file_variants(driver, variant, csv, |report| say!("{report}")),
+        None => host::point::run_file_until(driver, variant, csv, stop, report),
     }
 }
 
 fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
     let out = out.unwrap_or_else(|| host::report::default_path(folders));
     let written = host::report::write(folders, &out)?;
-    let _ = writeln!(std::io::stdout(), "report in {}", written.display());
+    let _ = writeln!(supervision::stdout(), "report in {}", written.display());
     Ok(())
 }
 
@@ -675,6 +826,9 @@ fn manual(program: &clap::Command) -> Result<(), Error> {
 
 /// A bar on a terminal, plain lines elsewhere; both on the error stream.
 struct Progress {
+    /// Number of the case, from 1, and where its results go.
+    place: (usize, PathBuf),
+    stop: Stop,
     bar: Option<ProgressBar>,
     cut_backs: usize,
     /// A phase has begun, so there is a folder with results.
@@ -682,8 +836,10 @@ struct Progress {
 }
 
 impl Progress {
-    fn new() -> Self {
+    fn new(number: usize, folder: &Path, stop: &Stop) -> Self {
         Self {
+            place: (number, folder.to_owned()),
+            stop: stop.clone(),
             bar: None,
             cut_backs: 0,
             has_begun: false,
@@ -709,6 +865,7 @@ impl Observer for Progress {
         self.finish();
         self.cut_backs = 0;
         self.has_begun = true;
+        supervision::case_begun(self.place.0, &self.place.1);
         if std::io::stderr().is_terminal() {
             let bar = ProgressBar::new(increments as u64);
             let template = "{prefix:16} {bar:32} {pos}/{len}  {msg}  {eta} left";
@@ -761,7 +918,7 @@ impl Observer for Progress {
         }
     }
 
-    fn wants_to_stop(&self) -> bool {
-        STOPS.load(Ordering::Relaxed)
+    fn stop(&self) -> Stop {
+        self.stop.clone()
     }
 }

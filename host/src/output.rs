@@ -5,6 +5,7 @@
 
 mod fields;
 mod figure;
+mod file;
 mod leftovers;
 mod points;
 mod profile;
@@ -12,6 +13,9 @@ mod summary;
 
 pub(crate) use figure::COLOURS;
 pub use figure::{Figures, check_figures, check_table_figures};
+pub(crate) use file::check_own;
+pub use file::refuse_other;
+pub(crate) use file::{begin, is_same, replace};
 pub use summary::PhaseRecord;
 
 use crate::case::{Case, Control, OutputInput, When};
@@ -21,14 +25,13 @@ use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::probe::{Probes, Snapshot};
 use crate::solver::Iteration;
-use fields::Fields;
+use fields::{Fields, Written};
 use figure::Curve;
+use file::{Appended, Extent};
 use points::Points;
 use profile::Profile;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use summary::{Course, Stopped, Summary};
@@ -77,18 +80,38 @@ pub struct Results {
 /// How far the results of a run had come at a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ResultsState {
-    history: u64,
-    path: Option<u64>,
-    profile: Option<u64>,
-    points: Option<u64>,
-    log: u64,
-    times: Option<Vec<f64>>,
+    history: Extent,
+    path: Option<Extent>,
+    profile: Option<Extent>,
+    points: Option<Extent>,
+    log: Extent,
+    fields: Option<Vec<Written>>,
     course: Course,
     curves: Vec<Vec<Curve>>,
     seconds: Duration,
 }
 
 impl ResultsState {
+    /// Checks that the files in the folder are still those of the run.
+    ///
+    /// # Errors
+    /// The first that is not, or cannot be read.
+    pub fn check(&self, folder: &Path) -> Result<(), Error> {
+        let tables = [
+            ("history.csv", Some(self.history)),
+            ("path.csv", self.path),
+            ("profile.csv", self.profile),
+            ("points.csv", self.points),
+            ("log.jsonl", Some(self.log)),
+        ];
+        for (name, extent) in tables {
+            if let Some(extent) = extent {
+                file::check(&folder.join(name), extent)?;
+            }
+        }
+        fields::check(folder, self.fields.as_deref().unwrap_or_default())
+    }
+
     /// The figures of the run.
     pub fn figures(self, case: &Case, probes: &Probes) -> Figures {
         let mut figures = empty_figures(case, probes);
@@ -105,34 +128,21 @@ fn empty_figures(case: &Case, probes: &Probes) -> Figures {
 /// A CSV file.
 #[derive(Debug)]
 struct Table {
-    path: PathBuf,
-    file: File,
+    file: Appended,
     /// Rows that are not in the file yet.
     rows: csv::Writer<Vec<u8>>,
-    /// Bytes of whole rows in the file.
-    length: u64,
 }
 
 impl Table {
-    /// Begins a file with a head; or, `from` a length, goes on after that of an earlier run's.
+    /// Begins a file with a head; or, `from` what it held, goes on after that of an earlier run's.
     fn begin<'a>(
         path: PathBuf,
         columns: impl IntoIterator<Item = &'a str>,
-        from: Option<u64>,
+        from: Option<Extent>,
     ) -> Result<Self, Error> {
-        let file = match from {
-            None => create(&path)?,
-            Some(length) => OpenOptions::new()
-                .write(true)
-                .open(&path)
-                .and_then(|file| cut(&file, length).map(|()| file))
-                .map_err(|error| unwritable(&path, error))?,
-        };
         let mut table = Self {
-            path,
-            file,
+            file: Appended::begin(path, from)?,
             rows: csv::Writer::from_writer(Vec::new()),
-            length: from.unwrap_or(0),
         };
         if from.is_none() {
             table.row(columns)?;
@@ -144,7 +154,7 @@ impl Table {
     fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(&mut self, cells: I) -> Result<(), Error> {
         self.rows
             .write_record(cells)
-            .map_err(|error| unwritable(&self.path, std::io::Error::other(error)))
+            .map_err(|error| unwritable(self.file.path(), std::io::Error::other(error)))
     }
 
     /// Writes the rows that are waiting, all of them or none.
@@ -153,57 +163,13 @@ impl Table {
         let rows = rows
             .into_inner()
             .map_err(|error| Error::Internal(error.to_string()))?;
-        append(&mut self.file, &mut self.length, &rows)
-            .map_err(|error| unwritable(&self.path, error))
+        self.file.append(&rows)
     }
 
     /// Waits until everything is on the disk.
-    fn sync(&self) -> Result<u64, Error> {
-        let synced = self.file.sync_data();
-        synced.map_err(|error| unwritable(&self.path, error))?;
-        Ok(self.length)
+    fn sync(&self) -> Result<Extent, Error> {
+        self.file.sync()
     }
-}
-
-/// Appends to a file of this length. What fits of a text that does not fit as a whole is taken
-/// back: it would pass for more than it is.
-fn append(file: &mut File, length: &mut u64, text: &[u8]) -> std::io::Result<()> {
-    if let Err(error) = file.write_all(text) {
-        let _ = file.set_len(*length);
-        return Err(error);
-    }
-    *length += text.len() as u64;
-    Ok(())
-}
-
-/// Forgets what a file holds after `length` bytes and goes on there.
-fn cut(mut file: &File, length: u64) -> std::io::Result<()> {
-    if file.metadata()?.len() < length {
-        return Err(std::io::Error::other(
-            "it is shorter than it was at the last checkpoint: it was changed since",
-        ));
-    }
-    file.set_len(length)?;
-    file.seek(SeekFrom::Start(length))?;
-    Ok(())
-}
-
-/// Refuses to write where something else than a file is: a pipe that nobody reads would keep the
-/// program waiting for ever.
-///
-/// # Errors
-/// [`Error::Unwritable`].
-pub fn refuse_other(path: &Path) -> Result<(), Error> {
-    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        let other = std::io::Error::other("there is something else than a file of this name");
-        return Err(unwritable(path, other));
-    }
-    Ok(())
-}
-
-fn create(path: &Path) -> Result<File, Error> {
-    refuse_other(path)?;
-    File::create(path).map_err(|error| unwritable(path, error))
 }
 
 pub(crate) fn unwritable(path: &Path, source: std::io::Error) -> Error {
@@ -231,40 +197,11 @@ fn internal_variables(model: &Model, of: impl Fn(&Group) -> bool) -> Vec<String>
 
 /// One JSON object a line. As long as it is open, no other run writes into the folder.
 #[derive(Debug)]
-struct LogFile {
-    path: PathBuf,
-    file: File,
-    /// Bytes of whole lines.
-    length: u64,
-}
+struct LogFile(Appended);
 
 impl LogFile {
-    /// Opens and locks the file, and goes on after its first `length` bytes.
-    fn begin(path: PathBuf, length: u64) -> Result<Self, Error> {
-        let mut options = OpenOptions::new();
-        let options = options.read(true).write(true).create(true).truncate(false);
-        let file = options
-            .open(&path)
-            .map_err(|error| unwritable(&path, error))?;
-        // Some file systems know no locks: an error says nothing of another run.
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            let busy = std::io::Error::other("another run is writing into this folder");
-            return Err(unwritable(&path, busy));
-        }
-        cut(&file, length).map_err(|error| unwritable(&path, error))?;
-        Ok(Self { path, file, length })
-    }
-
     fn line(&mut self, value: &Value) -> Result<(), Error> {
-        let line = format!("{value}\n");
-        append(&mut self.file, &mut self.length, line.as_bytes())
-            .map_err(|error| unwritable(&self.path, error))
-    }
-
-    fn sync(&self) -> Result<u64, Error> {
-        let synced = self.file.sync_data();
-        synced.map_err(|error| unwritable(&self.path, error))?;
-        Ok(self.length)
+        self.0.append(format!("{value}\n").as_bytes())
     }
 }
 
@@ -280,7 +217,7 @@ impl Results {
         probes: &Probes,
     ) -> Result<Self, Error> {
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
-        let log = LogFile::begin(folder.join("log.jsonl"), 0)?;
+        let log = LogFile(Appended::begin_locked(folder.join("log.jsonl"), false)?);
         leftovers::remove(folder)?;
         Self::begin(folder, case, model, probes, log, None)
     }
@@ -297,7 +234,10 @@ impl Results {
         probes: &Probes,
         state: ResultsState,
     ) -> Result<Self, Error> {
-        let log = LogFile::begin(folder.join("log.jsonl"), state.log)?;
+        let log = Appended::begin_locked(folder.join("log.jsonl"), true)?;
+        // Nothing is cut to its length before all are known to be good.
+        state.check(folder)?;
+        let log = LogFile(log.go_on(state.log)?);
         Self::begin(folder, case, model, probes, log, Some(state))
     }
 
@@ -342,11 +282,13 @@ impl Results {
             results.summary.course = state.course;
             results.figures.restore(state.curves);
             results.seconds = state.seconds;
-            if let (Some(fields), Some(times)) = (&mut results.fields, state.times) {
-                fields.times = times;
+            if let (Some(fields), Some(written)) = (&mut results.fields, state.fields) {
+                fields.written = written;
             }
         }
         write_summary(folder, &results.summary.running())?;
+        #[cfg(unix)]
+        crate::memory::writes(Some(folder));
         Ok(results)
     }
 
@@ -363,8 +305,8 @@ impl Results {
             path: path.transpose()?,
             profile: profile.transpose()?,
             points: points.transpose()?,
-            log: self.log.sync()?,
-            times: self.fields.as_ref().map(|fields| fields.times.clone()),
+            log: self.log.0.sync()?,
+            fields: self.fields.as_ref().map(|fields| fields.written.clone()),
             course: self.summary.course.clone(),
             curves: self.figures.curves(),
             seconds: self.seconds,
@@ -491,7 +433,7 @@ impl Results {
             probes,
         });
         if let Some(fields) = &mut self.fields
-            && fields.times.last().copied() != Some(time)
+            && fields.last() != Some(time)
         {
             fields.write(time, snapshot, mesh)?;
         }
@@ -591,10 +533,14 @@ impl Results {
         let summary = self
             .summary
             .finish(groups, [total, self.seconds], warnings, error);
-        self.log
-            .line(&json!({ "event": "end", "status": summary["status"] }))?;
+        let logged = self
+            .log
+            .line(&json!({ "event": "end", "status": summary["status"] }));
+        // A log that takes no more must not leave a run that seems to go on.
         write_summary(&self.folder, &summary)?;
-        drawn
+        #[cfg(unix)]
+        crate::memory::writes(None);
+        logged.and(drawn)
     }
 }
 
@@ -616,13 +562,35 @@ pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
     })
 }
 
+/// Has the summary of a run that could not end it say how it ended. Whether there is one.
+///
+/// # Errors
+/// [`Error::Unreadable`] or [`Error::Unwritable`].
+pub fn end_summary(folder: &Path, error: &Error) -> Result<bool, Error> {
+    let path = folder.join("summary.json");
+    if !path.is_file() {
+        return Ok(false);
+    }
+    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let Ok(Value::Object(mut summary)) = serde_json::from_str(&text) else {
+        return Ok(false);
+    };
+    summary.insert("status".to_owned(), summary::status(Some(error)).into());
+    summary.insert("error".to_owned(), error.to_string().into());
+    write_summary(folder, &summary.into())?;
+    Ok(true)
+}
+
 /// Writes the summary whole or not at all.
 fn write_summary(folder: &Path, summary: &Value) -> Result<(), Error> {
     let path = folder.join("summary.json");
     let partial = folder.join("summary.json.part");
     let text = serde_json::to_string_pretty(summary)
         .map_err(|error| Error::Internal(error.to_string()))?;
-    std::fs::write(&partial, text + "\n").map_err(|error| unwritable(&partial, error))?;
+    replace(&partial, text + "\n")?;
     std::fs::rename(&partial, &path).map_err(|error| unwritable(&path, error))
 }
 

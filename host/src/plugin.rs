@@ -1,6 +1,11 @@
 //! Laws from shared libraries: finding, opening, building and calling them.
 
 pub mod adapter;
+#[cfg(unix)]
+pub(crate) mod calls;
+#[cfg(not(unix))]
+#[path = "plugin/calls/none.rs"]
+pub(crate) mod calls;
 mod description;
 mod image;
 #[cfg(unix)]
@@ -19,12 +24,16 @@ pub use library::{Strided, probe};
 pub use search::SearchPath;
 pub use trust::Trust;
 
+use crate::custody;
 use crate::error::Error;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use abi::status::Outcome;
 use adapter::{Foreign, ForeignInstance, ForeignLaw};
+use calls::Doing;
 use image::Image;
+#[cfg(target_os = "linux")]
+pub(crate) use library::SharedMemory;
 use library::{Call, LawHandle, OwnedInstance};
 use sha2::{Digest, Sha256};
 use std::cell::RefCell;
@@ -319,7 +328,13 @@ impl LoadedLaw {
             .ok_or_else(|| defect("the hypothesis is not offered"))?
             .clone();
         let index = formulation.index;
-        let created = match origin {
+        let name = calls::name(&format!(
+            "law `{}` of library {}",
+            description.id,
+            self.library.path.display()
+        ));
+        calls::remember_process();
+        let create = || match origin {
             Origin::Here(handle) => handle.create(index, parameters).map(LawInstance::Here),
             Origin::Foreign(law) => law.create(hypothesis, parameters).map(LawInstance::Foreign),
             #[cfg(unix)]
@@ -330,6 +345,8 @@ impl LoadedLaw {
                     .map(LawInstance::Apart)
             }
         };
+        let created = calls::calling(name, Doing::Create, 0, Moment::default(), create);
+        let changes = custody::restore().map_err(|why| defect(&why))?;
         let instance = created.map_err(|(status, message)| {
             let parameter = message
                 .split_once(':')
@@ -348,6 +365,8 @@ impl LoadedLaw {
             formulation,
             parameters: parameters.to_vec(),
             instance,
+            name,
+            changes,
         })
     }
 }
@@ -360,6 +379,10 @@ pub struct Law {
     formulation: FormulationDescription,
     parameters: Vec<f64>,
     instance: LawInstance,
+    /// What it is called where calls are watched.
+    name: u64,
+    /// What it had changed of the process as it was built.
+    changes: Vec<String>,
 }
 
 /// What a library made of the parameters, in this process or in workers.
@@ -585,6 +608,11 @@ impl Law {
         &self.loaded
     }
 
+    /// What it had changed of the process as it was built, and what was set back.
+    pub fn changes(&self) -> &[String] {
+        &self.changes
+    }
+
     /// Values of its parameters, in declared order.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
@@ -645,7 +673,7 @@ impl Law {
         let mut state: Vec<f64> = initial.cycle().take(n_points * n_states).collect();
         let mut status = vec![raw::PILUM_E_INTERNAL; n_points];
         let mut factor = vec![0.0; n_points];
-        let result = self.instance.init_state(Call {
+        let call = Call {
             request: 0,
             n_points,
             n_components: self.n_components(),
@@ -663,6 +691,9 @@ impl Law {
             tangent: &mut [],
             status: &mut status,
             step_factor: &mut factor,
+        };
+        let result = calls::calling(self.name, Doing::Start, n_points, Moment::default(), || {
+            self.instance.init_state(call)
         });
         match result {
             None => Ok(state),
@@ -732,7 +763,7 @@ impl Law {
         let n = self.n_components();
         let (status, factor) = outcomes.unwritten(start.n_points);
         let (flux, flux_place) = end.flux;
-        let (worst, message) = self.instance.integrate(Call {
+        let call = Call {
             request: raw::PILUM_REQ_FLUX
                 | match operator {
                     Operator::None => 0,
@@ -755,7 +786,15 @@ impl Law {
             tangent: &mut *end.operator,
             status: &mut *status,
             step_factor: &mut *factor,
-        });
+        };
+        let update = || self.instance.integrate(call);
+        let (worst, message) = calls::calling(
+            self.name,
+            Doing::Update,
+            start.n_points,
+            start.moment,
+            update,
+        );
         let success = judge(worst, status, factor, message)?;
         let n_states = self.n_states();
         let n_operator = if operator == Operator::None { 0 } else { n * n };

@@ -20,7 +20,7 @@ pub use table::{Row, Table};
 
 use crate::capsule::{self, Capsule};
 use crate::error::{Error, suggestion};
-use crate::output::Figures;
+use crate::output::{Figures, is_same};
 use crate::plugin::Moment;
 use crate::plugin::adapter::{self, Adapter};
 use abi::status::Outcome;
@@ -127,9 +127,27 @@ pub fn run_file_variants(
     path: &Path,
     variant: Option<&str>,
     csv: Option<&Path>,
+    report: impl FnMut(&PointReport),
+) -> Result<(), Error> {
+    run_file_until(path, variant, csv, &crate::stop::Stop::never(), report)
+}
+
+/// As [`run_file_variants`], to be stopped on its way.
+///
+/// # Errors
+/// As [`run_file_variants`]; [`Error::Stopped`] after the rows found until then have been written.
+pub fn run_file_until(
+    path: &Path,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+    stop: &crate::stop::Stop,
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    run_all(Driver::read(path)?, path, variant, csv, &mut report)
+    let mut drivers = Driver::read(path)?;
+    for driver in &mut drivers {
+        driver.stop_on(stop);
+    }
+    run_all(drivers, path, variant, csv, &mut report)
 }
 
 /// Runs input of the IncrementalDriver of A. Niemunis with a UMAT. Rows go to `csv`, or to the
@@ -141,9 +159,11 @@ pub fn run_incremental(
     path: &Path,
     umat: &Path,
     csv: Option<&Path>,
+    stop: &crate::stop::Stop,
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    let driver = Driver::read_incremental(path, umat)?;
+    let mut driver = Driver::read_incremental(path, umat)?;
+    driver.stop_on(stop);
     run_all(vec![driver], path, None, csv, &mut report)
 }
 
@@ -187,7 +207,7 @@ fn run_all(
             )));
         };
         let name = Path::new("the standard output");
-        return match driver.write_csv(io::stdout().lock(), name) {
+        return match driver.write_csv(crate::supervision::stdout(), name) {
             Ok(done) => {
                 report(&done);
                 Ok(())
@@ -205,8 +225,7 @@ fn run_all(
     };
     for driver in &drivers {
         let csv = target(driver);
-        let same = path.canonicalize().ok().zip(csv.canonicalize().ok());
-        if same.is_some_and(|(driver, csv)| driver == csv) {
+        if is_same(path, &csv) {
             return Err(Error::Usage(format!(
                 "--csv {} would overwrite the driver file",
                 csv.display()
@@ -223,7 +242,7 @@ fn run_all(
             source,
         })?;
         let mut figures = driver.empty_figures();
-        let result = driver.follow(file, &csv, &mut figures);
+        let result = driver.follow(Guarded { file, length: 0 }, &csv, &mut figures);
         drawn.push((driver.variant.clone().unwrap_or_default(), figures));
         let mut done = result?;
         done.csv = Some(csv);
@@ -236,6 +255,27 @@ fn run_all(
         several => Figures::draw_overlaid(folder, several),
     };
     outcome.and(figures)
+}
+
+/// A file that is written to only as long as it is what was opened, and with what belongs to the
+/// process as it was.
+struct Guarded {
+    file: File,
+    length: u64,
+}
+
+impl Write for Guarded {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        crate::custody::restore().map_err(io::Error::other)?;
+        crate::output::check_own(&self.file, self.length)?;
+        let n = self.file.write(bytes)?;
+        self.length += n as u64;
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 /// `a/b.csv` to `a/b_<variant>.csv`.
@@ -265,6 +305,8 @@ struct Shortfall {
 enum Stop {
     Shortfall(Box<Shortfall>),
     Fatal(Fatal),
+    /// As asked.
+    Asked,
 }
 
 impl From<Fatal> for Stop {
@@ -459,11 +501,13 @@ impl Driver {
             internal: self.internal.clone(),
         };
         let mut search = Search::new(&self.law, &point);
+        search.stop = self.stop.clone();
         let mut warnings = self.warnings.clone();
         let answer = search
             .at_rest(&point)
             .map_err(|failure| self.explain(Stop::Fatal(failure), "initial state", &warnings))?;
         let Some(returned) = answer else {
+            self.stop.check("initial state")?;
             let words = search.take_obstacle().law.unwrap_or_default();
             return Err(self.initial_error(&words));
         };
@@ -529,6 +573,7 @@ impl Driver {
         let failure = match stop {
             Stop::Fatal(failure) => failure,
             Stop::Shortfall(shortfall) => shortfall.obstacle.refusal.as_ref()?,
+            Stop::Asked => return None,
         };
         let mut origin = vec![("driver", self.path().display().to_string().into())];
         origin.extend(self.variant.iter().map(|v| ("variant", v.as_str().into())));
@@ -555,6 +600,10 @@ impl Driver {
                     failure.message
                 ))
             }
+            Stop::Asked => Error::Stopped {
+                message: format!("{place}: stopped as asked; the rows before it are written"),
+                hint: None,
+            },
             Stop::Shortfall(shortfall) => {
                 let Shortfall {
                     reached,
@@ -774,6 +823,9 @@ impl Walk<'_> {
                 }
                 may_grow = true;
                 continue;
+            }
+            if self.search.stop.is_asked() {
+                return Err(Stop::Asked);
             }
             let obstacle = self.search.take_obstacle();
             let factor = obstacle.factor.map_or(0.5, |f| f.clamp(0.1, 0.9));

@@ -3,7 +3,7 @@
 mod section;
 
 use crate::assembly::{Tie, fold};
-use crate::case::{Case, ProbeInput, Reduce};
+use crate::case::{Case, Control, ProbeInput, Reduce};
 use crate::error::{Error, Place, Source, suggestion};
 use crate::group::Group;
 use crate::input::Named;
@@ -14,8 +14,10 @@ use toml::Spanned;
 /// Components of stress and strain by the name they have in quantities.
 const COMPONENTS: [&str; 4] = ["11", "22", "33", "12"];
 
-/// Columns of `history.csv` beside the probes.
-const RESERVED: [&str; 4] = ["phase", "increment", "time", "iterations"];
+/// Columns of `history.csv` beside the probes, and of `path.csv`, which only arc-length control
+/// writes.
+const OF_HISTORY: [&str; 4] = ["phase", "increment", "time", "iterations"];
+const OF_PATH: [&str; 4] = ["phase", "increment", "load_factor", "iterations"];
 
 /// All probes of a case, in the order of the file.
 #[derive(Debug)]
@@ -86,10 +88,7 @@ impl Probes {
     pub fn new(case: &Case, model: &Model) -> Result<Self, Error> {
         let mut probes: Vec<(String, Probe)> = Vec::new();
         for (name, input) in &case.file.probes {
-            if RESERVED.contains(&name.get_ref().as_str()) {
-                let message = format!("`{}` is a column of history.csv already", name.get_ref());
-                return Err(case.source.error(name.span(), message).into());
-            }
+            refuse_column(case, name)?;
             let resolver = Resolver {
                 case,
                 model,
@@ -173,6 +172,26 @@ impl Probes {
         }
         values
     }
+}
+
+/// Refuses a probe that is called as a column of the tables that it would be written to.
+fn refuse_column(case: &Case, name: &Spanned<String>) -> Result<(), Error> {
+    let has_path = case.file.solver.control == Control::ArcLength;
+    let mut tables = vec![("history.csv", OF_HISTORY)];
+    tables.extend(has_path.then_some(("path.csv", OF_PATH)));
+    let taken = |(_, columns): &&(&str, [&str; 4])| columns.contains(&name.get_ref().as_str());
+    let Some((table, _)) = tables.iter().find(taken) else {
+        return Ok(());
+    };
+    let mut reserved: Vec<&str> = tables.iter().flat_map(|(_, columns)| *columns).collect();
+    reserved.sort_unstable();
+    reserved.dedup();
+    let message = format!(
+        "`{}` is a column of {table} already; taken are: {}",
+        name.get_ref(),
+        reserved.join(", ")
+    );
+    Err(case.source.error(name.span(), message).into())
 }
 
 impl Probe {

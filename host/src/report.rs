@@ -3,9 +3,11 @@
 //!
 //! What needs no drawing is written as tables by the template; what does goes into the page as
 //! JSON, rounded to seven digits, and is drawn by the page's own script. The CSV files stay the
-//! primary result and are linked. A folder only has to have a `history.csv`; whatever else is
+//! primary result and are linked. However long they are, and however many runs there are, the page
+//! stays of a size that a browser opens; what is left out for that is said. A folder only has to have a `history.csv`; whatever else is
 //! missing or broken is left out, and the page says so.
 
+mod budget;
 mod comparison;
 mod fields;
 mod log;
@@ -16,6 +18,8 @@ mod short;
 mod table;
 
 use crate::error::Error;
+use crate::output::replace;
+use budget::Budget;
 use results::Run;
 use std::path::{Path, PathBuf};
 
@@ -46,9 +50,10 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
     }
     let mut runs = folders
         .iter()
-        .map(|folder| Run::read(folder))
+        .map(|folder| Run::read(folder, &Budget::of(folders.len())))
         .collect::<Result<Vec<_>, _>>()?;
     results::tell_apart(&mut runs);
+    let is_ours = out.is_dir() || out == default_path(folders);
     let out = if out.is_dir() {
         out.join(FILE)
     } else {
@@ -62,6 +67,11 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
     let parent = absolute.parent().unwrap_or(&absolute);
     std::fs::create_dir_all(parent).map_err(unwritable)?;
     let text = page::render(&runs, parent)?;
-    std::fs::write(&out, text).map_err(unwritable)?;
+    // A name that was asked for is followed, as a shell does.
+    if is_ours {
+        replace(&out, text)?;
+    } else {
+        std::fs::write(&out, text).map_err(unwritable)?;
+    }
     Ok(out)
 }

@@ -6,11 +6,13 @@ mod keeper;
 mod method;
 mod path;
 mod start;
+mod statics;
 
-use crate::assembly::{Places, System, fold};
+use crate::assembly::{Bodies, Places, System, fold};
 use crate::capsule::{self, Capsule};
 use crate::case::{Axis, Case, CaseFile, Control, Equations, Method, PhaseInput, SolverInput};
 use crate::checkpoint::{PhaseCourse, RunState, identity};
+use crate::custody;
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
@@ -19,8 +21,10 @@ use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figure
 use crate::plugin::{Library, Moment};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, Reuse, StepFailure, StepSuccess,
+    Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, Reuse, Runaway, StepFailure,
+    StepSuccess,
 };
+use crate::stop::Stop;
 use algebra::{LinearSolver, Singular, mesh_lines};
 use beyond::Beyond;
 pub(crate) use history::History;
@@ -42,9 +46,10 @@ pub trait Observer {
     fn warning(&mut self, message: &str);
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
-    /// Whether the run is to stop after the increment that has just been written.
-    fn wants_to_stop(&self) -> bool {
-        false
+    /// Who may want the run to stop: after the increment under way, or within it if that takes
+    /// long.
+    fn stop(&self) -> Stop {
+        Stop::never()
     }
 }
 
@@ -119,6 +124,7 @@ pub fn run_reusing(
     let (mut results, state) = if let Some(checkpoint) = found {
         let from = checkpoint.place(case);
         let Some(state) = checkpoint.run else {
+            checkpoint.results.check(folder)?;
             observer.resumed(None);
             return Ok(checkpoint.results.figures(case, &probes));
         };
@@ -134,6 +140,7 @@ pub fn run_reusing(
         (Results::create(folder, case, &model, &probes)?, None)
     };
     let mut run = Run::new(case, model, probes, reuse);
+    run.stop = observer.stop();
     let outcome = run.phases(state, &mut results, &mut observer, &mut keeper);
     for warning in run
         .beyond
@@ -190,8 +197,8 @@ impl Observer for Noting<'_> {
         self.observer.resumed(from);
     }
 
-    fn wants_to_stop(&self) -> bool {
-        self.observer.wants_to_stop()
+    fn stop(&self) -> Stop {
+        self.observer.stop()
     }
 }
 
@@ -217,8 +224,14 @@ struct Run<'a> {
     largest_force: f64,
     /// Results that the theory does not cover.
     beyond: Beyond,
+    /// The same at every degree of freedom.
+    largest_forces: Vec<f64>,
+    /// Rotations call forth no stresses in any group.
+    turns_freely: bool,
     /// Factors of linear parts.
     reuse: &'a mut Reuse,
+    /// Who may want it to stop.
+    stop: Stop,
 }
 
 /// The equations of one phase.
@@ -232,6 +245,9 @@ struct PhaseEquations {
     solver: LinearSolver,
     /// What the solver holds factorised.
     matrix: Matrix,
+    /// What the residual of the last step was measured against, by body, and its tolerance; nothing
+    /// before the first step.
+    measured: Option<(Vec<f64>, f64)>,
     /// Forces out of balance at the start, relative to the forces in play.
     out_of_balance: f64,
     n_unknowns: usize,
@@ -279,6 +295,7 @@ impl<'a> Run<'a> {
         } = model;
         let n_dofs = 2 * mesh.nodes.len();
         let looked_at = probes.looks_at(&groups);
+        let turns_freely = groups.iter().all(|group| turns_freely(group, &mesh.nodes));
         let mut run = Self {
             case,
             mesh,
@@ -293,7 +310,10 @@ impl<'a> Run<'a> {
             time: 0.0,
             largest_force: 0.0,
             beyond: Beyond::default(),
+            largest_forces: vec![0.0; n_dofs],
+            turns_freely,
             reuse,
+            stop: Stop::never(),
         };
         run.beyond.knows(&run.groups);
         for support in &case.file.supports {
@@ -468,6 +488,7 @@ impl<'a> Run<'a> {
             let mut done = match reached {
                 Ok(done) => done,
                 Err(error) => {
+                    let _ = custody::restore();
                     // What led here matters more than trouble with the state before it.
                     let _ = self.last_equilibrium(&place, equations, &course, record, results);
                     return Err(error);
@@ -485,6 +506,10 @@ impl<'a> Run<'a> {
                 .map_err(|why| {
                     Self::no_equilibrium(&place, lambda, n, &StepFailure::because(why), None)
                 })?;
+            custody::restore()
+                .map_err(|why| Error::plugin(format!("{place}: {why}")))?
+                .iter()
+                .for_each(|change| observer.warning(&format!("{place}: {change}")));
             let snapshot = self.snapshot(&reaction);
             done.probes = self.probes.values(&snapshot);
             self.probes.check(self.case, &place, &done.probes)?;
@@ -494,7 +519,7 @@ impl<'a> Run<'a> {
             results.increment(&place, n, &done, &snapshot, &self.mesh)?;
             observer.increment(&place, n, done.iterations);
             course.increment = increment;
-            let stops = observer.wants_to_stop();
+            let stops = self.stop.is_asked();
             if stops || keeper.is_due() {
                 course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
                 course.has_matrix = equations.matrix.is_kept(self.solver().method);
@@ -583,7 +608,10 @@ impl<'a> Run<'a> {
                         record.relaxed += 1;
                         observer.warning(&format!(
                             "{place}: Newton iterations came to a standstill; viscous relaxation \
-                             led to the next equilibrium"
+                             led to the next equilibrium; others may lie near, and which one is \
+                             found depends on the course of the relaxation: run it with other \
+                             increments, or in another unit of stress, and hold the results against \
+                             each other"
                         ));
                     }
                     if success.iterations.len() as f64 <= easy {
@@ -593,6 +621,7 @@ impl<'a> Run<'a> {
                         success, end, place, course, equations, record, results, &mut done,
                     )?;
                 }
+                Err(failure) if failure.is_stop => return Err(Self::stopped(place)),
                 Err(failure) => {
                     results.iterations(place, end, &failure.iterations)?;
                     done.iterations += failure.iterations.len();
@@ -653,6 +682,19 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// The error of an increment that was stopped on its way.
+    fn stopped(place: &Place) -> Error {
+        Error::Stopped {
+            message: format!(
+                "{place}: stopped as asked, within the increment; everything before it is written"
+            ),
+            hint: Some(
+                "the last equilibrium is `stopped_at` in summary.json; go on with --resume"
+                    .to_owned(),
+            ),
+        }
+    }
+
     /// The error of a phase that ends at load factor λ, with the call of the law that failed.
     fn cannot_go_on(
         &self,
@@ -681,7 +723,32 @@ impl<'a> Run<'a> {
             });
         }
         let hint = kept.or_else(|| self.suspicion(failure));
-        Ok(Self::no_equilibrium(place, lambda, n, failure, hint))
+        let known = [self.what_ran_away(failure), failure.culprit.clone()];
+        let known: Vec<String> = known.into_iter().flatten().collect();
+        let failure = StepFailure {
+            culprit: (!known.is_empty()).then(|| known.join("\n  ")),
+            ..failure.clone()
+        };
+        Ok(Self::no_equilibrium(place, lambda, n, &failure, hint))
+    }
+
+    /// The displacement that ran away in a failed step, in words.
+    fn what_ran_away(&self, failure: &StepFailure) -> Option<String> {
+        let Runaway { dof, increment } = failure.runaway?;
+        let node = dof / 2;
+        let of_node = |group: &&Group| {
+            let mut elements = 0..group.kinematics.n_elements();
+            elements.any(|element| group.kinematics.nodes(element).contains(&node))
+        };
+        let groups = self.groups.iter().filter(of_node);
+        let groups: Vec<String> = groups.map(|group| format!("`{}`", group.name)).collect();
+        let [x, y] = self.mesh.nodes[node];
+        let axis = if dof.is_multiple_of(2) { "x" } else { "y" };
+        Some(format!(
+            "the displacement in {axis} ran away: {increment:.1e} m in one step at node ({x:.4}, \
+             {y:.4}), group {}: a mechanism, which next to nothing resists",
+            groups.join(", ")
+        ))
     }
 
     /// Where to look if a law of the user's own may have kept the iterations from converging: a
@@ -729,6 +796,7 @@ impl<'a> Run<'a> {
             &settings,
             &mut record.costs,
         );
+        newton = newton.stopped_by(&self.stop);
         newton.step(loads, from, to, self.time + from, guess)
     }
 
@@ -745,6 +813,8 @@ impl<'a> Run<'a> {
                 group.commit();
             }
         }
+        let tolerance = self.file().solver.force_tolerance.max(success.round_off);
+        equations.measured = Some((success.scales.clone(), tolerance));
         if let Some(domain) = &mut equations.domain {
             let boundary = equations.places.boundary.iter();
             let moved: Vec<f64> = boundary.map(|&place| success.increment[place]).collect();
@@ -787,6 +857,8 @@ impl<'a> Run<'a> {
             }
         }
         fold(&self.model.ties, &mut reaction);
+        // Where a part of a domain is looked at, the forces on its boundary stand for the rest.
+        let mut beside = Vec::new();
         if let Some(domain) = &mut equations.domain {
             let tolerance = self.case.file.solver.force_tolerance;
             let looked_at = looked_at.map(|groups| LookedAt {
@@ -796,9 +868,20 @@ impl<'a> Run<'a> {
             let (groups, displacement) = (&mut self.groups, &mut self.displacement);
             let internal =
                 domain.bring_up(looked_at, groups, loads, lambda, displacement, tolerance)?;
-            for (reaction, internal) in reaction.iter_mut().zip(internal) {
-                *reaction += internal;
+            beside.extend(domain.forces_beside());
+            if beside.is_empty() {
+                for (reaction, internal) in reaction.iter_mut().zip(&internal) {
+                    *reaction += internal;
+                }
             }
+            self.check_balance(equations, loads, lambda, &reaction, &beside)?;
+            if !beside.is_empty() {
+                for (reaction, internal) in reaction.iter_mut().zip(&internal) {
+                    *reaction += internal;
+                }
+            }
+        } else {
+            self.check_balance(equations, loads, lambda, &reaction, &beside)?;
         }
         equations.system.follow(&mut self.displacement);
         for (force, external) in reaction.iter_mut().zip(&self.force) {
@@ -806,6 +889,57 @@ impl<'a> Run<'a> {
         }
         record.costs.laws += started.elapsed();
         Ok(reaction)
+    }
+
+    /// Holds reactions against loads, by the internal forces of the groups that were evaluated and
+    /// those that the domain `beside` them takes.
+    ///
+    /// # Errors
+    /// What does not balance.
+    fn check_balance(
+        &self,
+        equations: &PhaseEquations,
+        loads: &Loads,
+        lambda: f64,
+        internal: &[f64],
+        beside: &[(usize, f64)],
+    ) -> Result<(), String> {
+        let Some((scales, tolerance)) = &equations.measured else {
+            return Ok(());
+        };
+        let mut external = loads.external(lambda);
+        for &(dof, force) in beside {
+            external[dof] -= force;
+        }
+        let mut is_free = vec![false; external.len()];
+        let of_domain = equations.domain.iter().filter(|_| beside.is_empty());
+        let of_domain = of_domain.flat_map(LinearDomain::unknowns);
+        for &dof in equations.system.free().iter().chain(of_domain) {
+            is_free[dof] = true;
+        }
+        let supports = || {
+            let prescribed = self.prescribed.keys();
+            prescribed.map(|&dof| (dof, internal[dof]))
+        };
+        let unknowns = || {
+            let numbered = is_free.iter().enumerate().filter(|(_, is_free)| **is_free);
+            numbered.map(|(dof, _)| (dof, external[dof]))
+        };
+        // Supports may be those of several bodies: they are added up together.
+        let bound = statics::Bound {
+            scale: scales.iter().copied().fold(0.0, f64::max),
+            tolerance: *tolerance,
+            with_domain: equations.domain.is_some() && beside.is_empty(),
+        };
+        let model = statics::Model {
+            analysis: self.case.file.analysis,
+            nodes: &self.mesh.nodes,
+            turns_freely: self.turns_freely,
+        };
+        match statics::complaint(model, supports(), unknowns(), bound) {
+            None => Ok(()),
+            Some(complaint) => Err(complaint),
+        }
     }
 
     /// Loads of a phase; takes over its changes of constraints.
@@ -853,6 +987,7 @@ impl<'a> Run<'a> {
                 .collect(),
             out_of_balance: Vec::new(),
             scale: 0.0,
+            largest: Vec::new(),
         }
     }
 
@@ -897,6 +1032,8 @@ impl<'a> Run<'a> {
             }
             None => LinearSolver::new(&system.pattern, symmetric, own_lines)?,
         };
+        #[cfg(unix)]
+        crate::memory::expect(solver.bytes(), "factorising the equations");
         let mut unknowns = system.free().to_vec();
         unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
         unknowns.sort_unstable();
@@ -912,12 +1049,19 @@ impl<'a> Run<'a> {
                 None => domain.start(&self.groups, &loads, &self.displacement),
             }
         }
+        let bodies = Bodies::new(
+            &self.groups,
+            &self.model.ties,
+            &self.mesh.nodes,
+            is_prescribed,
+        );
         let mut equations = PhaseEquations {
-            places: Places::new(&system, is_prescribed),
+            places: Places::new(&system, is_prescribed).of(&bodies, &system),
             system,
             domain,
             solver,
             matrix: Matrix::resumed(course.map_or(0.0, |course| course.largest)),
+            measured: None,
             out_of_balance,
             n_unknowns: unknowns.len(),
             counted: [0; 2],
@@ -972,6 +1116,11 @@ impl<'a> Run<'a> {
         // Where nothing is left of earlier forces, what remains of them is round-off.
         self.largest_force = self.largest_force.max(f64::sqrt(play));
         loads.scale = self.largest_force;
+        let both = internal.iter().zip(&loads.force_start);
+        for (largest, (internal, external)) in self.largest_forces.iter_mut().zip(both) {
+            *largest = largest.max(internal.abs()).max(external.abs());
+        }
+        loads.largest.clone_from(&self.largest_forces);
         // An initial stress that the loads of its own phase balance is in balance.
         let rest = rest.min(against_end);
         if play > 0.0 {
@@ -1048,4 +1197,29 @@ impl<'a> Run<'a> {
             ),
         }
     }
+}
+
+/// Whether a rotation of all nodes about one of them is no strain in a group's elements.
+fn turns_freely(group: &Group, nodes: &[[f64; 2]]) -> bool {
+    let Some(&[x, y]) = nodes.first() else {
+        return true;
+    };
+    let gradients = |turn: [f64; 4]| {
+        let moved = |node: &[f64; 2]| {
+            let (x, y) = (node[0] - x, node[1] - y);
+            [turn[0] * x + turn[1] * y, turn[2] * x + turn[3] * y]
+        };
+        let displacement: Vec<f64> = nodes.iter().flat_map(moved).collect();
+        let mut strains = vec![0.0; group.strain.committed.len()];
+        group.kinematics.add_gradients(&displacement, &mut strains);
+        strains
+            .iter()
+            .fold(0.0, |largest: f64, e| largest.max(e.abs()))
+    };
+    // A shear of the same displacements for comparison.
+    let (turned, sheared) = (
+        gradients([0.0, -1.0, 1.0, 0.0]),
+        gradients([0.0, 1.0, 1.0, 0.0]),
+    );
+    turned <= 1e-6 * sheared.max(1.0)
 }

@@ -7,5 +7,6 @@ mod newton;
 
 pub use linear_domain::{LinearDomain, LookedAt, Reuse, Standing};
 pub use newton::{
-    Costs, Guess, Iteration, Loads, Matrix, Measure, Newton, StepFailure, StepSuccess,
+    Costs, Criterion, Guess, Iteration, Loads, Matrix, Measure, Newton, Runaway, StepFailure,
+    StepSuccess, Unmet,
 };

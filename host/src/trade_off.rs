@@ -10,6 +10,7 @@ mod clock;
 mod diagram;
 mod division;
 mod driver_study;
+mod pace;
 mod page;
 mod pareto;
 mod sampled;
@@ -19,13 +20,15 @@ mod study;
 mod table;
 mod trial;
 
-pub use accuracy::reach;
+pub use accuracy::{reach, reach_until};
 pub use sampled::Convergence;
 pub use study::{Measurement, Reference, Row, Study};
 
 use crate::case::{Case, base};
 use crate::error::{Error, Source, suggestion};
+use crate::output::replace;
 use crate::point::Driver;
+use crate::stop::Stop;
 use std::path::{Path, PathBuf};
 use trial::Scratch;
 
@@ -42,6 +45,8 @@ pub struct Options {
     pub most_increments: usize,
     /// Study the stiffness of zero-thickness interfaces instead.
     pub interface_stiffness: bool,
+    /// Who may want the study to stop.
+    pub stop: Stop,
 }
 
 /// Studies a driver or a case, or all its variants, and writes the results. `show` takes the
@@ -70,7 +75,7 @@ pub fn run(
             let message = "--interface-stiffness needs a case: a driver has no elements beside it";
             return Err(Error::Usage(message.to_owned()));
         }
-        run_drivers(&path, options, show)
+        run_drivers(&path, options, show, say)
     } else {
         run_cases(&path, options, show, say)
     }
@@ -83,8 +88,17 @@ pub(crate) fn is_driver(path: &Path) -> Result<bool, Error> {
     Ok(tables.any(|table| table.contains_key("hypothesis") || table.contains_key("segment")))
 }
 
-fn run_drivers(path: &Path, options: &Options, show: &mut dyn FnMut(&str)) -> Result<(), Error> {
+fn run_drivers(
+    path: &Path,
+    options: &Options,
+    show: &mut dyn FnMut(&str),
+    say: &mut dyn FnMut(&str),
+) -> Result<(), Error> {
     let mut drivers = Driver::read(path)?;
+    let stop = &options.stop;
+    for driver in &mut drivers {
+        driver.stop_on(stop);
+    }
     let stem = path.file_stem().unwrap_or_default();
     let stem = stem.to_string_lossy().into_owned();
     let name = |driver: &Driver| driver.variant().map(str::to_owned);
@@ -92,7 +106,7 @@ fn run_drivers(path: &Path, options: &Options, show: &mut dyn FnMut(&str)) -> Re
     let folder = options.folder(&stem);
     for driver in &drivers {
         let name = full_name(&stem, driver.variant());
-        let study = driver_study::study(driver, &name, options.most_increments)?;
+        let study = driver_study::study(driver, &name, options.most_increments, stop, say)?;
         finish(&study, &options.place(&folder, driver.variant()), show)?;
     }
     Ok(())
@@ -114,11 +128,11 @@ fn run_cases(
         let name = full_name(&case.name(), case.variant.as_deref());
         let place = options.place(&folder, case.variant.as_deref());
         if options.interface_stiffness {
-            stiffness::run(case, &name, &place, show, say)?;
+            stiffness::run(case, &name, (&place, &options.stop), show, say)?;
             continue;
         }
         let study = {
-            let scratch = Scratch::new(&place)?;
+            let scratch = Scratch::new(&place, &options.stop)?;
             case_study::study(case, &name, options.fine, &scratch, say)?
         };
         finish(&study, &place, show)?;
@@ -182,7 +196,7 @@ fn finish(study: &Study, folder: &Path, show: &mut dyn FnMut(&str)) -> Result<()
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Error> {
-    std::fs::write(path, text).map_err(|source| unwritable(path, source))
+    replace(path, text)
 }
 
 fn unwritable(path: &Path, source: std::io::Error) -> Error {

@@ -3,6 +3,7 @@
 mod arguments;
 mod bases;
 mod capsule;
+mod ended;
 mod isolate;
 mod libraries;
 mod loading;
@@ -16,6 +17,7 @@ mod program;
 mod results;
 #[cfg(unix)]
 mod resume;
+mod stopping;
 mod streams;
 mod syntax;
 mod trade_off;

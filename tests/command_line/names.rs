@@ -300,6 +300,17 @@ fn suggests_what_probes_can_show() {
                 &[("half =", "^iterations =")],
                 &["`iterations` is a column of history.csv already"],
             ),
+            (
+                "the name of a column of the path, where it is followed",
+                &[
+                    ("[solver]\n", "[solver]\ncontrol = \"arc_length\"\n"),
+                    ("half =", "^load_factor ="),
+                ],
+                &[
+                    "`load_factor` is a column of path.csv already",
+                    "taken are: increment, iterations, load_factor, phase, time",
+                ],
+            ),
         ],
     );
 }

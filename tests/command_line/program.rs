@@ -153,7 +153,7 @@ impl Place {
     }
 
     /// The program with this folder as its working directory.
-    fn command(&self, arguments: &[&str]) -> Command {
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let deps = std::env::current_exe()
             .unwrap()
             .parent()

@@ -137,6 +137,11 @@ fn names_the_check_of_a_law_that_may_have_a_wrong_tangent() {
     assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
     let check = format!("`pilum check {}` {CLAUSE}", troubled::library());
     assert!(outcome.says(&check), "{}", outcome.stderr);
+    // Not what contact does, but what the law says of its own stress.
+    let entry = "differs from differences of its own stress by";
+    assert!(outcome.says(entry), "{}", outcome.stderr);
+    assert!(outcome.says("in (t, t)"), "{}", outcome.stderr);
+    assert!(!outcome.says("opens and closes"), "{}", outcome.stderr);
     // With the tangent that is right, the law fails of itself.
     let place = troubled::place("").unwrap();
     let outcome = place.run_case(troubled::case("cut"));
@@ -173,6 +178,70 @@ fn does_not_write_into_a_pipe() {
     let outcome = place.run_case(CASE);
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(outcome.stderr.contains("history.csv"), "{}", outcome.stderr);
+}
+
+/// A link in the results folder is replaced; what it leads to belongs to somebody else.
+#[cfg(unix)]
+#[test]
+fn writes_through_no_link() {
+    let files = [
+        "history.csv",
+        "profile.csv",
+        "points.csv",
+        "log.jsonl",
+        "summary.json",
+        "summary.json.part",
+        "checkpoint.bin.part",
+        "fields.pvd",
+        "fields_00000.vtu",
+        "curve.svg",
+        "report.html",
+    ];
+    let place = Place::new();
+    std::fs::create_dir(place.path("out")).unwrap();
+    for (number, file) in files.iter().enumerate() {
+        place.write(&format!("mine_{number}"), "mine");
+        let (mine, name) = (
+            place.path(&format!("mine_{number}")),
+            place.path("out").join(file),
+        );
+        if number % 2 == 0 {
+            std::os::unix::fs::symlink(mine, name).unwrap();
+        } else {
+            std::fs::hard_link(mine, name).unwrap();
+        }
+    }
+    std::os::unix::fs::symlink(place.path("nowhere"), place.path("out/fields_00001.vtu")).unwrap();
+    let outcome = place.run_case(with_everything());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for number in 0..files.len() {
+        let mine = std::fs::read_to_string(place.path(&format!("mine_{number}"))).unwrap();
+        assert_eq!(mine, "mine", "{}", files[number]);
+    }
+    assert!(!place.path("nowhere").exists());
+    for file in files.iter().filter(|file| !file.ends_with(".part")) {
+        let found = place.path("out").join(file).symlink_metadata().unwrap();
+        assert!(found.is_file() && found.len() > 4, "{file}");
+    }
+}
+
+/// A name that the user gives is followed, as a shell follows it, but not onto the driver.
+#[cfg(unix)]
+#[test]
+fn a_table_is_not_written_over_its_driver_by_another_name() {
+    let place = Place::new();
+    let driver = "law = \"elastic\"\nhypothesis = \"3d\"\n\
+                  parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n\
+                  segment = [{ increments = 2, control = { 11 = { strain = 1e-3 } } }]\n";
+    place.write("driver.toml", driver);
+    std::fs::hard_link(place.path("driver.toml"), place.path("table.csv")).unwrap();
+    let outcome = place.run(&["point", "driver.toml", "--csv", "table.csv"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("would overwrite the driver file"));
+    std::os::unix::fs::symlink(place.path("there"), place.path("link.csv")).unwrap();
+    let outcome = place.run(&["point", "driver.toml", "--csv", "link.csv"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(place.path("there").is_file());
 }
 
 /// Everything a run can write, with a figure called `curve`.

@@ -360,6 +360,50 @@ fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
 }
 
 #[test]
+fn files_that_were_changed_since_the_checkpoint_are_named() {
+    let place = Place::new();
+    place.write("block.toml", long_case(""));
+    let run = [
+        "run",
+        "block.toml",
+        "--out",
+        "out",
+        "--checkpoint",
+        "0",
+        "--resume",
+    ];
+    let outcome = place.run(&run);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for file in ["history.csv", "profile.csv", "points.csv", "log.jsonl"] {
+        let path = place.path("out").join(file);
+        let good = std::fs::read(&path).unwrap();
+        // The last digit, one in the middle, one in the head.
+        for at in [good.len() - 2, good.len() / 2, 3] {
+            let mut bytes = good.clone();
+            bytes[at] ^= 1;
+            std::fs::write(&path, bytes).unwrap();
+            let outcome = place.run(&run);
+            assert_eq!(outcome.code, Some(BAD_INPUT), "{file}: {}", outcome.stderr);
+            assert!(outcome.says(file), "{file}: {}", outcome.stderr);
+            assert!(outcome.says("changed or removed"), "{}", outcome.stderr);
+        }
+        std::fs::write(&path, good).unwrap();
+    }
+    let field = place.path("out/fields_00003.vtu");
+    let good = std::fs::read(&field).unwrap();
+    std::fs::write(&field, &good[1..]).unwrap();
+    assert!(place.run(&run).says("fields_00003.vtu"));
+    std::fs::remove_file(&field).unwrap();
+    let outcome = place.run(&run);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("fields_00003.vtu"), "{}", outcome.stderr);
+    std::fs::write(&field, &good).unwrap();
+    let outcome = place.run(&run);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says("done already"), "{}", outcome.stderr);
+}
+
+#[test]
 fn two_runs_do_not_write_into_one_folder() {
     let place = Place::new();
     place.write("block.toml", CASE);

@@ -55,6 +55,20 @@ fn a_full_output_is_said_in_a_line() {
     }
 }
 
+/// Progress that cannot be written is no reason to lose the run, nor to end as if all was well.
+#[test]
+fn a_full_error_stream_is_exit_1_with_complete_results() {
+    let place = place();
+    let outcome = place.run_limited("exec 2> /dev/full", &["run", "case.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    let expected = place.run(&["run", "case.toml", "--out", "expected"]);
+    assert_eq!(expected.code, Some(DONE), "{}", expected.stderr);
+    let read = |file: &str| std::fs::read_to_string(place.path(file)).unwrap();
+    assert_eq!(read("out/history.csv"), read("expected/history.csv"));
+    assert!(read("out/summary.json").contains("\"status\": \"done\""));
+    assert!(place.path("out/report.html").is_file());
+}
+
 #[test]
 fn a_pipe_that_nobody_reads_any_more_is_no_error() {
     for arguments in PRINT {
@@ -106,4 +120,31 @@ fn devices_and_endless_files_are_no_input() {
     let pipe = "mkfifo pipe; cat driver.toml > pipe & :";
     let outcome = place().run_limited(pipe, &["point", "pipe"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}
+
+/// Whatever the limit, memory that runs out is said with how much is needed, the summary says that
+/// the run has stopped, and the rows that were written are whole.
+#[test]
+fn memory_that_runs_out_is_said() {
+    let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/bonded_pile");
+    // In KiB of address space: too little for threads, for files, for the equations.
+    for limit in [20_000, 40_000, 60_000, 140_000, 200_000] {
+        let place = Place::new();
+        let arguments = ["run", case, "--variant", "m2k", "--out", "out"];
+        let outcome = place.run_limited(&format!("ulimit -v {limit}"), &arguments);
+        let said = &outcome.stderr;
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{limit}: {said}");
+        assert!(outcome.says("not enough memory: about"), "{limit}: {said}");
+        assert!(!outcome.says("panicked"), "{limit}: {said}");
+        assert!(!outcome.says("internal error"), "{limit}: {said}");
+        if let Ok(summary) = std::fs::read_to_string(place.path("out/summary.json")) {
+            assert!(
+                summary.contains("\"status\": \"stopped\""),
+                "{limit}: {said}"
+            );
+            assert!(summary.contains("not enough memory"), "{limit}: {said}");
+            let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+            assert!(history.ends_with('\n'), "{limit}");
+        }
+    }
 }

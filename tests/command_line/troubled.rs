@@ -27,7 +27,36 @@ pub(crate) fn place(define: &'static str) -> Option<Place> {
     Some(place)
 }
 
+/// A folder with the law whose way "elsewhere" calls this C++ or Fortran routine.
+pub(crate) fn place_with(compiler: &str, ending: &str, routine: &str) -> Option<Place> {
+    let folder = TempDir::new().unwrap();
+    let source = folder.path().join("elsewhere").with_extension(ending);
+    std::fs::write(&source, routine).unwrap();
+    let object = folder.path().join("elsewhere.o");
+    let mut command = Command::new(compiler);
+    let command = command.args(["-c", "-fPIC", "-o"]).arg(&object);
+    let Ok(output) = command.arg(&source).output() else {
+        assert!(std::env::var_os("CI").is_none(), "there is no {compiler}");
+        println!("skipped: there is no {compiler}");
+        return None;
+    };
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let of_language = match compiler {
+        "c++" => "-lstdc++",
+        _ => "-lgfortran",
+    };
+    let more = [object.to_str().unwrap(), of_language];
+    let place = Place::new();
+    place.write(&library(), compile_with("TROUBLE_ELSEWHERE", &more)?);
+    Some(place)
+}
+
 fn compile(define: &str) -> Option<Vec<u8>> {
+    compile_with(define, &[])
+}
+
+fn compile_with(define: &str, more: &[&str]) -> Option<Vec<u8>> {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("library");
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -38,7 +67,8 @@ fn compile(define: &str) -> Option<Vec<u8>> {
         .args((!define.is_empty()).then(|| format!("-D{define}")))
         .arg("-I")
         .arg(here.join("../abi/include"))
-        .arg(here.join("command_line/fixtures/troubled.c"));
+        .arg(here.join("command_line/fixtures/troubled.c"))
+        .args(more);
     let output = tests::needs::output(&mut compiler)?;
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");

@@ -148,7 +148,7 @@ fn assert_limit(footing: Footing, finer: f64, extrapolated: f64) {
     assert!(without.abs() < extrapolated, "{what}");
 }
 
-const TRESCA: Footing = Footing {
+pub(crate) const TRESCA: Footing = Footing {
     friction_angle: 0.0,
     dilatancy_angle: 0.0,
     width: 5.0,

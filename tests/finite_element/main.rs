@@ -6,6 +6,7 @@
     reason = "part of the tests"
 )]
 
+mod bodies;
 mod condensed;
 mod cut_back;
 mod cylinder;
@@ -19,6 +20,7 @@ mod patch_layer;
 mod patch_solid;
 mod phases;
 mod relaxation;
+mod runaway;
 mod sections;
 mod setup;
 mod sliding_block;
@@ -26,3 +28,4 @@ mod snap_back;
 mod swap;
 mod thick_cylinder;
 mod thin_layer;
+mod zero_stress;

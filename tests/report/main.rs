@@ -5,4 +5,5 @@
 mod broken;
 mod browser;
 mod folders;
+mod many;
 mod page;

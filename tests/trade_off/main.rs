@@ -46,6 +46,7 @@ fn study(input: &Path, interface_stiffness: bool) -> (TempDir, String) {
         fine: true,
         most_increments: 1000,
         interface_stiffness,
+        stop: host::stop::Stop::never(),
     };
     let mut said = String::new();
     run(input, &options, &mut |text| said += text, &mut |_| ()).unwrap();

@@ -140,6 +140,11 @@ impl LinearSolver {
         })
     }
 
+    /// Bytes that a factorisation takes, by the analysis.
+    pub fn bytes(&self) -> u64 {
+        self.multifrontal.bytes()
+    }
+
     /// Factorises the matrix with these values, the block as it is.
     ///
     /// # Errors

@@ -142,6 +142,11 @@ impl Multifrontal {
         })
     }
 
+    /// Bytes that a factorisation takes, by the analysis.
+    pub fn bytes(&self) -> u64 {
+        self.analysis.bytes()
+    }
+
     /// Kept equations, in the order of the Schur complement.
     pub fn kept(&self) -> &[u32] {
         &self.analysis.kept
@@ -671,6 +676,31 @@ impl Analysis {
         }
         analysis.add_kept_entries(pattern, &position);
         Ok(analysis)
+    }
+
+    /// Memory that a factorisation takes: factors, the Schur complement, and the updates that wait
+    /// for their parents, one branch after the other.
+    fn bytes(&self) -> u64 {
+        let square = |n: usize| (n * n) as u64;
+        let mut factors = 0;
+        let mut peaks: Vec<u64> = Vec::with_capacity(self.fronts.len());
+        // Children come before their parents.
+        for shape in &self.fronts {
+            let (k, m) = (shape.pivots.len(), shape.rows.len());
+            factors += match self.kind {
+                Kind::Symmetric => square(k) + (k * m) as u64,
+                Kind::Unsymmetric => square(k) + 2 * (k * m) as u64,
+            };
+            let (mut waiting, mut peak) = (0, 0);
+            for &child in &shape.children {
+                peak = peak.max(waiting + peaks[child]);
+                waiting += square(self.fronts[child].rows.len());
+            }
+            peaks.push(peak.max(waiting + square(m)));
+        }
+        let peak = self.roots.iter().map(|&root| peaks[root]).max();
+        let words = factors + peak.unwrap_or(0) + square(self.kept.len());
+        words * size_of::<f64>() as u64
     }
 
     fn add_fronts(

@@ -1,11 +1,12 @@
 //! Fields for viewers that read VTK files: `fields.pvd` lists one `fields_<n>.vtu` per time.
 
-use super::unwritable;
+use super::{file, replace};
 use crate::case::When;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::probe::Snapshot;
+use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -17,8 +18,30 @@ const QUADRATIC_EDGE: u8 = 21;
 #[derive(Debug)]
 pub(super) struct Fields {
     folder: PathBuf,
-    /// Times written so far.
-    pub(super) times: Vec<f64>,
+    /// Files written so far.
+    pub(super) written: Vec<Written>,
+}
+
+/// A file of fields.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct Written {
+    time: f64,
+    length: u64,
+}
+
+fn file_name(number: usize) -> String {
+    format!("fields_{number:05}.vtu")
+}
+
+/// Checks that files are there as they were written, by their length alone.
+///
+/// # Errors
+/// The first that is not.
+pub(super) fn check(folder: &Path, written: &[Written]) -> Result<(), Error> {
+    for (number, written) in written.iter().enumerate() {
+        file::check_length(&folder.join(file_name(number)), written.length)?;
+    }
+    Ok(())
 }
 
 impl Fields {
@@ -26,7 +49,7 @@ impl Fields {
     pub(super) fn create(folder: &Path, when: When, _: &Model) -> Option<Self> {
         (when != When::Never).then(|| Self {
             folder: folder.to_owned(),
-            times: Vec::new(),
+            written: Vec::new(),
         })
     }
 
@@ -36,23 +59,29 @@ impl Fields {
         snapshot: &Snapshot<'_>,
         mesh: &Mesh,
     ) -> Result<(), Error> {
-        let file = |number: usize| format!("fields_{number:05}.vtu");
-        let path = self.folder.join(file(self.times.len()));
-        std::fs::write(&path, unstructured_grid(snapshot, mesh))
-            .map_err(|error| unwritable(&path, error))?;
-        self.times.push(time);
+        let path = self.folder.join(file_name(self.written.len()));
+        let text = unstructured_grid(snapshot, mesh);
+        replace(&path, &text)?;
+        self.written.push(Written {
+            time,
+            length: text.len() as u64,
+        });
         let mut list =
             String::from("<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n");
-        for (number, time) in self.times.iter().enumerate() {
+        for (number, Written { time, .. }) in self.written.iter().enumerate() {
             let _ = writeln!(
                 list,
                 "<DataSet timestep=\"{time}\" file=\"{}\"/>",
-                file(number)
+                file_name(number)
             );
         }
         list.push_str("</Collection>\n</VTKFile>\n");
-        let path = self.folder.join("fields.pvd");
-        std::fs::write(&path, list).map_err(|error| unwritable(&path, error))
+        replace(&self.folder.join("fields.pvd"), list)
+    }
+
+    /// The time written last.
+    pub(super) fn last(&self) -> Option<f64> {
+        self.written.last().map(|written| written.time)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Curves of probes, or of stresses along a cut, as SVG.
 
-use super::unwritable;
+use super::replace;
 use crate::case::{Case, CutInput, FigureInput};
 use crate::error::{Error, Place, Source, suggestion};
 use crate::group::Group;
@@ -365,7 +365,7 @@ fn draw_file(
     };
     let text = svg(&labels, curves)
         .map_err(|error| Error::Internal(format!("figure {}: {error}", path.display())))?;
-    std::fs::write(&path, text).map_err(|error| unwritable(&path, error))
+    replace(&path, text)
 }
 
 /// Curves as a text in SVG.

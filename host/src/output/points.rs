@@ -1,5 +1,6 @@
 //! Stresses at all integration points.
 
+use super::file::Extent;
 use super::{Table, internal_variables, number};
 use crate::case::When;
 use crate::error::{Error, Place};
@@ -21,7 +22,7 @@ impl Points {
         folder: &Path,
         when: When,
         model: &Model,
-        from: Option<u64>,
+        from: Option<Extent>,
     ) -> Result<Option<Self>, Error> {
         if when == When::Never {
             return Ok(None);

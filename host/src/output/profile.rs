@@ -1,5 +1,6 @@
 //! Values along interfaces.
 
+use super::file::Extent;
 use super::{Table, internal_variables, number};
 use crate::case::When;
 use crate::error::{Error, Place};
@@ -21,7 +22,7 @@ impl Profile {
         folder: &Path,
         when: When,
         model: &Model,
-        from: Option<u64>,
+        from: Option<Extent>,
     ) -> Result<Option<Self>, Error> {
         let is_interface = |group: &Group| group.jump_and_traction(0).is_some();
         if when == When::Never || !model.groups.iter().any(is_interface) {

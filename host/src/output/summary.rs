@@ -227,16 +227,7 @@ impl Summary {
         error: Option<&Error>,
     ) -> Value {
         let mut summary = self.head.clone();
-        summary.insert(
-            "status".to_owned(),
-            json!(match error {
-                None => "done",
-                Some(Error::NoEquilibrium { .. }) => "no equilibrium",
-                Some(Error::Plugin { .. }) => "plugin trouble",
-                Some(Error::Interrupted { .. }) => "interrupted",
-                Some(_) => "stopped",
-            }),
-        );
+        summary.insert("status".to_owned(), status(error).into());
         summary.insert("error".to_owned(), json!(error.map(ToString::to_string)));
         summary.insert("warnings".to_owned(), json!(warnings));
         let phases: Vec<Value> = self
@@ -308,6 +299,17 @@ impl Summary {
             json!({ "total": total.as_secs_f64(), "output": output.as_secs_f64() }),
         );
         summary.into()
+    }
+}
+
+/// How a run ended, in a word.
+pub(super) fn status(error: Option<&Error>) -> &'static str {
+    match error {
+        None => "done",
+        Some(Error::NoEquilibrium { .. }) => "no equilibrium",
+        Some(Error::Plugin { .. }) => "plugin trouble",
+        Some(error) if error.is_stop() => "interrupted",
+        Some(_) => "stopped",
     }
 }
 

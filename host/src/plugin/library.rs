@@ -20,7 +20,7 @@ mod shared;
 pub(super) mod umat;
 
 #[cfg(unix)]
-pub(super) use shared::SharedMemory;
+pub(crate) use shared::SharedMemory;
 
 use super::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
@@ -629,7 +629,7 @@ impl Strided {
     }
 
     /// The components of one point; as many as the slice holds of them.
-    pub(super) fn of_point(self, values: &[f64], point: usize, n_components: usize) -> Vec<f64> {
+    pub(crate) fn of_point(self, values: &[f64], point: usize, n_components: usize) -> Vec<f64> {
         let first = self.offset + point * self.point;
         let at = (0..n_components).map(|c| values.get(first + c * self.component));
         at.map_while(Option::<&f64>::copied).collect()

@@ -25,6 +25,7 @@ use super::frame::Frame;
 use super::restrictions::Restrictions;
 use super::{N_MAX, Vector};
 use crate::plugin::{BatchFailure, End, Law, Moment, Operator, Start, Strided};
+use crate::stop::Stop;
 use abi::status::Outcome;
 use nalgebra::{SMatrix, SVector};
 use std::mem::swap;
@@ -161,6 +162,8 @@ pub(super) struct Search<'a> {
     restricted: Option<(Restrictions, Point)>,
     /// Calls of the law.
     pub(super) calls: usize,
+    /// Who may want the search to stop: then the law refuses whatever it is asked.
+    pub(super) stop: Stop,
     /// Number of updates that the law called unreliable, and its first words about them.
     pub(super) unreliable: (usize, String),
 }
@@ -197,6 +200,7 @@ impl<'a> Search<'a> {
             frame: Frame::Cartesian,
             restricted: None,
             calls: 0,
+            stop: Stop::never(),
             unreliable: (0, String::new()),
         }
     }
@@ -408,6 +412,9 @@ impl<'a> Search<'a> {
         gradient: Vector,
         operator: Operator,
     ) -> Result<bool, Fatal> {
+        if self.stop.is_asked() {
+            return Ok(false);
+        }
         let rows = Strided::rows(self.n);
         let frame = self.frame;
         let gradient_start = frame.cartesian_gradient(&step.start.gradient);

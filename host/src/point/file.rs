@@ -194,6 +194,8 @@ pub struct Driver {
     source: Source,
     place_of_initial: Range<usize>,
     file: File,
+    /// Who may want it to stop.
+    pub(super) stop: crate::stop::Stop,
 }
 
 impl Driver {
@@ -284,6 +286,7 @@ impl Driver {
             source: source.clone(),
             place_of_initial,
             file: given,
+            stop: crate::stop::Stop::never(),
         };
         driver.internal = driver.initial_internal(&initial.internal)?;
         driver.check_figures(source)?;
@@ -328,6 +331,7 @@ impl Driver {
             source: source.clone(),
             place_of_initial: 0..0,
             file,
+            stop: crate::stop::Stop::never(),
         };
         // The law may refuse the stress, whatever its variables.
         driver.initial_internal(&Named::new())?;
@@ -395,7 +399,13 @@ impl Driver {
         input::set_parameters(&mut file.parameters, values);
         let mut driver = Self::build(&self.source, self.variant.clone(), file, true)?;
         driver.set_increments(&self.segment_increments());
+        driver.stop = self.stop.clone();
         Ok(driver)
+    }
+
+    /// Lets the driver be stopped on its way.
+    pub fn stop_on(&mut self, stop: &crate::stop::Stop) {
+        self.stop = stop.clone();
     }
 
     /// Number of increments of all segments.

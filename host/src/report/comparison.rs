@@ -12,7 +12,71 @@ pub(super) struct Setting {
     name: String,
     /// By run; empty where there is no such setting.
     values: Vec<String>,
+    /// The same, where they are numbers.
+    #[serde(skip)]
+    numbers: Vec<Option<f64>>,
     pub(super) differs: bool,
+}
+
+impl Setting {
+    /// What curves can be coloured by: numbers if all of them are, else texts.
+    fn by_run(&self) -> Varied<'_> {
+        let numbers: Option<Vec<f64>> = self.numbers.iter().copied().collect();
+        Varied {
+            name: format!("{}: {}", self.section, self.name),
+            texts: numbers.is_none().then_some(&self.values),
+            numbers,
+            is_first_choice: self.section.starts_with("law "),
+        }
+    }
+}
+
+/// A setting that differs, for the script.
+#[derive(Debug, Serialize)]
+pub(super) struct Varied<'s> {
+    name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    numbers: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    texts: Option<&'s Vec<String>>,
+    /// It is rather what was varied than what followed from it.
+    #[serde(skip)]
+    is_first_choice: bool,
+}
+
+/// The settings that differ, those first that curves are best coloured by: parameters of laws, and
+/// of these and the others the numbers.
+pub(super) fn varied(settings: &[Setting]) -> Vec<Varied<'_>> {
+    let differing = settings.iter().filter(|setting| setting.differs);
+    let mut varied: Vec<Varied<'_>> = differing.map(Setting::by_run).collect();
+    varied.sort_by_key(|varied| (!varied.is_first_choice, varied.numbers.is_none()));
+    varied
+}
+
+/// What many runs are of, for a title: their own title if they have one in common, else their
+/// cases.
+pub(super) fn subject(runs: &[Run]) -> String {
+    let distinct = |of: fn(&Run) -> &str| {
+        let mut found: Vec<&str> = Vec::new();
+        for name in runs.iter().map(of) {
+            if !found.contains(&name) {
+                found.push(name);
+            }
+        }
+        found
+    };
+    let titles = distinct(|run| text(&run.summary["title"]));
+    let cases = distinct(|run| text(&run.summary["case"]));
+    let n = runs.len();
+    match (titles.as_slice(), cases.as_slice()) {
+        ([title], _) if !title.is_empty() => format!("{n} runs of {title}"),
+        (_, [case]) if !case.is_empty() => format!("{n} runs of {case}"),
+        (_, [_, _, _, _, ..]) => format!("{n} runs of {} cases", cases.len()),
+        (_, cases) if cases.iter().all(|case| !case.is_empty()) => {
+            format!("{n} runs of {}", cases.join(", "))
+        }
+        _ => format!("{n} runs"),
+    }
 }
 
 /// Final values of a probe.
@@ -30,7 +94,7 @@ pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
     let mut settings: Vec<Setting> = Vec::new();
     for (number, of_run) in all.into_iter().enumerate() {
         let mut after = None;
-        for (section, name, value) in of_run {
+        for (section, name, value, number_of_run) in of_run {
             let found = settings
                 .iter()
                 .position(|s| s.section == section && s.name == name);
@@ -44,12 +108,14 @@ pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
                         section,
                         name,
                         values: vec![String::new(); runs.len()],
+                        numbers: vec![None; runs.len()],
                         differs: false,
                     },
                 );
                 at
             });
             settings[at].values[number] = value;
+            settings[at].numbers[number] = number_of_run;
             after = Some(at);
         }
     }
@@ -59,10 +125,11 @@ pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
     settings
 }
 
-/// Section, name and value of the settings of a run.
-fn settings_of(summary: &Value) -> Vec<(String, String, String)> {
+/// Section, name and value of the settings of a run; the value as a number too if it is one.
+fn settings_of(summary: &Value) -> Vec<(String, String, String, Option<f64>)> {
     let mut settings = Vec::new();
     let mut add = |section: &str, name: &str, value: &Value, unit: &str| {
+        let number = value.as_f64();
         let value = match value {
             Value::Null => return,
             Value::String(text) => text.clone(),
@@ -76,7 +143,7 @@ fn settings_of(summary: &Value) -> Vec<(String, String, String)> {
         };
         let unit = if unit == "-" { "" } else { unit };
         let value = format!("{value}{separator}{unit}");
-        settings.push((section.to_owned(), name.to_owned(), value));
+        settings.push((section.to_owned(), name.to_owned(), value, number));
     };
     add("program", "version", &summary["program"], "");
     add("model", "analysis", &summary["analysis"], "");

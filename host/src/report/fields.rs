@@ -1,12 +1,10 @@
 //! `fields.pvd` and its `*.vtu`: a reader of what this program writes, ASCII arrays, and no more.
 
+use super::budget::Budget;
 use super::short::{Short, thinned};
 use serde::Serialize;
 use std::path::Path;
 use std::str::FromStr;
-
-/// About so many numbers are shown; of more, some times are left out.
-const MOST_VALUES: usize = 600_000;
 
 /// Fields of a run on its mesh.
 #[derive(Debug, Serialize)]
@@ -47,8 +45,8 @@ struct Grid {
 }
 
 impl Fields {
-    /// Reads the fields in a folder, as far as they can be read.
-    pub(super) fn read(folder: &Path, notes: &mut Vec<String>) -> Option<Self> {
+    /// Reads the fields in a folder, as far as they can be read and the page can hold them.
+    pub(super) fn read(folder: &Path, budget: &Budget, notes: &mut Vec<String>) -> Option<Self> {
         let list = match std::fs::read_to_string(folder.join("fields.pvd")) {
             Ok(list) => list,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
@@ -83,8 +81,16 @@ impl Fields {
             };
             if fields.is_none() {
                 let size = grid.nodes.len() + grid.cells.len() * grid.fields.len();
+                let whole = size + grid.nodes.len() + 8 * grid.cells.len();
+                if whole > budget.mesh {
+                    notes.push(format!(
+                        "the fields are not shown: {whole} numbers for mesh and one time are too \
+                         many for this page"
+                    ));
+                    return None;
+                }
                 let must = |i: usize| i == number;
-                let times = thinned(files.len(), MOST_VALUES / size.max(1), must);
+                let times = thinned(files.len(), budget.fields / size.max(1), must);
                 shown = (0..files.len()).map(|i| times.contains(&i)).collect();
                 if times.len() < files.len() {
                     notes.push(format!(

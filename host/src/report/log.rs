@@ -1,20 +1,36 @@
 //! `log.jsonl`: iterations and cut-backs.
 
+use super::budget::Budget;
 use super::short::Short;
+use super::table::Broken;
+use crate::file::open_regular;
 use serde::Serialize;
 use serde_json::Value;
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
-/// More iterations than this are not shown; the last ones are kept.
-const MOST_ITERATIONS: usize = 20_000;
+/// Of the first cut-backs there is a table.
+const IN_TABLE: usize = 100;
+/// Of increments with results that a law calls inaccurate so many are told.
+const TOLD: usize = 20;
 
 /// The convergence of a run.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Log {
     /// Attempts at equilibrium, in order.
     pub(super) attempts: Vec<Attempt>,
-    /// Attempts that came to nothing.
-    pub(super) cut_backs: Vec<CutBack>,
+    /// Those of them that came to nothing.
+    cut_backs: Vec<CutBack>,
+    /// The first of all that came to nothing, and their number.
+    #[serde(skip)]
+    pub(super) first_cut_backs: Vec<CutBack>,
+    #[serde(skip)]
+    pub(super) n_cut_backs: usize,
+    /// Attempts that are no longer kept, and iterations of those that are.
+    #[serde(skip)]
+    forgotten: usize,
+    #[serde(skip)]
+    n_iterations: usize,
     /// Increments with results that a law calls inaccurate.
     #[serde(skip)]
     pub(super) unreliable: Vec<String>,
@@ -33,7 +49,7 @@ pub(super) struct Attempt {
 }
 
 /// A step given up.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct CutBack {
     pub(super) phase: String,
     pub(super) increment: u64,
@@ -46,35 +62,48 @@ pub(super) struct CutBack {
 
 impl Log {
     /// Reads a log as far as it goes.
-    pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Self {
-        let text = match std::fs::read(path) {
-            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
-            Err(error) => {
-                notes.push(format!(
-                    "log.jsonl: {error}; there is no convergence history"
-                ));
-                return Self::default();
-            }
-        };
+    pub(super) fn read(path: &Path, budget: &Budget, notes: &mut Vec<String>) -> Self {
         let mut log = Self::default();
-        let mut broken = Vec::new();
-        for (number, line) in text.lines().enumerate() {
-            match serde_json::from_str::<Value>(line) {
-                Ok(event) => log.take(&event),
-                Err(_) => broken.push(number + 1),
-            }
-        }
-        if let Some(first) = broken.first() {
+        if let Err(error) = log.read_lines(path, budget, notes) {
             notes.push(format!(
-                "log.jsonl: {} not complete and left out, the first is line {first}",
-                match broken.len() {
-                    1 => "1 line is".to_owned(),
-                    n => format!("{n} lines are"),
-                }
+                "log.jsonl: {error}; there is no convergence history"
+            ));
+            return Self::default();
+        }
+        log.forget(budget.iterations);
+        if log.forgotten > 0 {
+            notes.push(format!(
+                "the convergence history shows the last {} iterations only; log.jsonl has all",
+                log.n_iterations
             ));
         }
-        log.shorten(notes);
         log
+    }
+
+    fn read_lines(
+        &mut self,
+        path: &Path,
+        budget: &Budget,
+        notes: &mut Vec<String>,
+    ) -> io::Result<()> {
+        let mut file = BufReader::with_capacity(1 << 16, open_regular(path)?);
+        let mut broken = Broken::default();
+        let mut line = Vec::new();
+        for number in 1.. {
+            line.clear();
+            if file.read_until(b'\n', &mut line)? == 0 {
+                break;
+            }
+            match serde_json::from_slice::<Value>(&line) {
+                Ok(event) => self.take(&event),
+                Err(_) => broken.add(number),
+            }
+            if self.n_iterations > 2 * budget.iterations {
+                self.forget(budget.iterations);
+            }
+        }
+        notes.extend(broken.note("log.jsonl", "line", "is line"));
+        Ok(())
     }
 
     fn take(&mut self, event: &Value) {
@@ -94,17 +123,25 @@ impl Log {
                 }
                 if let Some(attempt) = self.attempts.last_mut() {
                     attempt.residuals.push(number("residual"));
+                    self.n_iterations += 1;
                 }
             }
-            Some("cut_back") => self.cut_backs.push(CutBack {
-                phase: text("phase"),
-                increment,
-                load_factor: number("load_factor"),
-                next_step: number("next_step"),
-                reason: text("reason"),
-                attempt: self.attempts.len().checked_sub(1),
-            }),
-            Some("unreliable") => self.unreliable.push(format!(
+            Some("cut_back") => {
+                let cut_back = CutBack {
+                    phase: text("phase"),
+                    increment,
+                    load_factor: number("load_factor"),
+                    next_step: number("next_step"),
+                    reason: text("reason"),
+                    attempt: self.attempts.len().checked_sub(1),
+                };
+                if self.n_cut_backs < IN_TABLE {
+                    self.first_cut_backs.push(cut_back.clone());
+                }
+                self.n_cut_backs += 1;
+                self.cut_backs.push(cut_back);
+            }
+            Some("unreliable") if self.unreliable.len() < TOLD => self.unreliable.push(format!(
                 "phase `{}`, increment {increment}: {}",
                 text("phase"),
                 text("reason")
@@ -114,30 +151,20 @@ impl Log {
         }
     }
 
-    fn shorten(&mut self, notes: &mut Vec<String>) {
-        let mut left = MOST_ITERATIONS;
-        let kept = self
-            .attempts
-            .iter()
-            .rev()
-            .take_while(|attempt| {
-                let fits = attempt.residuals.len() <= left;
-                left = left.saturating_sub(attempt.residuals.len());
-                fits
-            })
-            .count();
-        let gone = self.attempts.len() - kept;
-        if gone == 0 {
-            return;
+    /// Forgets the first attempts, so that no more than so many iterations are left, and what cut
+    /// them back.
+    fn forget(&mut self, most: usize) {
+        let mut gone = 0;
+        while self.n_iterations > most && gone < self.attempts.len() {
+            self.n_iterations -= self.attempts[gone].residuals.len();
+            gone += 1;
         }
         self.attempts.drain(..gone);
-        for cut_back in &mut self.cut_backs {
+        self.forgotten += gone;
+        self.cut_backs.retain_mut(|cut_back| {
             cut_back.attempt = cut_back.attempt.and_then(|n| n.checked_sub(gone));
-        }
-        notes.push(format!(
-            "the convergence history shows the last {MOST_ITERATIONS} iterations only; \
-             log.jsonl has all"
-        ));
+            gone == 0 || cut_back.attempt.is_some()
+        });
     }
 }
 
@@ -159,7 +186,7 @@ mod tests {
         );
         std::fs::write(&folder, lines).unwrap();
         let mut notes = Vec::new();
-        let log = Log::read(&folder, &mut notes);
+        let log = Log::read(&folder, &Budget::of(1), &mut notes);
         std::fs::remove_file(&folder).unwrap();
         assert_eq!(log.attempts.len(), 1);
         assert_eq!(log.attempts[0].residuals, [Short::from(1.0), Short(None)]);

@@ -1,6 +1,7 @@
 //! The page: tables by the template, everything that is drawn as JSON for the script.
 
-use super::comparison::{final_values, settings};
+use super::budget::MANY;
+use super::comparison::{final_values, settings, subject, varied};
 use super::fields::Fields;
 use super::log::Log;
 use super::profile::Profile;
@@ -30,8 +31,10 @@ const SCRIPT: [&str; 7] = [
 const UPLOT: &str = include_str!("vendor/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("vendor/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("vendor/LICENSE-uPlot");
-/// More cut-backs than this are only in the log.
-const MOST_CUT_BACKS: usize = 100;
+/// Of what is noted of many runs so many lines are shown.
+const MOST_NOTES: usize = 50;
+/// So many runs are named beside a note.
+const NAMED: usize = 4;
 /// Larger pictures are not copied into the page, in bytes.
 const LARGEST_PICTURE: usize = 200_000;
 /// Files of a run that the page links to.
@@ -63,26 +66,40 @@ pub(super) fn render(runs: &[Run], folder: &Path) -> Result<String, Error> {
     let internal = |why: String| Error::Internal(format!("report: {why}"));
     let drawn: Vec<Drawn<'_>> = runs.iter().map(drawn).collect();
     let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
+    let page = page(runs, folder, &data).map_err(|error| internal(error.to_string()))?;
     let mut environment = Environment::new();
     environment
         .add_template("report.html", TEMPLATE)
         .and_then(|()| environment.get_template("report.html"))
-        .and_then(|template| template.render(page(runs, folder, &data)))
+        .and_then(|template| template.render(page))
         .map_err(|error| internal(format!("{error:#}")))
 }
 
-fn page(runs: &[Run], folder: &Path, data: &str) -> Template {
+fn page(runs: &[Run], folder: &Path, data: &str) -> serde_json::Result<Template> {
     let is_comparison = runs.len() > 1;
-    let title = if is_comparison {
+    let is_many = runs.len() > MANY;
+    let title = if is_many {
+        subject(runs)
+    } else if is_comparison {
         let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
         format!("Comparison: {}", names.join(", "))
     } else {
         runs.first().map_or("", Run::title).to_owned()
     };
     let settings = settings(runs);
-    context! {
+    let varied = if is_many {
+        serde_json::to_string(&varied(&settings))?
+    } else {
+        String::new()
+    };
+    // Nothing in the data can end the script element.
+    let safe = |json: &str| json.replace('<', "\\u003c");
+    Ok(context! {
         title,
         is_comparison,
+        is_many,
+        varied => safe(&varied),
+        notes => if is_many { common_notes(runs) } else { Vec::new() },
         runs => runs.iter().map(|run| run_context(run, folder)).collect::<Vec<_>>(),
         final_values => Template::from(Serde(final_values(runs))),
         n_differing => settings.iter().filter(|setting| setting.differs).count(),
@@ -94,9 +111,39 @@ fn page(runs: &[Run], folder: &Path, data: &str) -> Template {
         licence => UPLOT_LICENCE,
         uplot => without_first_comment(UPLOT),
         script => SCRIPT.concat(),
-        // Nothing in the data can end the script element.
-        data => data.replace('<', "\\u003c"),
+        data => safe(data),
+    })
+}
+
+/// What is to be noted of many runs: every line once, with those that it is about.
+fn common_notes(runs: &[Run]) -> Vec<String> {
+    let mut notes: Vec<(String, Vec<&str>)> = Vec::new();
+    for run in runs {
+        let of_run = run.warnings().into_iter().chain(run.notes.iter().cloned());
+        for note in of_run {
+            match notes.iter_mut().find(|(known, _)| *known == note) {
+                Some((_, names)) => names.push(&run.name),
+                None => notes.push((note, vec![&run.name])),
+            }
+        }
     }
+    let left_out = notes.len().saturating_sub(MOST_NOTES);
+    let line = |(note, names): &(String, Vec<&str>)| match names.len() {
+        n if n == runs.len() => format!("all runs: {note}"),
+        n if n > NAMED => format!(
+            "{} and {} more: {note}",
+            names[..NAMED].join(", "),
+            n - NAMED
+        ),
+        _ => format!("{}: {note}", names.join(", ")),
+    };
+    let mut lines: Vec<String> = notes.iter().take(MOST_NOTES).map(line).collect();
+    if left_out > 0 {
+        lines.push(format!(
+            "{left_out} more notes are in the runs' own reports"
+        ));
+    }
+    lines
 }
 
 fn drawn(run: &Run) -> Drawn<'_> {
@@ -137,6 +184,10 @@ fn run_context(run: &Run, folder: &Path) -> Template {
         program => text(&summary["program"]),
         facts => facts(summary),
         notes => run.notes.clone(),
+        report => [super::FILE, "history.csv"].iter().find_map(|file| {
+            let path = run.folder.join(file);
+            path.is_file().then(|| link(folder, &path)).flatten()
+        }),
         warnings => run.warnings(),
         ends => ends(run),
         pictures => pictures(run),
@@ -148,7 +199,7 @@ fn run_context(run: &Run, folder: &Path) -> Template {
         seconds_output => seconds(&summary["seconds"]["output"]),
         law_calls => named_values(&summary["law_calls_by_group"]),
         cut_backs => cut_backs(&run.log),
-        n_cut_backs => run.log.cut_backs.len(),
+        n_cut_backs => run.log.n_cut_backs,
         case_files => list(&summary["case_files"])
             .map(|file| (text(&file["path"]).to_owned(), text(&file["text"]).to_owned()))
             .collect::<Vec<_>>(),
@@ -319,9 +370,8 @@ fn seconds(value: &Value) -> Option<String> {
 
 fn cut_backs(log: &Log) -> Vec<Template> {
     let number = |value: Option<f64>| value.map(display);
-    log.cut_backs
+    log.first_cut_backs
         .iter()
-        .take(MOST_CUT_BACKS)
         .map(|c| {
             context! {
                 phase => c.phase.as_str(),

@@ -4,13 +4,16 @@
 //! rows across the layer are numbered from one face to the other. The page shows the mean over the
 //! rows, as probes do, or every row.
 
+use super::budget::Budget;
+use super::results::Times;
 use super::short::{Short, thinned};
-use super::table::Table;
+use super::table::{Row, Table};
+use crate::error::Error;
 use serde::Serialize;
-use std::collections::HashMap;
+use std::path::Path;
 
-/// About so many numbers are shown; of a longer profile some increments are left out.
-const MOST_VALUES: usize = 400_000;
+/// So many times what is shown is kept in memory at most.
+const AHEAD: usize = 4;
 /// Points of an element closer than this are at the same position, relative to the group's length.
 const SAME_POSITION: f64 = 1e-6;
 /// Columns every profile begins with.
@@ -69,90 +72,250 @@ struct Point {
     s: f64,
 }
 
-impl Profile {
-    /// Takes over a table with [`COLUMNS`]. `time` gives the time of an increment.
-    pub(super) fn new(
-        table: &Table,
-        time: &HashMap<(String, usize), f64>,
-        notes: &mut Vec<String>,
-    ) -> Option<Self> {
-        let [phase, increment, ..] = COLUMNS.map(|name| table.position(name).unwrap_or(0));
-        let key = |row: usize| (table.text(row, phase), table.text(row, increment));
-        let mut blocks: Vec<std::ops::Range<usize>> = Vec::new();
-        for row in 0..table.n_rows() {
-            match blocks.last_mut() {
-                Some(block) if key(block.start) == key(row) => block.end = row + 1,
-                _ => blocks.push(row..row + 1),
-            }
+/// An increment on its way into the page.
+#[derive(Debug)]
+struct Block {
+    /// Number among the complete increments.
+    number: usize,
+    phase: usize,
+    increment: usize,
+    /// The next increment is of another phase, as far as it is known.
+    ends_phase: bool,
+    /// Row by row.
+    values: Vec<f64>,
+}
+
+/// The increments of a table. Of too many, every second is forgotten while they are read, but
+/// for the ends of phases and those where a quantity is lowest or highest.
+#[derive(Debug, Default)]
+struct Blocks {
+    kept: Vec<Block>,
+    /// Complete increments so far, and others.
+    n: usize,
+    n_broken: usize,
+    stride: usize,
+    /// So many may be kept.
+    most: usize,
+    /// Numbers of a row.
+    width: usize,
+}
+
+impl Blocks {
+    fn add(&mut self, phase: usize, increment: usize, values: Vec<f64>) {
+        if let Some(last) = self.kept.last_mut() {
+            last.ends_phase = last.phase != phase;
         }
-        let points = points(table, blocks.first()?.clone())?;
-        let complete = |block: &std::ops::Range<usize>| block.len() == points.len();
-        let n = blocks.len();
-        blocks.retain(complete);
-        if blocks.len() < n {
-            notes.push(format!(
-                "profile.csv: {} of {n} increments are not complete and left out",
-                n - blocks.len()
-            ));
-        }
-        let columns: Vec<usize> = (0..table.columns().len())
-            .filter(|&column| !COLUMNS.contains(&table.columns()[column].as_str()))
-            .collect();
-        let most = MOST_VALUES / (points.len() * columns.len()).max(1);
-        let ends_phase = |i: usize| {
-            let next = blocks.get(i + 1).map(|block| key(block.start).0);
-            next != Some(key(blocks[i].start).0)
-        };
-        let shown = thinned(blocks.len(), most, ends_phase);
-        if shown.len() < blocks.len() {
-            notes.push(format!(
-                "of {} profiles {} are shown; profile.csv has all",
-                blocks.len(),
-                shown.len()
-            ));
-        }
-        let (groups, order) = interfaces(&points);
-        let values_at = |column: usize, block: usize| {
-            let start = blocks[block].start;
-            let value = |&point: &usize| Short(table.number(start + point, column));
-            order.iter().map(value).collect()
-        };
-        let places = shown.iter().map(|&block| {
-            let (phase, increment) = key(blocks[block].start);
-            let increment = increment.parse().unwrap_or(0);
-            Place {
-                time: Short(time.get(&(phase.to_owned(), increment)).copied()),
-                phase: phase.to_owned(),
-                increment,
-            }
+        let number = self.n;
+        self.n += 1;
+        self.kept.push(Block {
+            number,
+            phase,
+            increment,
+            ends_phase: true,
+            values,
         });
-        let values = columns
-            .iter()
-            .map(|&column| shown.iter().map(|&i| values_at(column, i)).collect());
-        Some(Self {
-            increments: places.collect(),
-            values: values.collect(),
-            columns: columns
-                .iter()
-                .map(|&column| table.columns()[column].clone())
-                .collect(),
-            groups,
-        })
+        if self.kept.len() > self.most {
+            self.stride = 2 * self.stride.max(1);
+            self.thin();
+        }
+    }
+
+    fn thin(&mut self) {
+        let extreme = self.extreme();
+        let (last, stride) = (self.n - 1, self.stride);
+        let mut at = 0;
+        self.kept.retain(|block| {
+            let keeps = block.number.is_multiple_of(stride)
+                || block.number == last
+                || block.ends_phase
+                || extreme[at];
+            at += 1;
+            keeps
+        });
+    }
+
+    /// Of those that are kept, where a quantity is lowest or highest.
+    fn extreme(&self) -> Vec<bool> {
+        let mut extreme = vec![false; self.kept.len()];
+        for column in 0..self.width {
+            let (mut low, mut high) = ((f64::INFINITY, None), (f64::NEG_INFINITY, None));
+            for (at, block) in self.kept.iter().enumerate() {
+                for row in block.values.chunks_exact(self.width) {
+                    // Comparisons with NaN are false.
+                    if row[column] < low.0 {
+                        low = (row[column], Some(at));
+                    }
+                    if row[column] > high.0 {
+                        high = (row[column], Some(at));
+                    }
+                }
+            }
+            for at in [low.1, high.1].into_iter().flatten() {
+                extreme[at] = true;
+            }
+        }
+        extreme
     }
 }
 
-fn points(table: &Table, rows: std::ops::Range<usize>) -> Option<Vec<Point>> {
-    let [_, _, group, element, _, x, y, s] =
-        COLUMNS.map(|name| table.position(name).unwrap_or_default());
-    rows.map(|row| {
-        Some(Point {
-            group: table.text(row, group).to_owned(),
-            element: table.count(row, element)?,
-            position: [table.number(row, x)?, table.number(row, y)?],
-            s: table.number(row, s)?,
-        })
+impl Profile {
+    /// Reads a table with [`COLUMNS`]. `None` if there is nothing to show.
+    ///
+    /// # Errors
+    /// As [`Table::open`].
+    pub(super) fn read(
+        path: &Path,
+        times: &Times,
+        budget: &Budget,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<Self>, Error> {
+        let table = Table::open(path, &COLUMNS)?;
+        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
+        let [phase_at, increment_at, ..] = at;
+        let columns: Vec<usize> = (0..table.columns().len())
+            .filter(|&column| !COLUMNS.contains(&table.columns()[column].as_str()))
+            .collect();
+        let names: Vec<String> = columns
+            .iter()
+            .map(|&column| table.columns()[column].clone())
+            .collect();
+        let mut phases: Vec<String> = Vec::new();
+        // The first increment says which points there are.
+        let mut points: Option<Vec<Point>> = Some(Vec::new());
+        let mut blocks = Blocks {
+            width: columns.len(),
+            ..Blocks::default()
+        };
+        let mut key: (Vec<u8>, Vec<u8>) = Default::default();
+        let mut increment = 0;
+        let mut values: Vec<f64> = Vec::new();
+        let (mut n_rows, mut is_first) = (0, true);
+        let mut end = |values: &mut Vec<f64>,
+                       n_rows: usize,
+                       place: (usize, usize),
+                       points: &Option<Vec<Point>>,
+                       is_first: bool| {
+            let n_points = points.as_ref().map_or(0, Vec::len);
+            if is_first {
+                let size = (n_points * blocks.width).max(1);
+                blocks.most = AHEAD * (budget.profile / size).max(1);
+            }
+            if n_rows == n_points {
+                let next = Vec::with_capacity(values.len());
+                blocks.add(place.0, place.1, std::mem::replace(values, next));
+            } else {
+                blocks.n_broken += 1;
+                values.clear();
+            }
+        };
+        table.rows(notes, |row| {
+            let is_new = key.0 != row.bytes(phase_at) || key.1 != row.bytes(increment_at);
+            if is_new || n_rows == 0 {
+                if n_rows > 0 {
+                    let place = (phases.len() - 1, increment);
+                    end(&mut values, n_rows, place, &points, is_first);
+                    is_first = false;
+                }
+                n_rows = 0;
+                if phases.last().map(String::as_bytes) != Some(row.bytes(phase_at)) {
+                    phases.push(row.text(phase_at));
+                }
+                key.0.clear();
+                key.0.extend_from_slice(row.bytes(phase_at));
+                key.1.clear();
+                key.1.extend_from_slice(row.bytes(increment_at));
+                increment = row.count(increment_at).unwrap_or_default();
+            }
+            n_rows += 1;
+            if is_first && let Some(known) = &mut points {
+                match point(row, at) {
+                    Some(point) => known.push(point),
+                    None => points = None,
+                }
+            }
+            values.extend(columns.iter().map(|&column| row.number(column)));
+        })?;
+        if n_rows > 0 {
+            end(
+                &mut values,
+                n_rows,
+                (phases.len() - 1, increment),
+                &points,
+                is_first,
+            );
+        }
+        let Some(points) = points.filter(|points| !points.is_empty()) else {
+            return Ok(None);
+        };
+        if blocks.n_broken > 0 {
+            notes.push(format!(
+                "profile.csv: {} of {} increments are not complete and left out",
+                blocks.n_broken,
+                blocks.n + blocks.n_broken
+            ));
+        }
+        let size = points.len() * columns.len();
+        if size > budget.profile {
+            notes.push(format!(
+                "profile.csv is not shown: {size} numbers for every increment are too many for \
+                 this page"
+            ));
+            return Ok(None);
+        }
+        let most = budget.profile / size.max(1);
+        let extreme = if blocks.kept.len() > most {
+            blocks.extreme()
+        } else {
+            Vec::new()
+        };
+        let must = |i: usize| blocks.kept[i].ends_phase || extreme[i];
+        let shown = thinned(blocks.kept.len(), most, must);
+        if shown.len() < blocks.n {
+            notes.push(format!(
+                "of {} profiles {} are shown; profile.csv has all",
+                blocks.n,
+                shown.len()
+            ));
+        }
+        let shown: Vec<&Block> = shown.iter().map(|&i| &blocks.kept[i]).collect();
+        let (groups, order) = interfaces(&points);
+        let width = columns.len();
+        let values_at = |column: usize, block: &Block| -> Vec<Short> {
+            let value = |&point: &usize| {
+                let value = block.values[point * width + column];
+                Short(value.is_finite().then_some(value))
+            };
+            order.iter().map(value).collect()
+        };
+        let places = shown.iter().map(|block| {
+            let phase = phases[block.phase].clone();
+            Place {
+                time: Short(times.of(&phase, block.increment)),
+                phase,
+                increment: block.increment,
+            }
+        });
+        let values =
+            (0..width).map(|column| shown.iter().map(|block| values_at(column, block)).collect());
+        Ok(Some(Self {
+            increments: places.collect(),
+            values: values.collect(),
+            columns: names,
+            groups,
+        }))
+    }
+}
+
+/// The point of a row, `at` the columns of a profile.
+fn point(row: &Row, at: [usize; 8]) -> Option<Point> {
+    let [_, _, group, element, _, x, y, s] = at;
+    let number = |column: usize| Some(row.number(column)).filter(|value| value.is_finite());
+    Some(Point {
+        group: row.text(group),
+        element: row.count(element)?,
+        position: [number(x)?, number(y)?],
+        s: number(s)?,
     })
-    .collect()
 }
 
 /// Interfaces, and the points in the order of their stations.

@@ -1,18 +1,16 @@
 //! A results folder, read back.
 
+use super::budget::Budget;
 use super::fields::Fields;
 use super::log::Log;
-use super::profile::{COLUMNS, Profile};
-use super::short::{Short, thinned};
+use super::profile::Profile;
+use super::short::{Short, extremes, thinned};
 use super::table::Table;
 use crate::error::Error;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
-
-/// Of a longer history some increments are left out.
-const MOST_ROWS: usize = 5_000;
 
 /// A run as its folder shows it.
 #[derive(Debug)]
@@ -56,9 +54,39 @@ pub(super) struct History {
     /// Last row of every phase.
     #[serde(skip)]
     pub(super) ends: Vec<PhaseEnd>,
-    /// Times of the increments.
+    /// Times of the increments, by name and increment of the phase.
     #[serde(skip)]
-    times: HashMap<(String, usize), f64>,
+    times: Times,
+}
+
+/// Times of increments.
+#[derive(Debug, Default)]
+pub(super) struct Times(HashMap<String, HashMap<usize, f64>>);
+
+impl Times {
+    fn add(&mut self, phase: &str, increment: usize, time: f64) {
+        if let Some(of_phase) = self.0.get_mut(phase) {
+            of_phase.insert(increment, time);
+        } else {
+            let of_phase = HashMap::from([(increment, time)]);
+            self.0.insert(phase.to_owned(), of_phase);
+        }
+    }
+
+    /// The time of an increment.
+    pub(super) fn of(&self, phase: &str, increment: usize) -> Option<f64> {
+        self.0.get(phase)?.get(&increment).copied()
+    }
+
+    /// Phase and increment at a time.
+    fn label(&self, time: f64) -> String {
+        for (phase, times) in &self.0 {
+            if let Some((increment, _)) = times.iter().find(|(_, t)| (*t - time).abs() < 1e-9) {
+                return format!("{phase}, increment {increment}");
+            }
+        }
+        format!("time {time}")
+    }
 }
 
 /// The last increment of a phase.
@@ -71,60 +99,73 @@ pub(super) struct PhaseEnd {
 }
 
 impl History {
-    fn read(path: &Path, notes: &mut Vec<String>) -> Result<Self, Error> {
+    fn read(path: &Path, budget: &Budget, notes: &mut Vec<String>) -> Result<Self, Error> {
         let needed = ["phase", "increment", "time"];
-        let table = Table::read(path, &needed, notes)?;
+        let table = Table::open(path, &needed)?;
         let [phase, increment, time] = needed.map(|name| table.position(name).unwrap_or_default());
         let columns: Vec<usize> = (0..table.columns().len())
             .filter(|column| ![phase, increment].contains(column))
             .collect();
-        let mut ends: Vec<PhaseEnd> = Vec::new();
-        let mut phases: Vec<usize> = Vec::new();
-        let mut times = HashMap::new();
-        for row in 0..table.n_rows() {
-            let name = table.text(row, phase);
-            let end = PhaseEnd {
-                phase: name.to_owned(),
-                increment: table.count(row, increment).unwrap_or_default(),
-                values: columns.iter().map(|&c| table.number(row, c)).collect(),
-            };
-            if let Some(time) = table.number(row, time) {
-                times.insert((name.to_owned(), end.increment), time);
+        let names: Vec<String> = columns
+            .iter()
+            .map(|&c| table.columns()[c].clone())
+            .collect();
+        let time_at = columns.iter().position(|&column| column == time);
+        let mut phases: Vec<String> = Vec::new();
+        let mut of_row: Vec<usize> = Vec::new();
+        let mut increments: Vec<usize> = Vec::new();
+        let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
+        let mut times = Times::default();
+        table.rows(notes, |row| {
+            if phases.last().map(String::as_bytes) != Some(row.bytes(phase)) {
+                phases.push(row.text(phase));
             }
-            match ends.last_mut() {
-                Some(last) if last.phase == name => *last = end,
-                _ => ends.push(end),
+            of_row.push(phases.len() - 1);
+            increments.push(row.count(increment).unwrap_or_default());
+            for (values, &column) in values.iter_mut().zip(&columns) {
+                values.push(row.number(column));
             }
-            phases.push(ends.len() - 1);
+        })?;
+        let n = of_row.len();
+        if let Some(time_at) = time_at {
+            for row in 0..n {
+                let time = values[time_at][row];
+                if time.is_finite() {
+                    times.add(&phases[of_row[row]], increments[row], time);
+                }
+            }
         }
-        let ends_phase = |row: usize| phases.get(row + 1) != Some(&phases[row]);
-        let shown = thinned(table.n_rows(), MOST_ROWS, ends_phase);
-        if shown.len() < table.n_rows() {
+        let finite = |value: f64| value.is_finite().then_some(value);
+        let last_rows: Vec<usize> = (0..n)
+            .filter(|&row| of_row.get(row + 1) != Some(&of_row[row]))
+            .collect();
+        let ends = last_rows.iter().map(|&row| PhaseEnd {
+            phase: phases[of_row[row]].clone(),
+            increment: increments[row],
+            values: values.iter().map(|column| finite(column[row])).collect(),
+        });
+        let ends: Vec<PhaseEnd> = ends.collect();
+        let shown = shown_rows(&values, n, budget.history_rows(columns.len()), &last_rows);
+        if shown.len() < n {
             notes.push(format!(
-                "the curves show {} of {} increments; history.csv has all",
+                "the curves show {} of {n} increments, with the extremes of every probe; \
+                 history.csv has all",
                 shown.len(),
-                table.n_rows()
             ));
         }
-        if table.n_rows() == 0 {
+        if n == 0 {
             notes.push("history.csv has no increment: none reached equilibrium".to_owned());
         }
-        let column = |&column: &usize| {
-            let values = shown.iter().map(|&row| Short(table.number(row, column)));
+        let short = |column: &Vec<f64>| -> Vec<Short> {
+            let values = shown.iter().map(|&row| Short(finite(column[row])));
             values.collect()
         };
         Ok(Self {
-            phase: shown.iter().map(|&row| phases[row]).collect(),
-            increment: shown
-                .iter()
-                .map(|&row| table.count(row, increment).unwrap_or_default())
-                .collect(),
-            names: columns
-                .iter()
-                .map(|&c| table.columns()[c].clone())
-                .collect(),
-            values: columns.iter().map(column).collect(),
-            phases: ends.iter().map(|end| end.phase.clone()).collect(),
+            phase: shown.iter().map(|&row| of_row[row]).collect(),
+            increment: shown.iter().map(|&row| increments[row]).collect(),
+            values: values.iter().map(short).collect(),
+            names,
+            phases,
             ends,
             times,
         })
@@ -141,15 +182,23 @@ impl History {
         let column = self.names.iter().position(|n| n == name)?;
         self.ends.last()?.values[column]
     }
+}
 
-    /// Phase and increment at a time.
-    fn label(&self, time: f64) -> String {
-        let found = self.times.iter().find(|(_, t)| (*t - time).abs() < 1e-9);
-        match found {
-            Some(((phase, increment), _)) => format!("{phase}, increment {increment}"),
-            None => format!("time {time}"),
-        }
+/// Rows of the history to show: half of them evenly spaced, half where columns are lowest and
+/// highest, so that no peak is lost.
+fn shown_rows(columns: &[Vec<f64>], n: usize, most: usize, ends: &[usize]) -> Vec<usize> {
+    if n <= most {
+        return (0..n).collect();
     }
+    let half = (most / 2).max(1);
+    let mut rows = thinned(n, half, |_| false);
+    rows.extend(extremes(columns, n, half / (2 * columns.len()).max(1)));
+    if ends.len() <= most {
+        rows.extend(ends);
+    }
+    rows.sort_unstable();
+    rows.dedup();
+    rows
 }
 
 impl Run {
@@ -157,30 +206,30 @@ impl Run {
     ///
     /// # Errors
     /// As [`super::write`].
-    pub(super) fn read(folder: &Path) -> Result<Self, Error> {
+    pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Self, Error> {
         let mut notes = Vec::new();
-        let history = History::read(&folder.join("history.csv"), &mut notes)?;
+        let history = History::read(&folder.join("history.csv"), budget, &mut notes)?;
         let summary = summary(folder, &mut notes);
         let profile_path = folder.join("profile.csv");
         let profile = profile_path
             .is_file()
-            .then(|| Table::read(&profile_path, &COLUMNS, &mut notes));
+            .then(|| Profile::read(&profile_path, &history.times, budget, &mut notes));
         let profile = match profile {
             None => None,
-            Some(Ok(table)) => Profile::new(&table, &history.times, &mut notes),
+            Some(Ok(profile)) => profile,
             Some(Err(error)) => {
                 notes.push(format!("profile.csv: {error}; left out"));
                 None
             }
         };
-        let mut fields = Fields::read(folder, &mut notes);
+        let mut fields = Fields::read(folder, budget, &mut notes);
         if let Some(fields) = &mut fields {
             let groups: Vec<String> = list(&summary["groups"])
                 .map(|group| text(&group["name"]).to_owned())
                 .collect();
-            fields.label(&groups, |time| history.label(time));
+            fields.label(&groups, |time| history.times.label(time));
         }
-        let log = Log::read(&folder.join("log.jsonl"), &mut notes);
+        let log = Log::read(&folder.join("log.jsonl"), budget, &mut notes);
         let name = std::path::absolute(folder)
             .ok()
             .and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()))

@@ -41,13 +41,36 @@ pub(super) fn display(value: f64) -> String {
     }
 }
 
-/// Which of `n` entries to show if at most about `most` can be: evenly spaced, the last included,
-/// and those that must be.
+/// Which of `n` entries to show if at most about `most` can be: evenly spaced, the first and the
+/// last included, and those that must be, unless they alone are too many.
 pub(super) fn thinned(n: usize, most: usize, must: impl Fn(usize) -> bool) -> Vec<usize> {
+    if n <= most {
+        return (0..n).collect();
+    }
     let stride = n.div_ceil(most.max(1)).max(1);
+    let fits = (0..n).filter(|&i| must(i)).count() <= most.max(1);
     (0..n)
-        .filter(|&i| (n - 1 - i).is_multiple_of(stride) || must(i))
+        .filter(|&i| i == 0 && most > 1 || (n - 1 - i).is_multiple_of(stride) || fits && must(i))
         .collect()
+}
+
+/// Where columns are lowest and highest, by each of so many parts of the rows: what a curve's peaks
+/// are made of. Not ascending.
+pub(super) fn extremes(columns: &[Vec<f64>], n_rows: usize, parts: usize) -> Vec<usize> {
+    let length = n_rows.div_ceil(parts.max(1)).max(1);
+    let mut found = Vec::new();
+    for column in columns {
+        for (part, values) in column.chunks(length).enumerate() {
+            let numbers = || values.iter().enumerate().filter(|(_, v)| v.is_finite());
+            let ends = [
+                numbers().min_by(|a, b| a.1.total_cmp(b.1)),
+                numbers().max_by(|a, b| a.1.total_cmp(b.1)),
+            ];
+            let ends = ends.into_iter().flatten();
+            found.extend(ends.map(|(row, _)| part * length + row));
+        }
+    }
+    found
 }
 
 #[cfg(test)]
@@ -77,7 +100,18 @@ mod tests {
     #[test]
     fn thinning_keeps_the_last_and_what_it_must() {
         assert_eq!(thinned(3, 10, |_| false), [0, 1, 2]);
-        assert_eq!(thinned(10, 3, |i| i == 0), [0, 1, 5, 9]);
+        assert_eq!(thinned(10, 3, |i| i == 2), [0, 1, 2, 5, 9]);
+        assert_eq!(thinned(10, 1, |_| true), [9]);
         assert!(thinned(0, 3, |_| true).is_empty());
+    }
+
+    #[test]
+    fn extremes_of_every_part_are_found() {
+        let hill = vec![0.0, 3.0, 1.0, f64::NAN, 5.0, -1.0];
+        let mut found = extremes(&[hill], 6, 2);
+        found.sort_unstable();
+        assert_eq!(found, [0, 1, 4, 5]);
+        assert!(extremes(&[vec![f64::NAN]], 1, 1).is_empty());
+        assert!(extremes(&[vec![]], 0, 3).is_empty());
     }
 }

@@ -1,74 +1,69 @@
-//! Reading the CSV files of a run, whatever has become of them.
+//! Reading the CSV files of a run, whatever has become of them, and however long they are: row by
+//! row, never as a whole.
 
 use crate::error::{Error, Source};
-use std::path::Path;
+use crate::file::open_regular;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
 
-/// The complete rows of a CSV file.
+/// Of a header that cannot be used, so much is shown.
+const SHOWN: usize = 400;
+
+/// A CSV file that is about to be read.
 #[derive(Debug)]
 pub(super) struct Table {
-    /// Names of the columns.
+    path: PathBuf,
     columns: Vec<String>,
-    rows: Vec<csv::StringRecord>,
+    reader: csv::Reader<File>,
+    /// The file ends within a row: a run that is stopped can stop in the middle of a number.
+    is_cut: bool,
 }
 
 impl Table {
-    /// Reads a file that has to have certain columns. A row that is not complete is left out with
-    /// a note.
+    /// Opens a file that has to have certain columns.
     ///
     /// # Errors
     /// [`Error::Unreadable`]; [`Error::Input`] if a column is missing.
-    pub(super) fn read(
-        path: &Path,
-        needed: &[&str],
-        notes: &mut Vec<String>,
-    ) -> Result<Self, Error> {
-        let source = Source::read(path)?;
-        let text = source.text();
-        // A run that is stopped can stop in the middle of a number.
-        let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+    pub(super) fn open(path: &Path, needed: &[&str]) -> Result<Self, Error> {
+        let unreadable = |source| Error::Unreadable {
+            path: path.to_owned(),
+            source,
+        };
+        let mut file = open_regular(path).map_err(unreadable)?;
+        let is_cut = ends_in_a_row(&mut file).map_err(unreadable)?;
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)
-            .from_reader(whole.as_bytes());
-        let header_end = text.find('\n').unwrap_or(text.len());
-        let unusable = |why: String| -> Error { source.error(0..header_end, why).into() };
-        let columns: Vec<String> = match reader.headers() {
-            Ok(headers) => headers.iter().map(str::to_owned).collect(),
-            Err(error) => return Err(unusable(format!("the header cannot be read: {error}"))),
-        };
+            .buffer_capacity(1 << 16)
+            .from_reader(file);
+        let header = reader.byte_headers().map_err(|error| {
+            let why = io::Error::other(error.to_string());
+            unreadable(why)
+        })?;
+        let columns: Vec<String> = header
+            .iter()
+            .map(|name| String::from_utf8_lossy(name).into_owned())
+            .collect();
         let missing: Vec<&str> = needed
             .iter()
             .filter(|name| !columns.iter().any(|column| column == *name))
             .copied()
             .collect();
         if !missing.is_empty() {
-            return Err(unusable(format!(
+            let line: String = columns.join(",").chars().take(SHOWN).collect();
+            let source = Source::new(path, line.clone());
+            let message = format!(
                 "not written by a run: there is no column {}",
                 missing.join(", ")
-            )));
+            );
+            return Err(source.error(0..line.len(), message).into());
         }
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let mut rows = Vec::new();
-        let mut broken = Vec::new();
-        for row in reader.records() {
-            match row {
-                Ok(row) if row.len() == columns.len() => rows.push(row),
-                Ok(row) => broken.push(row.position().map_or(0, csv::Position::line)),
-                Err(error) => broken.push(error.position().map_or(0, csv::Position::line)),
-            }
-        }
-        if whole.len() < text.len() {
-            broken.push(whole.lines().count() as u64 + 1);
-        }
-        if let Some(line) = broken.first() {
-            notes.push(format!(
-                "{file}: {} not complete and left out, the first in line {line}",
-                match broken.len() {
-                    1 => "1 row is".to_owned(),
-                    n => format!("{n} rows are"),
-                }
-            ));
-        }
-        Ok(Self { columns, rows })
+        Ok(Self {
+            path: path.to_owned(),
+            columns,
+            reader,
+            is_cut,
+        })
     }
 
     /// Names of the columns, in order.
@@ -76,32 +71,119 @@ impl Table {
         &self.columns
     }
 
-    /// Number of rows.
-    pub(super) fn n_rows(&self) -> usize {
-        self.rows.len()
-    }
-
     /// Where a column stands.
     pub(super) fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column == name)
     }
 
-    /// A cell's text.
-    pub(super) fn text(&self, row: usize, column: usize) -> &str {
-        self.rows
-            .get(row)
-            .and_then(|row| row.get(column))
-            .unwrap_or_default()
+    /// Takes every complete row. One that is not is left out with a note.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`].
+    pub(super) fn rows(
+        mut self,
+        notes: &mut Vec<String>,
+        mut take: impl FnMut(&Row),
+    ) -> Result<(), Error> {
+        let mut broken = Broken::default();
+        let (mut row, mut next) = (Row::default(), Row::default());
+        let mut read = |row: &mut Row| {
+            let read = self.reader.read_byte_record(&mut row.0);
+            read.map_err(|error| Error::Unreadable {
+                path: self.path.clone(),
+                source: io::Error::other(error.to_string()),
+            })
+        };
+        let mut has_row = read(&mut row)?;
+        while has_row {
+            let has_next = read(&mut next)?;
+            let is_whole = row.0.len() == self.columns.len() && (has_next || !self.is_cut);
+            if is_whole {
+                take(&row);
+            } else {
+                broken.add(row.0.position().map_or(0, csv::Position::line));
+            }
+            std::mem::swap(&mut row, &mut next);
+            has_row = has_next;
+        }
+        let file = self.path.file_name().unwrap_or_default().to_string_lossy();
+        notes.extend(broken.note(&file, "row", "in line"));
+        Ok(())
+    }
+}
+
+/// Entries of a file that are not complete.
+#[derive(Debug, Default)]
+pub(super) struct Broken {
+    n: usize,
+    first: u64,
+}
+
+impl Broken {
+    pub(super) fn add(&mut self, line: u64) {
+        if self.n == 0 {
+            self.first = line;
+        }
+        self.n += 1;
     }
 
-    /// A cell's number, if it is a finite one.
-    pub(super) fn number(&self, row: usize, column: usize) -> Option<f64> {
-        let value: f64 = self.text(row, column).trim().parse().ok()?;
-        value.is_finite().then_some(value)
+    /// What is to be said of them, if there are any.
+    pub(super) fn note(&self, file: &str, entry: &str, place: &str) -> Option<String> {
+        let what = match self.n {
+            0 => return None,
+            1 => format!("1 {entry} is"),
+            n => format!("{n} {entry}s are"),
+        };
+        let first = self.first;
+        Some(format!(
+            "{file}: {what} not complete and left out, the first {place} {first}"
+        ))
+    }
+}
+
+/// A row.
+#[derive(Debug, Default)]
+pub(super) struct Row(csv::ByteRecord);
+
+impl Row {
+    /// A cell.
+    pub(super) fn bytes(&self, column: usize) -> &[u8] {
+        self.0.get(column).unwrap_or_default()
+    }
+
+    /// A cell's text.
+    pub(super) fn text(&self, column: usize) -> String {
+        String::from_utf8_lossy(self.bytes(column)).into_owned()
+    }
+
+    /// A cell's number, NaN if it is not a finite one.
+    pub(super) fn number(&self, column: usize) -> f64 {
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let value = text.trim().parse().unwrap_or(f64::NAN);
+        if f64::is_finite(value) {
+            value
+        } else {
+            f64::NAN
+        }
     }
 
     /// A cell's whole number.
-    pub(super) fn count(&self, row: usize, column: usize) -> Option<usize> {
-        self.text(row, column).trim().parse().ok()
+    pub(super) fn count(&self, column: usize) -> Option<usize> {
+        std::str::from_utf8(self.bytes(column))
+            .ok()?
+            .trim()
+            .parse()
+            .ok()
     }
+}
+
+/// Whether a file ends without the end of a line.
+fn ends_in_a_row(file: &mut File) -> io::Result<bool> {
+    let mut last = [b'\n'];
+    if file.metadata()?.len() > 0 {
+        file.seek(SeekFrom::End(-1))?;
+        file.read_exact(&mut last)?;
+        file.seek(SeekFrom::Start(0))?;
+    }
+    Ok(last != [b'\n'])
 }

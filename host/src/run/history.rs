@@ -117,6 +117,7 @@ mod tests {
                 unreliable: None,
                 relaxed: false,
                 round_off: 0.0,
+                scales: Vec::new(),
             };
             history.add(1.0, success);
         }

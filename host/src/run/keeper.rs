@@ -108,6 +108,7 @@ impl Run<'_> {
         self.force = state.force.into_owned();
         self.time = state.time;
         self.largest_force = state.largest_force;
+        self.largest_forces.clone_from(&state.course.loads.largest);
         Ok(state.course.into_owned())
     }
 }

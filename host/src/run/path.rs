@@ -104,6 +104,7 @@ impl Run<'_> {
                         course.distance = (GROWTH * course.distance).min(course.whole);
                     }
                 }
+                Err(failure) if failure.is_stop => return Err(Self::stopped(place)),
                 Err(failure) => {
                     results.iterations(place, from, &failure.iterations)?;
                     done.iterations += failure.iterations.len();
@@ -213,6 +214,7 @@ impl Run<'_> {
             &settings,
             &mut record.costs,
         );
+        newton = newton.stopped_by(&self.stop);
         let start = [phase.lambda, self.time];
         newton.step_along(
             &phase.loads,

@@ -1,14 +1,19 @@
 //! What keeps iterations from settling: two iterates compared, point by point.
 //!
 //! The host knows no law. It sees stresses that are zero in one iterate and not in the next, and
-//! tangents that change although the displacements hardly do.
+//! tangents that change although the displacements hardly do. Before it calls that a change of
+//! contact or of a branch, it holds the tangent of the point against the law's own answers: with a
+//! wrong one, points jump about for no other reason.
 
 use super::newton::norm;
 use crate::case::Formulation;
-use crate::group::Group;
+use crate::group::{Fault, Group};
 
 /// Smallest relative change of a tangent that is worth a word.
 const NOTABLE: f64 = 0.01;
+
+/// Points of a group whose tangents are looked at where none changes.
+const SAMPLES: usize = 8;
 
 /// Stresses and tangents of all points of an iterate, group by group.
 #[derive(Debug)]
@@ -82,9 +87,10 @@ impl Change {
     }
 }
 
-/// Names the point that differs most between the snapshot and the present iterate; `None` if no
-/// point's tangent changes notably.
-pub(super) fn compare(groups: &[Group], before: &Snapshot) -> Option<String> {
+/// Names the point that differs most between the snapshot and the present iterate, or one whose
+/// tangent is wrong; `None` if no point's tangent changes notably. `period`: time at the start of
+/// the step, and its increment.
+pub(super) fn compare(groups: &[Group], before: &Snapshot, period: (f64, f64)) -> Option<String> {
     let mut changed = 0;
     let mut worst: Option<(Change, &Group, usize)> = None;
     for (group, old) in groups.iter().zip(&before.0) {
@@ -98,9 +104,12 @@ pub(super) fn compare(groups: &[Group], before: &Snapshot) -> Option<String> {
             }
         }
     }
-    let (change, group, point) = worst?;
-    let per_element = group.kinematics.points_per_element();
-    let [x, y] = group.kinematics.position(point);
+    let Some((change, group, point)) = worst else {
+        return wrong_tangent(groups, period);
+    };
+    if let Some(fault) = group.tangent_fault(point, period.0, period.1) {
+        return Some(format!("{}: {fault}", place(group, point)));
+    }
     let what = match (change, group.formulation) {
         (Change::Vanishes(_), Formulation::ThinLayer | Formulation::ZeroThickness) => {
             "traction zero (no contact) in one iteration and not in the next: contact opens and \
@@ -123,11 +132,33 @@ pub(super) fn compare(groups: &[Group], before: &Snapshot) -> Option<String> {
         1 => ", and at one point more".to_owned(),
         n => format!(", and at {n} points more"),
     };
-    Some(format!(
-        "group `{}`, element {}, point {} at ({x:.4}, {y:.4}), law `{}`: {what}{others}",
+    Some(format!("{}: {what}{others}", place(group, point)))
+}
+
+/// A point in words.
+fn place(group: &Group, point: usize) -> String {
+    let per_element = group.kinematics.points_per_element();
+    let [x, y] = group.kinematics.position(point);
+    format!(
+        "group `{}`, element {}, point {} at ({x:.4}, {y:.4}), law `{}`",
         group.name,
         point / per_element + 1,
         point % per_element + 1,
         group.law.built.law.description().id,
-    ))
+    )
+}
+
+/// The first of some points whose law has a wrong tangent.
+fn wrong_tangent(groups: &[Group], (time, time_increment): (f64, f64)) -> Option<String> {
+    let nonlinear = groups.iter().filter(|group| !group.is_linear());
+    let points = nonlinear.flat_map(|group| {
+        let n = group.kinematics.n_points();
+        let some = (0..n).step_by(n.div_ceil(SAMPLES).max(1));
+        some.map(move |point| (group, point))
+    });
+    let mut faults = points.filter_map(|(group, point)| {
+        let fault: Fault = group.tangent_fault(point, time, time_increment)?;
+        Some(format!("{}: {fault}", place(group, point)))
+    });
+    faults.next()
 }

@@ -252,6 +252,8 @@ impl LinearDomain {
         } else {
             let lines = system.lines(lines);
             let mut factors = Multifrontal::new(&pattern, kind, &kept, Some(&lines))?;
+            #[cfg(unix)]
+            crate::memory::expect(factors.bytes(), "factorising the linear groups");
             let gathered = factors.gather(&values);
             // Where nothing may find the matrix, it is given up before its factors need the room.
             let remembered = reuse
@@ -337,6 +339,16 @@ impl LinearDomain {
     pub fn restart(&mut self, groups: &[Group], loads: &Loads, standing: &Standing) {
         self.start(groups, loads, &standing.complete.displacement);
         self.standing = standing.clone();
+    }
+
+    /// Where a part of the groups was looked at: the forces that the domain takes from its
+    /// boundary, by degree of freedom. None if all groups were.
+    pub fn forces_beside(&self) -> impl Iterator<Item = (usize, f64)> {
+        let forces = self.boundary.iter().zip(&self.standing.forces);
+        let is_part = self.standing.part.is_some();
+        forces
+            .filter(move |_| is_part)
+            .map(|(&dof, &force)| (dof, force))
     }
 
     /// Where the domain stands.

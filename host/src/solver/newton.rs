@@ -4,33 +4,34 @@
 //! Displacements and forces are vectors by place ([`Places`]) if nothing else is said.
 
 mod acceleration;
+mod acceptance;
+mod failure;
+mod given;
 mod matrix;
 mod path;
 mod relaxation;
 
+pub use failure::{Criterion, Runaway, StepFailure, Unmet};
 pub use matrix::Matrix;
 pub use path::Measure;
 
 use super::diagnosis::{self, Snapshot};
 use super::linear_domain::LinearDomain;
-use crate::assembly::{Places, System};
+use crate::assembly::{Places, System, norms};
 use crate::case::{Control, Method, SolverInput};
 use crate::group::{Group, PointFailure};
 use crate::plugin::Operator;
+use crate::stop::Stop;
 use acceleration::Acceleration;
+use acceptance::{Change, Criteria, EXACT, Measures, STALE};
 use algebra::LinearSolver;
+use given::Given;
 use relaxation::Relaxation;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
 /// Lengths of a correction that the line search tries, in order.
 const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
-/// The displacement criterion is waived where the residual is this far below its tolerance: a
-/// linear step ends after one correction, which is as large as the increment itself.
-const EXACT: f64 = 1e-3;
-/// Share of the tolerances that a correction with the matrix of an earlier step, and the residual
-/// it leaves, must not exceed; none is waived then.
-const STALE: f64 = 0.1;
 /// A quasi-Newton matrix is renewed where this many iterations (the state before them included)
 /// have not brought the residual down to this fraction.
 const PATIENCE: usize = 6;
@@ -57,6 +58,8 @@ pub struct Loads {
     /// Largest of the forces (2-norms) at the start of the phase: where all forces vanish in its
     /// course, the residual is still measured against something.
     pub scale: f64,
+    /// Largest of the forces at every degree of freedom at the start of this phase or an earlier one.
+    pub largest: Vec<f64>,
 }
 
 impl Loads {
@@ -177,42 +180,8 @@ pub struct StepSuccess {
     pub relaxed: bool,
     /// Relative residual that had to be taken for round-off, above the tolerance; else 0.
     pub round_off: f64,
-}
-
-/// A step that did not. The committed state is untouched.
-#[derive(Clone, Debug)]
-pub struct StepFailure {
-    /// What happened until then.
-    pub iterations: Vec<Iteration>,
-    /// Why.
-    pub reason: String,
-    /// Size of the next attempt that a law asks for, as a fraction of this one.
-    pub factor: Option<f64>,
-    /// A law that no smaller step will help.
-    pub defect: Option<PointFailure>,
-    /// The point whose law failed, if one did.
-    pub failed: Option<Box<PointFailure>>,
-    /// What keeps the iterations from settling, if that could be found out.
-    pub culprit: Option<String>,
-}
-
-impl StepFailure {
-    /// A failure of which nothing more is known.
-    pub fn because(reason: String) -> Self {
-        Self {
-            iterations: Vec::new(),
-            reason,
-            factor: None,
-            defect: None,
-            failed: None,
-            culprit: None,
-        }
-    }
-
-    /// The failure of a law.
-    pub fn of_law(failure: PointFailure) -> Self {
-        failed_law(failure)
-    }
+    /// What the residual was measured against, by body.
+    pub scales: Vec<f64>,
 }
 
 /// What iterations work on.
@@ -233,7 +202,14 @@ pub struct Newton<'a> {
     settings: &'a SolverInput,
     /// Costs so far.
     costs: &'a mut Costs,
-    scale: f64,
+    /// Largest of the forces at the start of the phase, by body.
+    at_start: Vec<f64>,
+    /// What is given to the step.
+    given: Given,
+    /// Sizes of the last correction, by body.
+    changes: Vec<Change>,
+    /// What ran away in the last evaluation.
+    runaway: Option<Runaway>,
     /// What the last evaluation asked the laws for.
     tangents: Operator,
     /// The matrix has been renewed in this step.
@@ -248,14 +224,17 @@ pub struct Newton<'a> {
     /// evaluations.
     displacement: Vec<f64>,
     force: Vec<f64>,
+    /// Who may want to stop the step, and when it was last asked for.
+    stop: Stop,
+    asked: Instant,
 }
 
 /// A step's end.
 struct Task<'t> {
     /// External forces.
     external: &'t [f64],
-    /// Norm of those on all degrees of freedom, or of the forces at the start of the phase.
-    imposed: f64,
+    /// Norm of those on all degrees of freedom, or of the forces at the start of the phase; by body.
+    imposed: Vec<f64>,
     /// Increments of prescribed displacements.
     prescribed: &'t [f64],
     /// Time at the start, and its increment.
@@ -265,7 +244,13 @@ struct Task<'t> {
 /// Residual by equation, and the residual's norm relative to the forces in play.
 struct Balance {
     residual: Vec<f64>,
+    /// The largest of all bodies.
     relative: f64,
+    by_body: Vec<f64>,
+    /// What it is relative to, by body.
+    scales: Vec<f64>,
+    /// Of every body, whether it has run away.
+    away: Vec<bool>,
     unreliable: Option<String>,
 }
 
@@ -293,7 +278,10 @@ impl<'a> Newton<'a> {
             groups,
             settings,
             costs,
-            scale: 0.0,
+            at_start: Vec::new(),
+            given: Given::default(),
+            changes: Vec::new(),
+            runaway: None,
             tangents: Operator::None,
             renewed: false,
             stalls: false,
@@ -301,7 +289,27 @@ impl<'a> Newton<'a> {
             domain_forces: Vec::new(),
             displacement: vec![0.0; system.n_dofs()],
             force: vec![0.0; system.n_dofs()],
+            stop: Stop::never(),
+            asked: Instant::now(),
         }
+    }
+
+    /// The same iterations, to be stopped when asked.
+    #[must_use]
+    pub fn stopped_by(mut self, stop: &Stop) -> Self {
+        self.stop = stop.clone();
+        self
+    }
+
+    /// Ends a step that is to stop: once in every iteration, before its laws are called.
+    fn may_go_on(&mut self) -> Result<(), StepFailure> {
+        let now = Instant::now();
+        self.stop
+            .beat(now - std::mem::replace(&mut self.asked, now));
+        if self.stop.is_urgent() {
+            return Err(StepFailure::stopped());
+        }
+        Ok(())
     }
 
     /// Factorises the matrix from the tangents that the groups hold, as an interrupted run had it.
@@ -328,8 +336,7 @@ impl<'a> Newton<'a> {
         time: f64,
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
-        self.scale = loads.scale;
-        self.begin();
+        self.set_out(loads);
         let contraction = guess.as_ref().and_then(|guess| guess.contraction);
         self.contraction = contraction.unwrap_or(f64::INFINITY);
         if let Some(domain) = self.domain {
@@ -344,12 +351,59 @@ impl<'a> Newton<'a> {
             &mut iterations,
         );
         self.end(outcome.is_ok());
-        outcome.map_err(|failure| StepFailure {
-            iterations,
-            ..failure
-        })
+        let period = (time, lambda_end - lambda_start);
+        outcome.map_err(|failure| self.explained(failure, iterations, lambda_start, period))
     }
 
+    /// Begins a step under these loads.
+    fn set_out(&mut self, loads: &Loads) {
+        let bodies = &self.places.bodies;
+        self.at_start = if bodies.n == 1 {
+            vec![loads.scale]
+        } else {
+            norms(&bodies.of_dof, bodies.n, &loads.largest)
+        };
+        self.given = Given::default();
+        self.changes = Vec::new();
+        self.runaway = None;
+        self.begin();
+    }
+
+    /// Norm of external forces, or of the forces at the start of the phase; by body.
+    fn imposed(&self, external: &[f64]) -> Vec<f64> {
+        let bodies = &self.places.bodies;
+        let norms = norms(&bodies.of_dof, bodies.n, external);
+        let both = norms.iter().zip(&self.at_start);
+        both.map(|(norm, at_start)| norm.max(*at_start)).collect()
+    }
+
+    /// A failure with all that can be said of it.
+    fn explained(
+        &mut self,
+        failure: StepFailure,
+        iterations: Vec<Iteration>,
+        lambda: f64,
+        period: (f64, f64),
+    ) -> StepFailure {
+        let failure = StepFailure {
+            iterations,
+            runaway: self.runaway,
+            ..failure
+        };
+        if failure.singular {
+            let singularity = self.singularity(period);
+            self.tangents = Operator::None;
+            self.will_compute(Operator::Elastic);
+            failure.explained(singularity, lambda)
+        } else {
+            failure
+        }
+    }
+
+    #[expect(
+        clippy::too_many_lines,
+        reason = "one loop, whose branches share its state"
+    )]
     fn iterate(
         &mut self,
         loads: &Loads,
@@ -363,14 +417,16 @@ impl<'a> Newton<'a> {
         let prescribed = self.places.gather(&prescribed);
         let task = Task {
             external: &self.places.gather(&external),
-            imposed: norm(&external).max(self.scale),
+            imposed: self.imposed(&external),
             prescribed: &prescribed,
             period: (time, lambda_end - lambda_start),
         };
+        let from_tangent = guess.is_none();
         let mut increment = match guess {
             Some(guess) => self.completed(guess.increment, &prescribed),
             None => self.predict(&task)?,
         };
+        self.starts_from(&increment, from_tangent);
         let operator = self.operator();
         let mut balance = self
             .evaluate(&increment, &task, operator)
@@ -390,6 +446,7 @@ impl<'a> Newton<'a> {
         // Where the last series of Newton iterations starts.
         let mut first = 0;
         loop {
+            self.may_go_on()?;
             let series = &iterations[first..];
             let stands_still = relaxation::stands_still(series);
             let is_over = series.len() > self.settings.max_iterations();
@@ -407,6 +464,7 @@ impl<'a> Newton<'a> {
                     unreliable: balance.unreliable,
                     relaxed: relaxation.is_some(),
                     round_off,
+                    scales: balance.scales,
                 });
             }
             if is_over {
@@ -424,6 +482,7 @@ impl<'a> Newton<'a> {
                     (increment, balance) = state;
                     first = iterations.len() - 1;
                 } else {
+                    self.may_go_on()?;
                     // Newton iterations go on where they stood, for as many as are left to them.
                     may_relax = false;
                     relaxation = None;
@@ -436,16 +495,52 @@ impl<'a> Newton<'a> {
                 continue;
             }
             self.stalls = stalls(&iterations[since..]);
-            if self.renew(&iterations[first..], &increment, &task)? {
-                since = iterations.len() - 1;
-                acceleration = quasi.then(Acceleration::default);
-            }
-            let (last, next, at) = self.correct(&increment, &balance, &task, &mut acceleration)?;
+            let corrected = self
+                .renew(&iterations[first..], &increment, &task)
+                .and_then(|renewed| {
+                    if renewed {
+                        since = iterations.len() - 1;
+                        acceleration = quasi.then(Acceleration::default);
+                    }
+                    self.correct(&increment, &balance, &task, &mut acceleration)
+                });
+            let (last, next, at) = match corrected {
+                Err(failure)
+                    if failure.singular && self.has_settled(&increment, &balance, &task) =>
+                {
+                    return Ok(StepSuccess {
+                        increment,
+                        iterations: std::mem::take(iterations),
+                        unreliable: balance.unreliable,
+                        relaxed: relaxation.is_some(),
+                        round_off: 0.0,
+                        scales: balance.scales,
+                    });
+                }
+                corrected => corrected?,
+            };
             iterations.push(last);
             (increment, balance) = (next, at);
         }
         let relaxed_in_vain = relaxes != may_relax;
-        Err(self.no_equilibrium(&increment, &balance, &task, relaxed_in_vain))
+        let last = iterations[iterations.len() - 1];
+        Err(self.no_equilibrium(&increment, &balance, &task, &last, relaxed_in_vain))
+    }
+
+    /// Notes a correction, or a fraction of it, that was taken.
+    fn took(&mut self, at: &Balance, correction: &[f64], moved: &[f64], length: f64) -> Iteration {
+        self.changes = self.changes(correction, moved);
+        // Of several bodies one that is at rest has nothing to correct.
+        let criteria = self.criteria(false);
+        let moving = self
+            .measures(at, length >= 1.0)
+            .into_iter()
+            .zip(&self.changes);
+        let relative = moving
+            .filter(|(measures, _)| self.changes.len() == 1 || !measures.is_exact(criteria))
+            .map(|(_, change)| change.relative)
+            .fold(0.0, f64::max);
+        Iteration::of(at, relative, length)
     }
 
     /// One correction, as far as it does not make the residual grow. Where one with the matrix of
@@ -457,14 +552,13 @@ impl<'a> Newton<'a> {
         task: &Task<'_>,
         acceleration: &mut Option<Acceleration>,
     ) -> Result<(Iteration, Vec<f64>, Balance), StepFailure> {
-        let size = |vector: &[f64]| norm(vector).max(f64::MIN_POSITIVE);
         if self.is_stale() {
             let correction = self.solve(&before.residual, None)?;
             let moved = moved_by(increment, 1.0, &correction);
             let operator = self.operator();
             match self.evaluate(&moved, task, operator) {
                 Ok(at) if at.relative <= before.relative.max(self.settings.force_tolerance) => {
-                    let taken = Iteration::of(&at, norm(&correction) / size(&moved), 1.0);
+                    let taken = self.took(&at, &correction, &moved, 1.0);
                     return Ok((taken, moved, at));
                 }
                 _ => {
@@ -479,12 +573,13 @@ impl<'a> Newton<'a> {
         if let Some(acceleration) = acceleration {
             correction = acceleration.improve(correction);
         }
-        let ends = self.probably_ends(before.relative, norm(&correction) / size(increment));
+        let size = norm(&correction) / norm(increment).max(f64::MIN_POSITIVE);
+        let ends = self.probably_ends(before.relative, size);
         let (length, moved, at) = self.search(increment, &correction, before, task, ends)?;
         if let Some(acceleration) = acceleration {
             acceleration.took(&correction, length);
         }
-        let taken = Iteration::of(&at, norm(&correction) / size(&moved), length);
+        let taken = self.took(&at, &correction, &moved, length);
         Ok((taken, moved, at))
     }
 
@@ -523,26 +618,71 @@ impl<'a> Newton<'a> {
             || (expected <= tolerance && correction <= self.settings.displacement_tolerance)
     }
 
+    /// What is asked of a state, of one that was corrected with the matrix of an earlier step or not.
+    fn criteria(&self, is_stale: bool) -> Criteria {
+        Criteria {
+            force: self.settings.force_tolerance,
+            displacement: self.settings.displacement_tolerance,
+            is_stale,
+        }
+    }
+
+    /// The bodies after an iteration, with a whole Newton correction or not.
+    fn measures(&self, balance: &Balance, is_whole: bool) -> Vec<Measures> {
+        let bodies = balance.by_body.iter().zip(&balance.away).enumerate();
+        bodies
+            .map(|(body, (&residual, &is_away))| {
+                let change = self.changes.get(body).copied();
+                Measures {
+                    residual,
+                    whole: change.filter(|_| is_whole),
+                    beyond: change.map_or(0.0, |change| change.beyond),
+                    is_away,
+                }
+            })
+            .collect()
+    }
+
     /// Whether an iteration has ended in equilibrium.
     fn is_equilibrium(&self, balance: &Balance, last: &Iteration) -> bool {
-        // To the matrix of an earlier step a part that has yielded since still looks stiff: its
-        // corrections are smaller than what is left.
-        let is_stale = last.correction.is_some() && self.is_stale();
-        let share = if is_stale { STALE } else { 1.0 };
-        let tolerance = share * self.settings.force_tolerance;
-        let enough = share * self.settings.displacement_tolerance;
-        let small_correction = last.step_length >= 1.0
-            && last.viscosity <= 0.0
-            && last.correction.is_some_and(|c| c <= enough);
-        let small_residual = balance.relative <= tolerance;
-        let is_exact = !is_stale && balance.relative <= EXACT * tolerance;
-        is_exact || (small_residual && small_correction)
+        let criteria = self.criteria(last.correction.is_some() && self.is_stale());
+        let is_whole =
+            last.correction.is_some() && last.step_length >= 1.0 && last.viscosity <= 0.0;
+        let bodies = self.measures(balance, is_whole);
+        bodies.iter().all(|body| body.is_equilibrium(criteria))
+    }
+
+    /// Whether a state whose tangent is singular is in equilibrium all the same, by the matrix at
+    /// the start of the step: a layer that has just lost its contact, with it its stiffness, and
+    /// whose residual is round-off. The trial state stays.
+    fn has_settled(&mut self, increment: &[f64], balance: &Balance, task: &Task<'_>) -> bool {
+        let criteria = Criteria {
+            is_stale: true,
+            ..self.criteria(true)
+        };
+        if balance.relative > STALE * criteria.force {
+            return false;
+        }
+        let still = vec![0.0; increment.len()];
+        let operator = self.operator();
+        let settled = self.evaluate(&still, task, operator).is_ok() && {
+            let values = self.stiffness();
+            self.factorise(values, 1.0).is_ok() && {
+                self.matrix.hold();
+                self.solve(&balance.residual, None).is_ok_and(|correction| {
+                    self.changes = self.changes(&correction, increment);
+                    let bodies = self.measures(balance, true);
+                    bodies.iter().all(|body| body.is_equilibrium(criteria))
+                })
+            }
+        };
+        settled && self.evaluate(increment, task, Operator::None).is_ok()
     }
 
     /// Whether a small residual is one that the last bit of the displacement increments makes, so
     /// that no iteration can lessen it. The trial state stays.
     fn is_round_off(&mut self, increment: &[f64], balance: &Balance, task: &Task<'_>) -> bool {
-        if balance.relative > STILL_SMALL {
+        if balance.relative > STILL_SMALL || balance.away.contains(&true) {
             return false;
         }
         let operator = self.tangents;
@@ -564,6 +704,7 @@ impl<'a> Newton<'a> {
         increment: &[f64],
         balance: &Balance,
         task: &Task<'_>,
+        last: &Iteration,
         relaxed_in_vain: bool,
     ) -> StepFailure {
         let tried = if relaxed_in_vain {
@@ -571,15 +712,33 @@ impl<'a> Newton<'a> {
         } else {
             ""
         };
-        let reason = format!(
-            "no equilibrium after {} iterations{tried}: residual {:.1e}, tolerance {:.1e}",
-            self.settings.max_iterations(),
-            balance.relative,
-            self.settings.force_tolerance
-        );
+        let n = self.settings.max_iterations();
+        let unmet = self.unmet(balance, last.correction);
+        let runaway = self.runaway;
+        let culprit = self.diagnose(increment, balance, task);
+        self.runaway = runaway;
         StepFailure {
-            culprit: self.diagnose(increment, balance, task),
-            ..plain(&reason)
+            culprit,
+            ..StepFailure::unmet(
+                &format!("no equilibrium after {n} iterations{tried}"),
+                unmet,
+            )
+        }
+    }
+
+    /// Both criteria at a state.
+    fn unmet(&self, balance: &Balance, correction: Option<f64>) -> Unmet {
+        let residual_tolerance = self.settings.force_tolerance;
+        Unmet {
+            failed: if balance.relative <= residual_tolerance {
+                Criterion::Correction
+            } else {
+                Criterion::Residual
+            },
+            residual: balance.relative,
+            residual_tolerance,
+            correction,
+            correction_tolerance: self.settings.displacement_tolerance,
         }
     }
 
@@ -602,7 +761,7 @@ impl<'a> Newton<'a> {
             .search(increment, &correction, balance, task, true)
             .ok()?;
         self.evaluate(&moved, task, Operator::Consistent).ok()?;
-        diagnosis::compare(self.groups, &before)
+        diagnosis::compare(self.groups, &before, task.period)
     }
 
     /// Displacement increments that the tangent at the start predicts.
@@ -641,6 +800,7 @@ impl<'a> Newton<'a> {
             1
         };
         for &length in &STEP_LENGTHS[..tries] {
+            self.may_go_on()?;
             let moved = moved_by(increment, length, correction);
             let operator = if ends {
                 Operator::None
@@ -682,17 +842,19 @@ impl<'a> Newton<'a> {
         task: &Task<'_>,
         operator: Operator,
     ) -> Result<Balance, PointFailure> {
+        let away = self.away(increment, task);
         let start = Instant::now();
         self.will_compute(operator);
-        self.costs.evaluations += 1;
-        self.places.scatter(increment, &mut self.displacement);
-        let outcome = self.evaluate_groups(task.period, operator);
-        let mut internal = self.places.take(&mut self.force);
-        let unreliable = outcome?;
-        self.tangents = operator;
-        self.places.fold(&mut internal);
+        let (mut internal, mut unreliable) = self.internal_forces(increment, task, operator)?;
         // Forces in play before those of the domain cancel them out.
-        let in_play = norm(&internal);
+        let trial = |group: &Group, _: usize| group.stress.trial.clone();
+        let in_play = self.forces_by_body(&internal, &trial);
+        let floors = self.floors(increment, task);
+        let (scales, has_moved) = self.scales(&in_play, &floors, task);
+        if has_moved {
+            (internal, unreliable) = self.internal_forces(increment, task, operator)?;
+        }
+        self.tangents = operator;
         if let Some(domain) = self.domain {
             let boundary = &self.places.boundary;
             let moved: Vec<f64> = boundary.iter().map(|&place| increment[place]).collect();
@@ -706,23 +868,58 @@ impl<'a> Newton<'a> {
         let residual: Vec<f64> = free
             .map(|&place| task.external[place] - internal[place])
             .collect();
-        let imposed = task.imposed;
-        // Where no force has ever acted, what is below round-off of K u counts as none.
-        let floor = if imposed > 0.0 {
-            0.0
-        } else {
-            let cancelling = self.matrix.largest * norm(increment) + norm(&self.domain_forces);
-            ROUND_OFF * cancelling / self.settings.force_tolerance
-        };
-        let scale = in_play.max(imposed).max(floor);
-        let size = norm(&residual);
-        let relative = if scale > 0.0 { size / scale } else { 0.0 };
+        let bodies = &self.places.bodies;
+        let sizes = norms(&bodies.of_equation, bodies.n, &residual);
+        let both = sizes.iter().zip(&scales);
+        let by_body: Vec<f64> = both
+            .map(|(size, &scale)| if scale > 0.0 { size / scale } else { 0.0 })
+            .collect();
         self.costs.laws += start.elapsed();
         Ok(Balance {
             residual,
-            relative,
+            relative: largest(&by_body),
+            by_body,
+            scales,
+            away,
             unreliable,
         })
+    }
+
+    /// Trial state and internal forces by place, without those of the domain, under displacement
+    /// increments. Says which law calls its result unreliable.
+    fn internal_forces(
+        &mut self,
+        increment: &[f64],
+        task: &Task<'_>,
+        operator: Operator,
+    ) -> Result<(Vec<f64>, Option<String>), PointFailure> {
+        self.costs.evaluations += 1;
+        self.places.scatter(increment, &mut self.displacement);
+        let outcome = self.evaluate_groups(task.period, operator);
+        let mut internal = self.places.take(&mut self.force);
+        let unreliable = outcome?;
+        self.places.fold(&mut internal);
+        Ok((internal, unreliable))
+    }
+
+    /// Forces by body that count as none where no force has ever acted: round-off of K u.
+    fn floors(&self, increment: &[f64], task: &Task<'_>) -> Vec<f64> {
+        if task.imposed.iter().all(|&imposed| imposed > 0.0) {
+            return vec![0.0; task.imposed.len()];
+        }
+        let bodies = &self.places.bodies;
+        let sizes = self.by_body(increment);
+        let of_domain = norm(&self.domain_forces);
+        (0..bodies.n)
+            .map(|body| {
+                let cancelling = self.matrix.largest_of(body) * sizes[body] + of_domain;
+                if task.imposed[body] > 0.0 {
+                    0.0
+                } else {
+                    ROUND_OFF * cancelling / self.settings.force_tolerance
+                }
+            })
+            .collect()
     }
 
     /// Trial state of the groups under the displacements in their room; the forces are added up in
@@ -791,6 +988,12 @@ pub(super) fn last_bit_scattered(increment: &[f64]) -> Vec<f64> {
     scattered.collect()
 }
 
+/// The largest of some sizes; not a number if one is none.
+fn largest(sizes: &[f64]) -> f64 {
+    let larger = |a: f64, b: &f64| if *b > a || b.is_nan() { *b } else { a };
+    sizes.iter().fold(0.0, larger)
+}
+
 /// 2-norm.
 pub(super) fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
@@ -807,11 +1010,12 @@ fn failed_law(failure: PointFailure) -> StepFailure {
         Argument | Internal | Unknown(_) | Unsupported
     );
     StepFailure {
-        iterations: Vec::new(),
-        reason: failure.to_string(),
         factor: failure.failure.factor,
         failed: Some(Box::new(failure.clone())),
-        defect: defective.then_some(failure),
-        culprit: None,
+        ..StepFailure {
+            reason: failure.to_string(),
+            defect: defective.then_some(failure),
+            ..StepFailure::because(String::new())
+        }
     }
 }

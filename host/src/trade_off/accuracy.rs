@@ -5,16 +5,21 @@
 //! error of the mesh is not part of it.
 
 use super::case_study::law_schemes;
+use super::pace::in_words;
 use super::sampled::Sampled;
 use super::scheme::Scheme;
 use super::trial::{Scratch, Settings, Trial, trial};
 use crate::case::{Case, Chosen};
 use crate::error::Error;
 use crate::input::ParameterValue;
+use crate::stop::Stop;
 use std::path::Path;
+use std::time::Instant;
 
 /// Factors of the file's increments.
 const FACTORS: [f64; 9] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
+/// What it is called where it is said what is being done.
+const STUDY: &str = "accuracy";
 /// Tolerances tried, coarse to fine.
 const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 /// Share of the target that increments may use up, and share that the tolerance may.
@@ -32,6 +37,19 @@ const ORDERS: [f64; 2] = [0.3, 1.0];
 /// # Errors
 /// Bad input before anything is written; no equilibrium with any settings; [`Error::Unwritable`].
 pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
+    reach_until(case, folder, &Stop::never(), &mut |_| ())
+}
+
+/// As [`reach`], to be stopped on its way. `say` takes what is being done.
+///
+/// # Errors
+/// As [`reach`]; [`Error::Stopped`].
+pub fn reach_until(
+    case: &Case,
+    folder: &Path,
+    stop: &Stop,
+    say: &mut dyn FnMut(&str),
+) -> Result<Option<Case>, Error> {
     let Some(accuracy) = &case.file.accuracy else {
         return Ok(None);
     };
@@ -40,12 +58,13 @@ pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
         let message = "`accuracy` is the error of the [probes], and there are none";
         return Err(case.source.error(accuracy.span(), message).into());
     }
-    let scratch = Scratch::new(folder)?;
+    let scratch = Scratch::new(folder, stop)?;
     let mut search = Search {
         case,
         scratch: &scratch,
         asked: *accuracy.get_ref(),
         runs: 0,
+        say,
     };
     let (settings, found) = search.best()?;
     let (settings, tolerance_error) = search.loosened(settings, &found)?;
@@ -98,6 +117,7 @@ struct Search<'a> {
     scratch: &'a Scratch,
     asked: f64,
     runs: usize,
+    say: &'a mut dyn FnMut(&str),
 }
 
 impl Search<'_> {
@@ -116,7 +136,9 @@ impl Search<'_> {
                 ..Settings::default()
             };
             // More increments than the file's scheme needs do not pay.
-            let Ok(found) = self.with(&settings, f64::max(best.1.factor, 1.0)) else {
+            let found = self.with(&settings, f64::max(best.1.factor, 1.0));
+            self.scratch.stop.check(STUDY)?;
+            let Ok(found) = found else {
                 continue;
             };
             let good = |found: &Found| found.error <= SHARES[0] * self.asked;
@@ -138,7 +160,10 @@ impl Search<'_> {
         let mut levels: Vec<(f64, Trial)> = Vec::new();
         let mut last_increments = Vec::new();
         let mut failure = None;
-        for factor in FACTORS.into_iter().filter(|f| *f <= f64::max(most, 2.0)) {
+        // Factor and seconds of the last run.
+        let mut last: Option<(f64, f64)> = None;
+        let factors = FACTORS.into_iter().filter(|f| *f <= f64::max(most, 2.0));
+        for factor in factors.clone() {
             let settings = Settings {
                 increments: factor,
                 ..settings.clone()
@@ -150,7 +175,20 @@ impl Search<'_> {
             }
             last_increments = increments;
             self.runs += 1;
-            match trial(self.case, &settings, self.scratch, false) {
+            let rest = factors.clone().filter(|f| *f >= factor).sum::<f64>();
+            let doing = format!("{STUDY}: run {}, {}", self.runs, settings.label());
+            (self.say)(&match last {
+                Some((of, took)) => format!(
+                    "{doing} (about {}, at most about {} left for these settings)",
+                    in_words(took * factor / of),
+                    in_words(took * rest / of)
+                ),
+                None => doing,
+            });
+            let started = Instant::now();
+            let outcome = trial(self.case, &settings, self.scratch, false);
+            last = Some((factor, started.elapsed().as_secs_f64()));
+            match outcome {
                 Ok(trial) => levels.push((factor, trial)),
                 Err(error @ Error::NoEquilibrium { .. }) => {
                     // Finer runs are not compared with coarser ones across a gap.
@@ -208,6 +246,7 @@ impl Search<'_> {
                 ..settings.clone()
             };
             self.runs += 1;
+            (self.say)(&format!("{STUDY}: run {}, {}", self.runs, loose.label()));
             let trial = match trial(self.case, &loose, self.scratch, false) {
                 Ok(trial) => trial,
                 Err(Error::NoEquilibrium { .. }) => continue,

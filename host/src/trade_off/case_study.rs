@@ -1,10 +1,11 @@
 //! The study of a case: one setting at a time away from the file's, and some together.
 
 use super::driver_study::in_one_line;
+use super::pace::Pace;
 use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
 use super::study::{Measurement, Reference, Row, Study};
-use super::trial::{COUNTS, SOLVER_CHOICES, Scratch, Settings, Trial, trial};
+use super::trial::{COUNTS, SOLVER_CHOICES, Scratch, Settings, Trial, repetitions, trial};
 use crate::case::{Case, Formulation, Integration};
 use crate::error::Error;
 use crate::input::BuiltLaw;
@@ -35,8 +36,21 @@ pub(super) fn study(
         let message = "there are no [probes], so there is nothing to measure the error of";
         return Err(case.source.error(0..0, message).into());
     }
-    let mut cases = Cases { case, scratch, say };
+    let mut cases = Cases {
+        case,
+        scratch,
+        say,
+        pace: Pace::new(1.0),
+        unit: 1.0,
+    };
     let mut default = cases.run(&Settings::default(), true)?;
+    // Counted in runs with the file's settings; that one was repeated.
+    cases.unit = default.seconds;
+    let divisions: &[usize] = if fine { &[2, 4] } else { &[2] };
+    cases.expect(REFERENCE_FACTORS.iter().sum());
+    for &division in divisions {
+        cases.expect(cases.weight(&divided(division), true));
+    }
     let laws = law_schemes(case, scratch)?;
     let (mut reference, path) = cases.path_reference(&laws)?;
     let mut scale = path.rows.largest();
@@ -58,11 +72,16 @@ pub(super) fn study(
         notes,
     };
     let mut timed = vec![(0, Settings::default())];
-    for (family, settings) in settings_on_this_mesh(case, &laws) {
+    let settings = settings_on_this_mesh(case, &laws);
+    for (_, settings) in &settings {
+        let again = MORE_ROUNDS as f64 * cases.weight(settings, false);
+        cases.expect(cases.weight(settings, true) + again);
+    }
+    for (family, settings) in settings {
         timed.push((study.rows.len(), settings.clone()));
         study
             .rows
-            .push(cases.row(family, &settings, 0, &path.rows, &scale));
+            .push(cases.row(family, &settings, 0, &path.rows, &scale)?);
     }
     for _ in 0..MORE_ROUNDS {
         for (number, settings) in &timed {
@@ -75,7 +94,7 @@ pub(super) fn study(
     if let Ok(measured) = &study.rows[0].outcome {
         default.seconds = measured.seconds;
     }
-    cases.meshes(&mut study, &default, &scale, fine);
+    cases.meshes(&mut study, &default, &scale, divisions)?;
     study.judge();
     Ok(study)
 }
@@ -176,12 +195,41 @@ struct Cases<'a> {
     case: &'a Case,
     scratch: &'a Scratch,
     say: &'a mut dyn FnMut(&str),
+    pace: Pace,
+    /// Seconds of a run with the file's settings.
+    unit: f64,
+}
+
+fn divided(division: usize) -> Settings {
+    Settings {
+        division,
+        ..Settings::default()
+    }
 }
 
 impl Cases<'_> {
     fn run(&mut self, settings: &Settings, timed: bool) -> Result<Trial, Error> {
-        (self.say)(&settings.label());
-        trial(self.case, settings, self.scratch, timed)
+        (self.say)(&self.pace.line(&settings.label()));
+        let outcome = trial(self.case, settings, self.scratch, timed);
+        self.pace.did(self.weight(settings, timed));
+        // Whatever became of it, the study goes no further once it is to stop.
+        self.scratch.stop.check("the study")?;
+        outcome
+    }
+
+    /// Probable cost of a trial, in runs with the file's settings. An element more costs time, and
+    /// an equation more bandwidth.
+    fn weight(&self, settings: &Settings, timed: bool) -> f64 {
+        let once = settings.increments * (settings.division as f64).powi(3);
+        if timed {
+            once * repetitions(once * self.unit)
+        } else {
+            once
+        }
+    }
+
+    fn expect(&mut self, more: f64) {
+        self.pace.add(more);
     }
 
     fn row(
@@ -191,16 +239,17 @@ impl Cases<'_> {
         number: usize,
         reference: &Sampled,
         scale: &[f64],
-    ) -> Row {
+    ) -> Result<Row, Error> {
         let outcome = self.run(settings, true);
+        self.scratch.stop.check("the study")?;
         let outcome = outcome.map(|trial| measurement(&trial, reference, scale));
-        Row {
+        Ok(Row {
             family,
             label: settings.label(),
             is_default: false,
             reference: number,
             outcome: outcome.map_err(|error| in_one_line(&error)),
-        }
+        })
     }
 
     /// The finest run on the file's mesh: many increments, a tight tolerance, and the scheme that
@@ -220,6 +269,7 @@ impl Cases<'_> {
             let mut rated = Vec::new();
             for candidate in candidates {
                 let [a, b] = [2.0, 4.0].map(|factor| self.at(&candidate, factor));
+                self.scratch.stop.check("the study")?;
                 let difference = match (a, b) {
                     (Ok(a), Ok(b)) => a.rows.difference(&b.rows, &b.rows.largest()),
                     _ => f64::INFINITY,
@@ -232,6 +282,7 @@ impl Cases<'_> {
         let mut failure = None;
         for candidate in candidates {
             let [coarse, middle, fine] = REFERENCE_FACTORS.map(|f| self.at(&candidate, f));
+            self.scratch.stop.check("the study")?;
             match (coarse, middle, fine) {
                 (Ok(coarse), Ok(middle), Ok(fine)) => {
                     let label = |increments: f64| {
@@ -268,16 +319,18 @@ impl Cases<'_> {
     }
 
     /// Divided meshes, and other integrations of thin layers, against the finest mesh.
-    fn meshes(&mut self, study: &mut Study, default: &Trial, scale: &[f64], fine: bool) {
-        let divided = |division| Settings {
-            division,
-            ..Settings::default()
-        };
-        let divisions: &[usize] = if fine { &[2, 4] } else { &[2] };
+    fn meshes(
+        &mut self,
+        study: &mut Study,
+        default: &Trial,
+        scale: &[f64],
+        divisions: &[usize],
+    ) -> Result<(), Error> {
         let mut trials = vec![(divided(1), Ok(default.clone()))];
         for &division in divisions {
             let settings = divided(division);
             let run = self.run(&settings, true);
+            self.scratch.stop.check("the study")?;
             trials.push((settings, run));
         }
         let done: Vec<(&Settings, &Trial)> = trials
@@ -291,7 +344,7 @@ impl Cases<'_> {
                     study.notes.push(format!("{}: {why}", settings.label()));
                 }
             }
-            return;
+            return Ok(());
         };
         let rows = reference.rows.clone();
         let coarse = done.len().checked_sub(3).map(|i| done[i].1);
@@ -327,9 +380,10 @@ impl Cases<'_> {
             });
         }
         for settings in self.integrations() {
-            let row = self.row("integration".to_owned(), &settings, number, &rows, scale);
+            let row = self.row("integration".to_owned(), &settings, number, &rows, scale)?;
             study.rows.push(row);
         }
+        Ok(())
     }
 
     /// Integrations of thin layers that no layer has in the file.
@@ -386,6 +440,7 @@ pub(super) fn law_schemes(case: &Case, scratch: &Scratch) -> Result<Vec<(String,
                 all[i - 1].is_finest = true;
             }
         }
+        scratch.stop.check("the study")?;
         let named = all.into_iter().filter(|scheme| !scheme.label.is_empty());
         found.extend(named.map(|scheme| (name.clone(), scheme)));
     }

@@ -1,11 +1,13 @@
 //! The study of a driver: increments per segment × integration scheme of the law.
 
 use super::clock::seconds_of_a_call;
+use super::pace::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Scheme, schemes};
 use super::study::{Measurement, ROWS, Reference, Row, Study};
 use crate::error::Error;
 use crate::point::Driver;
+use crate::stop::Stop;
 
 /// Increments per segment.
 const INCREMENTS: [usize; 10] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
@@ -17,7 +19,13 @@ const FEW: usize = 10;
 const COUNTS: &[&str] = &[ROWS, "law_calls", "cut_backs"];
 
 /// Runs the matrix. `most` bounds the increments per segment.
-pub(super) fn study(driver: &Driver, name: &str, most: usize) -> Result<Study, Error> {
+pub(super) fn study(
+    driver: &Driver,
+    name: &str,
+    most: usize,
+    stop: &Stop,
+    say: &mut dyn FnMut(&str),
+) -> Result<Study, Error> {
     let n_segments = driver.segment_increments().len();
     // The file's own setting has to run, whatever becomes of the others.
     follow(driver)?;
@@ -38,6 +46,8 @@ pub(super) fn study(driver: &Driver, name: &str, most: usize) -> Result<Study, E
         .map(|scheme| Ok((driver.with_parameters(&scheme.values)?, scheme)))
         .collect::<Result<Vec<_>, Error>>()?;
     let finest = INCREMENTS.into_iter().rfind(|n| *n <= most).unwrap_or(1) * FINER;
+    stop.check("the study")?;
+    say("the reference");
     let found = find_reference(&drivers, n_segments, finest)?;
     let mut study = Study {
         name: name.to_owned(),
@@ -49,6 +59,12 @@ pub(super) fn study(driver: &Driver, name: &str, most: usize) -> Result<Study, E
         notes: found.notes,
     };
     let own = driver.segment_increments();
+    // What does not depend on the increments is as long as some of them.
+    let weight = |increments: &[usize]| 100.0 + increments.iter().sum::<usize>() as f64;
+    let mut pace = Pace::new(0.0);
+    let of_scheme = INCREMENTS.into_iter().filter(|n| *n <= most);
+    let of_scheme: f64 = of_scheme.map(|n| weight(&vec![n; n_segments])).sum();
+    pace.add(drivers.len() as f64 * of_scheme);
     for (mut driver, scheme) in drivers {
         let mut numbers: Vec<Vec<usize>> = INCREMENTS
             .into_iter()
@@ -59,8 +75,11 @@ pub(super) fn study(driver: &Driver, name: &str, most: usize) -> Result<Study, E
             numbers.push(own.clone());
         }
         for increments in numbers {
+            say(&pace.line(&label(&scheme, &increments)));
             driver.set_increments(&increments);
             let outcome = measure(&driver, &found.rows, &found.scale);
+            stop.check("the study")?;
+            pace.did(weight(&increments));
             study.rows.push(Row {
                 family: family(&scheme),
                 label: label(&scheme, &increments),

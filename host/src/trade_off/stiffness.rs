@@ -6,6 +6,7 @@
 //! on the softer side. Which parameters of the law are stiffnesses is found by trying: those with
 //! the unit of a stiffness that scale the elastic operator.
 
+use super::pace::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
 use super::trial::{Scratch, Settings, measure};
@@ -17,6 +18,7 @@ use crate::input::{BuiltLaw, ParameterValue};
 use crate::mesh::Joint;
 use crate::model::Model;
 use crate::plugin::{End, Law, Moment, Operator, Start, Strided};
+use crate::stop::Stop;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -32,7 +34,7 @@ const PLATEAU: f64 = 0.01;
 pub(super) fn run(
     case: &Case,
     name: &str,
-    folder: &Path,
+    (folder, stop): (&Path, &Stop),
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
@@ -54,8 +56,8 @@ pub(super) fn run(
     let mut rows = Vec::new();
     for (number, group) in interfaces {
         let interface = Interface::new(&model, number, group)?;
-        let scratch = Scratch::new(folder)?;
-        let tried = interface.try_all(case, &scratch, say);
+        let scratch = Scratch::new(folder, stop)?;
+        let tried = interface.try_all(case, &scratch, say)?;
         text += &interface.table(name, &tried);
         rows.extend(tried.into_iter().map(|t| (group.name.clone(), t)));
     }
@@ -134,11 +136,17 @@ impl<'a> Interface<'a> {
         })
     }
 
-    fn try_all(&self, case: &Case, scratch: &Scratch, say: &mut dyn FnMut(&str)) -> Vec<Tried> {
+    fn try_all(
+        &self,
+        case: &Case,
+        scratch: &Scratch,
+        say: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Tried>, Error> {
+        let mut pace = Pace::new(FACTORS.len() as f64);
         let mut tried = Vec::new();
         let mut before: Option<Sampled> = None;
         for factor in FACTORS {
-            say(&format!("interface stiffness, factor {}", short(factor)));
+            say(&pace.line(&format!("interface stiffness, factor {}", short(factor))));
             let stiffness = self.unit.map(|unit| factor * unit);
             let outcome = self
                 .run(case, scratch, stiffness)
@@ -148,6 +156,8 @@ impl<'a> Interface<'a> {
                     before = Some(rows);
                     answer
                 });
+            scratch.stop.check("the study")?;
+            pace.did(1.0);
             tried.push(Tried {
                 factor,
                 stiffness,
@@ -155,7 +165,7 @@ impl<'a> Interface<'a> {
                 outcome: outcome.map_err(|error| super::driver_study::in_one_line(&error)),
             });
         }
-        tried
+        Ok(tried)
     }
 
     fn run(

@@ -1,6 +1,7 @@
 //! A study as a table: on a terminal, and as comma-separated values.
 
 use super::study::{Row, Study};
+use crate::output::begin;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -48,7 +49,7 @@ impl Study {
     /// # Errors
     /// The file cannot be written.
     pub(super) fn write_csv(&self, path: &Path) -> Result<(), csv::Error> {
-        let mut writer = csv::Writer::from_path(path)?;
+        let mut writer = csv::Writer::from_writer(begin(path)?);
         let fixed = [
             "family",
             "setting",

@@ -8,6 +8,7 @@ use crate::case::{Case, Equations, Formulation, Integration, Method, OutputInput
 use crate::error::{Error, Place};
 use crate::input::set_parameters;
 use crate::run::{Observer, run};
+use crate::stop::Stop;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -172,6 +173,8 @@ fn scaled(n: usize, factor: f64) -> usize {
 #[derive(Debug)]
 pub(super) struct Scratch {
     folder: PathBuf,
+    /// Who may want what is done there to stop.
+    pub(super) stop: Stop,
 }
 
 impl Scratch {
@@ -179,13 +182,14 @@ impl Scratch {
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub(super) fn new(within: &Path) -> Result<Self, Error> {
+    pub(super) fn new(within: &Path, stop: &Stop) -> Result<Self, Error> {
         let folder = within.join(".trial");
         std::fs::create_dir_all(&folder).map_err(|source| Error::Unwritable {
             path: folder.clone(),
             source,
         })?;
-        Ok(Self { folder })
+        let stop = stop.clone();
+        Ok(Self { folder, stop })
     }
 
     /// The folder.
@@ -219,6 +223,13 @@ pub(super) struct Trial {
 const MOST_REPETITIONS: usize = 8;
 const LONG_ENOUGH: f64 = 0.5;
 
+/// How often a trial of this length is repeated for its CPU time.
+pub(super) fn repetitions(seconds: f64) -> f64 {
+    (LONG_ENOUGH / seconds)
+        .ceil()
+        .clamp(1.0, MOST_REPETITIONS as f64)
+}
+
 /// Runs a case under some settings: once, or until its CPU time is known.
 ///
 /// # Errors
@@ -243,7 +254,11 @@ pub(super) fn measure(case: &mut Case, scratch: &Scratch, timed: bool) -> Result
     let mut seconds = f64::INFINITY;
     let mut spent = 0.0;
     for _ in 0..if timed { MOST_REPETITIONS } else { 1 } {
-        let mut meter = Meter::default();
+        scratch.stop.check("the study")?;
+        let mut meter = Meter {
+            started: None,
+            stop: scratch.stop.clone(),
+        };
         run(case, scratch.folder(), &mut meter)?;
         let took = cpu_seconds() - meter.started.unwrap_or_default();
         seconds = seconds.min(took);
@@ -269,6 +284,7 @@ pub(super) fn measure(case: &mut Case, scratch: &Scratch, timed: bool) -> Result
 #[derive(Debug, Default)]
 struct Meter {
     started: Option<f64>,
+    stop: Stop,
 }
 
 impl Observer for Meter {
@@ -281,6 +297,10 @@ impl Observer for Meter {
     fn cut_back(&mut self, _: &Place, _: &str) {}
 
     fn warning(&mut self, _: &str) {}
+
+    fn stop(&self) -> Stop {
+        self.stop.clone()
+    }
 }
 
 /// Probes of a history by phase and increment.

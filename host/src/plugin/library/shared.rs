@@ -1,6 +1,6 @@
 //! Memory that two processes share, seen as numbers.
 
-use memmap2::MmapRaw;
+use memmap2::{MmapMut, MmapRaw};
 use std::fs::File;
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,8 +8,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// A mapped file of 64-bit words. The other process may write to it at any time, whatever was
 /// agreed, so words are only copied, one by one, and any bits are a valid word.
 #[derive(Debug)]
-pub(in crate::plugin) struct SharedMemory {
-    file: File,
+pub(crate) struct SharedMemory {
+    /// `None`: nobody else has it.
+    file: Option<File>,
     map: MmapRaw,
 }
 
@@ -18,13 +19,43 @@ impl SharedMemory {
     ///
     /// # Errors
     /// The system's.
-    pub(in crate::plugin) fn new(file: File) -> io::Result<Self> {
+    pub(crate) fn new(file: File) -> io::Result<Self> {
         let map = MmapRaw::map_raw(&file)?;
+        let file = Some(file);
         Ok(Self { file, map })
     }
 
+    /// A page of this process alone. In a copy of it, made by `fork`, its words are 0.
+    ///
+    /// # Errors
+    /// The system's; it may not know how.
+    pub(in crate::plugin) fn gone_in_copies() -> io::Result<Self> {
+        let map = MmapMut::map_anon(4096)?;
+        let map = MmapRaw::from(map);
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::mm::{Advice, madvise};
+            // SAFETY: the page is this mapping's own, and no reference to its words is ever made.
+            unsafe { madvise(map.as_mut_ptr().cast(), 4096, Advice::LinuxWipeOnFork)? };
+        }
+        Ok(Self { file: None, map })
+    }
+
+    /// The file that both processes map.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn descriptor(&self) -> io::Result<std::os::fd::BorrowedFd<'_>> {
+        Ok(std::os::fd::AsFd::as_fd(self.file()?))
+    }
+
+    fn file(&self) -> io::Result<&File> {
+        let file = self.file.as_ref();
+        file.ok_or_else(|| io::Error::other("nobody shares this memory"))
+    }
+
     /// Number of words.
-    pub(in crate::plugin) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.map.len() / size_of::<u64>()
     }
 
@@ -33,8 +64,8 @@ impl SharedMemory {
     /// # Errors
     /// The system's.
     pub(in crate::plugin) fn grow(&mut self, n: usize) -> io::Result<()> {
-        self.file.set_len((n * size_of::<u64>()) as u64)?;
-        self.map = MmapRaw::map_raw(&self.file)?;
+        self.file()?.set_len((n * size_of::<u64>()) as u64)?;
+        self.map = MmapRaw::map_raw(self.file()?)?;
         Ok(())
     }
 
@@ -43,7 +74,7 @@ impl SharedMemory {
     /// # Errors
     /// The system's.
     pub(in crate::plugin) fn follow(&mut self) -> io::Result<()> {
-        self.map = MmapRaw::map_raw(&self.file)?;
+        self.map = MmapRaw::map_raw(self.file()?)?;
         Ok(())
     }
 
@@ -56,7 +87,7 @@ impl SharedMemory {
     }
 
     /// Writes words from place `i` on; returns the place after them.
-    pub(in crate::plugin) fn write(&self, i: usize, words: impl Iterator<Item = u64>) -> usize {
+    pub(crate) fn write(&self, i: usize, words: impl Iterator<Item = u64>) -> usize {
         let mut at = i;
         for word in words {
             self.word(at).store(word, Ordering::Relaxed);
@@ -66,7 +97,7 @@ impl SharedMemory {
     }
 
     /// `n` words from place `i` on.
-    pub(in crate::plugin) fn read(&self, i: usize, n: usize) -> impl Iterator<Item = u64> {
+    pub(crate) fn read(&self, i: usize, n: usize) -> impl Iterator<Item = u64> {
         (i..i + n).map(|at| self.word(at).load(Ordering::Relaxed))
     }
 }

@@ -17,6 +17,10 @@ window.addEventListener('error', event => complain(event.error || event.message)
 const runs = JSON.parse(document.getElementById('data').textContent);
 const isComparison = runs.length > 1;
 
+/** Of many runs: the settings that differ. They have no legend; a setting gives their colours. */
+const varied = (node => (node ? JSON.parse(node.textContent) : null))(document.getElementById('varied'));
+const isMany = varied != null;
+
 /** Runs a part; if it fails the others still work. */
 function part(start) {
   try {
@@ -103,11 +107,54 @@ function isDark() {
   return darkScheme.matches && !printing;
 }
 
-/** A series' colour: a number in the palette, or a place 0 … 1 from first to last. */
+/** A series' colour: a number in the palette, a place 0 … 1 from first to last, a hue, or none. */
 function colour(of, dark) {
+  if (of.none) return '#888888';
+  if (of.hue != null) return `hsl(${of.hue},${dark ? 70 : 75}%,${dark ? 66 : 38}%)`;
   if (of.along != null) return mapped(VIRIDIS, dark ? 1 - 0.65 * of.along : 0.9 * (1 - of.along));
   const palette = dark ? DARK : LIGHT;
   return palette[of % palette.length];
+}
+
+/** What many runs are coloured by: a number of `varied`, or their order. */
+const colouring = { by: isMany && varied.length ? 0 : -1 };
+
+/** A scale of the runs' values of a setting: numbers along a map, texts apart. */
+const scaleOf = by => {
+  const { name, numbers, texts } = by < 0 ? { name: 'order of the runs', numbers: runs.map((_, r) => r + 1) } : varied[by];
+  if (numbers) {
+    const [low, high] = rangeOf(numbers) || [0, 1];
+    const log = low > 0 && high / low > 100;
+    const at = value => (high > low ? (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)) : 0.5);
+    return { name, low, high, log, middle: log ? Math.sqrt(low * high) : (low + high) / 2, of: r => ({ along: at(numbers[r]) }) };
+  }
+  const kinds = [...new Set(texts.filter(text => text !== ''))];
+  const mark = kind => (kinds.length <= LIGHT.length ? kind : { hue: Math.round(360 * kind / kinds.length) });
+  return { name, kinds, mark, of: r => (texts[r] === '' ? { none: true } : mark(kinds.indexOf(texts[r]))) };
+};
+let colourScale = null;
+
+/** The colour of a run. */
+function runColour(r) {
+  if (!isMany) return r;
+  colourScale = colourScale || scaleOf(colouring.by);
+  return colourScale.of(r);
+}
+
+/** What is to be drawn again with other colours. */
+const recolours = [];
+
+function colourBy(by) {
+  colouring.by = by;
+  colourScale = scaleOf(by);
+  for (const recolour of recolours) part(recolour);
+}
+
+/** What a picture of many runs says of its colours. */
+function colourWords() {
+  if (!isMany) return '';
+  const { name, kinds, low, high } = colourScale || scaleOf(colouring.by);
+  return `; colour: ${name}` + (kinds ? '' : `, ${shown(low)} to ${shown(high)}`);
 }
 
 function variable(name) {

@@ -188,6 +188,8 @@ function makeChart(host, height, name) {
       host.dataset.drawn = digest(visible());
     },
     svg: title => chartSvg(u, spec, visible(), title),
+    /** Colours of the curves, as they are on white. */
+    colours: () => spec.series.map(s => colour(s.colour, false)),
     save: title => saveButtons(name, () => chart.svg(title ? title() : '')),
     get canvas() {
       return u.ctx.canvas;

@@ -71,5 +71,6 @@ part(() => {
 });
 
 /** Colours beside the names of the runs. */
-redraws.push(() => runs.forEach((_, r) => document.querySelectorAll(`.run-${r}`).forEach(node => { node.style.background = colour(r, isDark()); })));
+redraws.push(() => runs.forEach((_, r) => document.querySelectorAll(`.run-${r}`).forEach(node => { node.style.background = colour(runColour(r), isDark()); })));
+recolours.push(redraws[redraws.length - 1]);
 part(redraws[redraws.length - 1]);

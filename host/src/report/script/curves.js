@@ -32,10 +32,13 @@ function curves(x, ys, phase) {
   runs.forEach((run, r) => ys.forEach((y, k) => {
     const [xs, values] = [column(run, x, phase), column(run, y, phase)];
     if (!xs || !values) return;
-    const name = !isComparison ? y : ys.length > 1 ? `${run.name}: ${y}` : run.name;
+    // Of many runs the legend tells the probes apart, not the runs.
+    const byProbe = isMany && ys.length > 1;
+    const name = !isComparison || byProbe ? y : ys.length > 1 ? `${run.name}: ${y}` : run.name;
     series.push({
-      name, x: xs, y: values, colour: isComparison ? r : k, dash: isComparison ? DASHES[k % DASHES.length] : [],
-      points: xs.filter(v => v != null).length <= 60, radius: 1.8, tip: row => place(run, row),
+      name, x: xs, y: values, colour: isComparison ? runColour(r) : k, dash: isComparison ? DASHES[k % DASHES.length] : [],
+      unnamed: isMany && !(byProbe && r === 0), width: isMany ? 1.2 : undefined,
+      points: !isMany && xs.filter(v => v != null).length <= 60, radius: 1.8, tip: row => (byProbe ? `${run.name}, ` : '') + place(run, row),
     });
   }));
   return series;
@@ -63,13 +66,15 @@ part(() => {
     const body = make('div', {});
     const chart = makeChart(body, 340, () => figure.name);
     host.append(make('div', { class: 'card', 'data-figure': figure.name },
-      make('div', { class: 'card-head' }, make('h3', {}, title), chart.save(() => title)), body));
-    chart.set({
+      make('div', { class: 'card-head' }, make('h3', {}, title), chart.save(() => title + colourWords())), body));
+    const fill = () => chart.set({
       x: { label: figure.x_label || withUnit(figure.x, unitOf(figure.x)) },
       y: { label: figure.y_label || withUnit(figure.y.join(', '), commonUnit(figure.y)) },
       series: curves(figure.x, figure.y, figure.phase),
-      keepLegend: true,
+      keepLegend: !isMany,
     });
+    fill();
+    recolours.push(fill);
     return chart;
   });
   if (!figures.length) host.remove();
@@ -89,6 +94,7 @@ part(() => {
   const chart = makeChart(body, 340, () => [...state.y].join('_') + '_over_' + state.x);
   const title = make('h3', {});
   const caption = () => `${[...state.y].join(', ')} over ${state.x}`;
+  const captioned = () => caption() + colourWords();
   const update = () => {
     const ys = names.filter(name => state.y.has(name));
     title.textContent = ys.length ? caption() : 'nothing chosen';
@@ -109,12 +115,42 @@ part(() => {
     return chip;
   });
   host.append(
-    make('div', { class: 'card-head' }, title, chart.save(caption)),
+    make('div', { class: 'card-head' }, title, chart.save(captioned)),
     make('div', { class: 'controls' },
       choice('over', names.map(name => [name, withUnit(name, unitOf(name))]), state.x, value => { state.x = value; update(); }),
       choice('phase', [['', 'all'], ...phases.map(p => [p, p])], state.phase, value => { state.phase = value; update(); }),
       make('span', { class: 'chips', role: 'group', 'aria-label': 'curves' }, ...chips)),
     body);
   update();
+  recolours.push(update);
   chosen.chart = chart;
+});
+
+// --- colours of many runs ----------------------------------------------------------------------
+
+part(() => {
+  const host = document.getElementById('colouring');
+  if (!host) return;
+  const key = make('div', { class: 'colour-key' });
+  const swatch = of => {
+    const node = make('i', { class: 'swatch' });
+    node.style.background = colour(of, isDark());
+    return node;
+  };
+  const draw = () => {
+    const { kinds, mark, low, middle, high, log } = colourScale || scaleOf(colouring.by);
+    if (kinds) {
+      key.replaceChildren(...kinds.map((text, kind) => make('span', {}, swatch(mark(kind)), text)));
+      return;
+    }
+    const bar = make('div', { class: 'bar' });
+    const stops = Array.from({ length: 11 }, (_, i) => colour({ along: i / 10 }, isDark()));
+    bar.style.background = `linear-gradient(to right, ${stops.join(', ')})`;
+    key.replaceChildren(bar, make('div', { class: 'bar-ends' }, make('span', {}, shown(low)), make('span', {}, shown(middle) + (log ? ' (logarithmic)' : '')), make('span', {}, shown(high))));
+  };
+  const pairs = [...varied.map((setting, by) => [by, setting.name]), [-1, 'order of the runs']];
+  host.append(make('div', { class: 'controls' }, choice('colour by', pairs, colouring.by, value => colourBy(Number(value))), key));
+  draw();
+  redraws.push(draw);
+  recolours.push(draw);
 });

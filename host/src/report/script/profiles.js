@@ -67,7 +67,7 @@ part(() => {
     panel.node = make('div', {},
       make('div', { class: 'panel-head' },
         choice('', quantities.map(name => [name, name]), quantity, value => { panel.quantity = value; update(); }),
-        panel.chart.save(() => `${panel.quantity} along ${state.group}, ${describe(steps[state.step])}`)),
+        panel.chart.save(() => `${panel.quantity} along ${state.group}, ${describe(steps[state.step])}${colourWords()}`)),
       body);
     panel.body = body;
     return panel;
@@ -100,8 +100,8 @@ part(() => {
         const words = [isComparison ? run.name : '', isComparison && pin == null ? '' : driven(step) || `${step.phase}, increment ${step.increment}`, line.row];
         const values = line.values.map(v => (v == null ? null : v * scale.factor));
         series.push({
-          name: words.filter(Boolean).join(', '), x: upright ? values : line.s, y: upright ? line.s : values, points: true,
-          colour: isComparison ? r : pin != null ? { along: (pin + 0.5) / state.pins.length } : k,
+          name: words.filter(Boolean).join(', '), x: upright ? values : line.s, y: upright ? line.s : values, points: !isMany, unnamed: isMany,
+          colour: isComparison ? runColour(r) : pin != null ? { along: (pin + 0.5) / state.pins.length } : k,
           dash: isComparison && pin != null ? DASHES[1 + (pin % (DASHES.length - 1))] : line.row && (isComparison || pin != null) ? DASHES[k % DASHES.length] : [],
           width: pin == null ? 2.2 : 1.3, radius: pin == null ? 2.6 : 1.6, tip: () => describe(step),
         });
@@ -113,7 +113,7 @@ part(() => {
     const room = 0.03 * (ends[1] - ends[0] || 1);
     const along = { label: `position along ${state.group} (m)`, range: [ends[0] - room, ends[1] + room] };
     const across = { label: withUnit(quantity, scale.unit), range: state.fixed && whole ? padded(whole.map(v => v * scale.factor)) : undefined };
-    panel.chart.set({ x: upright ? across : along, y: upright ? along : across, series, keepLegend: true });
+    panel.chart.set({ x: upright ? across : along, y: upright ? along : across, series, keepLegend: !isMany });
   };
 
   const update = () => {
@@ -148,5 +148,6 @@ part(() => {
     make('div', { class: 'panels' }, ...panels.map(panel => panel.node)));
   steer.set(state.step, steps.length - 1);
   update();
+  recolours.push(update);
   chosen.profile = { chart: panels[0].chart, body: panels[0].body, steer, title, host, spread };
 });

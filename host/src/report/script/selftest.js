@@ -57,6 +57,18 @@ async function selftest() {
     outcome.contour = { states, svg: isSvg(contour.pictureOf()), hover: contour.hoverMiddle(), drawn: isDrawn(contour.canvas) };
   }
   if (residuals) outcome.residuals = { svg: isSvg(residuals.chart.svg('')), hover: residuals.chart.hoverLast() };
+  const by = document.querySelector('#colouring select');
+  if (by) {
+    outcome.colouring = [];
+    for (const option of [...by.options]) {
+      by.value = option.value;
+      by.dispatchEvent(new Event('change'));
+      await settled();
+      const key = document.querySelector('.colour-key').textContent;
+      outcome.colouring.push({ by: option.textContent, key, colours: chosen.figures[0].colours() });
+    }
+  }
+  outcome.legend_entries = Math.max(0, ...[...document.querySelectorAll('.legend')].map(legend => legend.querySelectorAll('button').length));
   outcome.png_bytes = (await png(chosen.chart.svg('chosen'))).size;
   redrawAll();
   await settled();

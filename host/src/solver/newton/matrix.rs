@@ -1,6 +1,6 @@
 //! Which matrix the corrections are computed with, and when it is renewed.
 
-use super::{Newton, StepFailure, Task, failed_law, plain};
+use super::{Newton, StepFailure, Task, failed_law};
 use crate::case::Method;
 use crate::plugin::Operator;
 use std::time::Instant;
@@ -21,6 +21,8 @@ pub struct Matrix {
     pub(super) is_constant: bool,
     /// Largest entry of the last one.
     pub(super) largest: f64,
+    /// The same of every body, where there are several.
+    largest_by_body: Vec<f64>,
 }
 
 impl Matrix {
@@ -35,6 +37,12 @@ impl Matrix {
     /// Largest entry; residuals are measured against it where no force has ever acted.
     pub fn largest(&self) -> f64 {
         self.largest
+    }
+
+    /// Largest entry of the equations of a body.
+    pub(super) fn largest_of(&self, body: usize) -> f64 {
+        let known = self.largest_by_body.get(body);
+        known.copied().unwrap_or(self.largest)
     }
 
     pub(super) fn hold(&mut self) {
@@ -136,6 +144,23 @@ impl Newton<'_> {
         let largest = |largest: f64, value: &f64| largest.max(value.abs());
         let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
         self.matrix.largest = values.iter().fold(of_domain, largest);
+        let bodies = &self.places.bodies;
+        if !bodies.of_equation.is_empty() {
+            let mut by_body = vec![0.0; bodies.n];
+            for (column, &body) in bodies.of_equation.iter().enumerate() {
+                let column = &values[self.system.pattern.places(column)];
+                by_body[body as usize] = column.iter().fold(by_body[body as usize], largest);
+            }
+            if let Some(domain) = self.domain {
+                let n = self.places.boundary.len();
+                let columns = domain.stiffness().chunks_exact(n.max(1));
+                for (&place, column) in self.places.boundary.iter().zip(columns) {
+                    let body = bodies.of_place[place] as usize;
+                    by_body[body] = column.iter().fold(by_body[body], largest);
+                }
+            }
+            self.matrix.largest_by_body = by_body;
+        }
         self.costs.assembly += start.elapsed();
         values
     }
@@ -150,7 +175,7 @@ impl Newton<'_> {
         let outcome = self.solver.factorise_with(values, share);
         self.costs.equations += start.elapsed();
         self.costs.factorisations += 1;
-        outcome.map_err(|_| singular())
+        outcome.map_err(|_| StepFailure::singular())
     }
 
     /// Solves K δ = residual − K_fp Δp with the factorised matrix.
@@ -174,7 +199,7 @@ impl Newton<'_> {
         let right: Vec<f64> = residual.iter().zip(&coupling).map(|(r, c)| r - c).collect();
         let solution = self.solver.solve(&right);
         self.costs.equations += start.elapsed();
-        let solution = solution.map_err(|_| singular())?;
+        let solution = solution.map_err(|_| StepFailure::singular())?;
         let mut correction = vec![0.0; self.places.n()];
         for (&place, value) in self.places.free.iter().zip(solution) {
             correction[place] = value;
@@ -182,8 +207,4 @@ impl Newton<'_> {
         self.places.follow(&mut correction);
         Ok(correction)
     }
-}
-
-fn singular() -> StepFailure {
-    plain("the tangent matrix is singular: a part of the model can move freely")
 }

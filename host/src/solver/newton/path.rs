@@ -12,7 +12,7 @@
 //!
 //! - K δ_r = r, K δ_q = q = dr/dλ (prescribed displacements included, also in δ_q), dλ = (s − c·(Δu + δ_r)) / c·δ_q, δ = δ_r + dλ δ_q.
 
-use super::{Iteration, Loads, Newton, StepFailure, StepSuccess, Task, failed_law, norm, plain};
+use super::{Iteration, Loads, Newton, StepFailure, StepSuccess, Task, failed_law, plain};
 use crate::assembly::Places;
 use crate::case::Formulation;
 use crate::group::Group;
@@ -87,8 +87,7 @@ impl Newton<'_> {
         (measure, distance): (&Measure, f64),
         guess: (Vec<f64>, f64),
     ) -> Result<(StepSuccess, f64), StepFailure> {
-        self.scale = loads.scale;
-        self.begin();
+        self.set_out(loads);
         let mut iterations = Vec::new();
         let outcome = self.iterate_along(
             loads,
@@ -97,10 +96,7 @@ impl Newton<'_> {
             guess,
             &mut iterations,
         );
-        outcome.map_err(|failure| StepFailure {
-            iterations,
-            ..failure
-        })
+        outcome.map_err(|failure| self.explained(failure, iterations, from, (time + from, 0.0)))
     }
 
     fn iterate_along(
@@ -113,14 +109,16 @@ impl Newton<'_> {
     ) -> Result<(StepSuccess, f64), StepFailure> {
         let rate = self.places.gather(&loads.prescribed_rate());
         let right = self.load_rate(loads);
+        self.starts_from(&increment, false);
         let mut balance = self.evaluate_along(loads, &rate, [from, time], &mut increment, rise)?;
         iterations.push(Iteration::first(&balance));
         for _ in 0..self.settings.max_iterations() {
+            self.may_go_on()?;
             let external = loads.external(from + rise);
             let task = Task {
                 external: &self.places.gather(&external),
-                imposed: norm(&external).max(self.scale),
-                prescribed: &[],
+                imposed: self.imposed(&external),
+                prescribed: &scaled(&rate, rise),
                 period: (time + from, rise.abs()),
             };
             self.prepare(&increment, &task)?;
@@ -153,6 +151,7 @@ impl Newton<'_> {
                 let Some(length) = lengths.next() else {
                     return Err(plain("the path ends here"));
                 };
+                self.may_go_on()?;
                 let moved = increment.iter().zip(&correction);
                 let mut moved: Vec<f64> = moved.map(|(u, d)| u + length * d).collect();
                 let risen = rise + length * more;
@@ -166,13 +165,7 @@ impl Newton<'_> {
                     _ => {}
                 }
             };
-            let size = norm(&increment).max(f64::MIN_POSITIVE);
-            let last = Iteration {
-                residual: balance.relative,
-                correction: Some(norm(&correction) / size),
-                step_length: length,
-                viscosity: 0.0,
-            };
+            let last = self.took(&balance, &correction, &increment, length);
             iterations.push(last);
             let is_there = (measure.of(&increment) - distance).abs() <= 1e-6 * distance.abs();
             if is_there && self.is_equilibrium(&balance, &last) {
@@ -182,16 +175,17 @@ impl Newton<'_> {
                     unreliable: balance.unreliable,
                     relaxed: false,
                     round_off: 0.0,
+                    scales: balance.scales,
                 };
                 return Ok((success, from + rise));
             }
         }
-        Err(plain(&format!(
-            "no equilibrium along the path after {} iterations: residual {:.1e}, tolerance {:.1e}",
-            self.settings.max_iterations(),
-            balance.relative,
-            self.settings.force_tolerance
-        )))
+        let correction = iterations.last().and_then(|last| last.correction);
+        let n = self.settings.max_iterations();
+        Err(StepFailure::unmet(
+            &format!("no equilibrium along the path after {n} iterations"),
+            self.unmet(&balance, correction),
+        ))
     }
 
     /// As [`Self::evaluate`] at a load factor, which sets the prescribed displacements.
@@ -213,8 +207,8 @@ impl Newton<'_> {
         }
         let task = Task {
             external: &self.places.gather(&external),
-            imposed: norm(&external).max(self.scale),
-            prescribed: &[],
+            imposed: self.imposed(&external),
+            prescribed: &scaled(rate, rise),
             period: (time + from, rise.abs()),
         };
         let operator = self.operator();
@@ -234,4 +228,9 @@ impl Newton<'_> {
         }
         self.places.free.iter().map(|&place| rate[place]).collect()
     }
+}
+
+/// Increments at this rate.
+fn scaled(rate: &[f64], rise: f64) -> Vec<f64> {
+    rate.iter().map(|rate| rise * rate).collect()
 }

@@ -15,7 +15,7 @@
 //! the residual has fallen; they alone decide on convergence, by the same tolerances. The motion
 //! changes the path within the step only: laws still see one increment from the last equilibrium.
 
-use super::{Balance, Iteration, Newton, StepFailure, Task, failed_law, norm, plain};
+use super::{Balance, Iteration, Newton, StepFailure, Task, failed_law};
 use crate::plugin::Operator;
 
 /// α. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
@@ -95,6 +95,7 @@ impl Newton<'_> {
             .map_err(failed_law)?;
         let mut largest = balance.relative;
         while relaxation.steps < MAX_STEPS {
+            self.may_go_on()?;
             relaxation.steps += 1;
             let correction = self.viscous_correction(&balance.residual, &relaxation.elastic)?;
             for (u, d) in relaxation.increment.iter_mut().zip(&correction) {
@@ -104,24 +105,21 @@ impl Newton<'_> {
             balance = self
                 .evaluate(&relaxation.increment, task, Operator::Consistent)
                 .map_err(failed_law)?;
+            let taken = self.took(&balance, &correction, &relaxation.increment, 1.0);
             iterations.push(Iteration {
-                residual: balance.relative,
-                correction: Some(
-                    norm(&correction) / norm(&relaxation.increment).max(f64::MIN_POSITIVE),
-                ),
-                step_length: 1.0,
                 viscosity: VISCOSITY,
+                ..taken
             });
             largest = largest.max(balance.relative);
             if balance.relative < before && balance.relative <= FALL * largest {
                 return Ok((relaxation.increment.clone(), balance));
             }
         }
-        Err(plain(&format!(
-            "no equilibrium by Newton iterations, nor by {MAX_STEPS} steps of viscous relaxation: \
-             residual {:.1e}, tolerance {:.1e}",
-            balance.relative, self.settings.force_tolerance
-        )))
+        let correction = iterations.last().and_then(|last| last.correction);
+        let what = format!(
+            "no equilibrium by Newton iterations, nor by {MAX_STEPS} steps of viscous relaxation"
+        );
+        Err(StepFailure::unmet(&what, self.unmet(&balance, correction)))
     }
 
     /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation.

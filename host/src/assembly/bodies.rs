@@ -1,0 +1,165 @@
+//! Parts of a model that do not touch: what one of them carries says nothing of another.
+
+use super::Tie;
+use crate::group::Group;
+
+/// A node, or a degree of freedom, that several bodies have in common, or none.
+pub const SHARED: u32 = u32::MAX;
+
+/// The bodies of a model: nodes that elements, interfaces or ties connect. Where both displacements
+/// of a node are prescribed, nothing passes from one side of it to the other.
+#[derive(Debug, Default)]
+pub struct Bodies {
+    /// Body of every node, or [`SHARED`].
+    of_node: Vec<u32>,
+    /// Body of every element, group by group; that of one without unknowns is [`SHARED`].
+    of_element: Vec<Vec<u32>>,
+    /// Largest side of every body.
+    extents: Vec<f64>,
+}
+
+impl Bodies {
+    /// Those of these groups on these nodes, where these degrees of freedom are prescribed.
+    pub fn new(groups: &[Group], ties: &[Tie], nodes: &[[f64; 2]], prescribed: &[bool]) -> Self {
+        let is_held = |node: usize| prescribed[2 * node] && prescribed[2 * node + 1];
+        let mut joined = Joined::new(nodes.len());
+        for tie in ties {
+            for (master, _) in tie.masters {
+                joined.join(tie.dof / 2, master / 2);
+            }
+        }
+        let loose = |group: &Group, element: usize| -> Vec<usize> {
+            let nodes = group.kinematics.nodes(element).iter().copied();
+            nodes.filter(|&node| !is_held(node)).collect()
+        };
+        for group in groups {
+            for element in 0..group.kinematics.n_elements() {
+                if let [first, others @ ..] = loose(group, element).as_slice() {
+                    for &node in others {
+                        joined.join(*first, node);
+                    }
+                }
+            }
+        }
+        let mut numbers = vec![SHARED; nodes.len()];
+        let mut boxes: Vec<[[f64; 2]; 2]> = Vec::new();
+        let mut of_node = vec![None; nodes.len()];
+        let mut of_element = Vec::new();
+        for group in groups {
+            let mut bodies = Vec::new();
+            for element in 0..group.kinematics.n_elements() {
+                let Some(&first) = loose(group, element).first() else {
+                    bodies.push(SHARED);
+                    continue;
+                };
+                let root = joined.root(first);
+                if numbers[root] == SHARED {
+                    numbers[root] = boxes.len() as u32;
+                    boxes.push([nodes[first]; 2]);
+                }
+                let number = numbers[root];
+                bodies.push(number);
+                let [least, most] = &mut boxes[number as usize];
+                for &node in group.kinematics.nodes(element) {
+                    for c in 0..2 {
+                        least[c] = least[c].min(nodes[node][c]);
+                        most[c] = most[c].max(nodes[node][c]);
+                    }
+                    let known = of_node[node].get_or_insert(number);
+                    if *known != number {
+                        *known = SHARED;
+                    }
+                }
+            }
+            of_element.push(bodies);
+        }
+        let side = |[least, most]: &[[f64; 2]; 2]| (most[0] - least[0]).max(most[1] - least[1]);
+        Self {
+            of_node: of_node.iter().map(|body| body.unwrap_or(SHARED)).collect(),
+            of_element,
+            extents: boxes.iter().map(side).collect(),
+        }
+    }
+
+    /// How many there are.
+    pub fn n(&self) -> usize {
+        self.extents.len()
+    }
+
+    /// Largest side of every body.
+    pub fn extents(&self) -> &[f64] {
+        &self.extents
+    }
+
+    /// Body of every element, group by group.
+    pub fn of_elements(&self) -> &[Vec<u32>] {
+        &self.of_element
+    }
+
+    /// Body of each of these degrees of freedom; empty if there is but one.
+    pub fn of(&self, dofs: impl Iterator<Item = usize>) -> Vec<u32> {
+        if self.n() <= 1 {
+            return Vec::new();
+        }
+        dofs.map(|dof| self.of_node[dof / 2]).collect()
+    }
+}
+
+/// Sets that grow together.
+struct Joined(Vec<usize>);
+
+impl Joined {
+    fn new(n: usize) -> Self {
+        Self((0..n).collect())
+    }
+
+    fn root(&mut self, mut node: usize) -> usize {
+        while self.0[node] != node {
+            self.0[node] = self.0[self.0[node]];
+            node = self.0[node];
+        }
+        node
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+/// 2-norms by body of a vector whose entries belong to these bodies, or to none; of all of it where
+/// no bodies are told apart.
+pub fn norms(bodies: &[u32], n: usize, v: &[f64]) -> Vec<f64> {
+    if bodies.is_empty() {
+        return vec![v.iter().map(|x| x * x).sum::<f64>().sqrt()];
+    }
+    let mut sums = vec![0.0; n];
+    for (&body, x) in bodies.iter().zip(v) {
+        if let Some(sum) = sums.get_mut(body as usize) {
+            *sum += x * x;
+        }
+    }
+    sums.iter().map(|sum: &f64| sum.sqrt()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn norms_are_those_of_each_body() {
+        let v = [3.0, 1e11, 4.0];
+        assert_eq!(norms(&[0, 1, 0], 2, &v), [5.0, 1e11]);
+        assert_eq!(norms(&[0, SHARED, 0], 2, &v), [5.0, 0.0]);
+        assert_eq!(norms(&[], 1, &[3.0, 4.0]), [5.0]);
+    }
+
+    #[test]
+    fn what_is_joined_by_way_of_others_is_one() {
+        let mut joined = Joined::new(5);
+        joined.join(0, 3);
+        joined.join(4, 3);
+        let roots: Vec<usize> = (0..5).map(|node| joined.root(node)).collect();
+        assert_eq!(roots, [0, 1, 2, 0, 0]);
+    }
+}

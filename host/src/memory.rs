@@ -1,0 +1,156 @@
+//! What happens when memory runs out: a message that says how much is needed, a summary that says so
+//! too, and exit code 1. Rows that were written stay.
+//!
+//! An allocation that fails cannot be reported by the code that asked for it: it has no other way
+//! on. So the program's allocator gives back a reserve, says what there is to say, and ends the
+//! process. What is worked on says beforehand how much it will take.
+
+use crate::error::Error;
+use rustix::io::Errno;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+/// The last words take less than this.
+const RESERVE: usize = 4 << 20;
+/// Exit code: the limit is the user's to raise.
+const CODE: u8 = 1;
+
+/// What the last words are said in.
+static HELD: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+/// Bytes that what goes on was expected to take in all.
+static EXPECTED: AtomicU64 = AtomicU64::new(0);
+/// What was announced with it.
+static DOING: Mutex<&str> = Mutex::new("");
+/// Folder of the results that are being written.
+static RESULTS: Mutex<Option<PathBuf>> = Mutex::new(None);
+/// A thread is saying the last words.
+static ENDS: AtomicBool = AtomicBool::new(false);
+
+/// The program's allocator: the system's, with an end that is said.
+#[derive(Debug)]
+pub struct Allocator;
+
+/// Ends the process if there is no memory.
+fn checked(found: *mut u8, size: usize) -> *mut u8 {
+    if found.is_null() {
+        end(size);
+    }
+    found
+}
+
+// SAFETY: everything is the system's allocator's, with the same arguments; what is added neither
+// unwinds nor returns.
+unsafe impl GlobalAlloc for Allocator {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as the caller promises.
+        checked(unsafe { System.alloc(layout) }, layout.size())
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promises.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as the caller promises.
+        checked(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // SAFETY: as the caller promises.
+        checked(unsafe { System.realloc(pointer, layout, size) }, size)
+    }
+}
+
+/// Sets aside what the last words are said in.
+pub fn reserve() {
+    if let Ok(mut held) = HELD.lock() {
+        *held = Vec::with_capacity(RESERVE);
+    }
+}
+
+/// What comes next, and how many bytes it takes beside what is in use.
+pub(crate) fn expect(bytes: u64, what: &'static str) {
+    EXPECTED.store(in_use().unwrap_or(0) + bytes, Ordering::Relaxed);
+    if let Ok(mut doing) = DOING.lock() {
+        *doing = what;
+    }
+}
+
+/// Results are being written into a folder, or no longer.
+pub(crate) fn writes(folder: Option<&Path>) {
+    if let Ok(mut results) = RESULTS.lock() {
+        *results = folder.map(Path::to_owned);
+    }
+}
+
+/// Says that a thread, or whatever else is not simply memory, could not be had.
+pub fn cannot_start(what: &str, why: &impl std::fmt::Display) -> String {
+    format!("{} to start {what}: {why}", shortage(0))
+}
+
+/// Bytes of address space in use.
+fn in_use() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let size = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmSize:"))?;
+    let kilobytes: u64 = size.split_ascii_whitespace().next()?.parse().ok()?;
+    Some(kilobytes << 10)
+}
+
+/// How much is needed: what was expected, or at least what is in use and what could not be had.
+fn shortage(size: u64) -> String {
+    let megabytes = |bytes: u64| bytes.div_ceil(1_000_000);
+    let least = in_use().unwrap_or(0) + size;
+    let expected = EXPECTED.load(Ordering::Relaxed);
+    let needed = if expected > least {
+        format!("about {} MB needed", megabytes(expected))
+    } else {
+        format!("about {} MB needed, or more", megabytes(least))
+    };
+    let doing = DOING.try_lock().map_or("", |doing| *doing);
+    let last = if doing.is_empty() {
+        String::new()
+    } else {
+        format!("; the last large piece of work was {doing}")
+    };
+    format!("not enough memory: {needed}{last}")
+}
+
+/// The last words of the process.
+#[cold]
+fn end(size: usize) {
+    if ENDS.swap(true, Ordering::SeqCst) {
+        // Another thread ends the process; this one, if it is it, has lost even its reserve.
+        std::thread::sleep(Duration::from_secs(10));
+        std::process::abort();
+    }
+    if let Ok(mut held) = HELD.try_lock() {
+        drop(std::mem::take(&mut *held));
+    }
+    let message = shortage(size as u64);
+    let text = format!(
+        "Error:   × {message}\n  help: raise the limit of memory, or take a coarser mesh; rows that were written are whole\n"
+    );
+    // Another thread may hold the lock of the error stream, and wait for memory.
+    let mut rest = text.as_bytes();
+    while !rest.is_empty() {
+        match rustix::io::write(rustix::stdio::stderr(), rest) {
+            Ok(n) if n > 0 => rest = &rest[n..],
+            Err(Errno::INTR) => (),
+            _ => break,
+        }
+    }
+    if let Ok(results) = RESULTS.try_lock()
+        && let Some(folder) = &*results
+    {
+        let _ = crate::output::end_summary(folder, &Error::Usage(message));
+    }
+    // Who watches this process knows that no law has ended it.
+    crate::supervision::end(CODE);
+    std::process::exit(CODE.into());
+}

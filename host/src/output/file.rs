@@ -1,0 +1,385 @@
+//! Files in a results folder: begun in place of whatever has their names, and, where a run goes on,
+//! only if they still hold what they held. Nothing is written through a link: what it leads to
+//! belongs to somebody else.
+
+use super::unwritable;
+use crate::error::Error;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, Metadata, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Bytes read at a time where a file is summed.
+const PIECE: usize = 1 << 16;
+/// Time that the process of a run that was killed may take to end.
+const MOMENT: Duration = Duration::from_millis(500);
+
+/// Refuses to write where something else than a file is: a pipe that nobody reads would keep the
+/// program waiting for ever.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn refuse_other(path: &Path) -> Result<(), Error> {
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        return Err(unwritable(path, other()));
+    }
+    Ok(())
+}
+
+fn other() -> io::Error {
+    io::Error::other("there is something else than a file of this name")
+}
+
+/// Writes a whole file of results in place of what has its name.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub(crate) fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Error> {
+    begin(path)
+        .and_then(|mut file| file.write_all(content.as_ref()))
+        .map_err(|error| unwritable(path, error))
+}
+
+/// Begins a file in place of what has its name, which other names of the same file keep.
+///
+/// # Errors
+/// That of the system; anything but a file or a link has the name.
+pub(crate) fn begin(path: &Path) -> io::Result<File> {
+    match path.symlink_metadata() {
+        Ok(found) if found.is_file() || found.is_symlink() => std::fs::remove_file(path)?,
+        Ok(_) => return Err(other()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => (),
+        Err(error) => return Err(error),
+    }
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create_new(true).open(path)
+}
+
+/// Whether what is written into this file is seen under another name.
+fn has_other_names(metadata: &Metadata) -> bool {
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::MetadataExt::nlink(metadata) > 1
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = metadata;
+        false
+    }
+}
+
+/// Whether two names lead to one file.
+pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let place = |path: &Path| path.metadata().map(|found| (found.dev(), found.ino())).ok();
+        place(a).is_some_and(|of_a| place(b) == Some(of_a))
+    }
+    #[cfg(not(unix))]
+    {
+        let same = a.canonicalize().ok().zip(b.canonicalize().ok());
+        same.is_some_and(|(a, b)| a == b)
+    }
+}
+
+/// A sum by which damage is noticed: of two texts that differ in eight bytes or fewer in a row it
+/// always differs, of others but for one in 2⁶⁴. It costs next to nothing beside writing them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    state: u64,
+    /// Bytes that do not fill a word yet.
+    rest: [u8; 8],
+    n: usize,
+}
+
+impl Sum {
+    /// One step: a bijection of the state for any word, and of the word for any state.
+    fn word(state: u64, word: [u8; 8]) -> u64 {
+        (state.rotate_left(23) ^ u64::from_le_bytes(word)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    }
+
+    fn add(&mut self, mut bytes: &[u8]) {
+        if self.n > 0 {
+            let taken = bytes.len().min(8 - self.n);
+            self.rest[self.n..self.n + taken].copy_from_slice(&bytes[..taken]);
+            self.n += taken;
+            bytes = &bytes[taken..];
+            if self.n < 8 {
+                return;
+            }
+            self.state = Self::word(self.state, self.rest);
+            self.n = 0;
+        }
+        let (words, rest) = bytes.as_chunks::<8>();
+        for word in words {
+            self.state = Self::word(self.state, *word);
+        }
+        self.rest[..rest.len()].copy_from_slice(rest);
+        self.n = rest.len();
+    }
+
+    fn value(&self) -> u64 {
+        let mut last = [0; 8];
+        last[..self.n].copy_from_slice(&self.rest[..self.n]);
+        Self::word(self.state, last)
+    }
+}
+
+/// How much a file held, and its sum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Extent {
+    pub(super) length: u64,
+    pub(super) sum: u64,
+}
+
+/// A file that is appended to.
+#[derive(Debug)]
+pub(super) struct Appended {
+    path: PathBuf,
+    file: File,
+    /// Bytes of whole entries in the file, and their sum.
+    length: u64,
+    sum: Sum,
+}
+
+impl Appended {
+    /// Begins a file; or, `from` what it held, goes on after that.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`]; [`Error::Usage`] if it no longer holds that.
+    pub(super) fn begin(path: PathBuf, from: Option<Extent>) -> Result<Self, Error> {
+        let Some(extent) = from else {
+            let file = begin(&path).map_err(|error| unwritable(&path, error))?;
+            return Ok(Self::new(path, file));
+        };
+        let mut options = OpenOptions::new();
+        refuse_link(&path)?;
+        let opened = options.read(true).write(true).open(&path);
+        let file = opened.map_err(|error| unwritable(&path, error))?;
+        Self::new(path, file).go_on(extent)
+    }
+
+    /// Begins a file, or opens the one that a run goes on in. As long as it is open, no other run
+    /// gets hold of it.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub(super) fn begin_locked(path: PathBuf, goes_on: bool) -> Result<Self, Error> {
+        let failed = |error| unwritable(&path, error);
+        // A link is not opened, not even to see whether another run writes there.
+        match path.symlink_metadata() {
+            Ok(_) if goes_on => refuse_link(&path)?,
+            Ok(found) if found.is_symlink() => std::fs::remove_file(&path).map_err(failed)?,
+            Ok(found) if !found.is_file() => return Err(failed(other())),
+            _ => (),
+        }
+        let mut options = OpenOptions::new();
+        let options = options.read(true).write(true).create(true).truncate(false);
+        let mut file = options.open(&path).map_err(failed)?;
+        lock(&file).map_err(failed)?;
+        if !goes_on {
+            if has_other_names(&file.metadata().map_err(failed)?) {
+                file = begin(&path).map_err(failed)?;
+                lock(&file).map_err(failed)?;
+            }
+            file.set_len(0).map_err(failed)?;
+        }
+        Ok(Self::new(path, file))
+    }
+
+    fn new(path: PathBuf, file: File) -> Self {
+        Self {
+            path,
+            file,
+            length: 0,
+            sum: Sum::default(),
+        }
+    }
+
+    /// Forgets what the file holds after `extent` and goes on there.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`]; [`Error::Usage`] if it does not begin with that.
+    pub(super) fn go_on(mut self, extent: Extent) -> Result<Self, Error> {
+        let summed = sum_of(&mut self.file, extent.length);
+        self.sum = summed.map_err(|error| unwritable(&self.path, error))?;
+        self.length = extent.length;
+        if self.extent() != extent {
+            return Err(changed(&self.path));
+        }
+        self.file
+            .set_len(extent.length)
+            .and_then(|()| self.file.seek(SeekFrom::Start(extent.length)))
+            .map_err(|error| unwritable(&self.path, error))?;
+        Ok(self)
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn extent(&self) -> Extent {
+        Extent {
+            length: self.length,
+            sum: self.sum.value(),
+        }
+    }
+
+    /// Appends whole entries. What fits of a text that does not fit as a whole is taken back: it
+    /// would pass for more than it is.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub(super) fn append(&mut self, text: &[u8]) -> Result<(), Error> {
+        check_own(&self.file, self.length).map_err(|error| unwritable(&self.path, error))?;
+        if let Err(error) = self.file.write_all(text) {
+            let _ = self.file.set_len(self.length);
+            return Err(unwritable(&self.path, error));
+        }
+        self.length += text.len() as u64;
+        self.sum.add(text);
+        Ok(())
+    }
+
+    /// Waits until everything is on the disk.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub(super) fn sync(&self) -> Result<Extent, Error> {
+        let synced = self.file.sync_data();
+        synced.map_err(|error| unwritable(&self.path, error))?;
+        Ok(self.extent())
+    }
+}
+
+/// Refuses to write where something else than the file is by now: a law may have closed it, and
+/// its number may be that of another one.
+///
+/// # Errors
+/// It is not the file of this length.
+pub(crate) fn check_own(file: &File, length: u64) -> io::Result<()> {
+    let found = file.metadata();
+    if found.is_ok_and(|found| !found.is_file() || found.len() == length) {
+        return Ok(());
+    }
+    let why = "a law has closed it, or something else has written to it";
+    Err(io::Error::other(why))
+}
+
+/// Locks a file. The process of a run that was killed may take a moment to end.
+fn lock(file: &File) -> io::Result<()> {
+    let since = Instant::now();
+    loop {
+        // Some file systems know no locks: an error says nothing of another run.
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) if since.elapsed() < MOMENT => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            Err(TryLockError::WouldBlock) => {
+                return Err(io::Error::other("another run is writing into this folder"));
+            }
+            _ => return Ok(()),
+        }
+    }
+}
+
+/// Checks that a file still begins with what it held, without touching it.
+///
+/// # Errors
+/// [`Error::Unreadable`]; [`Error::Usage`] if it does not.
+pub(super) fn check(path: &Path, extent: Extent) -> Result<(), Error> {
+    let unreadable = |source| Error::Unreadable {
+        path: path.to_owned(),
+        source,
+    };
+    let mut file = crate::file::open_regular(path).map_err(unreadable)?;
+    let sum = sum_of(&mut file, extent.length).map_err(unreadable)?;
+    if sum.value() == extent.sum {
+        Ok(())
+    } else {
+        Err(changed(path))
+    }
+}
+
+/// Checks that a file is there and has this length: a look at what it holds would take too long.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub(super) fn check_length(path: &Path, length: u64) -> Result<(), Error> {
+    match path.metadata() {
+        Ok(found) if found.is_file() && found.len() == length => Ok(()),
+        _ => Err(changed(path)),
+    }
+}
+
+/// The sum of the first bytes of a file; of all if there are fewer.
+fn sum_of(file: &mut File, length: u64) -> io::Result<Sum> {
+    file.seek(SeekFrom::Start(0))?;
+    let mut sum = Sum::default();
+    let mut piece = vec![0; PIECE];
+    let mut left = length;
+    while left > 0 {
+        let most = left.min(PIECE as u64) as usize;
+        let n = file.read(&mut piece[..most])?;
+        if n == 0 {
+            // Not even the remainder of the sum is the same then.
+            sum.add(&[1]);
+            break;
+        }
+        sum.add(&piece[..n]);
+        left -= n as u64;
+    }
+    Ok(sum)
+}
+
+fn refuse_link(path: &Path) -> Result<(), Error> {
+    let found = path.symlink_metadata();
+    let found = found.map_err(|error| unwritable(path, error))?;
+    if found.is_symlink() || has_other_names(&found) {
+        let why = "it is a link: results are not written through one";
+        return Err(unwritable(path, io::Error::other(why)));
+    }
+    if found.is_file() {
+        Ok(())
+    } else {
+        Err(unwritable(path, other()))
+    }
+}
+
+fn changed(path: &Path) -> Error {
+    Error::Usage(format!(
+        "{}: it is not what it was at the last checkpoint: it was changed or removed since; run \
+         without --resume to start anew",
+        path.display()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_does_not_depend_on_the_pieces_and_notices_every_byte() {
+        let text: Vec<u8> = (0..100_u8).map(|i| i.wrapping_mul(37)).collect();
+        let of = |pieces: &[&[u8]]| {
+            let mut sum = Sum::default();
+            pieces.iter().for_each(|piece| sum.add(piece));
+            sum.value()
+        };
+        let whole = of(&[&text]);
+        for at in 0..text.len() {
+            let (a, b) = text.split_at(at);
+            assert_eq!(of(&[a, b]), whole, "{at}");
+            let (b, c) = b.split_at(b.len().min(3));
+            assert_eq!(of(&[a, b, c]), whole, "{at}");
+            let mut other = text.clone();
+            other[at] ^= 1;
+            assert_ne!(of(&[&other]), whole, "{at}");
+        }
+        let mut exchanged = text.clone();
+        exchanged.swap(8, 16);
+        assert_ne!(of(&[&exchanged]), whole);
+    }
+}

@@ -1,0 +1,32 @@
+//! As on Unix, where processes can be watched; here nobody does.
+
+use super::Moment;
+
+/// What a law is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Doing {
+    /// Fixing parameters.
+    Create,
+    /// Giving initial internal variables.
+    Start,
+    /// Carrying points over an increment.
+    Update,
+}
+
+pub(crate) fn name(_text: &str) -> u64 {
+    0
+}
+
+pub(crate) fn of_group(_group: u64, _first: usize, _per_element: usize) {}
+
+pub(super) fn calling<T>(
+    _law: u64,
+    _doing: Doing,
+    _n_points: usize,
+    _moment: Moment,
+    call: impl FnOnce() -> T,
+) -> T {
+    call()
+}
+
+pub(crate) fn remember_process() {}

@@ -1,0 +1,160 @@
+//! The child's side: it says where it is and how it ends, and looks whether it is to stop.
+
+use super::{CALLS, FOLDER, FOLDER_WORDS, Page, WATCHER, word};
+use crate::plugin::{SharedMemory, calls};
+use crate::stop::Stop;
+use rustix::process::{Signal, getppid, set_parent_process_death_signal};
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+static PAGE: OnceLock<Page> = OnceLock::new();
+/// Bytes of the standard output that were handed out the first time.
+static SKIP: AtomicU64 = AtomicU64::new(0);
+
+/// Whether this process is a watcher's child. It then dies with the watcher.
+///
+/// # Errors
+/// The watcher's memory cannot be had.
+pub fn enter() -> io::Result<bool> {
+    let Some((watcher, descriptor)) = watcher() else {
+        return Ok(false);
+    };
+    // Whatever a law starts inherits the variable, but is nobody's child of the watcher.
+    let is_mine = || getppid().is_some_and(|parent| parent.as_raw_nonzero().get() == watcher);
+    if !is_mine() {
+        return Ok(false);
+    }
+    set_parent_process_death_signal(Some(Signal::KILL))?;
+    let open = || {
+        let path = format!("/proc/{watcher}/fd/{descriptor}");
+        File::options().read(true).write(true).open(path)
+    };
+    let file = open()?;
+    let [page, places] = [
+        SharedMemory::new(file.try_clone()?)?,
+        SharedMemory::new(file)?,
+    ];
+    let page = Page(page);
+    if !is_mine() {
+        return Err(io::Error::other("the watching process is gone"));
+    }
+    calls::keep_in(places, CALLS);
+    calls::remember_process();
+    SKIP.store(page.get(word::SKIP), Ordering::Relaxed);
+    let _ = PAGE.set(page);
+    Ok(true)
+}
+
+fn watcher() -> Option<(i32, i32)> {
+    let text = std::env::var(WATCHER).ok()?;
+    let (watcher, descriptor) = text.split_once(':')?;
+    Some((watcher.parse().ok()?, descriptor.parse().ok()?))
+}
+
+/// Says how the process ends: the last thing it does.
+pub fn end(code: u8) {
+    calls::end_if_copy(|| {});
+    let Some(page) = PAGE.get() else { return };
+    let _ = io::stdout().flush();
+    page.set(word::ENDED, u64::from(code) + 1);
+}
+
+/// Whether laws are called in processes of their own to find out which one ended the process.
+pub fn is_again() -> bool {
+    PAGE.get().is_some_and(|page| page.get(word::AGAIN) != 0)
+}
+
+/// Says whether laws are in processes of their own, whatever comes.
+pub fn begin_run(apart: bool) {
+    if let Some(page) = PAGE.get() {
+        page.set(word::APART, u64::from(apart));
+    }
+}
+
+/// Says that the results of this case, one of several, have begun in this folder.
+pub fn case_begun(number: usize, folder: &Path) {
+    if let Some(page) = PAGE.get() {
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let text = folder.to_string_lossy();
+        calls::write_text(&page.0, FOLDER, FOLDER_WORDS, &text);
+        page.set(word::CASES, number as u64);
+        page.set(word::RUNNING, 1);
+    }
+}
+
+/// Says that the phases of the present case are over.
+pub fn end_run() {
+    if let Some(page) = PAGE.get() {
+        page.set(word::RUNNING, 0);
+    }
+}
+
+/// Whether the results of this case had begun when the process was ended.
+pub fn was_begun(number: usize) -> bool {
+    PAGE.get()
+        .is_some_and(|page| page.get(word::AGAIN) != 0 && number as u64 <= page.get(word::BEGUN))
+}
+
+/// The watcher's request to stop; `None` if nobody watches.
+pub fn stop() -> Option<Stop> {
+    PAGE.get()?;
+    let asked = || {
+        let Some(page) = PAGE.get() else { return false };
+        // A copy that a law has made came back: what follows is not to be trusted.
+        page.get(word::STOPS) != 0 || page.calls().copy().is_some() || has_enough(page)
+    };
+    let beat = |took: Duration| {
+        if let Some(page) = PAGE.get() {
+            let took = took.as_micros() as u64;
+            if took > page.get(word::LONGEST) {
+                page.set(word::LONGEST, took);
+            }
+        }
+    };
+    Some(Stop::asked_by(asked, beat))
+}
+
+/// Whether the place where the process was ended lies behind.
+fn has_enough(page: &Page) -> bool {
+    let enough = page.get(word::ENOUGH);
+    enough != 0
+        && page.get(word::RUNNING) != 0
+        && page.get(word::CASES) >= page.get(word::BEGUN)
+        && page.calls().moment() > enough
+}
+
+/// The standard output, which a second attempt goes on with where the first one left it.
+#[derive(Debug, Default)]
+pub struct Handed(());
+
+/// The standard output.
+pub fn stdout() -> Handed {
+    Handed(())
+}
+
+impl Write for Handed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let skipped = SKIP.load(Ordering::Relaxed).min(bytes.len() as u64);
+        if skipped > 0 {
+            SKIP.fetch_sub(skipped, Ordering::Relaxed);
+            return Ok(skipped as usize);
+        }
+        crate::custody::restore().map_err(io::Error::other)?;
+        // No line is kept back: a law may end the process at any time.
+        let mut out = io::stdout().lock();
+        let n = out.write(bytes)?;
+        out.flush()?;
+        if let Some(page) = PAGE.get() {
+            page.set(word::HANDED, page.get(word::HANDED) + n as u64);
+        }
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stdout().flush()
+    }
+}

@@ -1,0 +1,77 @@
+//! How far a study has come, and how long it will still take.
+
+use std::time::Instant;
+
+/// Work done and to do, in any one unit.
+#[derive(Debug)]
+pub(super) struct Pace {
+    started: Instant,
+    done: f64,
+    all: f64,
+}
+
+impl Pace {
+    /// Nothing done yet.
+    pub(super) fn new(all: f64) -> Self {
+        Self {
+            started: Instant::now(),
+            done: 0.0,
+            all,
+        }
+    }
+
+    /// There is more to do than was known.
+    pub(super) fn add(&mut self, more: f64) {
+        self.all += more;
+    }
+
+    /// A piece is done.
+    pub(super) fn did(&mut self, piece: f64) {
+        self.done += piece;
+    }
+
+    /// What is being done, with the time that is left if it goes on at this pace.
+    pub(super) fn line(&self, doing: &str) -> String {
+        let rest = (self.all - self.done) / self.done;
+        if !rest.is_finite() || rest <= 0.0 {
+            return doing.to_owned();
+        }
+        let left = rest * self.started.elapsed().as_secs_f64();
+        format!("{doing} (about {} left)", in_words(left))
+    }
+}
+
+/// A length of time, as well as it is known.
+pub(super) fn in_words(seconds: f64) -> String {
+    if seconds < 100.0 {
+        format!("{:.0} s", seconds.max(1.0))
+    } else if seconds < 6000.0 {
+        format!("{:.0} min", seconds / 60.0)
+    } else {
+        format!("{:.1} h", seconds / 3600.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_in_proportion_to_what_is_left() {
+        let mut pace = Pace::new(1.0);
+        assert_eq!(pace.line("a"), "a");
+        pace.started -= std::time::Duration::from_secs(30);
+        pace.did(1.0);
+        assert_eq!(pace.line("b"), "b");
+        pace.add(2.0);
+        assert_eq!(pace.line("c"), "c (about 60 s left)");
+    }
+
+    #[test]
+    fn lengths_of_time_have_fitting_units() {
+        assert_eq!(
+            [0.2, 59.6, 150.0, 9000.0].map(in_words),
+            ["1 s", "60 s", "2 min", "2.5 h"]
+        );
+    }
+}

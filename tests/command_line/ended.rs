@@ -1,0 +1,236 @@
+//! Laws that end the process they are called in, in every way there is, or change it: the command
+//! ends with exit code 3 and names the place, and every row in equilibrium is kept.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{DONE, Outcome, PLUGIN_TROUBLE, Place};
+use crate::troubled;
+
+/// A way, and what is said of it once the law is in a process of its own.
+const WAYS: [(&str, &str); 6] = [
+    ("exit", "ended its process: exit code 0"),
+    ("quiet_exit", "ended its process: exit code 0"),
+    ("abort", "crashed: signal 6"),
+    ("segfault", "crashed: signal 11"),
+    ("overflow", "crashed: signal 6"),
+    ("jump", "crashed: signal"),
+];
+/// Routines in other languages that end the process.
+const ELSEWHERE: [(&str, &str, &str, &str); 2] = [
+    (
+        "c++",
+        "cpp",
+        "extern \"C\" void elsewhere() { throw 1; }\n",
+        "crashed: signal 6",
+    ),
+    (
+        "gfortran",
+        "f90",
+        "subroutine elsewhere() bind(c)\nstop\nend subroutine\n",
+        "ended its process: exit code 0",
+    ),
+];
+
+fn assert_trouble(outcome: &Outcome, says: &[&str], what: &str) {
+    let Outcome { code, stderr, .. } = outcome;
+    assert_eq!(*code, Some(PLUGIN_TROUBLE), "{what}: {stderr}");
+    for text in says {
+        assert!(outcome.says(text), "{what}: {text:?} is missing\n{stderr}");
+    }
+}
+
+/// Runs the case and looks at what is left: the first phase, whole.
+fn run_ends_well(place: &Place, how: &str, says: &str) {
+    place.write("case.toml", troubled::case(how));
+    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
+    let at = "phase `push`, increment 1: law `troubled`, group `layer`, element";
+    assert_trouble(&outcome, &[at, "point", says, "failure.toml"], how);
+    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    assert_eq!(history.lines().count(), 3, "{how}: {history}");
+    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    assert!(summary.contains("\"plugin trouble\""), "{how}: {summary}");
+    for file in ["failure.toml", "report.html"] {
+        assert!(place.path("out").join(file).is_file(), "{how}: {file}");
+    }
+}
+
+/// Runs the driver with its rows in a file and on the standard output, which must be the same.
+fn point_ends_well(place: &Place, how: &str, says: &str) {
+    place.write("driver.toml", troubled::driver(how));
+    let to_file = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    let at = "segment 1, increment 3 of 4 (3 of the file): law `troubled`";
+    assert_trouble(&to_file, &[at, says, "out.failure.toml"], how);
+    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 4, "{how}: {rows}");
+    let to_output = place.run(&["point", "driver.toml"]);
+    assert_trouble(&to_output, &[at, says], how);
+    assert_eq!(to_output.stdout, rows, "{how}");
+}
+
+#[test]
+fn a_law_that_ends_the_process_is_trouble() {
+    for (how, says) in WAYS {
+        let Some(place) = troubled::place("") else {
+            return;
+        };
+        run_ends_well(&place, how, says);
+        point_ends_well(&place, how, says);
+    }
+}
+
+#[test]
+fn so_is_one_in_another_language() {
+    for (compiler, ending, routine, says) in ELSEWHERE {
+        let Some(place) = troubled::place_with(compiler, ending, routine) else {
+            return;
+        };
+        run_ends_well(&place, "elsewhere", says);
+        point_ends_well(&place, "elsewhere", says);
+    }
+}
+
+#[test]
+fn so_is_one_that_does_it_as_it_is_given_its_parameters() {
+    for how in ["EXIT", "QUIET_EXIT", "SEGFAULT"] {
+        let define: &str = match how {
+            "EXIT" => "TROUBLE_IN_CREATE=EXIT",
+            "QUIET_EXIT" => "TROUBLE_IN_CREATE=QUIET_EXIT",
+            _ => "TROUBLE_IN_CREATE=SEGFAULT",
+        };
+        let Some(place) = troubled::place(define) else {
+            return;
+        };
+        place.write("driver.toml", troubled::driver("cut"));
+        place.write("case.toml", troubled::case("cut"));
+        for arguments in [["point", "driver.toml"], ["run", "case.toml"]] {
+            let outcome = place.run(&[&arguments[..], &["--no-probe"]].concat());
+            assert_trouble(&outcome, &["law `troubled`", "process"], how);
+            assert_eq!(outcome.stdout, "", "{how}");
+        }
+    }
+}
+
+/// The first process had handed out rows before it was ended; none is missing and none comes twice.
+#[test]
+fn rows_that_were_handed_out_come_once() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    let long = |how| {
+        let driver = troubled::driver(how).replace("increments = 4", "increments = 4000");
+        driver.replace("t = { jump = 2.0e-3 }", "t = { jump = 1.2e-3 }")
+    };
+    place.write(
+        "good.toml",
+        long("sleep").replace("limit = 1.0e-3", "limit = 1.0"),
+    );
+    let good = place.run(&["point", "good.toml"]);
+    assert_eq!(good.code, Some(DONE), "{}", good.stderr);
+    place.write("driver.toml", long("quiet_exit"));
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_trouble(&outcome, &["law `troubled`"], "quiet_exit");
+    let n = outcome.stdout.lines().count();
+    assert!(n > 3000, "{n} lines");
+    assert!(good.stdout.starts_with(&outcome.stdout));
+}
+
+/// Both copies come back from the call; only one may go on.
+#[test]
+fn a_copy_of_the_process_writes_nothing() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("case.toml", troubled::case("fork"));
+    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
+    let says = [
+        "law `troubled`",
+        "group `layer`, element",
+        "increment 1",
+        "(fork)",
+    ];
+    assert_trouble(&outcome, &says, "run");
+    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let mut rows: Vec<&str> = history.lines().collect();
+    assert!(rows.len() >= 3, "{history}");
+    rows.dedup();
+    assert_eq!(rows.len(), history.lines().count(), "{history}");
+    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    assert!(summary.contains("\"plugin trouble\""), "{summary}");
+    place.write("driver.toml", troubled::driver("fork"));
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_trouble(
+        &outcome,
+        &["law `troubled`", "increment 3", "(fork)"],
+        "point",
+    );
+    let rows: Vec<&str> = outcome.stdout.lines().collect();
+    assert!((4..=6).contains(&rows.len()), "{}", outcome.stdout);
+}
+
+#[test]
+fn a_law_cannot_move_the_results() {
+    let Some(place) = troubled::place("TROUBLE_IN_CREATE=FOLDER") else {
+        return;
+    };
+    place.write(
+        "case.toml",
+        troubled::case("cut").replacen("1.0e-6", "1.0", 1),
+    );
+    let outcome = place.run(&["run", "case.toml", "--out", "out", "--no-probe"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says("working folder"), "{}", outcome.stderr);
+    assert!(place.path("out/history.csv").is_file());
+    assert!(!place.path("elsewhere/out").exists());
+    // And in the course of the run, where a driver's figures and rows are to come.
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("driver.toml", troubled::driver("folder"));
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 6, "{rows}");
+}
+
+#[test]
+fn limits_and_locale_are_the_programs() {
+    let Some(place) = troubled::place("TROUBLE_IN_CREATE=LIMITS") else {
+        return;
+    };
+    place.write("case.toml", troubled::case("locale"));
+    let outcome = place.run(&["run", "case.toml", "--out", "out", "--no-probe"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says("limit of file sizes"), "{}", outcome.stderr);
+    let Some(plain) = troubled::place("") else {
+        return;
+    };
+    plain.write(
+        "case.toml",
+        troubled::case("locale").replacen("1.0e-6", "1.0", 1),
+    );
+    let outcome = plain.run(&["run", "case.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let [a, b] = [&place, &plain].map(|p| std::fs::read(p.path("out/history.csv")).unwrap());
+    assert_eq!(a, b);
+}
+
+/// A file that the law opens gets the number of one of the results.
+#[test]
+fn closed_files_are_not_mistaken_for_others() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("case.toml", troubled::case("descriptors"));
+    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
+    assert_ne!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says("a law has closed it"), "{}", outcome.stderr);
+    let taken = std::fs::metadata(place.path("taken")).unwrap();
+    assert_eq!(taken.len(), 0);
+    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    assert_eq!(history.lines().count(), 3, "{history}");
+    place.write("driver.toml", troubled::driver("descriptors"));
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_ne!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let taken = std::fs::metadata(place.path("taken")).unwrap();
+    assert_eq!(taken.len(), 0);
+}

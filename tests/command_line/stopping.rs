@@ -1,0 +1,219 @@
+//! Requests to stop, whatever a law does: exit code 130 within a bound, and nothing is lost.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
+
+use crate::program::{CASE, JOINT, Place, edited};
+use crate::troubled;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// What a shell says of a program that was stopped.
+const STOPPED: i32 = 130;
+/// A request is answered within one iteration or 2 s; the rest is for a busy machine.
+const BOUND: Duration = Duration::from_secs(8);
+
+/// Starts the program in a group of its own, as a shell does, with its messages in a file.
+fn start(place: &Place, arguments: &[&str]) -> Child {
+    let said = std::fs::File::create(place.path("said")).unwrap();
+    let mut command = place.command(arguments);
+    command.process_group(0).stdout(Stdio::null()).stderr(said);
+    command.spawn().unwrap()
+}
+
+fn said(place: &Place) -> String {
+    std::fs::read_to_string(place.path("said")).unwrap()
+}
+
+/// Waits until the program has said this.
+fn wait_for(place: &Place, text: &str) {
+    let since = Instant::now();
+    while !said(place).contains(text) {
+        assert!(since.elapsed() < Duration::from_mins(1), "{}", said(place));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Sends a signal to a process, or with `-` before its number to its group.
+fn send(signal: &str, to: &str) {
+    let sent = Command::new("kill").args([signal, "--", to]).status();
+    assert!(sent.unwrap().success(), "{signal} to {to}");
+}
+
+/// The exit code, which must come in time.
+fn code(child: &mut Child, place: &Place) -> Option<i32> {
+    let since = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        if since.elapsed() > BOUND {
+            child.kill().unwrap();
+            panic!("still there after {BOUND:?}: {}", said(place));
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn summary(place: &Place) -> serde_json::Value {
+    let text = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// Every point takes 20 ms in the second phase, which is 1000 increments long.
+fn slow_case() -> String {
+    let text = troubled::case("sleep");
+    let (first, second) = text.split_once("name = \"push\"").unwrap();
+    let second = second.replacen("increments = 2", "increments = 1000", 1);
+    format!("{first}name = \"push\"{second}")
+}
+
+#[test]
+fn ctrl_c_to_the_whole_group_stops_a_run() {
+    for isolate in [&[][..], &["--isolate"]] {
+        let Some(place) = troubled::place("") else {
+            return;
+        };
+        place.write("case.toml", slow_case());
+        let arguments = [&["run", "case.toml", "--out", "out"], isolate].concat();
+        let mut child = start(&place, &arguments);
+        wait_for(&place, "phase push: increment 1/");
+        send("-INT", &format!("-{}", child.id()));
+        assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+        assert!(!said(&place).contains("crashed"), "{}", said(&place));
+        assert_eq!(summary(&place)["status"], "interrupted");
+    }
+}
+
+/// The law takes the signals for itself; they are the program's all the same.
+#[test]
+fn stolen_signals_stop_a_run() {
+    for signal in ["-INT", "-TERM"] {
+        let Some(place) = troubled::place("TROUBLE_IN_CREATE=SIGNALS") else {
+            return;
+        };
+        place.write("case.toml", slow_case());
+        let mut child = start(&place, &["run", "case.toml", "--out", "out", "--no-probe"]);
+        wait_for(&place, "phase push: increment 1/");
+        send(signal, &format!("-{}", child.id()));
+        assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+        assert_eq!(summary(&place)["status"], "interrupted");
+    }
+}
+
+#[test]
+fn a_law_that_never_returns_is_stopped() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("case.toml", troubled::case("loop"));
+    let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
+    wait_for(&place, "phase push");
+    std::thread::sleep(Duration::from_millis(300));
+    send("-TERM", &child.id().to_string());
+    assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+    let text = said(&place);
+    assert!(
+        text.contains("law `troubled`") && text.contains("layer"),
+        "{text}"
+    );
+    assert_eq!(summary(&place)["status"], "interrupted");
+    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    assert_eq!(history.lines().count(), 3, "{history}");
+
+    place.write("driver.toml", troubled::driver("loop"));
+    let mut child = start(&place, &["point", "driver.toml", "--csv", "out.csv"]);
+    std::thread::sleep(Duration::from_millis(500));
+    send("-INT", &child.id().to_string());
+    std::thread::sleep(Duration::from_millis(200));
+    let again = Instant::now();
+    send("-INT", &child.id().to_string());
+    assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+    assert!(
+        again.elapsed() < Duration::from_secs(2),
+        "the second request waits"
+    );
+}
+
+/// A tangent that is wrong by a factor of 100 takes thousands of iterations and many cut-backs.
+#[test]
+fn a_hopeless_increment_is_stopped_within_it() {
+    let Some(place) = troubled::place("SHEAR_TANGENT=100.0") else {
+        return;
+    };
+    let solver = (
+        "max_iterations = 20",
+        "max_iterations = 1000\nmethod = \"newton\"",
+    );
+    let edits = JOINT.iter().copied().chain([solver]);
+    let text = edits.fold(troubled::case("cut"), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    place.write(
+        "case.toml",
+        text.replacen("limit = 1.0e-6", "limit = 1.0", 1),
+    );
+    let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
+    wait_for(&place, "phase weight");
+    send("-TERM", &child.id().to_string());
+    assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+    let text = said(&place);
+    assert!(text.contains("within the increment"), "{text}");
+    let summary = summary(&place);
+    assert_eq!(summary["status"], "interrupted");
+    assert_eq!(summary["stopped_at"]["phase"], "weight");
+}
+
+#[test]
+fn studies_say_how_far_they_are_and_stop() {
+    let place = Place::new();
+    let accurate = edited(&[
+        ("title", "accuracy = 1e-6\ntitle"),
+        ("n = 2, to = 1.0", "n = 60, to = 1.0"),
+        ("x = 1e-5", "x = 1e-3"),
+    ]);
+    place.write("accurate.toml", accurate);
+    place.write("case.toml", CASE);
+    let commands = [
+        ("run", "accurate.toml", "run 3"),
+        ("trade-off", "case.toml", "left)"),
+    ];
+    for (command, file, until) in commands {
+        let mut child = start(&place, &[command, file, "--out", "out"]);
+        wait_for(&place, until);
+        send("-INT", &format!("-{}", child.id()));
+        assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+        let text = said(&place);
+        assert!(
+            text.contains("left") && text.contains("stopped as asked"),
+            "{text}"
+        );
+        assert!(!place.path("out/.trial").exists(), "{command}");
+    }
+}
+
+#[test]
+fn a_child_does_not_outlive_the_program() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("case.toml", troubled::case("loop"));
+    let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
+    wait_for(&place, "phase push");
+    let children = format!("/proc/{0}/task/{0}/children", child.id());
+    let children = std::fs::read_to_string(children).unwrap();
+    let pids: Vec<&str> = children.split_whitespace().collect();
+    assert!(!pids.is_empty());
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let is_gone = |pid: &&str| {
+        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat"));
+        stat.is_err() || stat.is_ok_and(|stat| stat.contains(") Z "))
+    };
+    let gone = (0..200).any(|_| {
+        std::thread::sleep(Duration::from_millis(10));
+        pids.iter().all(is_gone)
+    });
+    assert!(gone, "{pids:?}");
+}

@@ -1,0 +1,252 @@
+//! Mechanisms that carry an iterate away.
+//!
+//! Goal        what runs away is no equilibrium: the run is right, or ends with exit code 2
+//! Geometry    a steel pile beside ground on a fine mesh; a footing on a strongly graded one
+//! Boundary    ground without confinement, integration `reduced`: elements next to no stiffness
+//!             holds; head or strip pushed down
+//! Law         mohr_coulomb
+//! Asserts     head load of the pile as with more increments and with full integration (26.6 to
+//!             26.9); pressure under the footing not above N_c = 2 + π by more than the meshes of
+//!             `footing.rs` give, and reactions that balance; else no equilibrium, with what ran
+//!             away, by every method, condensed or not
+
+use crate::footing::{self, Footing};
+use crate::setup::fail;
+use host::error::Error;
+use std::f64::consts::PI;
+use tests::case::{column, run_text};
+
+const METHODS: [&str; 7] = [
+    "",
+    "method = \"newton\"",
+    "method = \"modified_newton\"",
+    "method = \"initial_stress\"",
+    "method = \"quasi_newton\"",
+    "control = \"arc_length\"",
+    "equations = \"sparse\"",
+];
+
+/// Runs a case that ends well or without equilibrium; the last values of these probes if it ends
+/// well, the message else.
+fn outcome<const N: usize>(text: &str, probes: [&str; N]) -> Result<[f64; N], String> {
+    let folder = tempfile::tempdir().unwrap();
+    match run_text(text, folder.path()) {
+        Ok(_) => {
+            let history = folder.path().join("history.csv");
+            Ok(probes.map(|probe| *column(&history, probe).last().expect("an increment")))
+        }
+        Err(Error::NoEquilibrium { message, .. }) => Err(message),
+        Err(error) => panic!("{error}\n{text}"),
+    }
+}
+
+/// A pile of steel at the axis of a chamber, 0.1 mm in one increment.
+fn pile(solver: &str) -> String {
+    format!(
+        r#"
+analysis = "axisymmetric"
+[mesh]
+origin = [1.0, 0.0]
+columns = [{{ n = 2, to = 1.04 }}, {{ n = 1, to = 1.041 }}, {{ n = 2, to = 1.1 }}]
+rows = [{{ n = 4, to = 0.05 }}, {{ n = 1, to = 0.051 }}, {{ n = 4, to = 0.1 }}]
+[[mesh.region]]
+group = "ground"
+[[mesh.region]]
+group = "pile"
+x = [1.0, 1.04]
+y = [0.05, 0.1]
+[mesh.lines]
+left = {{ x = 1.0 }}
+right = {{ x = 1.1 }}
+bottom = {{ y = 0.0 }}
+head = {{ y = 0.1, x = [1.0, 1.04] }}
+[laws]
+steel = {{ law = "elastic", parameters = {{ young_modulus = 210e6, poisson_ratio = 0.28 }} }}
+[laws.ground]
+law = "mohr_coulomb"
+parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 36.5, dilatancy_angle = 12.0 }}
+[groups]
+ground = {{ formulation = "solid", law = "ground", integration = "reduced" }}
+pile = {{ formulation = "solid", law = "steel" }}
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[supports]]
+line = "right"
+fixed = ["x"]
+[[phase]]
+name = "push"
+increments = 1
+displacement = [{{ line = "head", y = -1e-4 }}]
+[probes]
+head = {{ line = "head", quantity = "reaction_z", scale = -1.0 }}
+bottom = {{ line = "bottom", quantity = "reaction_z" }}
+[solver]
+max_halvings = 3
+{solver}
+"#
+    )
+}
+
+#[test]
+fn a_pile_in_one_increment_carries_what_it_does_in_ten() {
+    for method in METHODS {
+        match outcome(&pile(method), ["head", "bottom"]) {
+            Ok([head, bottom]) => {
+                assert!((26.6..26.9).contains(&head), "{method}: {head} kN");
+                assert!((head - bottom).abs() < 1e-6 * head, "{method}: {bottom} kN");
+            }
+            Err(message) => assert!(message.contains("no equilibrium"), "{method}: {message}"),
+        }
+    }
+}
+
+/// Sixteen elements: a block of steel on ground that bears no tension, its side free.
+fn block(solver: &str) -> String {
+    format!(
+        r#"
+analysis = "plane_strain"
+[mesh]
+origin = [-1.0, -2.0]
+columns = [{{ n = 1, to = -0.96 }}, {{ n = 1, to = -0.9 }}]
+rows = [{{ n = 4, to = -1.5 }}, {{ n = 4, to = -1.0 }}]
+[[mesh.region]]
+group = "ground"
+[[mesh.region]]
+group = "block"
+x = [-1.0, -0.96]
+y = [-1.5, -1.0]
+[mesh.lines]
+left = {{ x = -1.0 }}
+bottom = {{ y = -2.0 }}
+head = {{ y = -1.0, x = [-1.0, -0.96] }}
+[laws]
+steel = {{ law = "elastic", parameters = {{ young_modulus = 210e6, poisson_ratio = 0.28 }} }}
+[laws.ground]
+law = "mohr_coulomb"
+parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 36.5, dilatancy_angle = 12.0, tensile_strength = 0.0 }}
+[groups]
+ground = {{ formulation = "solid", law = "ground", integration = "reduced" }}
+block = {{ formulation = "solid", law = "steel" }}
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[phase]]
+name = "push"
+increments = 3
+displacement = [{{ line = "head", y = -0.1 }}]
+[probes]
+head = {{ line = "head", quantity = "reaction_y", scale = -1.0 }}
+bottom = {{ line = "bottom", quantity = "reaction_y" }}
+[solver]
+max_halvings = 3
+{solver}
+"#
+    )
+}
+
+#[test]
+fn a_block_on_ground_that_flows_away_is_in_no_equilibrium() {
+    for method in [
+        "",
+        "force_tolerance = 1e-12",
+        "method = \"modified_newton\"",
+    ] {
+        match outcome(&block(method), ["head", "bottom"]) {
+            Ok([head, bottom]) => assert!(
+                (head - bottom).abs() < 1e-6 * head,
+                "{method}: {head}, {bottom}"
+            ),
+            Err(message) => assert!(message.contains("no equilibrium"), "{method}: {message}"),
+        }
+    }
+}
+
+#[test]
+fn a_footing_on_a_strongly_graded_mesh_carries_its_limit_load_or_says_that_it_does_not() {
+    let graded = |n| {
+        footing::text(Footing {
+            n,
+            increments: 2,
+            settlement: 1.0,
+            ..footing::TRESCA
+        })
+        .replace(
+            "[probes]",
+            "[probes]\nbottom = { line = \"bottom\", quantity = \"reaction_y\" }",
+        )
+    };
+    for by in [200.0, 2000.0] {
+        let text = strongly_graded(&graded(3), 3, by);
+        match outcome(&text, ["pressure", "bottom"]) {
+            Ok([pressure, bottom]) => {
+                // The meshes of `footing.rs` are within 10 % of the limit, from above.
+                let exact = 2.0 + PI;
+                assert!(
+                    pressure > 0.99 * exact && pressure < 1.1 * exact,
+                    "graded by {by}: {pressure}"
+                );
+                assert!(
+                    (pressure - bottom).abs() < 1e-6 * pressure,
+                    "graded by {by}: {bottom}"
+                );
+            }
+            Err(message) => assert!(
+                message.contains("no equilibrium"),
+                "graded by {by}: {message}"
+            ),
+        }
+    }
+}
+
+/// The mesh of a footing with elements that shrink by so much instead of 5.
+fn strongly_graded(text: &str, n: usize, by: f64) -> String {
+    let ratio = |by: f64| by.powf(-1.0 / n as f64);
+    let (mild, strong) = (ratio(5.0), ratio(by));
+    let mut text = text.to_owned();
+    for (old, new) in [
+        (format!("ratio = {mild} "), format!("ratio = {strong} ")),
+        (
+            format!("ratio = {} ", (1.0 / mild).sqrt()),
+            format!("ratio = {} ", (1.0 / strong).sqrt()),
+        ),
+        (
+            format!("ratio = {} ", mild.sqrt()),
+            format!("ratio = {} ", strong.sqrt()),
+        ),
+    ] {
+        assert_eq!(text.matches(&old).count(), 1, "{old}");
+        text = text.replace(&old, &new);
+    }
+    text
+}
+
+#[test]
+fn what_ran_away_is_named() {
+    // Corrections with a kept matrix, accelerated, leave the model altogether.
+    let failed = fail(&block("method = \"quasi_newton\""));
+    assert_eq!(failed.error.exit_code(), 2);
+    let message = failed.error.to_string();
+    assert!(message.contains(" ran away: "), "{message}");
+    assert!(message.contains("group `ground`"), "{message}");
+}
+
+#[test]
+fn both_criteria_are_given_and_the_failed_one_first() {
+    let failed = fail(&block(""));
+    let message = failed.error.to_string();
+    let at = |what: &str| {
+        message
+            .find(what)
+            .unwrap_or_else(|| panic!("{what}: {message}"))
+    };
+    let residual = at("residual");
+    assert!(residual < at("last correction"), "{message}");
+    assert!(message.contains("tolerance 1.0e-9") && message.contains("tolerance 1.0e-7"));
+}

@@ -1,0 +1,89 @@
+//! A layer that unloads to no stress at all.
+//!
+//! Goal        the end of unloading does not depend on which way up the model stands
+//! Geometry    a thin layer between two slabs, in the middle of the left part of a body
+//! Boundary    rollers below and left; head pushed by 0.1 mm and taken back
+//! Law         elastic; mepi in the layer, whose stiffness vanishes with its traction
+//! Asserts     both ways up: no force is left at the end
+
+use crate::setup::{Results, run};
+
+/// The body, or its mirror image in a horizontal plane.
+fn body(mirrored: bool) -> String {
+    let (down, up) = (1e-4, if mirrored { 1.0 } else { -1.0 });
+    let rows = if mirrored {
+        "[{ n = 1, to = -0.08336666666666667 }, { n = 1, to = -0.06673333333333334 }, { n = 1, to = -0.050100000000000006 }, { n = 1, to = -0.05 }, { n = 1, to = -0.03333333333333333 }, { n = 1, to = -0.016666666666666666 }, { n = 1, to = 0.0 }]"
+    } else {
+        "[{ n = 3, to = 0.05 }, { n = 1, to = 0.050100000000000006 }, { n = 3, to = 0.1 }]"
+    };
+    let (origin, b, i, top) = if mirrored {
+        (-0.1, [-0.1, 0.0], [-0.050100000000000006, -0.05], -0.1)
+    } else {
+        (0.0, [0.0, 0.1], [0.05, 0.050100000000000006], 0.1)
+    };
+    format!(
+        r#"
+analysis = "plane_strain"
+[mesh]
+origin = [5.0, {origin:?}]
+columns = [{{ n = 2, to = 5.4 }}, {{ n = 1, to = 5.4001 }}, {{ n = 2, to = 6.0, ratio = 1.0 }}]
+rows = {rows}
+[[mesh.region]]
+group = "a"
+[[mesh.region]]
+group = "b"
+x = [5.0, 5.4]
+y = {b:?}
+[[mesh.region]]
+group = "i"
+x = [5.0, 5.4]
+y = {i:?}
+[mesh.lines]
+left = {{ x = 5.0 }}
+bottom = {{ y = 0.0 }}
+head = {{ y = {top:?}, x = [5.0, 5.4] }}
+[laws]
+sand = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
+mepi = {{ law = "mepi", parameters = {{ k_n = 86e3, k_t = 37e3, n = 0.55, mu_0 = 0.27, mu_p = 0.7, mu_c0 = 0.46, a = 0.008, c_0 = 40.0, t = 0.002, p_0 = 100.0, sigma_ni = 100.0 }} }}
+[groups]
+a = {{ formulation = "solid", law = "sand", integration = "reduced" }}
+b = {{ formulation = "solid", law = "sand" }}
+i = {{ formulation = "thin_layer", law = "mepi", integration = "reduced", normal = "y" }}
+[[supports]]
+line = "bottom"
+fixed = ["y"]
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[phase]]
+name = "push"
+increments = 3
+displacement = [{{ line = "head", y = {:?} }}]
+[[phase]]
+name = "back"
+increments = 3
+displacement = [{{ line = "head", y = 0.0 }}]
+[probes]
+head = {{ line = "head", quantity = "reaction_y" }}
+"#,
+        up * down
+    )
+}
+
+#[test]
+fn both_ways_up_no_force_is_left() {
+    let mut pushed = Vec::new();
+    for mirrored in [false, true] {
+        let finished = run(&body(mirrored));
+        let force = finished.end_of("push", "head").abs();
+        assert!(force > 1.0, "{force} kN");
+        // Residuals of 1e-9 of that may be left.
+        assert!(
+            finished.last("head").abs() < 1e-8 * force,
+            "{mirrored}: {}",
+            finished.last("head")
+        );
+        pushed.push(force);
+    }
+    assert!((pushed[0] / pushed[1] - 1.0).abs() < 1e-8, "{pushed:?}");
+}
