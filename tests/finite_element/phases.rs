@@ -114,11 +114,10 @@ fn stress_is_carried_over_a_swap_of_laws() {
     }
     let summary = finished.summary();
     assert!(summary["phases"][1]["out_of_balance"].as_f64().unwrap() < EQUILIBRIUM);
-    assert!(
-        finished.observer.warnings.is_empty(),
-        "{:?}",
-        finished.observer.warnings
-    );
+    // Nothing but that a support's reaction is not the pressure beside it.
+    let warnings = &finished.observer.warnings;
+    let is_of_probe = |warning: &String| warning.starts_with("probe `on_top`");
+    assert!(warnings.iter().all(is_of_probe), "{warnings:?}");
 }
 
 #[test]

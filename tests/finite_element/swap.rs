@@ -29,8 +29,10 @@ use host::error::{Error, Place, Source};
 use host::input::parse;
 use host::run::{Observer, Options, run_reusing};
 use host::solver::Reuse;
-use std::cell::Cell;
+use host::stop::Stop;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tests::tolerance::EQUILIBRIUM;
 
@@ -234,17 +236,21 @@ fn an_interface_says_what_becomes_of_its_traction() {
 }
 
 /// Stops after so many increments.
-struct Stopping(Cell<usize>);
+struct Stopping {
+    left: usize,
+    flag: Arc<AtomicBool>,
+}
 
 impl Observer for Stopping {
     fn phase(&mut self, _: &str, _: usize) {}
     fn increment(&mut self, _: &Place, _: usize, _: usize) {
-        self.0.set(self.0.get().saturating_sub(1));
+        self.left = self.left.saturating_sub(1);
+        self.flag.store(self.left == 0, Ordering::Relaxed);
     }
     fn cut_back(&mut self, _: &Place, _: &str) {}
     fn warning(&mut self, _: &str) {}
-    fn wants_to_stop(&self) -> bool {
-        self.0.get() == 0
+    fn stop(&self) -> Stop {
+        Stop::flag(Arc::clone(&self.flag))
     }
 }
 
@@ -260,7 +266,10 @@ fn run_until(text: &str, folder: &Path, increments: usize) -> Result<(), Error> 
         resume: true,
         checkpoints: Some(Duration::ZERO),
     };
-    let mut observer = Stopping(Cell::new(increments));
+    let mut observer = Stopping {
+        left: increments,
+        flag: Arc::default(),
+    };
     run_reusing(&case, folder, &mut observer, &mut Reuse::default(), options).map(|_| ())
 }
 
