@@ -114,8 +114,10 @@ fn stress_is_carried_over_a_swap_of_laws() {
     }
     let summary = finished.summary();
     assert!(summary["phases"][1]["out_of_balance"].as_f64().unwrap() < EQUILIBRIUM);
+    // One probe reads the reaction of a line under pressure, on purpose.
+    let beside = |warning: &String| warning.starts_with("probe `on_top`: `reaction_y`");
     assert!(
-        finished.observer.warnings.is_empty(),
+        finished.observer.warnings.iter().all(beside),
         "{:?}",
         finished.observer.warnings
     );
