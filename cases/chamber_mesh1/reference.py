@@ -5,7 +5,9 @@ Problem   De Gennaro & Frank, "Modelisation de l'interaction sol-pieu par la met
           mesh 1, elastic sand, thin layer (t = 2 mm) with the interface law MEPI without softening on the shaft.
           Axisymmetric, small strains, units kN, m, kPa; finite-element stresses tension positive; forces are
           for the whole turn (2 pi).  Phase 1: confinement, one increment, everything elastic (layer = sand).
-          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head pushed 5 mm in 50 increments.
+          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head free, 5 increments.  What MEPI returns at
+          the strain it starts from is the stress it starts from; the force that this leaves out of balance is taken off
+          in proportion to the phase's course.  Phase 3: head pushed 5 mm in 50 increments; displacements from its start.
 Source    MEPI: equations (6)-(10), (12)-(17); thin layer: (18)-(19); parameters: Tables III and IV, p_0 = 100 kPa.
 Method    8-node quads, 3x3 Gauss points (--points 2: 2x2), full Newton with the consistent tangent, backtracking
           line search, start from the last increment (else from the tangent), relative residual 1e-10 over the free
@@ -25,7 +27,7 @@ from scipy.sparse.linalg import splu
 
 TAU2 = 2.0 * np.pi
 STEEL, SAND = (210e6, 0.28), (34e3, 0.30)                    # E [kPa], nu
-TOL, MAXIT, PRESSURE = 1e-10, 25, 100.0
+TOL, MAXIT, PRESSURE, SWAP = 1e-10, 25, 100.0, 5
 
 
 # ---------------------------------------------------------------- MEPI (compression and contraction positive)
@@ -52,13 +54,18 @@ class Mepi:
         st, tt = sn0 + self.kn * dun, tau0 + self.kt * dut
         if st <= 0.0:
             return st, 0.0, xi0, np.zeros((2, 2))                           # separation
+        dst, dtt = np.array([self.kn, 0.0]), np.array([0.0, self.kt])
+        if sn0 < 0.0:            # contact re-forms: only the part of the (straight) increment after that acts
+            part = st / (st - sn0)
+            tt = self.kt * dut * part
+            dtt = np.array([-self.kt * dut * self.kn * sn0 / (st - sn0) ** 2, self.kt * part])
         s, at = np.sign(tt), abs(tt)
 
         def f(dl):
             mu, _, g, _ = self.functions(xi0 + dl)
             return at - self.kt * dl - mu * (st - self.kn * dl * g)
         if f(0.0) <= 0.0:
-            return st, tt, xi0, np.diag([self.kn, self.kt])
+            return st, tt, xi0, np.array([dst, dtt])
         grid = np.linspace(0.0, at / self.kt, 129)                          # |tau| >= 0 bounds d lambda
         neg = np.nonzero(f(grid) <= 0.0)[0]
         if neg.size == 0:        # contraction uses up sn before slip ends: separation reached during the increment
@@ -70,9 +77,8 @@ class Mepi:
         mu, dmu, g, dg = (float(v) for v in self.functions(xi0 + dl))
         sn, tau = st - self.kn * dl * g, s * (at - self.kt * dl)
         slope = -self.kt - dmu * sn + mu * self.kn * (g + dl * dg)          # dF/d(d lambda)
-        ddl = np.array([mu * self.kn, -s * self.kt]) / slope                # d(d lambda)/d(un, ut)
-        tangent = np.array([np.array([self.kn, 0.0]) - self.kn * (g + dl * dg) * ddl,
-                            np.array([0.0, self.kt]) - s * self.kt * ddl])
+        ddl = (mu * dst - s * dtt) / slope                                  # d(d lambda)/d(un, ut)
+        tangent = np.array([dst - self.kn * (g + dl * dg) * ddl, dtt - s * self.kt * ddl])
         return sn, tau, xi0 + dl, tangent
 
 
@@ -210,17 +216,22 @@ class Chamber:
         K = sp.csc_matrix((ke.ravel(), (self.rows, self.cols)), shape=(self.ndof,) * 2)
         return f, K, fe, new, sig
 
-    def newton(self, u0, state, law, in_plane, fixed, dfixed, guess=None):
+    def take_over(self, u, state, law, in_plane):
+        """what the law makes of the stresses it finds, at the same strain, and the force this leaves out of balance"""
+        _, _, _, state, _ = self.evaluate(u, u, state, law, in_plane)
+        return state, self.evaluate(u, u, state, law, in_plane)[0] - self.load
+
+    def newton(self, u0, state, law, in_plane, fixed, dfixed, load, guess=None):
         """one (sub)increment -> u, state, results, log.  guess: displacement increment to start from (None: tangent)"""
         free = np.setdiff1d(np.arange(self.ndof), fixed)
         u = u0 if guess is None else u0 + guess
         step = u0[fixed] + dfixed - u[fixed]                               # imposed by the first iteration
-        size = lambda out: np.linalg.norm((self.load - out[0])[free]) / np.linalg.norm(out[0])
+        size = lambda out: np.linalg.norm((load - out[0])[free]) / np.linalg.norm(out[0])
         out, log = self.evaluate(u, u0, state, law, in_plane), []
         while len(log) < MAXIT:
             K, du = out[1].tocsr()[free], np.zeros(self.ndof)
             du[fixed] = step
-            du[free] = splu(K[:, free].tocsc()).solve((self.load - out[0])[free] - K[:, fixed] @ step)
+            du[free] = splu(K[:, free].tocsc()).solve((load - out[0])[free] - K[:, fixed] @ step)
             trials = []
             for a in 0.5 ** np.arange(6 if log and log[-1] > 1e-8 else 1):  # backtracking line search
                 trials.append((size(o := self.evaluate(u + a * du, u0, state, law, in_plane)), a, o))
@@ -264,26 +275,29 @@ def run(args):
 
     # phase 1, confinement
     fixed = np.concatenate([ch.axis, ch.top])
-    u, _, (f, fe, sig), log = ch.newton(np.zeros(ch.ndof), None, None, True, fixed, np.zeros(fixed.size))
-    record("confinement", 1, f, fe, sig, 0.0, [log])
+    u, _, (f, fe, sig), log = ch.newton(np.zeros(ch.ndof), None, None, True, fixed, np.zeros(fixed.size), ch.load)
+    record("confinement", 1, f, fe, sig, -u[ch.head].mean() * 1000, [log])
     print("confinement: head u_z [mm], per node:", u[ch.head] * 1000, "layer: max |tau|/sn",
           np.max(np.abs(sig[ch.is_layer][..., 3]) / -sig[ch.is_layer][..., 0]))
-    # phase 2, loading
+    # phase 2, the interface: nothing moves but what the law sets free
     s0 = sig[ch.is_layer]
     state = (s0, -s0[:, :, 0], np.zeros(s0.shape[:2]))
-    fixed = np.concatenate([ch.axis, ch.top, ch.head])
-    prescribed = np.concatenate([np.zeros(ch.axis.size + ch.top.size), -np.ones(ch.head.size)])
+    state, rest = ch.take_over(u, state, law, not args.no_in_plane)
+    rest[fixed] = 0.0
+    head = ch.head
 
-    last = [None, 1.0]                                                     # last increment of u, and of the head
+    last = [None, 1.0]                                                     # last increment of u, and of the phase's course
 
-    def advance(u, state, d, depth, logs):
+    def advance(u, state, start, part, depth, logs):
+        """from `start` by `part` of the phase; `push`: displacement in the whole phase, of the degrees of freedom `fixed`"""
         err = None
-        for guess in ([] if last[0] is None else [last[0] * (d / last[1])]) + [None]:
+        for guess in ([] if last[0] is None else [last[0] * (part / last[1])]) + [None]:
             try:
-                u1, st1, out, log = ch.newton(u, state, law, not args.no_in_plane, fixed, prescribed * d, guess)
+                u1, st1, out, log = ch.newton(u, state, law, not args.no_in_plane, fixed, push * part,
+                                              ch.load + (1.0 - (start + part)) * rest, guess)
                 logs.append(log)
                 total[0] += len(log)
-                last[:] = u1 - u, d
+                last[:] = u1 - u, part
                 return u1, st1, out
             except (FloatingPointError, RuntimeError) as e:
                 err = e
@@ -292,14 +306,24 @@ def run(args):
         print("  cut-back:", err)
         if depth == 12:
             raise SystemExit(f"gave up after {len(rows) - 1} increments: {err}")
-        u, state, _ = advance(u, state, d / 2, depth + 1, logs)
-        return advance(u, state, d / 2, depth + 1, logs)
+        u, state, _ = advance(u, state, start, part / 2, depth + 1, logs)
+        return advance(u, state, start + part / 2, part / 2, depth + 1, logs)
 
     worst = 0
     try:
+        push = np.zeros(fixed.size)
+        for inc in range(1, SWAP + 1):
+            logs = []
+            u, state, out = advance(u, state, (inc - 1) / SWAP, 1 / SWAP, 0, logs)
+            record("interface", inc, *out, -u[head].mean() * 1000, logs)
+        print(f"interface: {total[0]} iterations, {total[1]} cut-backs")
+        # phase 3, loading
+        fixed = np.concatenate([fixed, head])
+        push = np.where(np.isin(fixed, head), -0.005, 0.0)
+        rest[:], last[0], total[0] = 0.0, None, 0
         for inc in range(1, args.increments + 1):
             logs = []
-            u, state, out = advance(u, state, 0.005 / args.increments, 0, logs)
+            u, state, out = advance(u, state, (inc - 1) / args.increments, 1 / args.increments, 0, logs)
             worst = max(worst, max(len(l) for l in logs))
             record("loading", inc, *out, 5.0 * inc / args.increments, logs)
     finally:

@@ -262,7 +262,7 @@ impl Observer for Increments {
 }
 
 /// A whole run with its results, without their report; items are increments. The chamber's are one
-/// of confinement and 50 of loading.
+/// of confinement, 5 in which the law is swapped, and 50 of loading.
 fn whole(bencher: Bencher<'_, '_>, case: &Case) {
     let results = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("bench_{}", case.name()));
     let mut count = Increments::default();

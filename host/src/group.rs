@@ -4,6 +4,7 @@
 //! from it, so a failed increment leaves nothing behind.
 
 mod layer;
+mod takeover;
 mod tangent;
 
 pub use tangent::Fault;
@@ -20,6 +21,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
+pub use takeover::TakeOver;
 
 /// Points that one thread takes at a time.
 const BATCH: usize = 1024;
@@ -186,6 +188,9 @@ pub struct Group {
     /// Tangents of the element, point by point; of a linear law, those of one element only.
     tangent: Vec<f64>,
     tangents_are_constant: bool,
+    /// The trial state is what the law, which starts now, makes of the committed one over a nil
+    /// increment.
+    is_asked: bool,
 }
 
 impl Group {
@@ -221,6 +226,7 @@ impl Group {
             watched: 0,
             tangent: Vec::new(),
             tangents_are_constant: false,
+            is_asked: false,
         };
         group.start_law(law, None)?;
         Ok(group)
@@ -290,10 +296,12 @@ impl Group {
             self.tangent = tangent.into_owned();
         }
         self.law_calls = state.law_calls.into_owned();
+        self.forget_trial();
         Ok(())
     }
 
     fn start_law(&mut self, law: GroupLaw, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
+        self.forget_trial();
         self.law = law;
         self.watched = calls::name(&format!("group `{}`", self.name));
         let law = &self.law.built.law;
@@ -340,13 +348,18 @@ impl Group {
         self.tangent = vec![0.0; n_points * element_n * element_n];
         if self.uses_layer() {
             let mut operator = vec![0.0; n_points * n * n];
-            self.run_law(Operator::Elastic, 0.0, 0.0, &mut operator)
-                .map_err(|failure| self.locate(&failure))?;
+            self.run_law(
+                Operator::Elastic,
+                self.moment.step_start,
+                0.0,
+                &mut operator,
+            )
+            .map_err(|failure| self.locate(&failure))?;
             if let Some(layer) = &mut self.layer {
                 layer.start(&operator, starts_anew);
             }
-            // That was no state of the group's, only a call of its law.
-            self.forget_trial();
+            // No state of the group's before it is taken over.
+            self.is_asked = true;
         }
         Ok(())
     }
@@ -689,6 +702,7 @@ impl Group {
 
     /// Gives up the room of the trial state until the next one is computed.
     pub fn forget_trial(&mut self) {
+        self.is_asked = false;
         self.fields().for_each(Field::forget_trial);
     }
 

@@ -5,6 +5,7 @@ mod history;
 mod keeper;
 mod method;
 mod path;
+mod start;
 mod statics;
 
 use crate::assembly::{Bodies, Places, System, fold};
@@ -15,7 +16,7 @@ use crate::custody;
 use crate::error::{Error, Place};
 use crate::group::{Group, GroupLaw};
 use crate::mesh::Mesh;
-use crate::model::{Model, cannot_start, unit_pressure};
+use crate::model::{Model, unit_pressure};
 use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figures};
 use crate::plugin::{Library, Moment};
 use crate::probe::{Probes, Snapshot};
@@ -391,7 +392,7 @@ impl<'a> Run<'a> {
         let name = phase.name.get_ref();
         let loads = match &course {
             Some(course) => course.loads.clone(),
-            None => self.begin(number, phase)?,
+            None => self.begin(number, phase, results, observer)?,
         };
         let is_prescribed: Vec<bool> = (0..self.displacement.len())
             .map(|dof| self.prescribed.contains_key(&dof))
@@ -457,22 +458,6 @@ impl<'a> Run<'a> {
             .look(mesh, analysis, &self.groups, &self.displacement);
         results.phase(equations.counted_in(&record));
         outcome
-    }
-
-    /// Begins a phase: its laws and its loads.
-    fn begin(&mut self, number: usize, phase: &PhaseInput) -> Result<Loads, Error> {
-        for (group, law) in self.model.swaps[number].clone() {
-            self.groups[group]
-                .set_law(law)
-                .map_err(|failure| cannot_start(&self.case.source, self.file(), &failure))?;
-        }
-        Model::check_layers(self.case, &self.groups)?;
-        // The equations of the phase are set up in the room of trial states.
-        self.groups.iter_mut().for_each(Group::forget_trial);
-        let mut loads = self.loads(phase);
-        fold(&self.model.ties, &mut loads.force_start);
-        fold(&self.model.ties, &mut loads.force_end);
-        Ok(loads)
     }
 
     fn increments(

@@ -19,8 +19,13 @@ fn case(name: &str) -> PathBuf {
 fn run(name: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
     let mut warnings = run_case(&case(name), folder.path()).unwrap().warnings;
+    // What a swap changes is said, and that the joint ends inside the mesh; their READMEs say so.
+    warnings.retain(|warning| {
+        !warning.contains("takes over group `interface`")
+            && !warning.contains("out of balance")
+            && !warning.contains("group `interface` ends inside the mesh")
+    });
     if name == "chamber_oriented" {
-        // Its README says so.
         warnings.retain(|warning| !warning.contains("viscous relaxation"));
     }
     if name == "chamber_joint" {
@@ -45,8 +50,8 @@ fn every_probe_equals_that_of_an_independent_program() {
     let folder = run("chamber_mesh1");
     let rows = table(&folder.path().join("history.csv"));
     let reference = reference();
-    assert_eq!(rows.len(), 51);
-    assert_eq!(reference.len(), 51);
+    assert_eq!(rows.len(), 56);
+    assert_eq!(reference.len(), 56);
     for probe in [
         "tau_shaft",
         "sigma_n_shaft",
@@ -64,11 +69,7 @@ fn every_probe_equals_that_of_an_independent_program() {
         for (ours, theirs) in rows.iter().zip(&reference) {
             assert_eq!(ours["phase"], theirs["phase"]);
             assert_eq!(ours["increment"], theirs["increment"]);
-            // The reference counts w_t from the end of confinement.
-            if probe == "w_t" && ours["phase"] == "confinement" {
-                continue;
-            }
-            // Both programs iterate to 1e-9 or below; the measured difference is 4e-12.
+            // Both programs iterate to 1e-9 or below; the measured difference is 1e-10, from `q_s` while the law is swapped.
             let difference = (number(ours) - number(theirs)).abs();
             assert!(
                 difference <= EQUILIBRIUM * largest,
@@ -99,9 +100,9 @@ fn no_cut_back_is_needed_and_iterations_converge_quadratically() {
     let summary = std::fs::read_to_string(folder.path().join("summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["status"], "done");
-    assert_eq!(summary["phases"][1]["increments"], 50);
+    assert_eq!(summary["phases"][2]["increments"], 50);
     // An independent program that starts increments the same way needed 147.
-    assert!(summary["phases"][1]["iterations"].as_u64().unwrap() <= 200);
+    assert!(summary["phases"][2]["iterations"].as_u64().unwrap() <= 200);
 }
 
 /// Friction on the shaft at the end of loading, and the balance of vertical loads throughout.
@@ -117,9 +118,15 @@ fn assert_friction_and_balance(name: &str) {
         "{}",
         tau / sigma
     );
-    let q_t = column(&history, "q_t");
+    let loading = |row: &&BTreeMap<String, String>| row["phase"] == "loading";
+    let q_t: Vec<f64> = table(&history)
+        .iter()
+        .filter(loading)
+        .map(|row| row["q_t"].parse().unwrap())
+        .collect();
+    assert_eq!(q_t.len(), 50);
     assert!(
-        q_t.windows(2).skip(1).all(|pair| pair[1] >= pair[0]),
+        q_t.windows(2).all(|pair| pair[1] >= pair[0]),
         "the head load only rises"
     );
 }

@@ -29,7 +29,7 @@ fn growth(values: &[f64]) -> f64 {
 fn without_dilation_the_ultimate_friction_is_about_the_same() {
     let [mepi, oriented, joint] = ["mepi", "oriented", "joint"].map(|v| finished(CASE, v));
     let (m, o, j) = (friction(&mepi), friction(&oriented), friction(&joint));
-    // Measured at 3 mm: 94.2, 101.1, 99.5 kPa; at 5 mm: 96.5, 109.4, 99.7 kPa.
+    // Measured at 3 mm: 93.9, 100.6, 99.6 kPa; at 5 mm: 96.2, 109.1, 99.7 kPa.
     assert_close(m[29], j[29], 0.07, "MEPI and joint at 3 mm");
     assert_close(o[29], j[29], 0.07, "oriented criterion and joint at 3 mm");
     assert_close(m[49], j[49], 0.07, "MEPI and joint at 5 mm");
@@ -46,9 +46,10 @@ fn without_dilation_the_ultimate_friction_is_about_the_same() {
 fn mepi_mobilises_friction_gradually() {
     let share = |variant: &str| {
         let friction = friction(&finished(CASE, variant));
-        friction[0] / friction[29]
+        friction[1] / friction[29]
     };
-    // Share of the friction at 3 mm that the first 0.1 mm mobilises: 0.79, 0.88, 0.98.
+    // Share of the friction at 3 mm that the first 0.2 mm mobilises, half of which makes up for what the pile has risen
+    // when the law was swapped: 0.76, 0.87, 0.99.
     let [mepi, oriented, joint] = ["mepi", "oriented", "joint"].map(share);
     assert!(mepi < 0.82 && oriented > 0.85 && joint > 0.95);
 }
@@ -77,8 +78,8 @@ fn dilation_adds_little_with_the_joint_is_limited_with_mepi_excessive_with_the_c
         let more = |values: fn(&Run) -> Vec<f64>| values(&dilating)[49] / values(&not)[49];
         (more(friction), growth(&normal(&dilating)))
     };
-    // Factor on the friction, and growth of the normal stress: 1.24 and 35 kPa, 1.04 and 9 kPa,
-    // 7.7 and 1070 kPa.
+    // Factor on the friction, and growth of the normal stress: 1.24 and 34 kPa, 1.04 and 9 kPa,
+    // 7.7 and 1057 kPa.
     let (joint, mepi, oriented) = (gain("joint"), gain("mepi"), gain("oriented"));
     assert!(
         joint.0 > 1.02 && joint.0 < 1.3 && joint.1 < 40.0,
@@ -86,7 +87,8 @@ fn dilation_adds_little_with_the_joint_is_limited_with_mepi_excessive_with_the_c
     );
     assert!(mepi.0 > 1.02 && mepi.0 < 1.1 && mepi.1 < 15.0, "{mepi:?}");
     assert!(oriented.0 > 5.0 && oriented.1 > 500.0, "{oriented:?}");
-    // The criterion keeps growing; MEPI's dilation is over after 1 mm.
+    // The criterion keeps growing; MEPI's dilation is over 1 mm below where the pile stood before the swap let it rise
+    // by 0.12 mm.
     let sigma = normal(&finished(DILATING, "oriented"));
     assert_close(
         sigma[49] - sigma[39],
@@ -100,7 +102,7 @@ fn dilation_adds_little_with_the_joint_is_limited_with_mepi_excessive_with_the_c
         .map(|(dilating, not)| dilating - not)
         .collect();
     assert_close(
-        difference[9],
+        difference[10],
         difference[49],
         0.03,
         "what dilation adds to MEPI",

@@ -17,7 +17,7 @@ fn loading(run: &Run, probe: &str) -> Vec<f64> {
 #[test]
 fn lateral_pressure_falls_a_little_then_rises_to_the_papers_value() {
     let run = finished(CASE, "dilating");
-    // At half the shaft's length: 1.378, least 1.367 at 0.3 mm, 1.437 at 5 mm.
+    // At half the shaft's length: 1.378, after the swap 1.374, least 1.369 at 0.3 mm, 1.436 at 5 mm.
     let middle = loading(&run, "k_l_middle");
     let start = run.end("confinement", "k_l_middle");
     let least = middle.iter().copied().fold(f64::INFINITY, f64::min);
@@ -25,7 +25,7 @@ fn lateral_pressure_falls_a_little_then_rises_to_the_papers_value() {
     assert!(middle[9..].windows(2).all(|pair| pair[1] > pair[0]));
     // The paper's 1.55, with a head displacement of 10 mm.
     assert_close(run.end("loading", "k_l"), 1.55, 0.01, "K_l at 10 mm");
-    assert_close(loading(&run, "k_l")[49], 1.466, 0.001, "K_l at 5 mm");
+    assert_close(loading(&run, "k_l")[49], 1.456, 0.001, "K_l at 5 mm");
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn without_dilation_lateral_pressure_falls_first_and_stays_lower() {
     let (k_l, start) = (loading(&run, "k_l"), run.end("confinement", "k_l"));
     assert!(k_l[..5].iter().all(|&k| k < start && k > start - 0.05));
     let dilating = loading(&finished(CASE, "dilating"), "k_l");
-    // What dilation adds is complete after 1 mm and stays: 0.054 there, 0.056 at 10 mm.
+    // What dilation adds is complete after 1 mm and stays: 0.049 there, 0.051 at 10 mm.
     assert!(
         k_l.iter()
             .zip(&dilating)
@@ -89,7 +89,7 @@ fn displacements_concentrate_at_the_pile() {
     let run = finished(CASE, "dilating");
     let [near, middle, far] = ["w_12_mm", "w_42_mm", "w_104_mm"].map(|name| loading(&run, name));
     let head = loading(&run, "w_t");
-    // Settlement decays with the distance, and its share of the head's falls: 0.36, 0.18, 0.08.
+    // Settlement decays with the distance, and its share of the head's falls: 0.53, 0.26, 0.09.
     assert!((0..100).all(|i| near[i] > middle[i] && middle[i] > far[i]));
     let share = |i: usize| near[i] / head[i];
     assert!(share(1) > 1.8 * share(9) && share(9) > 1.8 * share(99));

@@ -16,6 +16,7 @@ fn meshes_1_and_2_nearly_coincide() {
     assert_eq!(mesh["nodes"], 405);
     assert_eq!(mesh["elements"], 120);
     assert_eq!(one.summary["mesh"]["nodes"], 629);
+    // Measured: 4.4 %, 4.7 %, 2.7 %.
     for (probe, tolerance) in [("tau_shaft", 0.05), ("sigma_n_shaft", 0.055), ("q_t", 0.05)] {
         let [a, b] = [&one, &two].map(|run| run.probe("loading", probe));
         let largest = a.last().unwrap();

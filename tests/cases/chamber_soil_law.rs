@@ -15,6 +15,7 @@ fn loads_balance() {
     for variant in ["elastic", "mohr_coulomb"] {
         let run = finished(CASE, variant);
         let plate = 100.0 * PI * 0.262 * 0.262;
+        // While the law is swapped, the head carries what is not yet taken off of the force this frees.
         for phase in ["confinement", "loading"] {
             let fraction = |i: usize| {
                 if phase == "confinement" {
@@ -59,7 +60,7 @@ fn lateral_pressure_keeps_rising() {
     assert!(sigma[4..].windows(2).all(|pair| pair[1] > pair[0]));
     // It does not settle: the last millimetre adds as much as the one from 2 to 3 mm, or more.
     assert!(sigma[49] - sigma[39] > sigma[29] - sigma[19]);
-    assert_eq!(run.summary["phases"][1]["cut_backs"], 0);
+    assert_eq!(run.summary["phases"][2]["cut_backs"], 0);
 }
 
 #[test]

@@ -19,6 +19,7 @@ mod results;
 mod resume;
 mod stopping;
 mod streams;
+mod swapped;
 mod syntax;
 mod trade_off;
 mod troubled;

@@ -25,6 +25,7 @@ mod sections;
 mod setup;
 mod sliding_block;
 mod snap_back;
+mod swap;
 mod thick_cylinder;
 mod thin_layer;
 mod zero_stress;

@@ -18,7 +18,15 @@ const KEPT: [&str; 4] = ["auto", "modified_newton", "initial_stress", "quasi_new
 fn chamber(method: &str) -> Finished {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/chamber_mesh1/case.toml");
     let text = std::fs::read_to_string(path).unwrap();
+    // The head is held while the law is swapped: free, it hangs on the friction that the swap takes away, and there
+    // `modified_newton` goes to and fro between two pieces of the law, at corrections four times the tolerance.
+    let swap = "laws = { interface = \"mepi\" }";
+    let held = format!(
+        "{swap}\nreset_displacements = true\ndisplacement = [{{ line = \"pile_head\", z = 0.0 }}]"
+    );
+    assert_eq!(text.matches(swap).count(), 1);
     let text = text
+        .replace(swap, &held)
         .replace("increments = 50", "increments = 10")
         .replace("-0.005", "-0.001")
         .replace("fields = \"phases\"", "");
@@ -71,8 +79,8 @@ fn methods_agree_in_the_chamber() {
             &["q_t", "tau_shaft", "sigma_n_shaft"],
         );
         if method == "initial_stress" {
-            // The elastic interface, and the linear groups that are condensed.
-            assert_eq!(count(&other, "factorisations"), 2);
+            // The elastic interface; the linear groups are condensed since the swap, which holds the same nodes.
+            assert_eq!(count(&other, "factorisations"), 1);
         }
     }
 }

@@ -3,7 +3,7 @@
 //! Goal        iterations that alternate between two pieces of the law come to the next stable
 //!             equilibrium by viscous relaxation, or say what they alternate between
 //! Geometry    the chamber of `cases/chamber_mesh1`, interface with means over the thickness
-//! Boundary    as there; confined in 10 increments, the head pushed by 2 mm in 20
+//! Boundary    as there; confined in 10 increments, the head pushed by 2 mm in 20, the law swapped as that starts
 //! Law         mohr_coulomb without cohesion (not associated), mepi in the interface
 //! Asserts     equilibrium of the loads, every increment ended by Newton iterations within the
 //!             tolerance; without relaxation, exit code 2 and the point that alternates
@@ -16,6 +16,9 @@ use std::path::Path;
 fn chamber(solver: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/chamber_mesh1/case.toml");
     let mut text = std::fs::read_to_string(path).unwrap();
+    let swap = text.find("[[phase]]\nname = \"interface\"").unwrap();
+    let loading = text.find("[[phase]]\nname = \"loading\"").unwrap();
+    text.replace_range(swap..loading, "");
     for (old, new) in [
         (
             "law = \"elastic\"\nparameters = { young_modulus = 34e3, poisson_ratio = 0.3 }",
@@ -24,7 +27,11 @@ fn chamber(solver: &str) -> String {
         ),
         ("integration = \"full\"", "integration = \"mean\""),
         ("increments = 1\n", "increments = 10\n"),
-        ("increments = 50", "increments = 20"),
+        // The law is swapped while the head is pushed: after a swap of its own nothing stands still.
+        (
+            "name = \"loading\"\nincrements = 50",
+            "name = \"loading\"\nincrements = 20\nlaws = { interface = \"mepi\" }",
+        ),
         ("-0.005", "-0.002"),
         (
             "[probes]",
@@ -64,8 +71,12 @@ fn relaxation_finds_the_next_equilibrium() {
         finished.in_phase("loading", "top"),
         finished.in_phase("loading", "q_t"),
     );
-    for (top, head) in top.iter().zip(&head) {
-        assert_close("loads", head - top, plate, 1e-8, plate);
+    // The force that the swap of the law frees is taken off in proportion to the phase.
+    let freed = (head[0] - top[0] - plate) / 0.95;
+    assert!(freed.abs() < 1e-5 * plate, "{freed}");
+    for (i, (top, head)) in top.iter().zip(&head).enumerate() {
+        let left = freed * (1.0 - 0.05 * (i + 1) as f64);
+        assert_close("loads", head - top, plate + left, 1e-8, plate);
     }
     assert!(head.windows(2).all(|pair| pair[1] > pair[0]), "{head:?}");
     // The state depends on the course of the relaxation, and says so.
@@ -76,7 +87,9 @@ fn relaxation_finds_the_next_equilibrium() {
 
 #[test]
 fn a_standstill_is_explained() {
-    let failed = fail(&chamber("\n[solver]\nrelaxation = false\n"));
+    // Smaller steps find a way round.
+    let solver = "\n[solver]\nrelaxation = false\nmax_halvings = 0\n";
+    let failed = fail(&chamber(solver));
     assert_eq!(failed.error.exit_code(), 2);
     let message = failed.error.to_string();
     assert!(message.contains("group `sand`, element "), "{message}");

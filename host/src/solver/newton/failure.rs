@@ -113,6 +113,11 @@ impl StepFailure {
         }
     }
 
+    /// The failure of a law.
+    pub fn of_law(failure: PointFailure) -> Self {
+        super::failed_law(failure)
+    }
+
     /// A step that was stopped as asked.
     pub fn stopped() -> Self {
         Self {
