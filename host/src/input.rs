@@ -377,18 +377,18 @@ impl ForeignKeys<'_> {
 
     /// Traps and scratch folders are a matter of the workers of UMATs.
     fn refuse_without_worker(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
-        let is_trap = |written: &&Spanned<Externals>| *written.get_ref() == Externals::Trap;
-        let is_kept = |written: &&Spanned<Scratch>| *written.get_ref() == Scratch::Keep;
+        let is_trap = |written: &Spanned<Externals>| *written.get_ref() == Externals::Trap;
+        let is_kept = |written: &Spanned<Scratch>| *written.get_ref() == Scratch::Keep;
         let keys = [
             (
                 "externals",
                 self.externals.map(Spanned::span),
-                self.externals.filter(is_trap).is_some(),
+                self.externals.is_some_and(is_trap),
             ),
             (
                 "scratch",
                 self.scratch.map(Spanned::span),
-                self.scratch.filter(is_kept).is_some(),
+                self.scratch.is_some_and(is_kept),
             ),
         ];
         let in_process = self.in_process.is_some_and(|written| *written.get_ref());

@@ -13,8 +13,8 @@ mod summary;
 
 pub(crate) use figure::COLOURS;
 pub use figure::{Figures, check_figures, check_table_figures};
-pub(crate) use file::check_own;
 pub use file::refuse_other;
+pub(crate) use file::{Identity, check_own, identity};
 pub(crate) use file::{begin, is_same, replace};
 pub use summary::PhaseRecord;
 

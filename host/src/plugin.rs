@@ -342,7 +342,7 @@ impl LoadedLaw {
                 let library = &self.library;
                 let law = (self.number, index);
                 isolate::IsolatedInstance::create(library, law, parameters, *is_serial)
-                    .map(LawInstance::Apart)
+                    .map(|apart| LawInstance::Apart(Box::new(apart)))
             }
         };
         let created = calls::calling(name, Doing::Create, 0, Moment::default(), create);
@@ -391,7 +391,7 @@ enum LawInstance {
     Here(OwnedInstance),
     Foreign(Box<dyn ForeignInstance>),
     #[cfg(unix)]
-    Apart(isolate::IsolatedInstance),
+    Apart(Box<isolate::IsolatedInstance>),
 }
 
 impl LawInstance {

@@ -20,7 +20,7 @@ pub use table::{Row, Table};
 
 use crate::capsule::{self, Capsule};
 use crate::error::{Error, suggestion};
-use crate::output::{Figures, is_same};
+use crate::output::{Figures, Identity, check_own, identity, is_same};
 use crate::plugin::Moment;
 use crate::plugin::adapter::{self, Adapter};
 use abi::status::Outcome;
@@ -242,7 +242,12 @@ fn run_all(
             source,
         })?;
         let mut figures = driver.empty_figures();
-        let result = driver.follow(Guarded { file, length: 0 }, &csv, &mut figures);
+        let out = Guarded {
+            own: identity(&file),
+            file,
+            length: 0,
+        };
+        let result = driver.follow(out, &csv, &mut figures);
         drawn.push((driver.variant.clone().unwrap_or_default(), figures));
         let mut done = result?;
         done.csv = Some(csv);
@@ -261,13 +266,14 @@ fn run_all(
 /// process as it was.
 struct Guarded {
     file: File,
+    own: Identity,
     length: u64,
 }
 
 impl Write for Guarded {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         crate::custody::restore().map_err(io::Error::other)?;
-        crate::output::check_own(&self.file, self.length)?;
+        check_own(&self.file, self.own, self.length)?;
         let n = self.file.write(bytes)?;
         self.length += n as u64;
         Ok(n)
@@ -471,26 +477,32 @@ impl Driver {
             ));
         }
         warnings.extend(self.law.take_notes());
+        Ok(self.report(&walk, increment, warnings))
+    }
+
+    /// What came of a walk to its end.
+    fn report(&self, walk: &Walk<'_>, increments: usize, warnings: Vec<String>) -> PointReport {
+        let n = self.law.n_components();
         let Point {
             gradient,
             flux,
             internal,
         } = &walk.point;
         let values = gradient[..n].iter().chain(&flux[..n]).chain(internal);
-        Ok(PointReport {
+        PointReport {
             variant: self.variant.clone(),
             law: self.law.description().id.clone(),
             version: self.law.description().version.clone(),
             library: self.law.library().path().to_owned(),
             sha256: self.law.library().sha256().to_owned(),
             hypothesis: self.law.hypothesis().name(),
-            increments: increment,
+            increments,
             calls: walk.search.calls,
             cut_backs: walk.cut_backs,
             last: self.columns().into_iter().zip(values.copied()).collect(),
             warnings,
             csv: None,
-        })
+        }
     }
 
     /// The initial state, checked by an update of no size.
@@ -770,7 +782,7 @@ impl Walk<'_> {
         Ramp { from, to }
     }
 
-    fn shortfall(&self, reached: f64, to: &Goal, obstacle: Obstacle) -> Stop {
+    fn shortfall(reached: f64, to: &Goal, obstacle: Obstacle) -> Stop {
         Stop::Shortfall(Box::new(Shortfall {
             reached,
             asked: to.flux,
@@ -833,7 +845,7 @@ impl Walk<'_> {
             may_grow = false;
             self.cut_backs += 1;
             if size < SMALLEST_STEP || self.search.calls - first_call > MAX_CALLS {
-                return Err(self.shortfall(done, to, obstacle));
+                return Err(Self::shortfall(done, to, obstacle));
             }
         }
         self.first_step = size;
@@ -842,7 +854,7 @@ impl Walk<'_> {
             Some(miss) => {
                 let mut obstacle = self.search.take_obstacle();
                 obstacle.miss = Some(miss);
-                Err(self.shortfall(1.0, to, obstacle))
+                Err(Self::shortfall(1.0, to, obstacle))
             }
         }
     }

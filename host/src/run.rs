@@ -858,10 +858,9 @@ impl<'a> Run<'a> {
         }
         fold(&self.model.ties, &mut reaction);
         // Where a part of a domain is looked at, the forces on its boundary stand for the rest.
-        let mut beside = Vec::new();
+        let mut beside = None;
         if let Some(domain) = &mut equations.domain {
             let tolerance = self.case.file.solver.force_tolerance;
-            let is_whole = looked_at.is_none();
             let looked_at = looked_at.map(|groups| LookedAt {
                 groups,
                 dofs: &self.looked_at.1,
@@ -869,23 +868,20 @@ impl<'a> Run<'a> {
             let (groups, displacement) = (&mut self.groups, &mut self.displacement);
             let internal =
                 domain.bring_up(looked_at, groups, loads, lambda, displacement, tolerance)?;
-            beside.extend(domain.forces_beside());
-            if beside.is_empty() {
+            beside = domain.forces_beside();
+            if beside.is_none() {
                 for (reaction, internal) in reaction.iter_mut().zip(&internal) {
                     *reaction += internal;
                 }
             }
-            // A domain of which a part is looked at, and that nothing lies beside, has no sum.
-            if is_whole || !beside.is_empty() {
-                self.check_balance(equations, loads, lambda, &reaction, &beside)?;
-            }
-            if !beside.is_empty() {
+            self.check_balance(equations, loads, lambda, &reaction, beside.as_deref())?;
+            if beside.is_some() {
                 for (reaction, internal) in reaction.iter_mut().zip(&internal) {
                     *reaction += internal;
                 }
             }
         } else {
-            self.check_balance(equations, loads, lambda, &reaction, &beside)?;
+            self.check_balance(equations, loads, lambda, &reaction, beside.as_deref())?;
         }
         equations.system.follow(&mut self.displacement);
         for (force, external) in reaction.iter_mut().zip(&self.force) {
@@ -906,17 +902,17 @@ impl<'a> Run<'a> {
         loads: &Loads,
         lambda: f64,
         internal: &[f64],
-        beside: &[(usize, f64)],
+        beside: Option<&[(usize, f64)]>,
     ) -> Result<(), String> {
         let Some((scales, tolerance)) = &equations.measured else {
             return Ok(());
         };
         let mut external = loads.external(lambda);
-        for &(dof, force) in beside {
+        for &(dof, force) in beside.unwrap_or_default() {
             external[dof] -= force;
         }
         let mut is_free = vec![false; external.len()];
-        let of_domain = equations.domain.iter().filter(|_| beside.is_empty());
+        let of_domain = equations.domain.iter().filter(|_| beside.is_none());
         let of_domain = of_domain.flat_map(LinearDomain::unknowns);
         for &dof in equations.system.free().iter().chain(of_domain) {
             is_free[dof] = true;
@@ -933,7 +929,7 @@ impl<'a> Run<'a> {
         let bound = statics::Bound {
             scale: scales.iter().copied().fold(0.0, f64::max),
             tolerance: *tolerance,
-            with_domain: equations.domain.is_some() && beside.is_empty(),
+            with_domain: equations.domain.is_some() && beside.is_none(),
         };
         let model = statics::Model {
             analysis: self.case.file.analysis,

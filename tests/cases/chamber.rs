@@ -28,6 +28,10 @@ fn run(name: &str) -> TempDir {
     if name == "chamber_oriented" {
         warnings.retain(|warning| !warning.contains("viscous relaxation"));
     }
+    if name == "chamber_joint" {
+        // So does this one's: at the toe's corner both sides stay joined.
+        warnings.retain(|warning| !warning.contains("at a corner of group `pile`"));
+    }
     assert_eq!(warnings, Vec::<String>::new());
     folder
 }

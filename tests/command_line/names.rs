@@ -295,6 +295,15 @@ fn suggests_what_probes_can_show() {
                 )],
                 &["probe `settlement`: forces are summed"],
             ),
+        ],
+    );
+}
+
+#[test]
+fn says_which_names_are_taken() {
+    refuses(
+        BAD_INPUT,
+        &[
             (
                 "the name of another column",
                 &[("half =", "^iterations =")],

@@ -143,7 +143,7 @@ fn a_hopeless_increment_is_stopped_within_it() {
     };
     let solver = (
         "max_iterations = 20",
-        "max_iterations = 1000\nmethod = \"newton\"",
+        "max_iterations = 100000\nmethod = \"newton\"",
     );
     let edits = JOINT.iter().copied().chain([solver]);
     let text = edits.fold(troubled::case("cut"), |text, (from, to)| {

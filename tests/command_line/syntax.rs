@@ -66,7 +66,7 @@ fn says_what_was_probably_meant() {
             ),
             (
                 "decimal comma at the end of an inline table",
-                &[("value = 10.0 }", "value = 10,5^ }")],
+                &[("value = 10.0 }", "value = 10,5 ^}")],
                 &["`10.5`, not `10,5`"],
             ),
             (

@@ -151,13 +151,14 @@ fn a_library_that_crashes_does_so_in_a_child() {
 
 #[test]
 #[cfg(unix)]
-fn without_a_probe_a_library_crashes_the_program() {
+fn without_a_probe_a_library_that_crashes_is_named() {
     let Some(place) = troubled::place("TROUBLE_AT_ENTRY") else {
         return;
     };
     place.write("driver.toml", troubled::driver("cut"));
     let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--no-probe"]);
-    assert_eq!(outcome.code, None, "{}", outcome.stderr);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    assert!(outcome.says(&troubled::library()), "{}", outcome.stderr);
 }
 
 #[test]

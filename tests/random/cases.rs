@@ -96,6 +96,7 @@ impl Model {
         }
     }
 
+    #[expect(clippy::too_many_lines, reason = "one list, in the order of the file")]
     fn text(&self) -> String {
         let ([x0, x1, x2, x3], [y0, y1, y2, y3]) = (self.x(), self.y());
         let foot = self.foot();
@@ -291,6 +292,7 @@ impl Model {
     }
 
     /// Whether rows keep what was asked, and how the run ended.
+    #[expect(clippy::too_many_lines, reason = "one list, in the order of the table")]
     fn check(&self, result: &Result<Silent, Error>, folder: &Path) -> Result<End, String> {
         let end = match result {
             Ok(_) => End::Done,

@@ -1,5 +1,9 @@
 //! One input for each seed. `PILUM_RANDOM` says how many seeds of each family, in place of its own
 //! number; `PILUM_RANDOM_SEED` the first of them.
+#![expect(
+    clippy::print_stderr,
+    reason = "what a random test found is for its reader"
+)]
 
 use proptest::prelude::{ProptestConfig, Strategy};
 use proptest::test_runner::{RngSeed, TestCaseError, TestError, TestRunner};
@@ -66,13 +70,13 @@ pub(crate) fn hold<S: Strategy>(
                 } else {
                     String::new()
                 };
-                println!("{family} {seed}: {reason}\n  {given}{small}");
+                eprintln!("{family} {seed}: {reason}\n  {given}{small}");
                 failures.push(format!("{seed}: {reason}"));
             }
             Err(TestError::Abort(reason)) => panic!("{family} {seed}: {reason}"),
         }
     }
-    println!(
+    eprintln!(
         "{family}: of {count}, {done} done, {} failed",
         failures.len()
     );

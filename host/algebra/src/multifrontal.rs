@@ -127,6 +127,9 @@ pub struct Multifrontal {
 impl Multifrontal {
     /// Analyses a pattern. `kept` says of every equation whether it is kept, `lines` on which mesh
     /// lines it lies; without them the order of elimination is found from the pattern alone.
+    ///
+    /// # Errors
+    /// [`Singular`] if the pattern alone makes the matrix singular, or memory runs out.
     pub fn new(
         pattern: &Pattern,
         kind: Kind,

@@ -139,6 +139,7 @@ pub(super) struct Extent {
 pub(super) struct Appended {
     path: PathBuf,
     file: File,
+    own: Identity,
     /// Bytes of whole entries in the file, and their sum.
     length: u64,
     sum: Sum,
@@ -192,6 +193,7 @@ impl Appended {
     fn new(path: PathBuf, file: File) -> Self {
         Self {
             path,
+            own: identity(&file),
             file,
             length: 0,
             sum: Sum::default(),
@@ -233,7 +235,8 @@ impl Appended {
     /// # Errors
     /// [`Error::Unwritable`].
     pub(super) fn append(&mut self, text: &[u8]) -> Result<(), Error> {
-        check_own(&self.file, self.length).map_err(|error| unwritable(&self.path, error))?;
+        check_own(&self.file, self.own, self.length)
+            .map_err(|error| unwritable(&self.path, error))?;
         if let Err(error) = self.file.write_all(text) {
             let _ = self.file.set_len(self.length);
             return Err(unwritable(&self.path, error));
@@ -254,14 +257,41 @@ impl Appended {
     }
 }
 
+/// What a file is, whatever it is called: its device and its number there; `None` where that is not
+/// known.
+pub(crate) type Identity = Option<(u64, u64)>;
+
+/// What an open file is.
+pub(crate) fn identity(file: &File) -> Identity {
+    file.metadata().ok().and_then(|found| identity_of(&found))
+}
+
+#[cfg_attr(
+    unix,
+    expect(clippy::unnecessary_wraps, reason = "not known on other systems")
+)]
+fn identity_of(found: &Metadata) -> Identity {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        Some((found.dev(), found.ino()))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = found;
+        None
+    }
+}
+
 /// Refuses to write where something else than the file is by now: a law may have closed it, and
 /// its number may be that of another one.
 ///
 /// # Errors
-/// It is not the file of this length.
-pub(crate) fn check_own(file: &File, length: u64) -> io::Result<()> {
-    let found = file.metadata();
-    if found.is_ok_and(|found| !found.is_file() || found.len() == length) {
+/// It is not this file, or not of this length.
+pub(crate) fn check_own(file: &File, own: Identity, length: u64) -> io::Result<()> {
+    let is_own =
+        |found: &Metadata| identity_of(found) == own && (!found.is_file() || found.len() == length);
+    if file.metadata().is_ok_and(|found| is_own(&found)) {
         return Ok(());
     }
     let why = "a law has closed it, or something else has written to it";
@@ -365,7 +395,9 @@ mod tests {
         let text: Vec<u8> = (0..100_u8).map(|i| i.wrapping_mul(37)).collect();
         let of = |pieces: &[&[u8]]| {
             let mut sum = Sum::default();
-            pieces.iter().for_each(|piece| sum.add(piece));
+            for piece in pieces {
+                sum.add(piece);
+            }
             sum.value()
         };
         let whole = of(&[&text]);

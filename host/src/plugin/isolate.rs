@@ -508,7 +508,9 @@ impl IsolatedInstance {
             return Ok(None);
         };
         let is_kept = foreign.scratch == Some(adapter::Scratch::Keep);
-        Scratch::new(id, is_kept).map(Some).map_err(no_folder)
+        Scratch::new(id, is_kept)
+            .map(Some)
+            .map_err(|why| no_folder(&why))
     }
 
     /// Arguments that the routine has overwritten, those that were not told before.
@@ -533,7 +535,7 @@ impl IsolatedInstance {
         let internal = |why| (raw::PILUM_E_INTERNAL, why);
         let folder = self.scratch.as_ref().map(Scratch::of_worker);
         let start = Start {
-            folder: folder.transpose().map_err(no_folder)?,
+            folder: folder.transpose().map_err(|why| no_folder(&why))?,
             ..self.start.clone()
         };
         match Worker::start(&start, &self.printed).map_err(internal)? {
@@ -615,7 +617,7 @@ impl IsolatedInstance {
     }
 }
 
-fn no_folder(why: io::Error) -> (Status, String) {
+fn no_folder(why: &io::Error) -> (Status, String) {
     let message = format!("there is no folder for its scratch files: {why}");
     (raw::PILUM_E_INTERNAL, message)
 }

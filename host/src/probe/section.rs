@@ -161,7 +161,10 @@ mod tests {
     fn ring() -> Mesh {
         let mut mesh = Mesh::default();
         let mut node = |x: f64, y: f64| {
-            let found = mesh.nodes.iter().position(|at| *at == [x, y]);
+            let found = mesh
+                .nodes
+                .iter()
+                .position(|at| f64::hypot(at[0] - x, at[1] - y) < 1e-12);
             found.unwrap_or_else(|| {
                 mesh.nodes.push([x, y]);
                 mesh.nodes.len() - 1

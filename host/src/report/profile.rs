@@ -158,27 +158,27 @@ impl Blocks {
     }
 }
 
-impl Profile {
-    /// Reads a table with [`COLUMNS`]. `None` if there is nothing to show.
+/// The rows of a table by increments.
+struct Profiles {
+    phases: Vec<String>,
+    /// Those of the first increment; `None` if they cannot be read.
+    points: Option<Vec<Point>>,
+    blocks: Blocks,
+}
+
+impl Profiles {
+    /// Reads the values of these columns.
     ///
     /// # Errors
-    /// As [`Table::open`].
-    pub(super) fn read(
-        path: &Path,
-        times: &Times,
+    /// As [`Table::rows`].
+    fn read(
+        table: Table,
+        at: [usize; COLUMNS.len()],
+        columns: &[usize],
         budget: &Budget,
         notes: &mut Vec<String>,
-    ) -> Result<Option<Self>, Error> {
-        let table = Table::open(path, &COLUMNS)?;
-        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
+    ) -> Result<Self, Error> {
         let [phase_at, increment_at, ..] = at;
-        let columns: Vec<usize> = (0..table.columns().len())
-            .filter(|&column| !COLUMNS.contains(&table.columns()[column].as_str()))
-            .collect();
-        let names: Vec<String> = columns
-            .iter()
-            .map(|&column| table.columns()[column].clone())
-            .collect();
         let mut phases: Vec<String> = Vec::new();
         // The first increment says which points there are.
         let mut points: Option<Vec<Point>> = Some(Vec::new());
@@ -244,6 +244,39 @@ impl Profile {
                 is_first,
             );
         }
+        Ok(Self {
+            phases,
+            points,
+            blocks,
+        })
+    }
+}
+
+impl Profile {
+    /// Reads a table with [`COLUMNS`]. `None` if there is nothing to show.
+    ///
+    /// # Errors
+    /// As [`Table::open`].
+    pub(super) fn read(
+        path: &Path,
+        times: &Times,
+        budget: &Budget,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<Self>, Error> {
+        let table = Table::open(path, &COLUMNS)?;
+        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
+        let columns: Vec<usize> = (0..table.columns().len())
+            .filter(|&column| !COLUMNS.contains(&table.columns()[column].as_str()))
+            .collect();
+        let names: Vec<String> = columns
+            .iter()
+            .map(|&column| table.columns()[column].clone())
+            .collect();
+        let Profiles {
+            phases,
+            points,
+            blocks,
+        } = Profiles::read(table, at, &columns, budget, notes)?;
         let Some(points) = points.filter(|points| !points.is_empty()) else {
             return Ok(None);
         };

@@ -342,13 +342,11 @@ impl LinearDomain {
     }
 
     /// Where a part of the groups was looked at: the forces that the domain takes from its
-    /// boundary, by degree of freedom. None if all groups were.
-    pub fn forces_beside(&self) -> impl Iterator<Item = (usize, f64)> {
+    /// boundary, by degree of freedom. `None` if all groups were.
+    pub fn forces_beside(&self) -> Option<Vec<(usize, f64)>> {
         let forces = self.boundary.iter().zip(&self.standing.forces);
-        let is_part = self.standing.part.is_some();
-        forces
-            .filter(move |_| is_part)
-            .map(|(&dof, &force)| (dof, force))
+        let forces = forces.map(|(&dof, &force)| (dof, force));
+        self.standing.part.is_some().then(|| forces.collect())
     }
 
     /// Where the domain stands.

@@ -39,7 +39,7 @@ fn the_same_where_a_stress_is_asked_for_ends_with_exit_code_2() {
     let Some(place) = place("silent") else {
         return;
     };
-    let text = driver("silent", "", "reach = 0.0");
+    let text = driver("silent", "", "reach = -1.0");
     place.write(
         "driver.toml",
         text.replacen("strain = -2e-3", "stress = -20.0", 1),
