@@ -1,22 +1,28 @@
 //! Laws that cannot be led through the nil increment in which a law that starts is asked what it makes of the
 //! stresses it finds.
 
-use crate::program::{DONE, Outcome, PLUGIN_TROUBLE};
+use crate::program::{DONE, Outcome, PLUGIN_TROUBLE, edited};
 use crate::troubled;
 
-/// The case, its layer elastic under the weight, then with the law.
+/// The case with a joint across it, which takes the law after the weight has pressed it.
 fn run(define: &'static str) -> Option<Outcome> {
     let place = troubled::place(define)?;
-    let group = "formulation = \"thin_layer\"\nlaw = \"";
-    let text = troubled::case("cut")
-        .replacen("limit = 1.0e-6", "limit = 1.0", 1)
-        .replacen(&format!("{group}joint"), &format!("{group}soil"), 1)
-        .replacen(
+    let text = edited(&[
+        ("title", "law_path = [\"laws\"]\ntitle"),
+        ("[[mesh.region]]\ngroup = \"layer\"\nx = [1.0, 1.01]\n", ""),
+        (
+            "[groups.soil]",
+            "[laws.troubled]\nlaw = \"troubled\"\n\n[groups.soil]",
+        ),
+        (
+            "formulation = \"thin_layer\"",
+            "formulation = \"zero_thickness\"\nline = \"middle\"",
+        ),
+        (
             "name = \"push\"\n",
-            "name = \"push\"\nlaws = { layer = \"joint\" }\n",
-            1,
-        );
-    assert!(text.contains(&format!("{group}soil")) && text.contains("laws = {"));
+            "name = \"push\"\nlaws = { layer = \"troubled\" }\n",
+        ),
+    ]);
     place.write("case.toml", text);
     Some(place.run(&["run", "case.toml", "--out", "out"]))
 }
