@@ -248,6 +248,17 @@ pub(crate) fn block_requests() -> io::Result<()> {
     signals.thread_block().map_err(io::Error::from)
 }
 
+/// Has a file that may not grow any more (a limit of the user's) be a full disk, not a signal that
+/// ends the process; for threads and processes that are started from now on, too.
+#[cfg(unix)]
+pub fn ignore_file_limit() {
+    use nix::sys::signal::{SigSet, Signal};
+    let mut signals = SigSet::empty();
+    signals.add(Signal::SIGXFSZ);
+    // Without it the signal ends the process, as it would have.
+    let _ = signals.thread_block();
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

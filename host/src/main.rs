@@ -228,7 +228,10 @@ impl Command {
 
 fn main() -> ExitCode {
     #[cfg(unix)]
-    host::memory::reserve();
+    {
+        host::memory::reserve();
+        host::child::ignore_file_limit();
+    }
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {

@@ -54,6 +54,18 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// The longer side of the rectangle that holds the mesh, in m.
+    pub fn longer_side(&self) -> f64 {
+        let extent = |c: usize| {
+            let at = self.nodes.iter().map(|node| node[c]);
+            let ends = at.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
+                [low.min(at), high.max(at)]
+            });
+            ends[1] - ends[0]
+        };
+        extent(0).max(extent(1))
+    }
+
     /// Builds the mesh of a case.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ use crate::plugin::{End, LoadedLaw, Moment, Operator, SearchPath, Start, Strided
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
-pub(crate) use plausible::implausible_stiffness;
+pub(crate) use plausible::{LARGE, implausible_stiffness};
 use std::collections::HashMap;
 use std::sync::Arc;
 use toml::Spanned;

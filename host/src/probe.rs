@@ -536,7 +536,7 @@ impl Resolver<'_> {
                 .into());
         };
         let points: Vec<usize> = (0..group.kinematics.n_points())
-            .filter(|&point| self.inside(group.kinematics.position(point)))
+            .filter(|&point| self.counts(group, point))
             .collect();
         if points.is_empty() {
             return Err(self.wrong("no integration point lies inside the extent"));
@@ -550,6 +550,9 @@ impl Resolver<'_> {
         } else {
             Vec::new()
         };
+        if reduce == Reduce::Average && weights.iter().sum::<f64>() <= 0.0 {
+            return Err(self.wrong("its points stand for no area: they lie on the axis"));
+        }
         Ok(Probe::Points {
             group: number,
             points,
@@ -558,6 +561,36 @@ impl Resolver<'_> {
             reduce,
             scale: self.input.scale,
         })
+    }
+
+    /// Whether a point lies strictly inside the extents. What is weighted counts, on their edge, if its
+    /// element lies inside: points of adjoining extents then count once.
+    fn counts(&self, group: &Group, point: usize) -> bool {
+        let position = group.kinematics.position(point);
+        if self.inside(position) {
+            return true;
+        }
+        let is_weighted = matches!(self.input.reduce, Some(Reduce::Average | Reduce::Integral));
+        let n = group.kinematics.points_per_element();
+        let first = point - point % n;
+        let middle = [0, 1].map(|c| {
+            let of_element = (first..first + n).map(|point| group.kinematics.position(point)[c]);
+            of_element.sum::<f64>() / n as f64
+        });
+        is_weighted && self.touches(position) && self.inside(middle)
+    }
+
+    /// Whether a place lies inside the extents or on their edge.
+    fn touches(&self, position: [f64; 2]) -> bool {
+        [self.input.x, self.input.y]
+            .iter()
+            .zip(position)
+            .all(|(extent, at)| {
+                extent.is_none_or(|[from, to]| {
+                    let close = 1e-9 * (to - from);
+                    at >= from - close && at <= to + close
+                })
+            })
     }
 
     fn inside(&self, position: [f64; 2]) -> bool {

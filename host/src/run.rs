@@ -65,6 +65,8 @@ pub struct Options {
 /// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
 /// be halved so often.
 const PATIENCE: f64 = 0.2;
+/// Round-off of forces that have gone, relative to them.
+const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
 /// Share of the method's own limit of iterations up to which a step counts as easy, so that the
@@ -927,9 +929,15 @@ impl<'a> Run<'a> {
         };
         // Supports may be those of several bodies: they are added up together.
         let bound = statics::Bound {
-            scale: scales.iter().copied().fold(0.0, f64::max),
+            scale: scales.iter().copied().fold(0.0, f64::hypot),
             tolerance: *tolerance,
             with_domain: equations.domain.is_some() && beside.is_none(),
+            last_bit: equations
+                .domain
+                .iter()
+                .filter(|_| beside.is_none())
+                .map(|domain| domain.largest * statics::norm(&self.displacement))
+                .sum(),
         };
         let model = statics::Model {
             analysis: self.case.file.analysis,
@@ -1114,13 +1122,20 @@ impl<'a> Run<'a> {
             play += f64::max(internal * internal, external * external);
         }
         // Where nothing is left of earlier forces, what remains of them is round-off.
-        self.largest_force = self.largest_force.max(f64::sqrt(play));
-        loads.scale = self.largest_force;
+        let left_of = |earlier: f64| ROUND_OFF * earlier / self.case.file.solver.force_tolerance;
+        let now = f64::sqrt(play);
+        loads.scale = now.max(left_of(self.largest_force));
         let both = internal.iter().zip(&loads.force_start);
-        for (largest, (internal, external)) in self.largest_forces.iter_mut().zip(both) {
-            *largest = largest.max(internal.abs()).max(external.abs());
+        let now_by_dof = both.map(|(internal, external)| internal.abs().max(external.abs()));
+        let now_by_dof: Vec<f64> = now_by_dof.collect();
+        let earlier = now_by_dof.iter().zip(&self.largest_forces);
+        loads.largest = earlier
+            .map(|(now, &earlier)| now.max(left_of(earlier)))
+            .collect();
+        self.largest_force = self.largest_force.max(now);
+        for (largest, now) in self.largest_forces.iter_mut().zip(now_by_dof) {
+            *largest = largest.max(now);
         }
-        loads.largest.clone_from(&self.largest_forces);
         // An initial stress that the loads of its own phase balance is in balance.
         let rest = rest.min(against_end);
         if play > 0.0 {

@@ -7,6 +7,9 @@ use crate::mesh::{EDGES, Mesh};
 use crate::plugin::ParameterDescription;
 use std::collections::{HashMap, HashSet};
 
+/// Strain beyond which geometry can no longer be taken as it was: the Green–Lagrange strain of a
+/// stretch is ε + ε²/2, so what is left out reaches ε/2, 10 % of the strain itself.
+pub(crate) const LARGE: f64 = 0.2;
 /// Largest difference between a layer's thickness and a parameter that stands for it, as a
 /// fraction: more than what a rounded number makes.
 const SAME_THICKNESS: f64 = 0.01;
@@ -24,7 +27,7 @@ pub(super) fn warnings(
     groups: &[Group],
     swaps: &[Vec<(usize, GroupLaw)>],
 ) -> Vec<String> {
-    let mut warnings = Vec::new();
+    let mut warnings = far(case, mesh);
     for (number, group) in groups.iter().enumerate() {
         match group.formulation {
             Formulation::ThinLayer => {
@@ -207,6 +210,27 @@ fn angle(mesh: &Mesh, nodes: &[usize], corner: usize) -> f64 {
     sine.atan2(a[0] * b[0] + a[1] * b[1]).abs()
 }
 
+/// Prescribed displacements far beyond the theory: millimetres may be meant.
+fn far(case: &Case, mesh: &Mesh) -> Vec<String> {
+    let side = mesh.longer_side();
+    let mut warnings = Vec::new();
+    for phase in &case.file.phases {
+        for input in &phase.displacement {
+            let largest = [input.x, input.y].into_iter().flatten();
+            let largest = largest.fold(0.0, |m: f64, u| m.max(u.abs()));
+            if largest > LARGE * side {
+                warnings.push(format!(
+                    "phase `{}` moves line `{}` by {largest:.4e} m, the model is {side:.4} m long: beyond \
+                     the theory of small displacements; are millimetres meant?",
+                    phase.name.get_ref(),
+                    input.line.get_ref(),
+                ));
+            }
+        }
+    }
+    warnings
+}
+
 /// Probes of the reaction of a line that is also under pressure: the reaction is what the support
 /// adds to it.
 fn reactions(case: &Case, mesh: &Mesh) -> Vec<String> {
@@ -257,7 +281,7 @@ fn reactions(case: &Case, mesh: &Mesh) -> Vec<String> {
             warnings.push(format!(
                 "probe `{}`: `{}` of line `{}` is what its support adds to the pressure on line \
                  `{under}`: {share:.6e} {unit} of pressure (phase `{}`) are not in it. `{force}` with \
-                 a `group` is the whole",
+                 a `group`, of all groups at the line together, is the whole",
                 name.get_ref(),
                 quantity.get_ref(),
                 line.get_ref(),

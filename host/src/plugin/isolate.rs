@@ -22,6 +22,7 @@ use crate::error::Error;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use printed::{Output, Printed};
+use rustix::process::{Pid, Signal, WaitOptions};
 use scratch::Scratch;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
@@ -684,6 +685,8 @@ fn serve() -> io::Result<()> {
 
 /// A worker's law and what it works on.
 struct Bench {
+    /// This process: a law may make copies of it.
+    process: Pid,
     instance: LawInstance,
     n_components: usize,
     n_states: usize,
@@ -696,6 +699,7 @@ struct Bench {
 impl Bench {
     fn new(library: &Library, build: &Build, memory: SharedMemory) -> Result<Self, Started> {
         let unusable = |why: &str| Started::Unusable(why.to_owned());
+        let process = rustix::process::getpid();
         let Some((description, origin)) = library.laws.get(build.law) else {
             return Err(unusable("it lacks a law"));
         };
@@ -719,7 +723,11 @@ impl Bench {
             Origin::Apart { .. } => return Err(unusable("its worker has a worker")),
         }
         .map_err(|(status, message)| Started::Refused(status, message))?;
+        if has_copied(process) {
+            return Err(unusable(COPIED));
+        }
         Ok(Self {
+            process,
             instance,
             n_components: hypothesis.n_components(),
             n_states: formulation.internal_variables.len(),
@@ -831,12 +839,37 @@ impl Bench {
         } else {
             self.instance.integrate(call)
         };
+        if has_copied(self.process) {
+            return Ok(copied(&mut self.status));
+        }
         let outputs = self.outputs.iter().map(|value| value.to_bits());
         let at = self.memory.write(first_output, outputs);
         let status = self.status.iter().map(|status| u64::from(*status as u32));
         self.memory.write(at, status);
         Ok(answer)
     }
+}
+
+/// What is said of a law that forks.
+const COPIED: &str = "the law made a copy of its process (fork)";
+
+/// Whether a law has made a copy of this process. The copy ends here: it must not answer, too.
+fn has_copied(process: Pid) -> bool {
+    if rustix::process::getpid() != process {
+        let _ = rustix::process::kill_process(rustix::process::getpid(), Signal::KILL);
+        std::process::abort();
+    }
+    // A worker starts no processes of its own.
+    !matches!(
+        rustix::process::waitpid(None, WaitOptions::NOHANG),
+        Err(rustix::io::Errno::CHILD)
+    )
+}
+
+/// The outcome of a call that is not to be trusted.
+fn copied(status: &mut [Status]) -> (Status, String) {
+    status.fill(raw::PILUM_E_INTERNAL);
+    (raw::PILUM_E_INTERNAL, COPIED.to_owned())
 }
 
 /// Descriptions of a library's laws, for the host.

@@ -44,6 +44,8 @@ pub struct Table<W: Write> {
     out: W,
     pending: String,
     flushed: Instant,
+    /// The driver came through a pipe: it cannot be followed once more if a law ends the process.
+    is_only_once: bool,
 }
 
 impl<W: Write> Table<W> {
@@ -59,6 +61,7 @@ impl<W: Write> Table<W> {
             out,
             pending,
             flushed: Instant::now(),
+            is_only_once: !driver.path().is_file(),
         }
     }
 
@@ -75,7 +78,7 @@ impl<W: Write> Table<W> {
             write!(text, ",{:.16e}", value + 0.0).map_err(|_| io::Error::other(full))?;
         }
         writeln!(text, ",{}", row.iterations).map_err(|_| io::Error::other(full))?;
-        if text.len() > 1 << 15 || self.flushed.elapsed() > FLUSH_EVERY {
+        if self.is_only_once || text.len() > 1 << 15 || self.flushed.elapsed() > FLUSH_EVERY {
             self.flush()?;
         }
         Ok(())

@@ -5,12 +5,9 @@ use crate::case::{Analysis, Formulation};
 use crate::element::depth;
 use crate::group::Group;
 use crate::mesh::Mesh;
-use crate::model::implausible_stiffness;
+use crate::model::{LARGE, implausible_stiffness};
 use std::collections::HashSet;
 
-/// Strain beyond which geometry can no longer be taken as it was: the Green–Lagrange strain of a
-/// stretch is ε + ε²/2, so what is left out reaches ε/2, 10 % of the strain itself.
-const LARGE: f64 = 0.2;
 /// Share of the bodies' area that may be strained more than that: at a corner such as a pile's toe
 /// strains grow without bound as elements shrink, over an area that vanishes.
 const SHARE: f64 = 0.01;
@@ -69,8 +66,12 @@ impl Beyond {
             for (point, e) in strains.enumerate() {
                 let position = group.kinematics.position(point);
                 let own = group.kinematics.weight(point) / depth(analysis, position[0]);
-                let components = [e[0], e[1], e[2], e[3] / 2.0];
-                let strain = components.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+                // The largest principal strain, whatever the axes.
+                let (mean, radius) = (
+                    f64::midpoint(e[0], e[1]),
+                    f64::hypot((e[0] - e[1]) / 2.0, e[3] / 2.0),
+                );
+                let strain = (mean.abs() + radius).max(e[2].abs());
                 area += own;
                 if strain > LARGE {
                     strained += own;
@@ -87,14 +88,7 @@ impl Beyond {
     }
 
     fn displacements(&mut self, mesh: &Mesh, displacement: &[f64]) {
-        let extent = |c: usize| {
-            let at = mesh.nodes.iter().map(|node| node[c]);
-            let ends = at.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
-                [low.min(at), high.max(at)]
-            });
-            ends[1] - ends[0]
-        };
-        let side = extent(0).max(extent(1));
+        let side = mesh.longer_side();
         let largest = displacement.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
         if largest > LARGE * side && self.moved.is_none_or(|[worst, _]| largest > worst) {
             self.moved = Some([largest, side]);

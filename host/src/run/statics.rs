@@ -8,7 +8,8 @@
 //! - |Σ r| ≤ √n ‖r‖ ≤ √n τ F,
 //!
 //! and for moments the same times the farthest lever. F is what is given to the step, not what the
-//! iterate makes of it, and the sums are those that a user sees in the results.
+//! iterate makes of it. Of several bodies, each held to its own F, it is √ΣF². The sums are those that
+//! a user sees in the results, plus what is still carried of the forces out of balance at the start.
 
 use crate::case::Analysis;
 
@@ -40,6 +41,14 @@ pub(super) struct Bound {
     /// The forces of a condensed domain are among those that are added up: they were held against
     /// themselves, and may be much larger than those of the rest.
     pub(super) with_domain: bool,
+    /// Forces whose last bit stands for that of the displacements: largest stiffness of a condensed
+    /// domain times displacements.
+    pub(super) last_bit: f64,
+}
+
+/// 2-norm.
+pub(super) fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
 impl Balance {
@@ -74,7 +83,7 @@ impl Balance {
         } else {
             bound.scale
         };
-        let allowed = n * (tolerance * scale + ROUND_OFF * own.max(scale));
+        let allowed = n * (tolerance * scale + ROUND_OFF * own.max(scale).max(bound.last_bit));
         let is_off = |&&c: &&usize| {
             let lever = if c == 2 { self.lever } else { 1.0 };
             let left = self.reactions[c] + self.loads[c];
@@ -137,6 +146,7 @@ mod tests {
         scale: 10.0,
         tolerance: 1e-6,
         with_domain: false,
+        last_bit: 0.0,
     };
 
     /// A beam held at both ends of its lower side, with a force at the third node.

@@ -557,8 +557,14 @@ impl LinearDomain {
             // A residual that no longer falls has come down to round-off.
             if relative > 0.5 * before || tries.next().is_none() {
                 let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
-                if relative <= ACCEPTED_ROUND_OFF * last_bit && relative <= STILL_SMALL {
+                let is_round_off = relative <= ACCEPTED_ROUND_OFF * last_bit;
+                if is_round_off && relative <= STILL_SMALL {
                     break (relative, internal);
+                }
+                // All forces there are, are what rounding leaves of none: a body that was moved as
+                // a whole.
+                if is_round_off && ACCEPTED_ROUND_OFF * last_bit >= 1.0 {
+                    break (0.0, internal);
                 }
                 return Err(format!(
                     "the linear groups are left with a residual of {relative:.1e}, tolerance \

@@ -448,7 +448,8 @@ impl<'a> Newton<'a> {
         loop {
             self.may_go_on()?;
             let series = &iterations[first..];
-            let stands_still = relaxation::stands_still(series);
+            // Methods that keep their matrix are slow without having come to an end.
+            let stands_still = self.settings.method.is_newton() && relaxation::stands_still(series);
             let is_over = series.len() > self.settings.max_iterations();
             let is_equilibrium = self.is_equilibrium(&balance, &series[series.len() - 1]);
             let ends = stands_still || is_over;
@@ -694,8 +695,17 @@ impl<'a> Newton<'a> {
             return false;
         };
         let pairs = moved.residual.iter().zip(&balance.residual);
-        let change = norm(&pairs.map(|(a, b)| a - b).collect::<Vec<f64>>());
-        norm(&balance.residual) <= ACCEPTED_ROUND_OFF * change
+        let change: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        // The noise of a stiff body excuses nothing in another one.
+        let bodies = &self.places.bodies;
+        let of = |vector: &[f64]| norms(&bodies.of_equation, bodies.n, vector);
+        let sizes = of(&balance.residual).into_iter().zip(of(&change));
+        let tolerance = self.settings.force_tolerance;
+        sizes
+            .zip(&balance.by_body)
+            .all(|((left, noise), &relative)| {
+                relative <= tolerance || left <= ACCEPTED_ROUND_OFF * noise
+            })
     }
 
     /// What is said of iterations that have come to their end.
@@ -904,16 +914,14 @@ impl<'a> Newton<'a> {
 
     /// Forces by body that count as none where no force has ever acted: round-off of K u.
     fn floors(&self, increment: &[f64], task: &Task<'_>) -> Vec<f64> {
-        if task.imposed.iter().all(|&imposed| imposed > 0.0) {
-            return vec![0.0; task.imposed.len()];
-        }
         let bodies = &self.places.bodies;
         let sizes = self.by_body(increment);
         let of_domain = norm(&self.domain_forces);
         (0..bodies.n)
             .map(|body| {
                 let cancelling = self.matrix.largest_of(body) * sizes[body] + of_domain;
-                if task.imposed[body] > 0.0 {
+                // Forces no larger than that are themselves what rounding leaves.
+                if task.imposed[body] > ROUND_OFF * cancelling {
                     0.0
                 } else {
                     ROUND_OFF * cancelling / self.settings.force_tolerance

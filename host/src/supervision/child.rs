@@ -123,7 +123,7 @@ fn has_enough(page: &Page) -> bool {
     let enough = page.get(word::ENOUGH);
     enough != 0
         && page.get(word::RUNNING) != 0
-        && page.get(word::CASES) >= page.get(word::BEGUN)
+        && page.get(word::CASES) == page.get(word::BEGUN)
         && page.calls().moment() > enough
 }
 

@@ -208,6 +208,7 @@ impl Watch {
             io::stderr(),
             "{trouble}; once more with laws in processes of their own, to name the point"
         );
+        let folder = self.page.folder();
         self.prepare_again(&calls);
         let ending = self.carry_out();
         let code = self.ended();
@@ -229,14 +230,19 @@ impl Watch {
             (None, Ok(ending)) => format!("the second attempt ended, too: {ending}"),
             (None, Err(why)) => format!("there was no second attempt: {why}"),
         };
-        Err(self.mended(mend, Error::Plugin {
+        let error = Error::Plugin {
             message: format!("{trouble}\n  {since}"),
             hint: Some(
                 "all rows in equilibrium are written; `--isolate`, with `--resume` for a run, goes \
                  on with laws in processes of their own"
                     .to_owned(),
             ),
-        }))
+        };
+        // The run that it happened in, not one that came after it.
+        if !folder.is_empty() {
+            mend(Path::new(&folder), &error);
+        }
+        Err(error)
     }
 
     /// The exit code, if the child has said it.

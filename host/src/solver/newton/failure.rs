@@ -148,7 +148,7 @@ impl StepFailure {
             Singularity::Free => ": a part of the model can move freely".to_owned(),
             Singularity::Limit => format!(
                 ", the elastic one is not: a limit state (a collapse load or a mechanism) beyond \
-                 load factor {lambda:.4} of the phase"
+                 load factor {lambda:.3e} of the phase"
             ),
             Singularity::Unknown => String::new(),
         };
