@@ -936,7 +936,7 @@ impl<'a> Run<'a> {
                 .domain
                 .iter()
                 .filter(|_| beside.is_none())
-                .map(|domain| domain.largest * statics::norm(&self.displacement))
+                .map(|domain| domain.stiffest * statics::norm(&self.displacement))
                 .sum(),
         };
         let model = statics::Model {

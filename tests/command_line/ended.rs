@@ -234,3 +234,52 @@ fn closed_files_are_not_mistaken_for_others() {
     let taken = std::fs::metadata(place.path("taken")).unwrap();
     assert_eq!(taken.len(), 0);
 }
+
+/// What ended one variant says nothing of the next one.
+#[test]
+fn variants_after_it_are_computed() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    let variants = ["cut", "segfault", "locale"].map(|how| {
+        format!("[[variant]]\nname = \"{how}\"\n[variant.laws.joint]\nparameters = {{ how = \"{how}\" }}\n")
+    });
+    let text = troubled::case("cut").replacen("limit = 1.0e-6", "limit = 1.0", 1);
+    // The second one alone goes beyond its limit.
+    let variants = variants.concat().replacen(
+        "how = \"segfault\" }",
+        "how = \"segfault\", limit = 1.0e-6 }",
+        1,
+    );
+    place.write("case.toml", format!("{text}\n{variants}"));
+    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
+    assert_trouble(
+        &outcome,
+        &["law `troubled`", "crashed: signal 11"],
+        "variants",
+    );
+    for (variant, status) in [
+        ("cut", "done"),
+        ("segfault", "plugin trouble"),
+        ("locale", "done"),
+    ] {
+        let summary = place.path("out").join(variant).join("summary.json");
+        let summary = std::fs::read_to_string(summary).unwrap();
+        let status = format!("\"status\": \"{status}\"");
+        assert!(summary.contains(&status), "{variant}: {summary}");
+    }
+}
+
+/// A driver that came through a pipe cannot be followed once more: every row is written at once.
+#[test]
+fn rows_of_a_driver_from_a_pipe_are_kept() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("driver.toml", troubled::driver("exit"));
+    let pipe = "mkfifo pipe; cat driver.toml > pipe & :";
+    let outcome = place.run_limited(pipe, &["point", "pipe", "--csv", "out.csv"]);
+    assert_trouble(&outcome, &["law `troubled`", "ended itself"], "pipe");
+    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 4, "{rows}");
+}

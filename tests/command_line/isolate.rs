@@ -40,6 +40,25 @@ fn a_run_ends_with_what_had_converged() {
     }
 }
 
+/// Two workers would answer in turn, one increment late.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_copy_of_a_worker_does_not_answer_too() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("driver.toml", troubled::driver("fork"));
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    assert!(
+        outcome.says("made a copy of its process"),
+        "{}",
+        outcome.stderr
+    );
+    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 4, "{rows}");
+}
+
 #[test]
 fn a_driver_ends_with_its_rows() {
     for (how, says) in WAYS {

@@ -83,3 +83,186 @@ fn the_weaker_of_two_bodies_is_as_it_is_alone() {
         }
     }
 }
+
+/// Each body may be left with its own residual: the sum of many is no larger than √B of them.
+#[test]
+fn many_bodies_balance_together() {
+    let n = 12;
+    let (mut columns, mut regions, mut lines) = (String::new(), String::new(), String::new());
+    let (mut supports, mut pressure) = (String::new(), String::new());
+    for body in 0..n {
+        let left = 1.5 * f64::from(body);
+        let (right, next) = (left + 1.0, left + 1.5);
+        columns += &format!("{{ n = 1, to = {right} }}, {{ n = 1, to = {next} }}, ");
+        regions += &format!("[[mesh.region]]\ngroup = \"ground\"\nx = [{left}, {right}]\n");
+        lines += &format!("top_{body} = {{ y = 1.0, x = [{left}, {right}] }}\n");
+        lines += &format!("l_{body} = {{ x = {right} }}\nr_{body} = {{ x = {next} }}\n");
+        for side in ["l", "r"] {
+            supports +=
+                &format!("[[supports]]\nline = \"{side}_{body}\"\nfixed = [\"x\", \"y\"]\n");
+        }
+        pressure += &format!("{{ line = \"top_{body}\", value = 6.0 }}, ");
+    }
+    let finished = run(&format!(
+        r#"
+analysis = "plane_strain"
+[mesh]
+origin = [0.0, 0.0]
+columns = [{columns}]
+rows = [{{ n = 2, to = 1.0 }}]
+[[mesh.region]]
+group = "wall"
+{regions}
+[mesh.lines]
+left = {{ x = 0.0 }}
+base = {{ y = 0.0 }}
+{lines}
+[laws]
+elastic = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
+mc = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 20.0, dilatancy_angle = 0.0 }} }}
+[groups]
+wall = {{ formulation = "solid", law = "elastic" }}
+ground = {{ formulation = "solid", law = "mc" }}
+[[supports]]
+line = "base"
+fixed = ["x", "y"]
+[[supports]]
+line = "left"
+fixed = ["x", "y"]
+{supports}
+[[phase]]
+name = "press"
+increments = 1
+pressure = [{pressure}]
+[probes]
+settlement = {{ line = "top_0", quantity = "displacement_y" }}
+[solver]
+method = "initial_stress"
+equations = "sparse"
+force_tolerance = 1e-3
+displacement_tolerance = 0.1
+"#
+    ));
+    assert!(finished.last("settlement") < 0.0);
+}
+
+/// A body that nothing presses, moved as a whole: no force, whatever it was moved by before.
+#[test]
+fn a_body_is_moved_as_a_whole_without_force() {
+    for law in [
+        "{ law = \"elastic\", parameters = { young_modulus = 2.1e8, poisson_ratio = 0.3 } }",
+        "{ law = \"mohr_coulomb\", parameters = { young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 20.0, dilatancy_angle = 10.0 } }",
+    ] {
+        for equations in ["auto", "sparse"] {
+            let finished = run(&format!(
+                r#"
+analysis = "plane_strain"
+[mesh]
+columns = [{{ n = 3, to = 1.0 }}]
+rows = [{{ n = 3, to = 1.0 }}]
+[[mesh.region]]
+group = "block"
+[mesh.lines]
+base = {{ y = 0.0 }}
+top = {{ y = 1.0 }}
+[laws]
+ground = {law}
+[groups]
+block = {{ formulation = "solid", law = "ground" }}
+[[supports]]
+line = "base"
+fixed = ["y"]
+[[phase]]
+name = "one"
+increments = 2
+displacement = [{{ line = "base", x = 0.001 }}]
+[[phase]]
+name = "two"
+increments = 2
+displacement = [{{ line = "base", x = 0.1 }}]
+[probes]
+force = {{ line = "base", quantity = "reaction_x" }}
+top = {{ line = "top", quantity = "displacement_x" }}
+[solver]
+equations = "{equations}"
+"#
+            ));
+            assert!(
+                (finished.last("top") - 0.1).abs() < 1e-12,
+                "{law} {equations}"
+            );
+            // The last bits of displacements of 0.1 m times the stiffness.
+            assert!(
+                finished.last("force").abs() < 2.1e8 * 0.1 * 1e-12,
+                "{law} {equations}"
+            );
+        }
+    }
+}
+
+/// What pressed once, and is gone, does not loosen what comes after it.
+#[test]
+fn earlier_loads_do_not_widen_the_tolerance() {
+    let settlement = |before: &str| {
+        run(&format!(
+            r#"
+analysis = "plane_strain"
+[mesh]
+columns = [{{ n = 3, to = 1.0 }}, {{ n = 4, to = 5.0 }}]
+rows = [{{ n = 6, to = 4.0 }}]
+[[mesh.region]]
+group = "ground"
+[mesh.lines]
+base = {{ y = 0.0 }}
+left = {{ x = 0.0 }}
+right = {{ x = 5.0 }}
+top = {{ y = 4.0 }}
+strip = {{ y = 4.0, x = [0.0, 1.0] }}
+[laws]
+elastic = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
+mc = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 30.0, dilatancy_angle = 0.0 }} }}
+[groups]
+ground = {{ formulation = "solid", law = "elastic" }}
+[[supports]]
+line = "base"
+fixed = ["y"]
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[supports]]
+line = "right"
+fixed = ["x"]
+{before}
+[[phase]]
+name = "footing"
+increments = 4
+laws = {{ ground = "mc" }}
+reset_displacements = true
+pressure = [{{ line = "top", value = 0.0 }}, {{ line = "strip", value = 15.0 }}]
+[probes]
+s = {{ line = "strip", quantity = "displacement_y" }}
+[solver]
+method = "initial_stress"
+force_tolerance = 1e-3
+displacement_tolerance = 1e-3
+"#
+        ))
+        .last("s")
+    };
+    let alone = settlement("");
+    let after = settlement(
+        r#"[[phase]]
+name = "preload"
+increments = 1
+pressure = [{ line = "top", value = 1e6 }]
+[[phase]]
+name = "unload"
+increments = 1
+pressure = [{ line = "top", value = 0.0 }]"#,
+    );
+    // Both within the tolerances of 1e-3; the load before was 7e4 times as large.
+    assert!(
+        (after / alone - 1.0).abs() < 5e-3,
+        "{after} after, {alone} alone"
+    );
+}

@@ -192,6 +192,7 @@ volume = {{ group = "pile", quantity = "stress_22", reduce = "integral" }}
 stress = {{ group = "pile", quantity = "stress_22", reduce = "average" }}
 lower = {{ group = "skin", quantity = "traction_t", reduce = "integral", z = [-0.1, 0.5] }}
 upper = {{ group = "skin", quantity = "traction_t", reduce = "integral", z = [0.5, 2.1] }}
+edges = {{ group = "skin", quantity = "traction_t", reduce = "integral", z = [0.0, 2.0] }}
 "#
     ))
 }
@@ -216,6 +217,8 @@ fn the_integral_of_the_friction_is_what_the_shaft_carries() {
     assert!((mean * area / shaft - 1.0).abs() > 0.01, "{}", mean * area);
     let parts = finished.last("lower") + finished.last("upper");
     assert_close("parts", parts, integral, EXACT, shaft);
+    // Extents that end where the shaft does hold the points at its ends.
+    assert_close("edges", finished.last("edges"), integral, EXACT, shaft);
     let volume = PI * 0.3 * 0.3 * 2.0;
     let stress = finished.last("stress");
     assert_close(

@@ -22,7 +22,7 @@ use toml::Spanned;
 
 /// What a case file looks like among driver files.
 const CASE: base::OtherKind = base::OtherKind {
-    keys: &["analysis", "mesh", "groups", "laws", "supports", "phase"],
+    keys: &["analysis", "mesh", "groups", "supports", "phase"],
     message: "this is a case file; expected a driver file, which leads a law at one point",
     command: "pilum run",
 };

@@ -172,6 +172,8 @@ pub struct LinearDomain {
     pub factorised: bool,
     /// Largest entry of the boundary's stiffness.
     pub largest: f64,
+    /// Largest entry of its matrix before it was condensed.
+    pub stiffest: f64,
     /// Degrees of freedom of the boundary, in the order of the Schur complement.
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
@@ -239,6 +241,9 @@ impl LinearDomain {
         };
         let mut values = Vec::new();
         system.assemble(groups, &mut values);
+        let stiffest = values
+            .iter()
+            .fold(0.0, |most: f64, value| most.max(value.abs()));
         let known = reuse
             .as_ref()
             .and_then(|reuse| reuse.find(kind, &system.pattern, &values, &kept));
@@ -277,6 +282,7 @@ impl LinearDomain {
         let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();
         let largest = |largest: f64, value: &f64| largest.max(value.abs());
         let domain = Self {
+            stiffest,
             largest: factors.schur().iter().fold(0.0, largest),
             standing: Standing::default(),
             part: None,
