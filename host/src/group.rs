@@ -770,6 +770,24 @@ impl Group {
         force
     }
 
+    /// Force that some of this group's zero-thickness elements exert on the side of smaller coordinates
+    /// (committed), kN. At an end that is not doubled the nodal forces of both sides cancel; the
+    /// tractions do not.
+    pub fn handed_on(&self, elements: &[usize], component: usize) -> f64 {
+        let n = self.kinematics.points_per_element();
+        let of_point = |element: usize, point: usize| {
+            let axes = self.kinematics.axes(element);
+            let [normal, tangential] = [0, 1].map(|c| self.stress.committed[2 * point + c]);
+            let traction = axes.across[component] * normal + axes.along[component] * tangential;
+            self.kinematics.weight(point) * traction
+        };
+        let of_element = |&element: &usize| {
+            let points = element * n..(element + 1) * n;
+            points.map(|point| of_point(element, point)).sum::<f64>()
+        };
+        -elements.iter().map(of_element).sum::<f64>()
+    }
+
     /// Jump and traction (normal, tangential) of a point of a thin layer or zero-thickness
     /// element (committed); `None` for solids.
     pub fn jump_and_traction(&self, point: usize) -> Option<([f64; 2], [f64; 2])> {

@@ -3,7 +3,7 @@
 mod section;
 
 use crate::assembly::{Tie, fold};
-use crate::case::{Case, Control, ProbeInput, Reduce};
+use crate::case::{Case, Control, Formulation, ProbeInput, Reduce};
 use crate::error::{Error, Place, Source, suggestion};
 use crate::group::Group;
 use crate::input::Named;
@@ -51,6 +51,13 @@ enum Probe {
         component: usize,
         group: Option<usize>,
         elements: Option<Vec<usize>>,
+        scale: f64,
+    },
+    /// What zero-thickness elements along a line hand on from one side to the other.
+    HandedOn {
+        group: usize,
+        elements: Vec<usize>,
+        component: usize,
         scale: f64,
     },
     /// Sum of earlier probes with factors.
@@ -118,6 +125,7 @@ impl Probes {
         for (_, probe) in &self.probes {
             match probe {
                 Probe::Points { group, .. }
+                | Probe::HandedOn { group, .. }
                 | Probe::Force {
                     group: Some(group), ..
                 } => looked[*group] = true,
@@ -250,6 +258,12 @@ impl Probe {
                             .sum::<f64>(),
                 )
             }
+            Self::HandedOn {
+                group,
+                elements,
+                component,
+                scale,
+            } => Some(scale * snapshot.groups[*group].handed_on(elements, *component)),
             Self::Combination(terms) => terms
                 .iter()
                 .map(|&(i, factor)| earlier[i].map(|v| factor * v))
@@ -452,6 +466,18 @@ impl Resolver<'_> {
                 }
                 let group = group.map(|name| self.group_number(name)).transpose()?;
                 let inside = group.and_then(|number| section(&self.model.mesh, of_line, number));
+                let is_whole = self.input.x.is_none() && self.input.y.is_none();
+                if let (Some(group), Some(part)) = (group, &inside)
+                    && self.model.groups[group].formulation == Formulation::ZeroThickness
+                    && is_whole
+                {
+                    return Ok(Probe::HandedOn {
+                        group,
+                        elements: part.elements.clone(),
+                        component,
+                        scale,
+                    });
+                }
                 let (nodes, elements) = match inside {
                     None => (nodes, None),
                     Some(part) => {

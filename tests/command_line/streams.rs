@@ -154,7 +154,7 @@ fn memory_that_runs_out_is_said() {
 #[cfg(unix)]
 fn a_file_that_may_not_grow_is_said() {
     let place = place();
-    place.write("case.toml", CASE.to_owned());
+    place.write("case.toml", CASE);
     let outcome = place.run_limited("ulimit -f 1", &["run", "case.toml", "--out", "out"]);
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(outcome.says("File too large"), "{}", outcome.stderr);

@@ -88,21 +88,38 @@ fn the_weaker_of_two_bodies_is_as_it_is_alone() {
 #[test]
 fn many_bodies_balance_together() {
     let n = 12;
-    let (mut columns, mut regions, mut lines) = (String::new(), String::new(), String::new());
-    let (mut supports, mut pressure) = (String::new(), String::new());
-    for body in 0..n {
-        let left = 1.5 * f64::from(body);
-        let (right, next) = (left + 1.0, left + 1.5);
-        columns += &format!("{{ n = 1, to = {right} }}, {{ n = 1, to = {next} }}, ");
-        regions += &format!("[[mesh.region]]\ngroup = \"ground\"\nx = [{left}, {right}]\n");
-        lines += &format!("top_{body} = {{ y = 1.0, x = [{left}, {right}] }}\n");
-        lines += &format!("l_{body} = {{ x = {right} }}\nr_{body} = {{ x = {next} }}\n");
-        for side in ["l", "r"] {
-            supports +=
-                &format!("[[supports]]\nline = \"{side}_{body}\"\nfixed = [\"x\", \"y\"]\n");
-        }
-        pressure += &format!("{{ line = \"top_{body}\", value = 6.0 }}, ");
-    }
+    let of_all = |part: &dyn Fn(i32, f64) -> String| -> String {
+        let parts: Vec<String> = (0..n)
+            .map(|body| part(body, 1.5 * f64::from(body)))
+            .collect();
+        parts.concat()
+    };
+    let columns = of_all(&|_, x| {
+        format!(
+            "{{ n = 1, to = {} }}, {{ n = 1, to = {} }}, ",
+            x + 1.0,
+            x + 1.5
+        )
+    });
+    let regions = of_all(&|_, x| {
+        format!(
+            "[[mesh.region]]\ngroup = \"ground\"\nx = [{x}, {}]\n",
+            x + 1.0
+        )
+    });
+    let lines = of_all(&|body, x| {
+        let (right, next) = (x + 1.0, x + 1.5);
+        format!(
+            "top_{body} = {{ y = 1.0, x = [{x}, {right}] }}\nl_{body} = {{ x = {right} }}\nr_{body} = {{ x = {next} }}\n"
+        )
+    });
+    let supports = of_all(&|body, _| {
+        let side = |side: &str| {
+            format!("[[supports]]\nline = \"{side}_{body}\"\nfixed = [\"x\", \"y\"]\n")
+        };
+        side("l") + &side("r")
+    });
+    let pressure = of_all(&|body, _| format!("{{ line = \"top_{body}\", value = 6.0 }}, "));
     let finished = run(&format!(
         r#"
 analysis = "plane_strain"

@@ -238,3 +238,38 @@ fn so_it_is_of_a_layer() {
     // Strains linear across the layer do exactly the work of its faces' slip.
     assert_close("integral", finished.last("integral"), shaft, EXACT, shaft);
 }
+
+/// The end inside the mesh is not doubled: the interface's share there is handed on all the same.
+#[test]
+fn an_interface_that_ends_inside_hands_on_all_of_its_traction() {
+    let finished = run(r#"analysis = "plane_strain"
+[mesh]
+columns = [{ n = 4, to = 1.0 }]
+rows = [{ n = 4, to = 1.0 }]
+[[mesh.region]]
+group = "block"
+[mesh.lines]
+base = { y = 0.0 }
+top = { y = 1.0 }
+half = { y = 0.5, x = [0.0, 0.5] }
+[laws]
+elastic = { law = "elastic", parameters = { young_modulus = 34e3, poisson_ratio = 0.0 } }
+joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e7, shear_stiffness = 1e7, cohesion = 1000.0, friction_angle = 30.0, dilatancy_angle = 0.0 } }
+[groups]
+block = { formulation = "solid", law = "elastic", initial_stress = [0.0, -100.0, 0.0, 0.0] }
+joint = { formulation = "zero_thickness", line = "half", integration = "nodes", law = "joint" }
+[[supports]]
+line = "base"
+fixed = ["x", "y"]
+[[phase]]
+name = "one"
+increments = 1
+pressure = [{ line = "top", value = 100.0 }]
+[probes]
+force = { line = "half", group = "joint", quantity = "force_y" }
+traction = { group = "joint", quantity = "traction_n", reduce = "integral" }
+"#);
+    // 100 kPa on half a metre.
+    assert_close("force", finished.last("force"), 50.0, EXACT, 50.0);
+    assert_close("traction", finished.last("traction"), -50.0, EXACT, 50.0);
+}
