@@ -9,9 +9,9 @@
 //!
 //! | words of the memory | |
 //! |---|---|
-//! | 0 … 15 | see [`word`] |
+//! | 0 … 15 | see `word` |
 //! | folder | where the present run writes |
-//! | calls | [`crate::plugin::calls`] |
+//! | calls | `plugin::calls` |
 
 #[cfg(target_os = "linux")]
 mod child;
