@@ -15,6 +15,10 @@ pub enum Fault {
     /// The tangent is not the derivative of the law's stress: difference, relative to the largest
     /// entry, and the components.
     Tangent(f64, [String; 2]),
+    /// The tangent is not what the stress does as the increment goes on: difference, relative to
+    /// the larger of both. An elastic tangent of a law that flows is like that: it is the slope of
+    /// unloading.
+    Onward(f64),
     /// The stress answers a strain with the opposite sign: the slope, and the component.
     Sign(f64, String),
 }
@@ -26,6 +30,13 @@ impl std::fmt::Display for Fault {
                 f,
                 "the tangent of the law differs from differences of its own stress by {:.0} % in \
                  ({row}, {column}): Newton iterations cannot settle with it",
+                100.0 * relative
+            ),
+            Self::Onward(relative) => write!(
+                f,
+                "the tangent of the law differs by {:.0} % from what its stress does as the increment \
+                 goes on (an elastic tangent of a law that flows does): `method = \"quasi_newton\"` does \
+                 without an exact one",
                 100.0 * relative
             ),
             Self::Sign(slope, component) => write!(
@@ -113,11 +124,45 @@ impl Group {
         }
         let names = law.hypothesis().components();
         let name = |i: usize| names[i].to_string();
-        fault(n, &matrix, &slopes).map(|fault| match fault {
+        let onward: Vec<f64> = start.iter().zip(end).map(|(a, b)| b - a).collect();
+        let slopes_onward: Vec<Vec<f64>> = DIFFERENCES
+            .iter()
+            .filter_map(|size| {
+                let moved: Vec<f64> = end.iter().zip(&onward).map(|(e, d)| e + size * d).collect();
+                let (there, _) = answer(&moved, Operator::None)?;
+                Some(
+                    there
+                        .iter()
+                        .zip(&here)
+                        .map(|(a, b)| (a - b) / size)
+                        .collect(),
+                )
+            })
+            .collect();
+        let of_entries = fault(n, &matrix, &slopes);
+        let of_entries = of_entries.map(|fault| match fault {
             (relative, [i, j]) if i != n => Fault::Tangent(relative, [name(i), name(j)]),
             (slope, [_, j]) => Fault::Sign(slope, name(j)),
-        })
+        });
+        of_entries.or_else(|| off_onward(&matrix, &onward, &slopes_onward).map(Fault::Onward))
     }
+}
+
+/// How far the tangent times the increment is from all of some slopes of the stress along it, if that
+/// is too far.
+fn off_onward(matrix: &[f64], onward: &[f64], slopes: &[Vec<f64>]) -> Option<f64> {
+    let n = onward.len();
+    let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let expected: Vec<f64> = matrix
+        .chunks_exact(n)
+        .map(|row| row.iter().zip(onward).map(|(c, d)| c * d).sum())
+        .collect();
+    let off = slopes.iter().map(|slope| {
+        let difference: Vec<f64> = slope.iter().zip(&expected).map(|(a, b)| a - b).collect();
+        norm(&difference) / norm(slope).max(norm(&expected)).max(f64::MIN_POSITIVE)
+    });
+    let least = off.fold(f64::INFINITY, f64::min);
+    (least.is_finite() && least > WRONG).then_some(least)
 }
 
 /// The worst entry of a tangent beside slopes of the stress and its place; or, where it is right
@@ -161,5 +206,15 @@ mod tests {
         assert_eq!(fault(2, &wrong, &wrong), Some((-4.0, [2, 0])));
         // Nothing is known where the law fails on both sides.
         assert_eq!(fault(1, &[1.0], &[f64::INFINITY]), None);
+    }
+
+    #[test]
+    fn an_elastic_tangent_of_a_law_that_flows_is_told_by_its_increment() {
+        // Along the increment (1, 0) the stress rises by a tenth of what the tangent says.
+        let matrix = [10.0, 0.0, 0.0, 5.0];
+        let off = off_onward(&matrix, &[1.0, 0.0], &[vec![1.0, 0.0], vec![1.1, 0.0]]);
+        assert!((off.unwrap() - 0.89).abs() < 1e-12);
+        let right = off_onward(&matrix, &[1.0, 0.0], &[vec![1.0, 0.0], vec![9.99, 0.0]]);
+        assert_eq!(right, None);
     }
 }

@@ -2,7 +2,7 @@
 //! that are never reached, with tangents by rows or of elasticity.
 
 use super::{driver, gfortran, number, place, rows, soil, source};
-use crate::program::{BAD_INPUT, DONE, Outcome, PLUGIN_TROUBLE, Place};
+use crate::program::{BAD_INPUT, DONE, NO_EQUILIBRIUM, Outcome, PLUGIN_TROUBLE, Place};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
@@ -393,6 +393,14 @@ fn an_approximate_tangent_chooses_its_method() {
     place.write(
         "elastic_tangent.law.toml",
         sidecar.replacen("tangent = \"approximate\"", "", 1),
+    );
+    // Where that fails, the message says why.
+    let outcome = flowing(&place, "");
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert!(
+        outcome.says("the tangent of the law differs"),
+        "{}",
+        outcome.stderr
     );
     let _ = flowing(&place, "max_iterations = 1000\nrelaxation = false");
     let newton = summary(&place);
