@@ -21,7 +21,6 @@ on_request() { # TARGET TEST
 
 # The program and all that its tests need, as `.ci/run` builds them.
 cargo test --workspace --release --no-run || exit 1
-on_request figures the_committed_figures_are_those_of_the_cases
 on_request trade_off the_committed_errors_are_those_that_are_measured
 on_request command_line trade_off::a_case_is_measured_on_its_mesh_and_against_a_finer_one
 printf '%s\n' "${rows[@]}"

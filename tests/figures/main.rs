@@ -2,8 +2,8 @@
 //! minute, so the test is asked for by name:
 //!
 //! ```sh
-//! cargo test --release -p tests --test figures -- --ignored                  # compares
-//! PILUM_BLESS=1 cargo test --release -p tests --test figures -- --ignored    # rewrites those that differ
+//! cargo test --release -p tests --test figures                  # compares
+//! PILUM_BLESS=1 cargo test --release -p tests --test figures    # rewrites those that differ
 //! ```
 #![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
 
@@ -198,7 +198,6 @@ fn every_figure_has_its_case() {
 }
 
 #[test]
-#[ignore = "runs every case, which takes about a minute"]
 fn the_committed_figures_are_those_of_the_cases() {
     let bless = std::env::var_os("PILUM_BLESS").is_some_and(|value| value == "1");
     let mut places: BTreeMap<&str, TempDir> = BTreeMap::new();
@@ -224,7 +223,7 @@ fn the_committed_figures_are_those_of_the_cases() {
     assert!(
         differing.is_empty(),
         "figures differ from what the cases draw: {differing:#?}\nrewrite them with: \
-         PILUM_BLESS=1 cargo test --release -p tests --test figures -- --ignored"
+         PILUM_BLESS=1 cargo test --release -p tests --test figures"
     );
 }
 
