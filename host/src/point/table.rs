@@ -75,7 +75,8 @@ impl<W: Write> Table<W> {
         write!(text, "{}", row.increment).map_err(|_| io::Error::other(full))?;
         for value in row.gradient.iter().chain(row.flux).chain(row.internal) {
             // Adding 0 turns −0 into 0.
-            write!(text, ",{:.16e}", value + 0.0).map_err(|_| io::Error::other(full))?;
+            text.push(',');
+            write!(text, "{:.16e}", value + 0.0).map_err(|_| io::Error::other(full))?;
         }
         writeln!(text, ",{}", row.iterations).map_err(|_| io::Error::other(full))?;
         if self.is_only_once || text.len() > 1 << 15 || self.flushed.elapsed() > FLUSH_EVERY {
