@@ -131,7 +131,13 @@ fn killed_and_resumed(solver: &str, kills: u32) {
         on_the_way += usize::from((1..2 * INCREMENTS).contains(&whole_rows(&place)));
         if whole_rows(&place) == 2 * INCREMENTS {
             // Resumed often enough to have come to its end: the next run starts anew.
-            std::fs::remove_dir_all(place.path("out")).unwrap();
+            // The process that did the work may take a moment to follow the one that was killed, and
+            // writes until then.
+            let since = Instant::now();
+            while let Err(why) = std::fs::remove_dir_all(place.path("out")) {
+                assert!(since.elapsed() < Duration::from_secs(5), "{why}");
+                std::thread::sleep(Duration::from_millis(10));
+            }
         }
     }
     assert!(
