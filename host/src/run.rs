@@ -21,8 +21,8 @@ use crate::output::{Figures, IncrementRecord, PhaseRecord, Results, check_figure
 use crate::plugin::{Library, Moment};
 use crate::probe::{Probes, Snapshot};
 use crate::solver::{
-    Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, Reuse, Runaway, StepFailure,
-    StepSuccess,
+    Costs, Guess, LinearDomain, Loads, LookedAt, Matrix, Newton, ROUND_OFF, Reuse, Runaway,
+    StepFailure, StepSuccess, norm,
 };
 use crate::stop::Stop;
 use algebra::{LinearSolver, Singular, mesh_lines};
@@ -65,8 +65,6 @@ pub struct Options {
 /// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
 /// be halved so often.
 const PATIENCE: f64 = 0.2;
-/// Round-off of forces that have gone, relative to them.
-const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
 /// Share of the method's own limit of iterations up to which a step counts as easy, so that the
@@ -224,10 +222,10 @@ struct Run<'a> {
     time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     largest_force: f64,
-    /// Results that the theory does not cover.
-    beyond: Beyond,
     /// The same at every degree of freedom.
     largest_forces: Vec<f64>,
+    /// Results that the theory does not cover.
+    beyond: Beyond,
     /// Rotations call forth no stresses in any group.
     turns_freely: bool,
     /// Factors of linear parts.
@@ -936,7 +934,7 @@ impl<'a> Run<'a> {
                 .domain
                 .iter()
                 .filter(|_| beside.is_none())
-                .map(|domain| domain.stiffest * statics::norm(&self.displacement))
+                .map(|domain| domain.stiffest * norm(&self.displacement))
                 .sum(),
         };
         let model = statics::Model {

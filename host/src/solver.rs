@@ -10,3 +10,4 @@ pub use newton::{
     Costs, Criterion, Guess, Iteration, Loads, Matrix, Measure, Newton, Runaway, StepFailure,
     StepSuccess, Unmet,
 };
+pub(crate) use newton::{ROUND_OFF, STILL_SMALL, norm};

@@ -12,12 +12,7 @@
 //! a user sees in the results, plus what is still carried of the forces out of balance at the start.
 
 use crate::case::Analysis;
-
-/// Round-off of a sum, relative to the forces it is of; as in the residual.
-const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
-
-/// Largest relative residual that may be round-off; as in the iterations.
-const STILL_SMALL: f64 = 1e-6;
+use crate::solver::{ROUND_OFF, STILL_SMALL};
 
 /// Forces on a model and what may be left of their sum.
 #[derive(Clone, Debug, Default)]
@@ -44,11 +39,6 @@ pub(super) struct Bound {
     /// Forces whose last bit stands for that of the displacements: largest stiffness of a condensed
     /// domain times displacements.
     pub(super) last_bit: f64,
-}
-
-/// 2-norm.
-pub(super) fn norm(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
 impl Balance {

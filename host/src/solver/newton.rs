@@ -37,12 +37,12 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 const PATIENCE: usize = 6;
 const PROGRESS: f64 = 0.1;
 /// Largest relative residual that may be round-off.
-pub(super) const STILL_SMALL: f64 = 1e-6;
+pub(crate) const STILL_SMALL: f64 = 1e-6;
 /// Round-off that a state may have, in changes of its forces by the last bit of the displacement
 /// increments.
 pub(super) const ACCEPTED_ROUND_OFF: f64 = 8.0;
 /// Round-off of K u, relative to the forces it is the difference of.
-const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+pub(crate) const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 /// Loads over a phase, as functions of the load factor λ from 0 to 1.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -55,10 +55,10 @@ pub struct Loads {
     pub prescribed: Vec<(usize, f64, f64)>,
     /// Forces out of balance at the start, carried to equilibrium in proportion to λ.
     pub out_of_balance: Vec<f64>,
-    /// Largest of the forces (2-norms) at the start of the phase: where all forces vanish in its
-    /// course, the residual is still measured against something.
+    /// Largest of the forces (2-norms) at the start of the phase, and what rounding leaves of those of
+    /// earlier phases: where all forces vanish, the residual is still measured against something.
     pub scale: f64,
-    /// Largest of the forces at every degree of freedom at the start of this phase or an earlier one.
+    /// The same at every degree of freedom.
     pub largest: Vec<f64>,
 }
 
@@ -1003,7 +1003,7 @@ fn largest(sizes: &[f64]) -> f64 {
 }
 
 /// 2-norm.
-pub(super) fn norm(v: &[f64]) -> f64 {
+pub(crate) fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
