@@ -170,16 +170,6 @@ pub(super) struct Segment {
     pub(super) restrictions: Option<Restrictions>,
 }
 
-/// Names of gradient and flux of a hypothesis.
-pub(crate) fn words(hypothesis: Hypothesis) -> (&'static str, &'static str) {
-    match hypothesis {
-        Hypothesis::Interface2d => ("jump", "traction"),
-        Hypothesis::PlaneStrain | Hypothesis::Axisymmetric | Hypothesis::ThreeD => {
-            ("strain", "stress")
-        }
-    }
-}
-
 /// A driver file, checked, with its law built.
 #[derive(Debug)]
 pub struct Driver {

@@ -1,0 +1,161 @@
+//! What a law is asked and what it answers: points of a batch before and after an increment.
+
+use crate::Strided;
+use abi::status::Outcome;
+
+/// Which operator a call computes beside the fluxes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operator {
+    /// None.
+    None,
+    /// The tangent consistent with the update.
+    Consistent,
+    /// The elastic operator.
+    Elastic,
+}
+
+/// Where an integration point lies. Laws of the contract do not ask; routines made for other
+/// programs do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Site {
+    /// Coordinates.
+    pub position: [f64; 2],
+    /// Characteristic length of the element.
+    pub length: f64,
+    /// Element within its group, from 1.
+    pub element: u32,
+    /// Integration point within the element, from 1.
+    pub point: u32,
+}
+
+impl Default for Site {
+    /// A point by itself.
+    fn default() -> Self {
+        Self {
+            position: [0.0; 2],
+            length: 1.0,
+            element: 1,
+            point: 1,
+        }
+    }
+}
+
+/// Which step of the loading it is, for routines that ask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Phase, or segment of a driver, from 1.
+    pub step: u32,
+    /// Increment of it, from 1.
+    pub increment: u32,
+    /// Time at which it started.
+    pub step_start: f64,
+}
+
+impl Default for Moment {
+    /// The first increment of all.
+    fn default() -> Self {
+        Self {
+            step: 1,
+            increment: 1,
+            step_start: 0.0,
+        }
+    }
+}
+
+/// Points of a batch at the start of an increment, and the gradients at its end.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// Number of points.
+    pub n_points: usize,
+    /// Gradients at the start, and their place.
+    pub gradient: (&'a [f64], Strided),
+    /// Gradients at the end, and their place.
+    pub gradient_end: (&'a [f64], Strided),
+    /// Fluxes at the start, and their place.
+    pub flux: (&'a [f64], Strided),
+    /// Internal variables at the start, point by point.
+    pub state: &'a [f64],
+    /// Time at the start.
+    pub time: f64,
+    /// Time increment.
+    pub time_increment: f64,
+    /// Which step and increment it is.
+    pub moment: Moment,
+    /// Where the points lie; empty if the law does not ask ([`Law::asks_for_sites`]).
+    pub sites: &'a [Site],
+}
+
+/// Where the results of a call go.
+#[derive(Debug)]
+pub struct End<'a> {
+    /// Fluxes, and their place.
+    pub flux: (&'a mut [f64], Strided),
+    /// Internal variables, point by point.
+    pub state: &'a mut [f64],
+    /// Operators, point by point, row-major; may be empty if none is wanted.
+    pub operator: &'a mut [f64],
+}
+
+/// Why a batch cannot be used. The outputs are garbage then.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BatchFailure {
+    /// The first of the worst points.
+    pub point: usize,
+    /// What the law said of it.
+    pub outcome: Outcome,
+    /// In words; empty if the law gave none.
+    pub message: String,
+    /// The smallest step factor asked for, if only smaller steps are asked for.
+    pub factor: Option<f64>,
+    /// What the law was asked at the point.
+    pub call: Option<Box<PointCall>>,
+}
+
+/// What a call asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// An update, with an operator or none.
+    Update(Operator),
+    /// Initial internal variables.
+    InitialState,
+}
+
+/// A call of a law for one point: all that the answer depends on, beside the law and its
+/// parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointCall {
+    /// What is asked for.
+    pub request: Request,
+    /// Time at the start.
+    pub time: f64,
+    /// Time increment.
+    pub time_increment: f64,
+    /// Gradient at the start.
+    pub gradient: Vec<f64>,
+    /// Gradient at the end.
+    pub gradient_end: Vec<f64>,
+    /// Flux at the start.
+    pub flux: Vec<f64>,
+    /// Internal variables at the start.
+    pub state: Vec<f64>,
+    /// Which step and increment it is.
+    pub moment: Moment,
+    /// Where the point lies.
+    pub site: Site,
+}
+
+impl BatchFailure {
+    pub(crate) fn of_call(self, call: PointCall) -> Self {
+        Self {
+            call: Some(Box::new(call)),
+            ..self
+        }
+    }
+}
+
+/// A batch that can be used.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BatchSuccess {
+    /// Points whose results are valid but inaccurate, and the law's message about them.
+    pub unreliable: Option<(usize, String)>,
+}

@@ -1,0 +1,513 @@
+//! A failed call of a law in a file of its own: everything the call depends on, so that it can be
+//! repeated bit for bit, without the case it comes from.
+
+use crate::Error;
+use crate::adapter::{Adapter, Externals};
+use crate::description::words;
+use crate::{BatchFailure, Law, Moment, Operator, PointCall, Request, Site};
+use abi::Hypothesis;
+use abi::status::Outcome;
+use indexmap::IndexMap;
+use serde::Deserialize;
+use std::fmt::Write as _;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use text::{Source, suggestion, toml_error, write::replace};
+use toml::de::DeTable;
+
+/// Name of the file in a results folder.
+pub const FILE_NAME: &str = "failure.toml";
+
+/// A failed call, and where it comes from.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Capsule {
+    /// Version of this form.
+    version: u32,
+    law: LawPart,
+    #[serde(rename = "where", default)]
+    origin: IndexMap<String, toml::Value>,
+    outcome: OutcomePart,
+    #[serde(default)]
+    parameters: IndexMap<String, f64>,
+    call: CallPart,
+    start: Values,
+    #[serde(default)]
+    end: Values,
+    /// The file it was read from.
+    #[serde(skip)]
+    source: Option<Source>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LawPart {
+    id: String,
+    version: String,
+    hypothesis: String,
+    library: PathBuf,
+    sha256: String,
+    adapter: Option<Adapter>,
+    sidecar: Option<PathBuf>,
+    externals: Option<Externals>,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OutcomePart {
+    status: String,
+    message: String,
+    step_factor: Option<f64>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CallPart {
+    request: String,
+    time: f64,
+    time_increment: f64,
+    moment: Option<MomentPart>,
+    site: Option<SitePart>,
+}
+
+/// Which step it is; laws of the contract do not ask.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MomentPart {
+    step: u32,
+    increment: u32,
+    start: f64,
+}
+
+/// Where the point lies; laws of the contract do not ask.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SitePart {
+    position: [f64; 2],
+    length: f64,
+    element: u32,
+    point: u32,
+}
+
+/// Gradients, fluxes and internal variables by name.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Values {
+    #[serde(alias = "strain")]
+    jump: IndexMap<String, f64>,
+    #[serde(alias = "stress")]
+    traction: IndexMap<String, f64>,
+    internal: IndexMap<String, f64>,
+}
+
+/// Names of the requests in files.
+const REQUESTS: [(&str, Request); 4] = [
+    ("fluxes", Request::Update(Operator::None)),
+    (
+        "fluxes and consistent tangent",
+        Request::Update(Operator::Consistent),
+    ),
+    (
+        "fluxes and elastic operator",
+        Request::Update(Operator::Elastic),
+    ),
+    ("initial state", Request::InitialState),
+];
+
+impl Capsule {
+    /// The capsule of a failed call; `None` if it is not known. `origin` says where it happened, by
+    /// key.
+    pub fn of(law: &Law, failure: &BatchFailure, origin: Vec<(&str, toml::Value)>) -> Option<Self> {
+        let call = failure.call.as_deref()?;
+        let hypothesis = law.hypothesis();
+        let description = law.description();
+        let components = |values: &[f64]| -> IndexMap<String, f64> {
+            let names = hypothesis.components().iter();
+            let names = names.map(|name| (*name).to_owned());
+            names.zip(values.iter().copied()).collect()
+        };
+        let variables = law.formulation().internal_variables.iter();
+        let ids = description.parameters.iter().map(|p| p.id.clone());
+        let request = REQUESTS.iter().find(|(_, r)| *r == call.request)?.0;
+        let foreign = law.library().foreign();
+        Some(Self {
+            version: 1,
+            law: LawPart {
+                id: description.id.clone(),
+                version: description.version.clone(),
+                hypothesis: hypothesis.name().to_owned(),
+                library: std::path::absolute(law.library().path()).ok()?,
+                sha256: law.library().sha256().to_owned(),
+                adapter: foreign.map(|foreign| foreign.adapter),
+                sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
+                externals: foreign.and_then(|foreign| foreign.externals),
+            },
+            origin: origin
+                .into_iter()
+                .map(|(key, value)| (key.to_owned(), value))
+                .collect(),
+            outcome: OutcomePart::of(failure),
+            parameters: ids.zip(law.parameters().iter().copied()).collect(),
+            call: CallPart {
+                request: request.to_owned(),
+                time: call.time,
+                time_increment: call.time_increment,
+                moment: foreign.map(|_| MomentPart {
+                    step: call.moment.step,
+                    increment: call.moment.increment,
+                    start: call.moment.step_start,
+                }),
+                site: foreign.map(|_| SitePart {
+                    position: call.site.position,
+                    length: call.site.length,
+                    element: call.site.element,
+                    point: call.site.point,
+                }),
+            },
+            start: Values {
+                jump: components(&call.gradient),
+                traction: components(&call.flux),
+                internal: variables
+                    .map(|v| v.id.clone())
+                    .zip(call.state.iter().copied())
+                    .collect(),
+            },
+            end: Values {
+                jump: components(&call.gradient_end),
+                ..Values::default()
+            },
+            source: None,
+        })
+    }
+
+    /// Reads a capsule.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`]; [`Error::Input`] at the place that does not fit.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Self::of_source(Source::read(path)?)
+    }
+
+    /// Takes the text of a capsule.
+    pub fn of_source(source: Source) -> Result<Self, Error> {
+        let mut capsule: Self =
+            toml::from_str(source.text()).map_err(|why| toml_error(&source, &why))?;
+        capsule.source = Some(source);
+        if capsule.version != 1 {
+            let message = format!("this is a capsule of version {}", capsule.version);
+            return Err(capsule.error(&["version"], message));
+        }
+        if capsule.hypothesis().is_none() {
+            let message = format!("there is no hypothesis `{}`", capsule.law.hypothesis);
+            let known = Hypothesis::ALL.map(Hypothesis::name);
+            let hint = suggestion(&capsule.law.hypothesis, known);
+            return Err(capsule
+                .error(&["law", "hypothesis"], message)
+                .with_hint(&hint));
+        }
+        if capsule.request().is_none() {
+            let message = format!("there is no request `{}`", capsule.call.request);
+            let hint = suggestion(&capsule.call.request, REQUESTS.map(|(name, _)| name));
+            return Err(capsule
+                .error(&["call", "request"], message)
+                .with_hint(&hint));
+        }
+        Ok(capsule)
+    }
+
+    /// An error about what stands under these keys, or about the last of them that is there.
+    fn error(&self, keys: &[&str], message: impl Into<String>) -> Error {
+        let Some(source) = &self.source else {
+            return text::Error::Usage(message.into()).into();
+        };
+        source.error(place(source.text(), keys), message).into()
+    }
+
+    /// Id of the law.
+    pub fn law_id(&self) -> &str {
+        &self.law.id
+    }
+
+    /// Writes the capsule.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        Ok(replace(path, self.to_string())?)
+    }
+
+    fn hypothesis(&self) -> Option<Hypothesis> {
+        let mut all = Hypothesis::ALL.into_iter();
+        all.find(|h| h.name() == self.law.hypothesis)
+    }
+
+    fn request(&self) -> Option<Request> {
+        let named = |(name, _): &&(&str, Request)| *name == self.call.request;
+        REQUESTS.iter().find(named).map(|(_, request)| *request)
+    }
+}
+
+impl OutcomePart {
+    fn of(failure: &BatchFailure) -> Self {
+        Self {
+            status: status(failure.outcome).to_owned(),
+            message: failure.message.clone(),
+            step_factor: failure.factor,
+        }
+    }
+}
+
+/// Name of an outcome in files.
+fn status(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Ok => "ok",
+        Outcome::Unreliable => "unreliable",
+        Outcome::CutStep => "cut step",
+        Outcome::Argument => "argument",
+        Outcome::Parameter => "parameter",
+        Outcome::Unsupported => "unsupported",
+        Outcome::Domain => "domain",
+        Outcome::Numeric => "numeric",
+        Outcome::Internal => "internal",
+        Outcome::Unknown(_) => "unknown",
+    }
+}
+
+/// A number that reads back to the same bits.
+fn real(value: f64) -> String {
+    if value.is_nan() {
+        "nan".to_owned()
+    } else {
+        format!("{value:?}")
+    }
+}
+
+fn text(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}
+
+fn table(values: &IndexMap<String, f64>) -> String {
+    let entries: Vec<String> = values
+        .iter()
+        .map(|(name, value)| format!("{name} = {}", real(*value)))
+        .collect();
+    format!("{{ {} }}", entries.join(", "))
+}
+
+impl std::fmt::Display for Capsule {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (gradient, flux) = self.hypothesis().map_or(("jump", "traction"), words);
+        writeln!(
+            f,
+            "# A call of a law that failed. `pilum replay` repeats it: numbers read back to the same \
+             bits.\nversion = {}\n",
+            self.version
+        )?;
+        let law = &self.law;
+        writeln!(
+            f,
+            "[law]\nid = {}\nversion = {}\nhypothesis = {}\nlibrary = {}\nsha256 = {}",
+            text(&law.id),
+            text(&law.version),
+            text(&law.hypothesis),
+            text(&law.library.to_string_lossy()),
+            text(&law.sha256)
+        )?;
+        if let Some(adapter) = law.adapter {
+            writeln!(f, "adapter = {}", text(adapter.name()))?;
+        }
+        if let Some(sidecar) = &law.sidecar {
+            writeln!(f, "sidecar = {}", text(&sidecar.to_string_lossy()))?;
+        }
+        if let Some(externals) = law.externals {
+            writeln!(f, "externals = {}", text(externals.name()))?;
+        }
+        writeln!(f)?;
+        writeln!(f, "[where]")?;
+        for (key, value) in &self.origin {
+            writeln!(f, "{key} = {value}")?;
+        }
+        let outcome = &self.outcome;
+        writeln!(
+            f,
+            "\n[outcome]\nstatus = {}\nmessage = {}",
+            text(&outcome.status),
+            text(&outcome.message)
+        )?;
+        if let Some(factor) = outcome.step_factor {
+            writeln!(f, "step_factor = {}", real(factor))?;
+        }
+        writeln!(f, "\n[parameters]")?;
+        for (id, value) in &self.parameters {
+            writeln!(f, "{id} = {}", real(*value))?;
+        }
+        writeln!(
+            f,
+            "\n[call]\nrequest = {}\ntime = {}\ntime_increment = {}",
+            text(&self.call.request),
+            real(self.call.time),
+            real(self.call.time_increment)
+        )?;
+        if let Some(moment) = &self.call.moment {
+            let (step, increment, start) = (moment.step, moment.increment, real(moment.start));
+            writeln!(
+                f,
+                "moment = {{ step = {step}, increment = {increment}, start = {start} }}"
+            )?;
+        }
+        if let Some(site) = &self.call.site {
+            let [x, y] = site.position.map(real);
+            writeln!(
+                f,
+                "site = {{ position = [{x}, {y}], length = {}, element = {}, point = {} }}",
+                real(site.length),
+                site.element,
+                site.point
+            )?;
+        }
+        writeln!(f, "\n[start]")?;
+        let mut lines = String::new();
+        for (name, values) in [
+            (gradient, &self.start.jump),
+            (flux, &self.start.traction),
+            ("internal", &self.start.internal),
+        ] {
+            if !values.is_empty() {
+                writeln!(lines, "{name} = {}", table(values))?;
+            }
+        }
+        f.write_str(&lines)?;
+        if !self.end.jump.is_empty() {
+            writeln!(f, "\n[end]\n{gradient} = {}", table(&self.end.jump))?;
+        }
+        Ok(())
+    }
+}
+
+/// Where the value under these keys stands, or else the last of the keys that is there; of a whole
+/// table its head.
+fn place(text: &str, keys: &[&str]) -> Range<usize> {
+    let mut at = 0..0;
+    let Ok(root) = DeTable::parse(text) else {
+        return at;
+    };
+    let mut table = Some(root.get_ref());
+    for key in keys {
+        let found = table.and_then(|table| table.iter().find(|(name, _)| name.get_ref() == key));
+        let Some((name, value)) = found else { break };
+        table = value.get_ref().as_table();
+        at = if table.is_some() {
+            name.span()
+        } else {
+            value.span()
+        };
+    }
+    at
+}
+
+impl Capsule {
+    /// The values of a table in the order of some names. `keys`: what leads to the table.
+    ///
+    /// # Errors
+    /// The name that is missing, or too much.
+    fn in_order<'a>(
+        &self,
+        values: &IndexMap<String, f64>,
+        names: impl Iterator<Item = &'a str> + Clone,
+        keys: &[&str],
+        what: &str,
+    ) -> Result<Vec<f64>, Error> {
+        if let Some(other) = values.keys().find(|key| !names.clone().any(|n| n == *key)) {
+            let keys = [keys, &[other]].concat();
+            let names: Vec<&str> = names.collect();
+            let message = format!("law `{}` has no {what} `{other}`", self.law.id);
+            return Err(self
+                .error(&keys, message)
+                .with_hint(&suggestion(other, names)));
+        }
+        names
+            .map(|name| {
+                let value = values.get(name).copied();
+                value.ok_or_else(|| self.error(keys, format!("the {what} `{name}` is missing")))
+            })
+            .collect()
+    }
+
+    /// The call, with its values in the order of this law.
+    fn point_call(&self, law: &Law) -> Result<PointCall, Error> {
+        let request = self.request().ok_or_else(|| {
+            let message = format!("there is no request `{}`", self.call.request);
+            self.error(&["call", "request"], message)
+        })?;
+        let (gradient, flux) = words(law.hypothesis());
+        let components = |values: &IndexMap<String, f64>, part: &str, what: &str| {
+            if values.is_empty() && request == Request::InitialState {
+                return Ok(Vec::new());
+            }
+            let names = law.hypothesis().components().iter().copied();
+            self.in_order(values, names, &[part, what], what)
+        };
+        let variables = law.formulation().internal_variables.iter();
+        let state = if request == Request::InitialState {
+            Vec::new()
+        } else {
+            let ids = variables.map(|v| v.id.as_str());
+            self.in_order(
+                &self.start.internal,
+                ids,
+                &["start", "internal"],
+                "internal variable",
+            )?
+        };
+        Ok(PointCall {
+            request,
+            time: self.call.time,
+            time_increment: self.call.time_increment,
+            gradient: components(&self.start.jump, "start", gradient)?,
+            gradient_end: components(&self.end.jump, "end", gradient)?,
+            flux: components(&self.start.traction, "start", flux)?,
+            state,
+            moment: self
+                .call
+                .moment
+                .map_or_else(Moment::default, |moment| Moment {
+                    step: moment.step,
+                    increment: moment.increment,
+                    step_start: moment.start,
+                }),
+            site: self.call.site.map_or_else(Site::default, |site| Site {
+                position: site.position,
+                length: site.length,
+                element: site.element,
+                point: site.point,
+            }),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_to_the_same_bits() {
+        let values = [
+            0.1 + 0.2,
+            -0.0,
+            f64::MIN_POSITIVE,
+            5e-324,
+            f64::MAX,
+            1e16,
+            -1.0 / 3.0,
+            f64::INFINITY,
+        ];
+        for value in values {
+            let line = format!("x = {}", real(value));
+            let read: IndexMap<String, f64> = toml::from_str(&line).unwrap();
+            assert_eq!(read["x"].to_bits(), value.to_bits(), "{line}");
+        }
+        let read: IndexMap<String, f64> =
+            toml::from_str(&format!("x = {}", real(f64::NAN))).unwrap();
+        assert!(read["x"].is_nan());
+    }
+}

@@ -1,0 +1,458 @@
+//! What a library says about itself on disk. Nothing of it is executed, and it may be for another
+//! kind of computer.
+
+use crate::Error;
+use text::file;
+use crate::hexadecimal_sha256;
+use abi::raw::{self, MagicBlock};
+use abi::version;
+use object::read::elf::{Dyn, ElfFile, FileHeader};
+use object::read::macho::{MachHeader, MachOFile};
+use object::read::pe::{ImageNtHeaders, PeFile};
+use object::{Architecture, BinaryFormat, File, LittleEndian, Object, ObjectSection, ObjectSymbol};
+use object::{ReadRef, SymbolKind, elf};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fmt::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+/// Symbols of the contract.
+const CONTRACT: [&str; 3] = ["pilum_magic", "pilum_entry", "pilum_rust_layout"];
+/// Symbols that linkers add.
+const LINKER: [&str; 6] = [
+    "_init",
+    "_fini",
+    "_edata",
+    "_end",
+    "__bss_start",
+    "__dso_handle",
+];
+
+/// What was read from a library.
+#[derive(Clone, Debug, Serialize)]
+pub struct Inspection {
+    /// The file.
+    pub path: PathBuf,
+    /// Its size in bytes.
+    pub bytes: usize,
+    /// Its SHA-256 in hexadecimal digits.
+    pub sha256: String,
+    /// `elf`, `mach-o` or `pe`.
+    pub format: &'static str,
+    /// Processor, such as `x86_64`.
+    pub architecture: String,
+    /// Address width.
+    pub bits: u8,
+    /// The handshake block, if it has one.
+    pub handshake: Option<Handshake>,
+    /// Laws in its manifest.
+    pub laws: Vec<ManifestEntry>,
+    /// Libraries that it needs.
+    pub needs: Vec<String>,
+    /// Folders that it asks the loader to search for them.
+    pub search: Vec<String>,
+    /// Symbols that others can use.
+    pub exported: Vec<String>,
+    /// Symbols that others must provide.
+    pub undefined: Vec<String>,
+    /// Why this program could not use it, and what it should not have.
+    pub remarks: Vec<String>,
+}
+
+/// The handshake block as it stands in the file.
+#[derive(Clone, Debug, Serialize)]
+pub struct Handshake {
+    /// Version of the contract, major and minor.
+    pub abi: [u16; 2],
+    /// Hash of the layout of the contract's types.
+    pub layout_hash: String,
+    /// What the library was built with.
+    pub sdk: String,
+    /// The field that keeps this program from using it.
+    pub mismatch: Option<String>,
+}
+
+/// A line of the manifest.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ManifestEntry {
+    /// Id of the law.
+    pub id: String,
+    /// Version of the law.
+    pub version: String,
+}
+
+/// Reads a library without executing it.
+///
+/// # Errors
+/// [`text::Error::Unreadable`]; [`Error::Library`] for what is no library.
+pub fn inspect(path: &Path) -> Result<Inspection, Error> {
+    let bytes = file::read_library(path).map_err(|source| text::Error::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    inspect_bytes(path, &bytes)
+}
+
+/// As [`inspect`], with the bytes of the file.
+pub(crate) fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<Inspection, Error> {
+    let no_library =
+        |why: &dyn fmt::Display| Error::library(format!("{} is no library: {why}", path.display()));
+    let file = File::parse(bytes).map_err(|why| no_library(&why))?;
+    let format = match file.format() {
+        BinaryFormat::Elf => "elf",
+        BinaryFormat::MachO => "mach-o",
+        BinaryFormat::Pe => "pe",
+        other => {
+            return Err(no_library(&format!(
+                "{other:?} is not a format of libraries"
+            )));
+        }
+    };
+    let (needs, search) = needs(&file, bytes).map_err(|why| no_library(&why))?;
+    let (exported, undefined) = symbols(&file).map_err(|why| no_library(&why))?;
+    let mut inspection = Inspection {
+        path: path.to_owned(),
+        bytes: bytes.len(),
+        sha256: hexadecimal_sha256(bytes),
+        format,
+        architecture: architecture(file.architecture()),
+        bits: if file.is_64() { 64 } else { 32 },
+        handshake: handshake(&file),
+        laws: manifest(&file).unwrap_or_default(),
+        needs,
+        search,
+        exported,
+        undefined,
+        remarks: Vec::new(),
+    };
+    inspection.remarks = inspection.remarks(&file);
+    Ok(inspection)
+}
+
+impl Inspection {
+    fn remarks(&self, file: &File<'_>) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let ours = std::env::consts::ARCH;
+        if self.architecture != ours {
+            remarks.push(format!(
+                "it is for {}, this program for {ours}",
+                self.architecture
+            ));
+        }
+        let format = match std::env::consts::OS {
+            "windows" => "pe",
+            "macos" | "ios" => "mach-o",
+            _ => "elf",
+        };
+        if self.format != format {
+            remarks.push(format!(
+                "it has the format {}, this system uses {format}",
+                self.format
+            ));
+        }
+        if file.kind() != object::ObjectKind::Dynamic {
+            remarks.push(format!("it is no shared library: {:?}", file.kind()));
+        }
+        match &self.handshake {
+            None => {
+                remarks.push("it has no handshake block `pilum_magic`: no law library".to_owned());
+            }
+            Some(handshake) => remarks.extend(handshake.mismatch.clone()),
+        }
+        if self.handshake.is_some() {
+            if !self.exported.iter().any(|name| name == "pilum_entry") {
+                remarks.push("it has no function `pilum_entry`".to_owned());
+            }
+            if self.laws.is_empty() {
+                remarks.push(
+                    "it has no manifest: its laws are found only by the file's name".to_owned(),
+                );
+            }
+        }
+        let others: Vec<&str> = self
+            .exported
+            .iter()
+            .map(String::as_str)
+            .filter(|name| !CONTRACT.contains(name) && !LINKER.contains(name))
+            .filter(|name| !self.is_for_other_programs(name))
+            .collect();
+        if let [first, ..] = others.as_slice() {
+            remarks.push(format!(
+                "it exports {} symbols beside the contract's, such as `{first}`: hide them",
+                others.len()
+            ));
+        }
+        remarks
+    }
+
+    /// Entries of other programs: user materials, and behaviours of MFront's generic interface.
+    fn is_for_other_programs(&self, name: &str) -> bool {
+        let behaviours = self.exported.iter();
+        let mut behaviours = behaviours.filter_map(|name| name.strip_suffix("_mfront_mkt"));
+        matches!(name, "umat_" | "umat" | "UMAT" | "CALCULIX")
+            || behaviours.any(|behaviour| {
+                name.strip_prefix(behaviour)
+                    .is_some_and(|rest| rest.starts_with('_'))
+            })
+    }
+}
+
+impl fmt::Display for Inspection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |names: &[String]| match names {
+            [] => "none".to_owned(),
+            names => wrapped(names),
+        };
+        writeln!(f, "library       {}", self.path.display())?;
+        writeln!(f, "sha256        {}", self.sha256)?;
+        writeln!(
+            f,
+            "format        {}, {}, {} bit, {} bytes",
+            self.format, self.architecture, self.bits, self.bytes
+        )?;
+        if let Some(Handshake {
+            abi: [major, minor],
+            layout_hash,
+            sdk,
+            ..
+        }) = &self.handshake
+        {
+            writeln!(
+                f,
+                "contract      {major}.{minor}, layout {layout_hash}, built with {sdk}"
+            )?;
+        }
+        let laws: Vec<String> = self
+            .laws
+            .iter()
+            .map(|law| format!("{} {}", law.id, law.version))
+            .collect();
+        writeln!(f, "laws          {}", list(&laws))?;
+        writeln!(f, "needs         {}", list(&self.needs))?;
+        if !self.search.is_empty() {
+            writeln!(f, "looks in      {}", list(&self.search))?;
+        }
+        writeln!(f, "exports       {}", list(&self.exported))?;
+        write!(f, "undefined     {}", list(&self.undefined))?;
+        for remark in &self.remarks {
+            write!(f, "\nremark        {remark}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Names in lines of readable length.
+fn wrapped(names: &[String]) -> String {
+    const INDENT: usize = 14;
+    const LINE: usize = 100;
+    let mut text = String::new();
+    let mut column = INDENT;
+    for (i, name) in names.iter().enumerate() {
+        if i > 0 {
+            let fits = column + 2 + name.chars().count() < LINE;
+            let break_line = format!(",\n{:INDENT$}", "");
+            text.push_str(if fits { ", " } else { &break_line });
+            column = if fits { column + 2 } else { INDENT };
+        }
+        column += name.chars().count();
+        text.push_str(name);
+    }
+    text
+}
+
+/// The name that Rust's target names use.
+fn architecture(architecture: Architecture) -> String {
+    match architecture {
+        Architecture::X86_64 => "x86_64".to_owned(),
+        Architecture::I386 => "x86".to_owned(),
+        Architecture::Aarch64 => "aarch64".to_owned(),
+        other => format!("{other:?}").to_lowercase(),
+    }
+}
+
+/// Laws in the manifest section; `None` without one.
+pub(crate) fn manifest<'data>(
+    file: &File<'data, impl ReadRef<'data>>,
+) -> Option<Vec<ManifestEntry>> {
+    let section = file
+        .section_by_name(".pilum")
+        .or_else(|| file.section_by_name("__pilum"))?;
+    let text = std::str::from_utf8(section.data().ok()?).ok()?;
+    let mut lines = text.trim_end_matches('\0').lines();
+    (lines.next()? == "pilum 1").then(|| {
+        let entry = |line: &str| {
+            let mut words = line.split_whitespace();
+            Some(ManifestEntry {
+                id: words.next()?.to_owned(),
+                version: words.next().unwrap_or_default().to_owned(),
+            })
+        };
+        lines.filter_map(entry).collect()
+    })
+}
+
+/// The bytes of the block that the file exports as `pilum_magic`.
+fn handshake(file: &File<'_>) -> Option<Handshake> {
+    let named = |symbol: &object::Symbol<'_, '_>| {
+        symbol.is_definition()
+            && symbol
+                .name()
+                .is_ok_and(|name| matches!(name, "pilum_magic" | "_pilum_magic"))
+    };
+    let address = file
+        .dynamic_symbols()
+        .chain(file.symbols())
+        .find(named)
+        .map(|symbol| symbol.address())
+        .or_else(|| {
+            let exports = file.exports().ok()?;
+            let export = exports.iter().find(|e| e.name() == b"pilum_magic")?;
+            Some(export.address())
+        })?;
+    let bytes = file
+        .sections()
+        .find_map(|section| section.data_range(address, 64).ok().flatten())?;
+    let big = !file.is_little_endian();
+    let number = |at: usize, n: usize| {
+        let bytes = &bytes[at..at + n];
+        let digit = |all: u64, byte: &u8| all << 8 | u64::from(*byte);
+        if big {
+            bytes.iter().fold(0, digit)
+        } else {
+            bytes.iter().rev().fold(0, digit)
+        }
+    };
+    let mut block = MagicBlock {
+        struct_size: number(0, 4) as u32,
+        magic: number(4, 4) as u32,
+        abi_major: number(8, 2) as u16,
+        abi_minor: number(10, 2) as u16,
+        pointer_bytes: bytes[12],
+        real_bytes: bytes[13],
+        reserved: [0; 2],
+        layout_hash: number(16, 8),
+        sdk: [0; 40],
+    };
+    let sdk = &bytes[24..64];
+    for (to, from) in block.sdk.iter_mut().zip(sdk) {
+        *to = *from as std::ffi::c_char;
+    }
+    let sdk: Vec<u8> = sdk.iter().copied().take_while(|&byte| byte != 0).collect();
+    (block.magic == raw::PILUM_MAGIC || block.magic == raw::PILUM_MAGIC.swap_bytes()).then(|| {
+        Handshake {
+            abi: [block.abi_major, block.abi_minor],
+            layout_hash: format!("{:#018x}", block.layout_hash),
+            sdk: String::from_utf8_lossy(&sdk).into_owned(),
+            mismatch: version::check(&block).err().map(|why| why.to_string()),
+        }
+    })
+}
+
+/// Names of exported and of undefined symbols, sorted.
+fn symbols(file: &File<'_>) -> object::Result<(Vec<String>, Vec<String>)> {
+    let mut exported = BTreeSet::new();
+    let mut undefined = BTreeSet::new();
+    if file.format() == BinaryFormat::Elf {
+        for symbol in file.dynamic_symbols() {
+            let Ok(name) = symbol.name() else { continue };
+            if name.is_empty() || symbol.kind() == SymbolKind::File {
+                continue;
+            }
+            if symbol.is_undefined() {
+                undefined.insert(name.to_owned());
+            } else if symbol.is_global() {
+                exported.insert(name.to_owned());
+            }
+        }
+    } else {
+        let text = |name: &[u8]| {
+            let name = String::from_utf8_lossy(name).into_owned();
+            let c_name = name
+                .strip_prefix('_')
+                .filter(|_| file.format() == BinaryFormat::MachO);
+            c_name.map(str::to_owned).unwrap_or(name)
+        };
+        exported.extend(file.exports()?.iter().map(|export| text(export.name())));
+        undefined.extend(file.imports()?.iter().map(|import| text(import.name())));
+    }
+    Ok((
+        exported.into_iter().collect(),
+        undefined.into_iter().collect(),
+    ))
+}
+
+/// Libraries that a file needs, and folders in which it wants them looked for.
+fn needs(file: &File<'_>, bytes: &[u8]) -> object::Result<(Vec<String>, Vec<String>)> {
+    match file {
+        File::Elf32(elf) => elf_needs(elf, bytes),
+        File::Elf64(elf) => elf_needs(elf, bytes),
+        File::MachO32(macho) => macho_needs(macho),
+        File::MachO64(macho) => macho_needs(macho),
+        File::Pe32(pe) => pe_needs(pe),
+        File::Pe64(pe) => pe_needs(pe),
+        _ => Ok(Default::default()),
+    }
+}
+
+fn elf_needs<Elf: FileHeader>(
+    file: &ElfFile<'_, Elf>,
+    bytes: &[u8],
+) -> object::Result<(Vec<String>, Vec<String>)> {
+    let endian = file.endian();
+    let sections = file.elf_section_table();
+    let (mut needs, mut search) = (Vec::new(), Vec::new());
+    let Some((entries, strings)) = sections.dynamic(endian, bytes)? else {
+        return Ok((needs, search));
+    };
+    let strings = sections.strings(endian, bytes, strings)?;
+    for entry in entries {
+        let list = match entry.tag32(endian) {
+            Some(elf::DT_NEEDED) => &mut needs,
+            Some(elf::DT_RPATH | elf::DT_RUNPATH) => &mut search,
+            _ => continue,
+        };
+        let text = String::from_utf8_lossy(entry.string(endian, strings)?);
+        list.extend(text.split(':').map(str::to_owned));
+    }
+    Ok((needs, search))
+}
+
+fn macho_needs<Mach: MachHeader>(
+    file: &MachOFile<'_, Mach>,
+) -> object::Result<(Vec<String>, Vec<String>)> {
+    let endian = file.endian();
+    let mut needs = Vec::new();
+    let mut commands = file.macho_load_commands()?;
+    while let Some(command) = commands.next()? {
+        if let Some(library) = command.dylib()? {
+            let name = command.string(endian, library.dylib.name)?;
+            needs.push(String::from_utf8_lossy(name).into_owned());
+        }
+    }
+    Ok((needs, Vec::new()))
+}
+
+fn pe_needs<Pe: ImageNtHeaders>(
+    file: &PeFile<'_, Pe>,
+) -> object::Result<(Vec<String>, Vec<String>)> {
+    let mut needs = Vec::new();
+    if let Some(table) = file.import_table()? {
+        let mut libraries = table.descriptors()?;
+        while let Some(library) = libraries.next()? {
+            let name = table.name(library.name.get(LittleEndian))?;
+            needs.push(String::from_utf8_lossy(name).into_owned());
+        }
+    }
+    Ok((needs, Vec::new()))
+}
+
+/// The inspection as JSON.
+///
+/// # Errors
+/// [`text::Error::Internal`].
+pub fn json(inspection: &Inspection) -> Result<String, Error> {
+    let mut text =
+        serde_json::to_string_pretty(inspection).map_err(|why| Error::internal(why.to_string()))?;
+    let _ = writeln!(text);
+    Ok(text)
+}

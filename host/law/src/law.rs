@@ -1,0 +1,410 @@
+//! A law with its parameters, as elements call it.
+
+use crate::adapter::ForeignInstance;
+use crate::calls::{self, Doing};
+#[cfg(unix)]
+use crate::isolate;
+use crate::library::{Call, OwnedInstance, Strided};
+use crate::{
+    BatchFailure, BatchSuccess, End, FormulationDescription, LawDescription, Library, LoadedLaw,
+    Moment, Operator, PointCall, Request, Site, Start,
+};
+use abi::Hypothesis;
+use abi::raw::{self, Status};
+use abi::status::Outcome;
+use std::cell::RefCell;
+
+/// A law with its parameters fixed under a hypothesis: what elements call.
+#[derive(Debug)]
+pub struct Law {
+    pub(crate) loaded: LoadedLaw,
+    pub(crate) hypothesis: Hypothesis,
+    pub(crate) formulation: FormulationDescription,
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) instance: LawInstance,
+    /// What it is called where calls are watched.
+    pub(crate) name: u64,
+    /// What it had changed of the process as it was built.
+    pub(crate) changes: Vec<String>,
+}
+
+/// What a library made of the parameters, in this process or in workers.
+#[derive(Debug)]
+pub(crate) enum LawInstance {
+    Here(OwnedInstance),
+    Foreign(Box<dyn ForeignInstance>),
+    #[cfg(unix)]
+    Apart(Box<isolate::IsolatedInstance>),
+}
+
+impl LawInstance {
+    /// Asks for initial internal variables. `None` if the law has no `init_state`.
+    pub(crate) fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
+        match self {
+            Self::Here(instance) => instance.init_state(call),
+            Self::Foreign(instance) => instance.init_state(call),
+            #[cfg(unix)]
+            Self::Apart(instance) => instance.init_state(call),
+        }
+    }
+
+    /// Carries the points over the increment. Returns the most severe status and a message.
+    pub(crate) fn integrate(&self, call: Call<'_>) -> (Status, String) {
+        match self {
+            Self::Here(instance) => instance.integrate(call),
+            Self::Foreign(instance) => instance.integrate(call),
+            #[cfg(unix)]
+            Self::Apart(instance) => instance.integrate(call),
+        }
+    }
+
+    pub(crate) fn take_overwritten(&self) -> Vec<String> {
+        match self {
+            Self::Here(_) => Vec::new(),
+            Self::Foreign(instance) => instance.take_overwritten(),
+            #[cfg(unix)]
+            Self::Apart(instance) => instance.take_overwritten(),
+        }
+    }
+}
+
+impl Law {
+    /// Description of the law.
+    pub fn description(&self) -> &LawDescription {
+        self.loaded.description()
+    }
+
+    /// What it offers under the hypothesis it was built for.
+    pub fn formulation(&self) -> &FormulationDescription {
+        &self.formulation
+    }
+
+    /// Hypothesis it was built for.
+    pub fn hypothesis(&self) -> Hypothesis {
+        self.hypothesis
+    }
+
+    /// Library it comes from.
+    pub fn library(&self) -> &Library {
+        self.loaded.library()
+    }
+
+    /// The law without its parameters.
+    pub fn loaded(&self) -> &LoadedLaw {
+        &self.loaded
+    }
+
+    /// What it had changed of the process as it was built, and what was set back.
+    pub fn changes(&self) -> &[String] {
+        &self.changes
+    }
+
+    /// Values of its parameters, in declared order.
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
+    }
+
+    /// Whether a failure that no smaller step helps is trouble with the library, and not a limit of
+    /// what the law can follow: numbers that are not finite under a claim of success, which is all
+    /// that is numeric about routines made for other programs.
+    pub fn breaks_down(&self, failure: &BatchFailure) -> bool {
+        let is_foreign = self.library().foreign().is_some();
+        failure.outcome == Outcome::Numeric && (is_foreign || failure.message == NOT_FINITE)
+    }
+
+    /// Whether the law is told where its points lie.
+    pub fn asks_for_sites(&self) -> bool {
+        self.library().foreign().is_some()
+    }
+
+    /// What the user should know of the calls since the last time that this was asked.
+    pub fn take_notes(&self) -> Vec<String> {
+        let names = self.instance.take_overwritten();
+        let note = || {
+            format!(
+                "law `{}`: the routine overwrites {}, which it is given to read; here that is a \
+                 copy, and what is left there is not used",
+                self.description().id,
+                names.join(", ")
+            )
+        };
+        (!names.is_empty()).then(note).into_iter().collect()
+    }
+
+    /// Number of components of gradient and flux.
+    pub fn n_components(&self) -> usize {
+        self.hypothesis.n_components()
+    }
+
+    /// Number of internal variables.
+    pub fn n_states(&self) -> usize {
+        self.formulation.internal_variables.len()
+    }
+
+    /// Internal variables of points that carry these fluxes before anything has happened.
+    ///
+    /// # Errors
+    /// The law cannot start from one of the fluxes.
+    pub fn initial_state(
+        &self,
+        n_points: usize,
+        flux: (&[f64], Strided),
+    ) -> Result<Vec<f64>, BatchFailure> {
+        let n_states = self.n_states();
+        let initial = self
+            .formulation
+            .internal_variables
+            .iter()
+            .map(|v| v.initial_value);
+        let mut state: Vec<f64> = initial.cycle().take(n_points * n_states).collect();
+        let mut status = vec![raw::PILUM_E_INTERNAL; n_points];
+        let mut factor = vec![0.0; n_points];
+        let call = Call {
+            request: 0,
+            n_points,
+            n_components: self.n_components(),
+            n_states,
+            time: 0.0,
+            time_increment: 0.0,
+            moment: Moment::default(),
+            sites: &[],
+            gradient0: None,
+            gradient1: None,
+            flux0: flux,
+            state0: &[],
+            flux1: None,
+            state1: &mut state,
+            tangent: &mut [],
+            status: &mut status,
+            step_factor: &mut factor,
+        };
+        let result = calls::calling(self.name, Doing::Start, n_points, Moment::default(), || {
+            self.instance.init_state(call)
+        });
+        match result {
+            None => Ok(state),
+            Some((worst, message)) => {
+                let outputs = [(&*state, Strided::rows(n_states), n_states)];
+                judge(worst, &status, &factor, message)
+                    .and_then(|_| finite(&outputs, n_points))
+                    .map_err(|failure| {
+                        let call = PointCall {
+                            request: Request::InitialState,
+                            time: 0.0,
+                            time_increment: 0.0,
+                            gradient: Vec::new(),
+                            gradient_end: Vec::new(),
+                            flux: flux.1.of_point(flux.0, failure.point, self.n_components()),
+                            state: Vec::new(),
+                            moment: Moment::default(),
+                            site: Site::default(),
+                        };
+                        failure.of_call(call)
+                    })?;
+                Ok(state)
+            }
+        }
+    }
+
+    /// Carries points over an increment.
+    ///
+    /// # Errors
+    /// A point asks for a smaller step, or fails; also if it claims success with a result that
+    /// is not finite, or if its outcome contradicts that of the batch.
+    pub fn integrate(
+        &self,
+        start: &Start<'_>,
+        operator: Operator,
+        end: End<'_>,
+    ) -> Result<BatchSuccess, BatchFailure> {
+        OUTCOMES
+            .with_borrow_mut(|outcomes| self.integrate_with(outcomes, start, operator, end))
+            .map_err(|failure| {
+                let (point, n) = (failure.point, self.n_components());
+                let of_point =
+                    |(values, place): (&[f64], Strided)| place.of_point(values, point, n);
+                let rows = Strided::rows(self.n_states());
+                let call = PointCall {
+                    request: Request::Update(operator),
+                    time: start.time,
+                    time_increment: start.time_increment,
+                    gradient: of_point(start.gradient),
+                    gradient_end: of_point(start.gradient_end),
+                    flux: of_point(start.flux),
+                    state: rows.of_point(start.state, point, self.n_states()),
+                    moment: start.moment,
+                    site: start.sites.get(point).copied().unwrap_or_default(),
+                };
+                failure.of_call(call)
+            })
+    }
+
+    fn integrate_with(
+        &self,
+        outcomes: &mut Outcomes,
+        start: &Start<'_>,
+        operator: Operator,
+        end: End<'_>,
+    ) -> Result<BatchSuccess, BatchFailure> {
+        let n = self.n_components();
+        let (status, factor) = outcomes.unwritten(start.n_points);
+        let (flux, flux_place) = end.flux;
+        let call = Call {
+            request: raw::PILUM_REQ_FLUX
+                | match operator {
+                    Operator::None => 0,
+                    Operator::Consistent => raw::PILUM_REQ_TANGENT,
+                    Operator::Elastic => raw::PILUM_REQ_ELASTIC,
+                },
+            n_points: start.n_points,
+            n_components: n,
+            n_states: self.n_states(),
+            time: start.time,
+            time_increment: start.time_increment,
+            moment: start.moment,
+            sites: start.sites,
+            gradient0: Some(start.gradient),
+            gradient1: Some(start.gradient_end),
+            flux0: start.flux,
+            state0: start.state,
+            flux1: Some((&mut *flux, flux_place)),
+            state1: &mut *end.state,
+            tangent: &mut *end.operator,
+            status: &mut *status,
+            step_factor: &mut *factor,
+        };
+        let update = || self.instance.integrate(call);
+        let (worst, message) = calls::calling(
+            self.name,
+            Doing::Update,
+            start.n_points,
+            start.moment,
+            update,
+        );
+        let success = judge(worst, status, factor, message)?;
+        let n_states = self.n_states();
+        let n_operator = if operator == Operator::None { 0 } else { n * n };
+        let outputs = [
+            (&*flux, flux_place, n),
+            (&*end.state, Strided::rows(n_states), n_states),
+            (&*end.operator, Strided::rows(n_operator), n_operator),
+        ];
+        finite(&outputs, start.n_points)?;
+        Ok(success)
+    }
+}
+
+/// Room for the outcomes of one call. Each thread keeps its own from call to call, so that a call
+/// allocates nothing once the largest batch has been seen.
+#[derive(Debug, Default)]
+struct Outcomes {
+    status: Vec<Status>,
+    factor: Vec<f64>,
+}
+
+thread_local! {
+    static OUTCOMES: RefCell<Outcomes> = RefCell::default();
+}
+
+impl Outcomes {
+    /// Outcomes of so many points as they are before a law has written them.
+    fn unwritten(&mut self, n_points: usize) -> (&mut [Status], &mut [f64]) {
+        self.status.clear();
+        self.status.resize(n_points, raw::PILUM_E_INTERNAL);
+        self.factor.clear();
+        self.factor.resize(n_points, f64::NAN);
+        (&mut self.status, &mut self.factor)
+    }
+}
+
+/// Turns status codes into a verdict over the batch.
+fn judge(
+    worst: Status,
+    status: &[Status],
+    factor: &[f64],
+    message: String,
+) -> Result<BatchSuccess, BatchFailure> {
+    // `PILUM_OK` is 0.
+    if status.iter().fold(worst, |all, s| all | s) == raw::PILUM_OK {
+        return Ok(BatchSuccess::default());
+    }
+    let severity = |s: Status| if s < 0 { 100 - s } else { s };
+    let point = (0..status.len())
+        .rev()
+        .max_by_key(|&i| severity(status[i]))
+        .unwrap_or(0);
+    let at_point = status.get(point).copied().unwrap_or(worst);
+    let code = abi::status::most_severe(worst, at_point);
+    match Outcome::from_code(code) {
+        Outcome::Ok => Ok(BatchSuccess::default()),
+        Outcome::Unreliable => Ok(BatchSuccess {
+            unreliable: Some((point, message)),
+        }),
+        Outcome::CutStep => {
+            // A law that leaves the factor alone leaves the choice to the host.
+            let smallest = factor
+                .iter()
+                .zip(status)
+                .filter(|(f, s)| **s == raw::PILUM_CUT_STEP && **f > 0.0 && **f < 1.0)
+                .map(|(f, _)| *f)
+                .fold(f64::INFINITY, f64::min);
+            let factor = if smallest.is_finite() { smallest } else { 0.25 };
+            Err(BatchFailure {
+                point,
+                outcome: Outcome::CutStep,
+                message,
+                factor: Some(factor),
+                call: None,
+            })
+        }
+        outcome => Err(BatchFailure {
+            point,
+            outcome,
+            message,
+            factor: None,
+            call: None,
+        }),
+    }
+}
+
+/// What is said of a success that is none.
+const NOT_FINITE: &str = "the law claims success with a result that is not finite";
+
+/// Distrusts success: every output must be finite.
+fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), BatchFailure> {
+    let whole = |(values, place, n): &(&[f64], Strided, usize)| {
+        let packed = place.component == 1 && place.point == *n;
+        packed && all_finite(&values[place.offset..place.offset + n_points * n])
+    };
+    if outputs.iter().all(whole) {
+        return Ok(());
+    }
+    for point in 0..n_points {
+        for (values, place, n) in outputs {
+            let first = place.offset + point * place.point;
+            if !(0..*n).all(|c| values[first + c * place.component].is_finite()) {
+                return Err(BatchFailure {
+                    point,
+                    outcome: Outcome::Numeric,
+                    message: NOT_FINITE.to_owned(),
+                    factor: None,
+                    call: None,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether all values are finite: 0 times a finite number is 0. Eight sums at a time and no branch,
+/// so that it costs little more than reading the values.
+fn all_finite(values: &[f64]) -> bool {
+    let (chunks, rest) = values.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for chunk in chunks {
+        for (sum, value) in sums.iter_mut().zip(chunk) {
+            *sum += 0.0 * value;
+        }
+    }
+    sums.iter().sum::<f64>() == 0.0 && rest.iter().all(|v| v.is_finite())
+}

@@ -1,0 +1,50 @@
+//! A library file becomes a law that can be called: searching, checking, opening, describing,
+//! building and calling. What is made for other programs stands behind an [`adapter`]; what may crash
+//! or hang runs in a [`child`] process or in workers ([`isolate`]). The host's `unsafe` code is here.
+
+pub mod adapter;
+mod call;
+#[cfg(unix)]
+pub mod calls;
+#[cfg(not(unix))]
+#[path = "calls/none.rs"]
+pub mod calls;
+pub mod capsule;
+pub mod child;
+pub mod custody;
+mod description;
+mod digest;
+mod error;
+mod image;
+pub mod inspect;
+#[cfg(unix)]
+pub mod isolate;
+mod law;
+mod library;
+mod opened;
+mod pins;
+mod search;
+mod stop;
+mod trust;
+pub mod vetting;
+
+pub use call::{
+    BatchFailure, BatchSuccess, End, Moment, Operator, PointCall, Request, Site, Start,
+};
+pub use description::{
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
+    words,
+};
+pub use digest::{hexadecimal, hexadecimal_sha256};
+pub use error::Error;
+pub use law::Law;
+#[cfg(target_os = "linux")]
+pub use library::SharedMemory;
+#[doc(hidden)]
+pub use library::describe_memory;
+pub use library::{Strided, probe};
+pub use opened::{CreateFailure, Library, LoadedLaw};
+pub use pins::{Pins, lock_path};
+pub use search::SearchPath;
+pub use stop::{GRACE, Stop, Stopped};
+pub use trust::Trust;

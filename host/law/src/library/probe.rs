@@ -1,0 +1,612 @@
+//! Calls of a law as `pilum check` makes them: through arrays whose neighbourhood, layout and
+//! protection are chosen, and with arguments that a host in earnest never gives. All that a caller
+//! hands over and gets back is safe.
+
+mod pages;
+mod traps;
+
+use super::{HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, load};
+use abi::raw::{self, Batch, Host, Instance, MagicBlock, Status, View, ViewMut};
+use abi::version;
+pub use pages::Fence;
+use pages::Pages;
+use std::ffi::c_char;
+use std::io;
+use std::mem::size_of;
+use std::path::Path;
+use std::ptr::{null, null_mut};
+pub use traps::CAN_TRAP;
+use traps::Traps;
+
+/// What cells hold before a law has written them: a NaN that no computation makes.
+const UNWRITTEN: f64 = f64::from_bits(0x7ff8_dead_beef_a5a5);
+/// The outcome of a point before the law has written one: no version of the contract has it.
+pub const NO_OUTCOME: Status = -0x5a5a;
+/// Size of this host's batch, in bytes.
+pub const BATCH_BYTES: usize = size_of::<Batch>();
+
+/// How the values of several points stand in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Point by point.
+    Points,
+    /// Component by component.
+    Components,
+    /// With gaps between components and between points.
+    Spread,
+    /// Inputs only once, for all points; outputs point by point.
+    Uniform,
+}
+
+/// A point at the start of an increment, and its gradient at the end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointStart {
+    /// Gradient at the start.
+    pub gradient0: Vec<f64>,
+    /// Gradient at the end.
+    pub gradient1: Vec<f64>,
+    /// Flux at the start.
+    pub flux0: Vec<f64>,
+    /// Internal variables at the start.
+    pub state0: Vec<f64>,
+}
+
+/// What a law has written for a point.
+#[derive(Clone, Debug)]
+pub struct PointEnd {
+    /// Outcome; [`NO_OUTCOME`] where none was written or none could be.
+    pub status: Status,
+    /// Step factor.
+    pub step_factor: f64,
+    /// Flux.
+    pub flux: Vec<f64>,
+    /// Internal variables.
+    pub state: Vec<f64>,
+    /// Operator, row by row; empty if none was requested.
+    pub tangent: Vec<f64>,
+}
+
+/// All that one call has left behind.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// What the call returned.
+    pub status: Status,
+    /// The whole message buffer.
+    pub message: Vec<u8>,
+    /// The points.
+    pub points: Vec<PointEnd>,
+    /// Something was written between the cells of an output.
+    pub stray: bool,
+}
+
+impl Answer {
+    /// The message up to its NUL; `None` if it has none.
+    pub fn text(&self) -> Option<String> {
+        terminated(&self.message)
+    }
+}
+
+fn terminated(buffer: &[u8]) -> Option<String> {
+    let end = buffer.iter().position(|&byte| byte == 0)?;
+    Some(String::from_utf8_lossy(&buffer[..end]).into_owned())
+}
+
+/// The form of a call.
+#[derive(Clone, Copy, Debug)]
+pub struct Form {
+    /// Requests.
+    pub request: u32,
+    /// Layout of all arrays.
+    pub order: Order,
+    /// What lies beside inputs.
+    pub around_inputs: Fence,
+    /// What lies beside outputs.
+    pub around_outputs: Fence,
+    /// Writing to an input ends the process.
+    pub inputs_locked: bool,
+    /// Hand over `status` and `step_factor`.
+    pub outcomes: bool,
+    /// Size of the message buffer; none: null.
+    pub message: Option<usize>,
+    /// Size of the batch struct, in bytes.
+    pub batch_bytes: usize,
+    /// Number of the first point.
+    pub first_point: u64,
+    /// Length of the increment in time.
+    pub time_increment: f64,
+    /// An allocation during the call ends the process with a trap, where [`CAN_TRAP`].
+    pub trapped: bool,
+}
+
+impl Form {
+    /// An ordinary call with these requests, whose arrays have room to spare around them.
+    pub fn of(request: u32) -> Self {
+        Self {
+            request,
+            order: Order::Points,
+            around_inputs: Fence::Far,
+            around_outputs: Fence::Far,
+            inputs_locked: false,
+            outcomes: true,
+            message: Some(512),
+            batch_bytes: BATCH_BYTES,
+            first_point: 0,
+            time_increment: 1.0,
+            trapped: false,
+        }
+    }
+}
+
+/// Values of many points in pages of their own.
+#[derive(Debug)]
+struct Array {
+    pages: Pages,
+    n_points: usize,
+    n_components: usize,
+    point: usize,
+    component: usize,
+}
+
+impl Array {
+    fn new(
+        order: Order,
+        is_input: bool,
+        n_points: usize,
+        n_components: usize,
+        fence: Fence,
+    ) -> io::Result<Self> {
+        let (point, component) = match order {
+            Order::Uniform if is_input => (0, 1),
+            Order::Points | Order::Uniform => (n_components, 1),
+            Order::Components => (1, n_points),
+            Order::Spread => (3 * n_components + 5, 3),
+        };
+        let cells = if n_points == 0 || n_components == 0 {
+            0
+        } else {
+            (n_points - 1) * point + (n_components - 1) * component + 1
+        };
+        let mut pages = Pages::new(cells * size_of::<f64>(), fence)?;
+        doubles_mut(&mut pages).fill(UNWRITTEN);
+        Ok(Self {
+            pages,
+            n_points,
+            n_components,
+            point,
+            component,
+        })
+    }
+
+    fn put(&mut self, i: usize, values: &[f64]) {
+        assert!(i < self.n_points && values.len() == self.n_components);
+        for (c, &value) in values.iter().enumerate() {
+            doubles_mut(&mut self.pages)[i * self.point + c * self.component] = value;
+        }
+    }
+
+    fn row(&self, i: usize) -> Vec<f64> {
+        (0..self.n_components)
+            .map(|c| doubles(&self.pages)[i * self.point + c * self.component])
+            .collect()
+    }
+
+    /// Whether anything but the cells was written.
+    fn stray(&self) -> bool {
+        let mut is_cell = vec![false; doubles(&self.pages).len()];
+        for i in 0..self.n_points {
+            for c in 0..self.n_components {
+                is_cell[i * self.point + c * self.component] = true;
+            }
+        }
+        doubles(&self.pages)
+            .iter()
+            .zip(is_cell)
+            .any(|(value, is_cell)| !is_cell && value.to_bits() != UNWRITTEN.to_bits())
+    }
+
+    fn is_nothing(&self) -> bool {
+        self.n_points == 0 || self.n_components == 0
+    }
+
+    fn view(&self) -> View {
+        if self.is_nothing() {
+            return NOTHING;
+        }
+        View {
+            p: self.pages.pointer().cast(),
+            point: self.point as isize,
+            component: self.component as isize,
+        }
+    }
+
+    fn view_mut(&self) -> ViewMut {
+        if self.is_nothing() {
+            return NOWHERE;
+        }
+        ViewMut {
+            p: self.pages.pointer().cast(),
+            point: self.point as isize,
+            component: self.component as isize,
+        }
+    }
+}
+
+fn doubles(pages: &Pages) -> &[f64] {
+    // SAFETY: every bit pattern is a double; the bytes are aligned for one, since arrays of
+    // doubles are a multiple of eight bytes long and end or start at the end of a page.
+    let (before, values, _) = unsafe { pages.bytes().align_to() };
+    assert!(before.is_empty());
+    values
+}
+
+fn doubles_mut(pages: &mut Pages) -> &mut [f64] {
+    // SAFETY: as above.
+    let (before, values, _) = unsafe { pages.bytes_mut().align_to_mut() };
+    assert!(before.is_empty());
+    values
+}
+
+/// A law whose parameters are fixed, to be probed.
+#[derive(Debug)]
+pub struct Probe {
+    instance: OwnedInstance,
+    n_components: usize,
+    n_states: usize,
+}
+
+/// Arguments of `create`.
+#[derive(Clone, Copy, Debug)]
+pub struct CreateForm<'a> {
+    /// Number of the formulation.
+    pub formulation: u32,
+    /// Values; none: null.
+    pub values: Option<&'a [f64]>,
+    /// The number of values that is told.
+    pub n_values: usize,
+    /// Size of the message buffer; none: null.
+    pub message: Option<usize>,
+    /// Bytes of the host's description beyond those this version knows.
+    pub more_host: usize,
+    /// Components of gradient and flux, for later calls.
+    pub n_components: usize,
+    /// Internal variables, for later calls.
+    pub n_states: usize,
+}
+
+/// What `create` has left behind.
+#[derive(Debug)]
+pub struct Created {
+    /// What it returned.
+    pub status: Status,
+    /// The whole message buffer.
+    pub message: Vec<u8>,
+    /// The instance, if one was written.
+    pub probe: Option<Probe>,
+}
+
+impl Created {
+    /// The message up to its NUL; `None` if it has none.
+    pub fn text(&self) -> Option<String> {
+        terminated(&self.message)
+    }
+}
+
+/// The host's description with bytes at its end that this version does not know. It stays for the
+/// life of the process.
+fn longer_host(more: usize) -> io::Result<*const Host> {
+    let size = size_of::<Host>() + more;
+    let mut pages = Pages::new(size, Fence::After)?;
+    pages.bytes_mut().fill(0xa5);
+    let (before, hosts, _) = {
+        // SAFETY: these bytes may be anything, since only a host is written to them.
+        unsafe {
+            pages
+                .bytes_mut()
+                .align_to_mut::<std::mem::MaybeUninit<Host>>()
+        }
+    };
+    let at: *const Host = match (before, hosts) {
+        ([], [host, ..]) => host.write(Host {
+            struct_size: size as u32,
+            ..HOST.0
+        }),
+        _ => {
+            return Err(io::Error::other(
+                "the description of the host is not aligned",
+            ));
+        }
+    };
+    pages.lock()?;
+    std::mem::forget(pages);
+    Ok(at)
+}
+
+/// Calls `create`.
+///
+/// # Errors
+/// There is no memory.
+pub(crate) fn create(law: LawHandle, form: &CreateForm<'_>) -> io::Result<Created> {
+    let Some(create) = law.known.create else {
+        return Err(io::Error::other("`create` is null"));
+    };
+    let host = match form.more_host {
+        0 => &raw const HOST.0,
+        more => longer_host(more)?,
+    };
+    let values = form
+        .values
+        .map(|values| -> io::Result<Array> {
+            let mut array = Array::new(Order::Points, true, 1, values.len(), Fence::After)?;
+            array.put(0, values);
+            array.pages.lock()?;
+            Ok(array)
+        })
+        .transpose()?;
+    let message = message_buffer(form.message)?;
+    let mut instance: *mut Instance = null_mut();
+    // SAFETY: contract, "create": `law.at` is the law itself; values, messages and `out` are as
+    // long as told, or null, which the law has to refuse.
+    let status = unsafe {
+        create(
+            law.at,
+            host,
+            form.formulation,
+            values.as_ref().map_or(null(), |array| array.view().p),
+            form.n_values as u32,
+            &raw mut instance,
+            message
+                .as_ref()
+                .map_or(null_mut(), |m| m.pointer().cast::<c_char>()),
+            form.message.unwrap_or(0),
+        )
+    };
+    Ok(Created {
+        status,
+        message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
+        probe: (!instance.is_null()).then(|| Probe {
+            instance: OwnedInstance { law, instance },
+            n_components: form.n_components,
+            n_states: form.n_states,
+        }),
+    })
+}
+
+/// Calls `destroy` with null, which the contract allows.
+pub(crate) fn destroy_nothing(law: LawHandle) {
+    if let Some(destroy) = law.known.destroy {
+        // SAFETY: contract, "create": null is allowed.
+        unsafe { destroy(null_mut()) };
+    }
+}
+
+/// A message buffer as the host hands it over: its first byte is NUL, the rest is not.
+fn message_buffer(capacity: Option<usize>) -> io::Result<Option<Pages>> {
+    let Some(capacity) = capacity else {
+        return Ok(None);
+    };
+    let mut pages = Pages::new(capacity, Fence::After)?;
+    pages.bytes_mut().fill(b'#');
+    if let Some(first) = pages.bytes_mut().first_mut() {
+        *first = 0;
+    }
+    Ok(Some(pages))
+}
+
+/// Which function of a law is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Function {
+    InitState,
+    Integrate,
+}
+
+impl Probe {
+    /// Number of components of gradient and flux.
+    pub fn n_components(&self) -> usize {
+        self.n_components
+    }
+
+    /// Number of internal variables.
+    pub fn n_states(&self) -> usize {
+        self.n_states
+    }
+
+    /// Asks for the internal variables of points that carry these fluxes. `None` if the law has no
+    /// `init_state`.
+    ///
+    /// # Errors
+    /// There is no memory.
+    pub fn init_state(&self, fluxes: &[Vec<f64>], form: &Form) -> io::Result<Option<Answer>> {
+        if self.instance.law.known.init_state.is_none() {
+            return Ok(None);
+        }
+        let starts: Vec<PointStart> = fluxes
+            .iter()
+            .map(|flux| PointStart {
+                gradient0: Vec::new(),
+                gradient1: Vec::new(),
+                flux0: flux.clone(),
+                state0: Vec::new(),
+            })
+            .collect();
+        self.call(Function::InitState, &starts, form).map(Some)
+    }
+
+    /// Calls `integrate`.
+    ///
+    /// # Errors
+    /// There is no memory.
+    pub fn integrate(&self, starts: &[PointStart], form: &Form) -> io::Result<Answer> {
+        self.call(Function::Integrate, starts, form)
+    }
+
+    fn call(&self, function: Function, starts: &[PointStart], form: &Form) -> io::Result<Answer> {
+        let known = &self.instance.law.known;
+        let Some(called) = (match function {
+            Function::InitState => known.init_state,
+            Function::Integrate => known.integrate,
+        }) else {
+            return Err(io::Error::other("the function is null"));
+        };
+        let n = starts.len();
+        let integrating = function == Function::Integrate;
+        let n_gradient = if integrating { self.n_components } else { 0 };
+        let n_tangent = if form.request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) == 0 {
+            0
+        } else {
+            n_gradient * n_gradient
+        };
+        let n_state0 = if integrating { self.n_states } else { 0 };
+        let input = |n_components, values: fn(&PointStart) -> &[f64]| -> io::Result<Array> {
+            let mut array = Array::new(form.order, true, n, n_components, form.around_inputs)?;
+            for (i, start) in starts.iter().enumerate() {
+                array.put(i, values(start));
+            }
+            if form.inputs_locked {
+                array.pages.lock()?;
+            }
+            Ok(array)
+        };
+        let output =
+            |n_components| Array::new(form.order, false, n, n_components, form.around_outputs);
+        let gradient0 = input(n_gradient, |start| &start.gradient0)?;
+        let gradient1 = input(n_gradient, |start| &start.gradient1)?;
+        let flux0 = input(self.n_components, |start| &start.flux0)?;
+        let state0 = input(n_state0, |start| &start.state0)?;
+        let flux1 = output(n_gradient)?;
+        let state1 = output(self.n_states)?;
+        let tangent = output(n_tangent)?;
+        let step_factor = output_of_one(n, form)?;
+        let mut status = Pages::new(n * size_of::<Status>(), form.around_outputs)?;
+        for four in status.bytes_mut().chunks_exact_mut(size_of::<Status>()) {
+            four.copy_from_slice(&NO_OUTCOME.to_ne_bytes());
+        }
+        let message = message_buffer(form.message)?;
+        let batch = Batch {
+            struct_size: form.batch_bytes as u32,
+            request: form.request,
+            n_points: n as u64,
+            first_point: form.first_point,
+            time: 0.0,
+            time_increment: form.time_increment,
+            gradient0: gradient0.view(),
+            gradient1: gradient1.view(),
+            flux0: flux0.view(),
+            state0: state0.view(),
+            flux1: flux1.view_mut(),
+            state1: state1.view_mut(),
+            tangent: tangent.view_mut(),
+            status: if form.outcomes {
+                status.pointer().cast()
+            } else {
+                null_mut()
+            },
+            step_factor: if form.outcomes {
+                step_factor.pages.pointer().cast()
+            } else {
+                null_mut()
+            },
+            message: message.as_ref().map_or(null_mut(), |m| m.pointer().cast()),
+            message_capacity: form.message.unwrap_or(0),
+        };
+        let letter = in_pages(&batch, form.batch_bytes)?;
+        let traps = Traps::new(form.trapped)?;
+        traps.set();
+        // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
+        // function; a batch that tells less than version 1.0 has to be refused unread.
+        let returned = unsafe { called(self.instance.instance, letter.pointer().cast()) };
+        traps.remove();
+        let statuses = status
+            .bytes()
+            .chunks_exact(size_of::<Status>())
+            .map(|four| Status::from_ne_bytes([four[0], four[1], four[2], four[3]]));
+        let points = statuses
+            .enumerate()
+            .map(|(i, status)| PointEnd {
+                status,
+                step_factor: step_factor.row(i)[0],
+                flux: flux1.row(i),
+                state: state1.row(i),
+                tangent: tangent.row(i),
+            })
+            .collect();
+        Ok(Answer {
+            status: returned,
+            message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
+            points,
+            stray: [flux1, state1, tangent].iter().any(Array::stray),
+        })
+    }
+}
+
+fn output_of_one(n_points: usize, form: &Form) -> io::Result<Array> {
+    Array::new(Order::Points, false, n_points, 1, form.around_outputs)
+}
+
+/// The first bytes of a batch in read-only pages that end where it says; bytes beyond it are 0xa5.
+fn in_pages(batch: &Batch, bytes: usize) -> io::Result<Pages> {
+    let mut pages = Pages::new(bytes, Fence::After)?;
+    pages.bytes_mut().fill(0xa5);
+    // SAFETY: a batch consists of numbers and pointers without padding.
+    let known = unsafe {
+        std::slice::from_raw_parts(std::ptr::from_ref(batch).cast::<u8>(), size_of::<Batch>())
+    };
+    let n = bytes.min(known.len());
+    pages.bytes_mut()[..n].copy_from_slice(&known[..n]);
+    pages.lock()?;
+    Ok(pages)
+}
+
+/// Opens a library with all its symbols, and no more.
+///
+/// # Errors
+/// What the system says.
+pub fn open(path: &Path) -> Result<(), String> {
+    symbols(path).map(|_| ())
+}
+
+/// The library, never unloaded.
+fn symbols(path: &Path) -> Result<&'static libloading::Library, String> {
+    // SAFETY: running the library's initialisers is what loading means; the user named it.
+    let library = unsafe { load(path) }.map_err(|error| {
+        std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string)
+    })?;
+    Ok(Box::leak(Box::new(library)))
+}
+
+/// Compares the handshake block with this host's.
+///
+/// # Errors
+/// There is none, or the first field that differs.
+pub fn shake_hands(path: &Path) -> Result<(), String> {
+    // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
+    let magic = unsafe { symbols(path)?.get::<*const MagicBlock>(b"pilum_magic\0") }
+        .map_err(|_| "there is no symbol `pilum_magic`".to_owned())?;
+    // SAFETY: as above; the block is at least 64 bytes in every version.
+    let magic = unsafe { (*magic).read_unaligned() };
+    version::check(&magic).map_err(|mismatch| mismatch.to_string())
+}
+
+/// Calls `pilum_entry` twice, then from another thread, with a host that is longer than this one.
+/// The addresses it returned.
+///
+/// # Errors
+/// There is no such function.
+pub fn enter(path: &Path) -> Result<[usize; 3], String> {
+    let library = symbols(path)?;
+    // SAFETY: contract, "Handshake": once the block is accepted, `pilum_entry` has this type.
+    let entry = *unsafe { library.get::<raw::Entry>(b"pilum_entry\0") }
+        .map_err(|_| "there is no symbol `pilum_entry`".to_owned())?;
+    // SAFETY: contract, "Entry": may be called with any valid host block, from any thread.
+    let call = move || unsafe { entry(&raw const HOST.0) }.addr();
+    let other = move || -> io::Result<usize> {
+        let host = longer_host(64)?;
+        // SAFETY: as above.
+        Ok(unsafe { entry(host) }.addr())
+    };
+    let (first, second) = (call(), call());
+    let third = std::thread::spawn(other)
+        .join()
+        .map_err(|_| "`pilum_entry` panicked".to_owned())?
+        .map_err(|error| error.to_string())?;
+    Ok([first, second, third])
+}

@@ -1,0 +1,203 @@
+//! Where libraries are looked for. Only explicit folders count, never the working directory.
+
+use super::adapter::Foreign;
+use super::{Library, LoadedLaw};
+use crate::Error;
+use text::suggestion;
+use text::file;
+use crate::inspect;
+use crate::Pins;
+use std::collections::BTreeMap;
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Folders to look in, in order, and the libraries opened so far.
+#[derive(Debug)]
+pub struct SearchPath {
+    folders: Vec<PathBuf>,
+    pins: Pins,
+    opened: Mutex<BTreeMap<PathBuf, Arc<Library>>>,
+}
+
+/// The folder of the program and its `deps`; both exist in a build folder.
+pub(crate) fn beside_program() -> Vec<PathBuf> {
+    let program = std::env::current_exe().ok();
+    let folder = program.as_deref().and_then(Path::parent);
+    folder.map_or(Vec::new(), |folder| {
+        vec![folder.to_owned(), folder.join("deps")]
+    })
+}
+
+impl SearchPath {
+    /// First the given folders (from a case file), then those of `PILUM_LAW_PATH`, then the
+    /// folder of the program and its `deps`.
+    pub fn new(from_case: &[PathBuf]) -> Self {
+        let mut folders = from_case.to_vec();
+        if let Some(list) = std::env::var_os("PILUM_LAW_PATH") {
+            folders.extend(std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty()));
+        }
+        folders.extend(beside_program());
+        Self {
+            folders,
+            pins: Pins::default(),
+            opened: Mutex::default(),
+        }
+    }
+
+    /// Only libraries that these pins allow.
+    #[must_use]
+    pub fn pinned(self, pins: Pins) -> Self {
+        Self { pins, ..self }
+    }
+
+    /// The folders, in order.
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
+    }
+
+    /// Opens the library that holds a law: in the first folder that has one, the library named
+    /// like the law, else the one whose manifest lists it. Libraries are opened once.
+    ///
+    /// # Errors
+    /// [`Error::Library`] if there is none, if two libraries of a folder claim the law, or if the
+    /// library cannot be used.
+    pub fn law(&self, id: &str) -> Result<LoadedLaw, Error> {
+        for folder in &self.folders {
+            let named = folder.join(format!("{DLL_PREFIX}{id}{DLL_SUFFIX}"));
+            let path = if named.is_file() {
+                named
+            } else {
+                let mut claims = manifests(folder)
+                    .into_iter()
+                    .filter(|(_, laws)| laws.iter().any(|law| law == id));
+                match (claims.next(), claims.next()) {
+                    (None, _) => continue,
+                    (Some((path, _)), None) => path,
+                    (Some((first, _)), Some((second, _))) => {
+                        return Err(Error::library(format!(
+                            "law `{id}` is in two libraries: {} and {}",
+                            first.display(),
+                            second.display()
+                        )));
+                    }
+                }
+            };
+            let library = self.open_for(&path, Some(id))?;
+            return library
+                .law(id)
+                .ok_or_else(|| no_such_law(&library, &path, id));
+        }
+        let installed = self.installed();
+        let ids: Vec<&str> = installed.keys().map(String::as_str).collect();
+        let folders: Vec<String> = self
+            .folders
+            .iter()
+            .map(|f| f.display().to_string())
+            .collect();
+        Err(Error::Library {
+            message: format!("no library with law `{id}` in {}", folders.join(", ")),
+            hint: Some(if ids.is_empty() {
+                "no law library is there at all; in the repository, `cargo build --release` builds \
+                 the laws"
+                    .to_owned()
+            } else {
+                format!(
+                    "{}; more folders: `law_path` in the file, or PILUM_LAW_PATH",
+                    suggestion(id, ids)
+                )
+            }),
+        })
+    }
+
+    /// A law of a library that is made for another program.
+    ///
+    /// # Errors
+    /// As [`Library::open_foreign`]; [`Error::Library`] if it has no such law.
+    pub fn foreign_law(&self, id: &str, foreign: &Foreign) -> Result<LoadedLaw, Error> {
+        let approve = |sha256: &str| self.pins.check(id, &foreign.library, sha256);
+        let library = Library::open_foreign(foreign, approve)?;
+        library
+            .law(id)
+            .ok_or_else(|| no_such_law(&library, &foreign.library, id))
+    }
+
+    /// Opens a library, once.
+    ///
+    /// # Errors
+    /// As [`Library::open`].
+    pub fn open(&self, path: &Path) -> Result<Arc<Library>, Error> {
+        self.open_for(path, None)
+    }
+
+    fn open_for(&self, path: &Path, law: Option<&str>) -> Result<Arc<Library>, Error> {
+        let approve = |sha256: &str| law.map_or(Ok(()), |id| self.pins.check(id, path, sha256));
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(library) = opened.get(path) {
+            approve(library.sha256())?;
+            return Ok(Arc::clone(library));
+        }
+        let library = Library::open_if(path, approve)?;
+        opened.insert(path.to_owned(), Arc::clone(&library));
+        Ok(library)
+    }
+
+    /// Ids of all laws found, with their libraries, read from manifests without running anything.
+    pub fn installed(&self) -> BTreeMap<String, PathBuf> {
+        let mut found = BTreeMap::new();
+        let mut is_installed = false;
+        for (number, folder) in self.folders.iter().enumerate() {
+            // Cargo's folder of parts holds the libraries of tests too. Who has built the program
+            // has the others beside it.
+            let is_last = number + 1 == self.folders.len();
+            if is_last && is_installed && folder.ends_with("deps") {
+                continue;
+            }
+            let libraries = manifests(folder);
+            is_installed = !libraries.is_empty();
+            for (path, laws) in libraries {
+                for law in laws {
+                    found.entry(law).or_insert_with(|| path.clone());
+                }
+            }
+        }
+        found
+    }
+}
+
+fn no_such_law(library: &Library, path: &Path, id: &str) -> Error {
+    let ids: Vec<&str> = library.laws().map(|law| law.id.as_str()).collect();
+    Error::Library {
+        message: format!("library {} has no law `{id}`", path.display()),
+        hint: Some(suggestion(id, ids)),
+    }
+}
+
+/// Libraries of a folder that carry a manifest, sorted by name, with the ids of their laws.
+fn manifests(folder: &Path) -> Vec<(PathBuf, Vec<String>)> {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    let mut paths: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .filter(|path| path.to_string_lossy().ends_with(DLL_SUFFIX))
+        .collect();
+    paths.sort();
+    paths
+        .into_iter()
+        .filter_map(|path| manifest(&path).map(|laws| (path, laws)))
+        .collect()
+}
+
+/// Ids in the manifest section of a library. Only the parts of the file that are needed are read.
+fn manifest(path: &Path) -> Option<Vec<String>> {
+    let file = file::open_regular(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    if length > file::LARGEST_LIBRARY {
+        return None;
+    }
+    let cache = object::ReadCache::new(file);
+    let file = object::File::parse(&cache).ok()?;
+    let laws = inspect::manifest(&file)?;
+    Some(laws.into_iter().map(|law| law.id).collect())
+}

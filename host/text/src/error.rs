@@ -1,0 +1,71 @@
+//! What can go wrong with files.
+
+use crate::InputError;
+use miette::Diagnostic;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A file, or what somebody asked for, is wrong.
+#[derive(Debug, Error, Diagnostic)]
+pub enum Error {
+    /// An input file is wrong.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Input(#[from] Box<InputError>),
+    /// An input file cannot be read.
+    #[error("cannot read {}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Results cannot be written.
+    #[error("cannot write {}", path.display())]
+    #[diagnostic(help("name another place for the results on the command line"))]
+    Unwritable {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// What was asked for does not fit what there is.
+    #[error("{0}")]
+    Usage(String),
+    /// A defect of the program.
+    #[error("internal error: {0}")]
+    Internal(String),
+}
+
+impl From<InputError> for Error {
+    fn from(error: InputError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
+impl Error {
+    /// A file or folder cannot be written.
+    pub fn unwritable(path: &Path, source: std::io::Error) -> Self {
+        Self::Unwritable {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    /// Adds what the user could do, where a place in a file is marked.
+    #[must_use]
+    pub fn with_hint(mut self, more: &str) -> Self {
+        if let Self::Input(input) = &mut self {
+            add_hint(input.hint_mut(), more);
+        }
+        self
+    }
+}
+
+/// Adds to what the user could do.
+pub fn add_hint(hint: &mut Option<String>, more: &str) {
+    *hint = Some(match hint.take() {
+        Some(hint) => format!("{hint}; {more}"),
+        None => more.to_owned(),
+    });
+}

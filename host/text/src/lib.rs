@@ -1,0 +1,19 @@
+//! Files that people write, and the place of each mistake in them.
+//!
+//! A [`Source`] is a text with the files that it came from; [`read`] turns it into values, or into an
+//! [`InputError`] that says file, line, key and what was expected; [`base`] lets files build on each
+//! other. Nothing here knows what the keys mean.
+
+pub mod base;
+mod error;
+pub mod file;
+mod read;
+mod source;
+mod suggest;
+mod wording;
+pub mod write;
+
+pub use error::{Error, add_hint};
+pub use read::{Named, deserialize, parse, toml_error};
+pub use source::{InputError, Source};
+pub use suggest::{nearest, suggestion};

@@ -1,0 +1,221 @@
+//! A text that a user wrote, and errors with their place in it.
+
+use crate::{Error, file};
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode, SourceSpan};
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::string::FromUtf8Error;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// An input file with the files it is based on, kept for messages that point into them.
+///
+/// The texts stand one after the other, so that one span says file and place.
+#[derive(Clone, Debug)]
+pub struct Source {
+    path: PathBuf,
+    text: Arc<str>,
+    /// Where each file starts in the text, in order.
+    files: Vec<(usize, PathBuf)>,
+}
+
+impl Source {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = file::read_text(path)
+            .and_then(|bytes| String::from_utf8(bytes).map_err(|error| not_utf_8(&error)))
+            .map_err(|source| Error::Unreadable {
+                path: path.to_owned(),
+                source,
+            })?;
+        Ok(Self::new(path, text))
+    }
+
+    /// Takes a text as if it came from a file of this name.
+    pub fn new(path: impl Into<PathBuf>, text: impl Into<Arc<str>>) -> Self {
+        let path = path.into();
+        Self {
+            files: vec![(0, path.clone())],
+            path,
+            text: text.into(),
+        }
+    }
+
+    /// This file after the one it is based on.
+    #[must_use]
+    pub fn based_on(&self, base: &Self) -> Self {
+        let offset = base.text.len() + 1;
+        let own = self
+            .files
+            .iter()
+            .map(|(start, path)| (start + offset, path.clone()));
+        Self {
+            path: self.path.clone(),
+            text: format!("{}\n{}", base.text, self.text).into(),
+            files: base.files.iter().cloned().chain(own).collect(),
+        }
+    }
+
+    /// Path of the file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Text of the file, after those it is based on.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Where the files stand in the text.
+    pub fn files(&self) -> impl Iterator<Item = Range<usize>> {
+        (0..self.files.len()).map(|number| {
+            let end = self
+                .files
+                .get(number + 1)
+                .map_or(self.text.len(), |(next, _)| next - 1);
+            self.files[number].0..end
+        })
+    }
+
+    /// The file a span lies in, where it starts, and its text.
+    fn file(&self, at: usize) -> (&Path, usize, &str) {
+        let number = self
+            .files
+            .iter()
+            .rposition(|(start, _)| *start <= at)
+            .unwrap_or(0);
+        let range = self.files().nth(number).unwrap_or_default();
+        (&self.files[number].1, range.start, &self.text[range])
+    }
+
+    /// The file a span lies in.
+    pub fn path_at(&self, span: &Range<usize>) -> &Path {
+        self.file(span.start).0
+    }
+
+    /// File, line and column (from 1) of the start of a span.
+    pub fn place(&self, span: &Range<usize>) -> String {
+        let (path, start, text) = self.file(span.start);
+        let before = &text[..(span.start - start).min(text.len())];
+        let line = before.matches('\n').count() + 1;
+        let column = before
+            .rsplit('\n')
+            .next()
+            .map_or(0, |line| line.chars().count())
+            + 1;
+        format!("{}:{line}:{column}", path.display())
+    }
+
+    /// Marks a second place of an error, if it is in the same file.
+    #[must_use]
+    pub fn mark(
+        &self,
+        mut error: InputError,
+        span: Range<usize>,
+        label: impl Into<String>,
+    ) -> InputError {
+        let (path, start, text) = self.file(span.start);
+        if error.source_code.name() == path.display().to_string() {
+            let span = span.start - start..span.end.saturating_sub(start).min(text.len());
+            error.second = Some((span.into(), label.into()));
+        }
+        error
+    }
+
+    /// An error about the bytes `span`.
+    pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> InputError {
+        let (path, start, text) = self.file(span.start);
+        let span = span.start - start..span.end.saturating_sub(start).min(text.len());
+        InputError {
+            message: message.into(),
+            label: None,
+            hint: None,
+            span: span.into(),
+            second: None,
+            source_code: NamedSource::new(path.display().to_string(), text.to_owned())
+                .with_language("TOML"),
+        }
+    }
+}
+
+/// The place where a file ceases to be UTF-8, and what it could be instead.
+fn not_utf_8(error: &FromUtf8Error) -> std::io::Error {
+    let bytes = error.as_bytes();
+    let at = error.utf8_error().valid_up_to();
+    let line = bytes[..at].split(|&byte| byte == b'\n').count();
+    let hint = match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => ": it looks like UTF-16, save it as UTF-8",
+        _ if bytes.contains(&0) => ": it looks like a binary file",
+        _ => ": save it as UTF-8",
+    };
+    std::io::Error::new(
+        std::io::ErrorKind::InvalidData,
+        format!(
+            "line {line}: the byte {:#04x} is not UTF-8 text{hint}",
+            bytes[at]
+        ),
+    )
+}
+
+/// An error in an input file, with its place.
+#[derive(Clone, Debug, Error)]
+#[error("{message}")]
+pub struct InputError {
+    message: String,
+    label: Option<String>,
+    hint: Option<String>,
+    span: SourceSpan,
+    /// Another place that it is about.
+    second: Option<(SourceSpan, String)>,
+    source_code: NamedSource<String>,
+}
+
+impl Diagnostic for InputError {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        let hint = self.hint.as_ref()?;
+        Some(Box::new(hint))
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(&self.source_code)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let label = LabeledSpan::new_with_span(self.label.clone(), self.span);
+        let second = self
+            .second
+            .iter()
+            .map(|(span, label)| LabeledSpan::new_with_span(Some(label.clone()), *span));
+        Some(Box::new(std::iter::once(label).chain(second)))
+    }
+}
+
+impl InputError {
+    /// What the user could do, if something is known.
+    pub fn hint_mut(&mut self) -> &mut Option<String> {
+        &mut self.hint
+    }
+
+    /// Adds what the user could do.
+    #[must_use]
+    pub fn hint(self, hint: impl Into<String>) -> Self {
+        Self {
+            hint: Some(hint.into()),
+            ..self
+        }
+    }
+
+    /// Adds a word beside the underlined place.
+    #[must_use]
+    pub fn label(self, label: impl Into<String>) -> Self {
+        Self {
+            label: Some(label.into()),
+            ..self
+        }
+    }
+}
+

@@ -1,0 +1,43 @@
+//! Names that a user may have meant.
+
+/// The candidate closest to `name`, if any is close enough to be a slip of the pen.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // The distance takes the product of the lengths.
+    const LONGEST: usize = 200;
+    candidates
+        .into_iter()
+        .filter(|candidate| candidate.len().max(name.len()) <= LONGEST)
+        .map(|candidate| (strsim::levenshtein(name, candidate), candidate))
+        .filter(|(distance, candidate)| {
+            *distance <= 1 + candidate.len() / 3 && *distance < candidate.len().max(name.len())
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// `did you mean …?` and the whole list, for a name that is not among the candidates.
+pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    let all: Vec<&str> = candidates.clone().into_iter().collect();
+    let list = if all.is_empty() {
+        "there is none".to_owned()
+    } else {
+        all.join(", ")
+    };
+    match nearest(name, candidates) {
+        Some(near) => format!("did you mean `{near}`? There is: {list}"),
+        None => format!("there is: {list}").replace("there is: there is none", "there is none"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn suggests_the_nearest_name() {
+        let names = ["young_modulus", "poisson_ratio"];
+        assert_eq!(nearest("youngs_modulus", names), Some("young_modulus"));
+        assert_eq!(nearest("cohesion", names), None);
+        assert_eq!(nearest("w", ["x", "y"]), None);
+    }
+}
