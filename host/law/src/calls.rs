@@ -20,7 +20,7 @@ const WORDS: usize = 8;
 const NAMES: usize = 96;
 const NAME: usize = 48;
 /// Words in all: the places, the place of a copy, the number of names, the names.
-pub(crate) const SIZE: usize = COUNT + 1 + NAMES * NAME;
+pub const SIZE: usize = COUNT + 1 + NAMES * NAME;
 const COPY: usize = THREADS * WORDS;
 const COUNT: usize = COPY + WORDS;
 
@@ -49,7 +49,7 @@ struct Scope {
 
 /// What a law is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Doing {
+pub enum Doing {
     /// Fixing parameters.
     Create = 1,
     /// Giving initial internal variables.
@@ -59,12 +59,12 @@ pub(crate) enum Doing {
 }
 
 /// Keeps the places in this memory from now on.
-pub(crate) fn keep_in(memory: SharedMemory, at: usize) {
+pub fn keep_in(memory: SharedMemory, at: usize) {
     let _ = SHARED.set((memory, at));
 }
 
 /// A number for a name; 0 where nobody watches.
-pub(crate) fn name(text: &str) -> u64 {
+pub fn name(text: &str) -> u64 {
     let Some((memory, at)) = SHARED.get() else {
         return 0;
     };
@@ -82,7 +82,7 @@ pub(crate) fn name(text: &str) -> u64 {
 }
 
 /// Says whose points the next call of this thread carries: points of a group from this one on.
-pub(crate) fn of_group(group: u64, first: usize, per_element: usize) {
+pub fn of_group(group: u64, first: usize, per_element: usize) {
     SCOPE.set(Scope {
         group,
         first: first as u64,
@@ -91,7 +91,7 @@ pub(crate) fn of_group(group: u64, first: usize, per_element: usize) {
 }
 
 /// Calls a law.
-pub(crate) fn calling<T>(
+pub fn calling<T>(
     law: u64,
     doing: Doing,
     n_points: usize,
@@ -140,7 +140,7 @@ fn enter() -> usize {
 }
 
 /// Remembers which process this is, before a law is called for the first time.
-pub(crate) fn remember_process() {
+pub fn remember_process() {
     ORIGINAL.get_or_init(|| {
         let word = SharedMemory::gone_in_copies().ok()?;
         word.write(0, std::iter::once(1));
@@ -149,13 +149,13 @@ pub(crate) fn remember_process() {
 }
 
 /// Whether this process is a copy that a law has made.
-pub(crate) fn is_copy() -> bool {
+pub fn is_copy() -> bool {
     let original = ORIGINAL.get().and_then(Option::as_ref);
     original.is_some_and(|word| word.read(0, 1).next() == Some(0))
 }
 
 /// A copy of the process must not go on: it would write the results once more.
-pub(crate) fn end_if_copy(report: impl FnOnce()) {
+pub fn end_if_copy(report: impl FnOnce()) {
     if is_copy() {
         report();
         // Nothing that the copy has registered or opened may run or be written at its end.
@@ -166,7 +166,7 @@ pub(crate) fn end_if_copy(report: impl FnOnce()) {
 }
 
 /// Writes a text into so many words, cut where they end.
-pub(crate) fn write_text(memory: &SharedMemory, at: usize, n_words: usize, text: &str) {
+pub fn write_text(memory: &SharedMemory, at: usize, n_words: usize, text: &str) {
     let mut end = text.len().min(8 * (n_words - 1));
     while !text.is_char_boundary(end) {
         end -= 1;
@@ -182,7 +182,7 @@ pub(crate) fn write_text(memory: &SharedMemory, at: usize, n_words: usize, text:
 }
 
 /// The text that [`write_text`] wrote.
-pub(crate) fn read_text(memory: &SharedMemory, at: usize, n_words: usize) -> String {
+pub fn read_text(memory: &SharedMemory, at: usize, n_words: usize) -> String {
     let length = memory.read(at, 1).next().unwrap_or(0);
     let length = (length as usize).min(8 * (n_words - 1));
     let words = memory.read(at + 1, length.div_ceil(8));
@@ -193,7 +193,7 @@ pub(crate) fn read_text(memory: &SharedMemory, at: usize, n_words: usize) -> Str
 
 /// A call that was under way, as whoever watches sees it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Seen {
+pub struct Seen {
     doing: u64,
     law: String,
     group: String,
@@ -201,7 +201,7 @@ pub(crate) struct Seen {
     per_element: u64,
     n_points: u64,
     /// Phase or segment, and its increment.
-    pub(crate) moment: u64,
+    pub moment: u64,
     calls: u64,
 }
 
@@ -233,26 +233,26 @@ impl std::fmt::Display for Seen {
 
 /// What whoever watches sees in the memory.
 #[derive(Debug)]
-pub(crate) struct Watched<'a>(pub(crate) &'a SharedMemory, pub(crate) usize);
+pub struct Watched<'a>(pub(crate) &'a SharedMemory, pub(crate) usize);
 
 impl Watched<'_> {
     /// Calls under way.
-    pub(crate) fn calls(&self) -> Vec<Seen> {
+    pub fn calls(&self) -> Vec<Seen> {
         (0..THREADS).filter_map(|t| self.at(t * WORDS)).collect()
     }
 
     /// The call from which a copy of the process came back.
-    pub(crate) fn copy(&self) -> Option<Seen> {
+    pub fn copy(&self) -> Option<Seen> {
         self.at(COPY)
     }
 
     /// Forgets all of it.
-    pub(crate) fn clear(&self) {
+    pub fn clear(&self) {
         self.0.write(self.1, std::iter::repeat_n(0, SIZE));
     }
 
     /// The latest phase and increment in which a law was called.
-    pub(crate) fn moment(&self) -> u64 {
+    pub fn moment(&self) -> u64 {
         let of_thread = |t: usize| self.0.read(self.1 + t * WORDS + 6, 1).next();
         (0..THREADS).filter_map(of_thread).max().unwrap_or(0)
     }

@@ -434,7 +434,7 @@ impl Capsule {
     }
 
     /// The call, with its values in the order of this law.
-    fn point_call(&self, law: &Law) -> Result<PointCall, Error> {
+    pub fn point_call(&self, law: &Law) -> Result<PointCall, Error> {
         let request = self.request().ok_or_else(|| {
             let message = format!("there is no request `{}`", self.call.request);
             self.error(&["call", "request"], message)

@@ -183,7 +183,7 @@ fn last_words(pieces: &Receiver<Vec<u8>>) -> Vec<u8> {
 }
 
 #[cfg(unix)]
-pub(crate) fn ending(status: ExitStatus) -> Ending {
+pub fn ending(status: ExitStatus) -> Ending {
     use std::os::unix::process::ExitStatusExt;
     match (status.code(), status.signal()) {
         (Some(code), _) => Ending::Exited(code),
@@ -192,7 +192,7 @@ pub(crate) fn ending(status: ExitStatus) -> Ending {
 }
 
 #[cfg(not(unix))]
-pub(crate) fn ending(status: ExitStatus) -> Ending {
+pub fn ending(status: ExitStatus) -> Ending {
     Ending::Exited(status.code().unwrap_or(-1))
 }
 
@@ -239,7 +239,7 @@ pub fn enter() -> io::Result<()> {
 /// # Errors
 /// The system's.
 #[cfg(unix)]
-pub(crate) fn block_requests() -> io::Result<()> {
+pub fn block_requests() -> io::Result<()> {
     use nix::sys::signal::{SigSet, Signal};
     let mut signals = SigSet::empty();
     for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {

@@ -3,6 +3,7 @@
 //! or hang runs in a [`child`] process or in workers ([`isolate`]). The host's `unsafe` code is here.
 
 pub mod adapter;
+mod built;
 mod call;
 #[cfg(unix)]
 pub mod calls;
@@ -28,6 +29,7 @@ mod stop;
 mod trust;
 pub mod vetting;
 
+pub use built::{BuildCause, BuildFailure, BuiltLaw, UsedParameter, Value};
 pub use call::{
     BatchFailure, BatchSuccess, End, Moment, Operator, PointCall, Request, Site, Start,
 };

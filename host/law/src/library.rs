@@ -629,7 +629,7 @@ impl Strided {
     }
 
     /// The components of one point; as many as the slice holds of them.
-    pub(crate) fn of_point(self, values: &[f64], point: usize, n_components: usize) -> Vec<f64> {
+    pub fn of_point(self, values: &[f64], point: usize, n_components: usize) -> Vec<f64> {
         let first = self.offset + point * self.point;
         let at = (0..n_components).map(|c| values.get(first + c * self.component));
         at.map_while(Option::<&f64>::copied).collect()

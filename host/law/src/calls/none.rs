@@ -4,7 +4,7 @@ use super::Moment;
 
 /// What a law is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Doing {
+pub enum Doing {
     /// Fixing parameters.
     Create,
     /// Giving initial internal variables.
@@ -13,11 +13,11 @@ pub(crate) enum Doing {
     Update,
 }
 
-pub(crate) fn name(_text: &str) -> u64 {
+pub fn name(_text: &str) -> u64 {
     0
 }
 
-pub(crate) fn of_group(_group: u64, _first: usize, _per_element: usize) {}
+pub fn of_group(_group: u64, _first: usize, _per_element: usize) {}
 
 pub(super) fn calling<T>(
     _law: u64,
@@ -29,4 +29,4 @@ pub(super) fn calling<T>(
     call()
 }
 
-pub(crate) fn remember_process() {}
+pub fn remember_process() {}

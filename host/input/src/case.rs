@@ -1,0 +1,607 @@
+//! The case file: what a user writes, key by key. Reading it gives these types; references
+//! between them (a group's law, a load's line) are resolved by the modules that use them.
+
+pub(crate) mod base;
+
+use crate::error::{Error, Source};
+use crate::input::{ForeignKeys, Named, ParameterTable, ParameterValue};
+use crate::plugin::adapter::{Adapter, Externals, Foreign, Scratch};
+use crate::schema;
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize, de};
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// What a driver file looks like among case files.
+const DRIVER: base::OtherKind = base::OtherKind {
+    keys: &["hypothesis", "segment"],
+    message: "this is a driver file, which leads a law at one point; expected a case file",
+    command: "pilum point",
+};
+
+/// A case file and its text.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Text and path, for messages.
+    pub source: Source,
+    /// Contents.
+    pub file: CaseFile,
+    /// Name of the variant, if the file stands for several cases.
+    pub variant: Option<String>,
+}
+
+impl Case {
+    /// Reads a case file, or `case.toml` in a folder: one case, or one for each `[[variant]]`.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], or [`Error::Input`] at the place that does not fit.
+    pub fn load(path: &Path) -> Result<Vec<Self>, Error> {
+        let path = if path.is_dir() {
+            path.join("case.toml")
+        } else {
+            path.to_owned()
+        };
+        Self::of(Source::read(&path)?)
+    }
+
+    /// Takes the text of a case file.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the place that does not fit.
+    pub(crate) fn of(source: Source) -> Result<Vec<Self>, Error> {
+        let (source, files) = base::read_kind(source, &DRIVER)?;
+        let case = |(variant, file)| Self {
+            source: source.clone(),
+            file,
+            variant,
+        };
+        Ok(files.into_iter().map(case).collect())
+    }
+
+    /// Folder for the results if none is given: `results/<case>`, or `results/<case>/<variant>`.
+    pub fn default_folder(&self) -> PathBuf {
+        let folder = Path::new("results").join(self.name());
+        self.variant
+            .iter()
+            .fold(folder, |folder, variant| folder.join(variant))
+    }
+
+    /// Name of the case: its folder if the file is called `case.toml`, else the file's stem.
+    pub fn name(&self) -> String {
+        let path = self.source.path();
+        let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let named = if absolute.file_name().is_some_and(|name| name == "case.toml") {
+            absolute.parent().and_then(Path::file_name)
+        } else {
+            absolute.file_stem()
+        };
+        named.map_or_else(
+            || "case".to_owned(),
+            |name| name.to_string_lossy().into_owned(),
+        )
+    }
+
+    /// Folders with law libraries, relative to the file that names them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there is no such folder.
+    pub fn law_folders(&self) -> Result<Vec<PathBuf>, Error> {
+        let folder = |written: &Spanned<PathBuf>| {
+            let file = self.source.path_at(&written.span());
+            let folder = file
+                .parent()
+                .unwrap_or(Path::new("."))
+                .join(written.get_ref());
+            if folder.is_dir() {
+                return Ok(folder);
+            }
+            let message = format!("`law_path`: there is no folder {}", folder.display());
+            Err(self.source.error(written.span(), message).into())
+        };
+        self.file.law_path.iter().map(folder).collect()
+    }
+}
+
+/// The keys of a case file. Units: kN, m, kPa; angles in degrees.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CaseFile {
+    /// What the case is.
+    #[serde(default)]
+    pub title: String,
+    /// Kinematics of the plane.
+    pub analysis: Analysis,
+    /// Folders with law libraries, relative to the case file.
+    #[serde(default)]
+    #[schemars(with = "Vec<PathBuf>")]
+    pub law_path: Vec<Spanned<PathBuf>>,
+    /// The mesh.
+    pub mesh: MeshInput,
+    /// Laws with their parameters, by a name that groups refer to.
+    #[schemars(with = "BTreeMap<String, LawInput>")]
+    pub laws: Named<LawInput>,
+    /// Element groups, by a name that regions refer to.
+    #[schemars(with = "BTreeMap<String, GroupInput>")]
+    pub groups: Named<GroupInput>,
+    /// Displacements held at zero throughout.
+    #[serde(default)]
+    pub supports: Vec<SupportInput>,
+    /// Loading phases, in order.
+    #[serde(rename = "phase")]
+    pub phases: Vec<PhaseInput>,
+    /// Quantities written for every increment.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ProbeInput>")]
+    pub probes: Named<ProbeInput>,
+    /// Curves of probes, drawn when the run ends.
+    #[serde(default, rename = "figure")]
+    pub figures: Vec<FigureInput>,
+    /// Solver settings.
+    #[serde(default)]
+    pub solver: SolverInput,
+    /// What is written.
+    #[serde(default)]
+    pub output: OutputInput,
+    /// Relative error of the probes that the run may have; settings that reach it are then found
+    /// by a study before the run.
+    #[serde(default, deserialize_with = "accuracy")]
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
+    pub accuracy: Option<Spanned<f64>>,
+    /// The settings that such a study chose.
+    #[serde(skip)]
+    pub chosen: Option<Chosen>,
+}
+
+/// Settings chosen for an `accuracy`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Chosen {
+    /// Relative error asked for.
+    pub asked: f64,
+    /// Relative error estimated.
+    pub reached: f64,
+    /// It is at most what was asked for.
+    pub is_reached: bool,
+    /// How the error was estimated.
+    pub estimate: String,
+    /// Increments by phase.
+    pub increments: Vec<(String, usize)>,
+    /// Tolerance of the residual.
+    pub force_tolerance: f64,
+    /// Tolerance of the correction.
+    pub displacement_tolerance: f64,
+    /// Parameters of laws that differ from the file, as `law.parameter = value`.
+    pub parameters: Vec<String>,
+    /// Runs that the study took.
+    pub runs: usize,
+}
+
+/// A structured mesh of 8-node quads.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshInput {
+    /// Where columns and rows start; (0, 0) if left out.
+    #[schemars(with = "Option<[f64; 2]>")]
+    pub origin: Option<Spanned<[f64; 2]>>,
+    /// Columns, in the direction of x (r).
+    #[schemars(with = "Vec<PartInput>")]
+    pub columns: Spanned<Vec<Spanned<PartInput>>>,
+    /// Rows, in the direction of y (z).
+    #[schemars(with = "Vec<PartInput>")]
+    pub rows: Spanned<Vec<Spanned<PartInput>>>,
+    /// Which group an element belongs to; later regions override earlier ones.
+    #[serde(rename = "region")]
+    pub regions: Vec<RegionInput>,
+    /// Named lines.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, LineInput>")]
+    pub lines: Named<LineInput>,
+}
+
+/// Some columns or rows, following the previous ones.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartInput {
+    /// How many.
+    pub n: usize,
+    /// Coordinate where they end.
+    pub to: f64,
+    /// Size of each divided by the size of the one before.
+    #[serde(default = "one")]
+    pub ratio: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A rectangle of elements.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
+#[serde(deny_unknown_fields)]
+pub struct RegionInput {
+    /// The group its elements belong to.
+    #[schemars(with = "String")]
+    pub group: Spanned<String>,
+    /// Extent in x (r); everything if left out.
+    #[serde(alias = "r")]
+    #[schemars(with = "Option<[f64; 2]>")]
+    pub x: Option<Spanned<[f64; 2]>>,
+    /// Extent in y (z); everything if left out.
+    #[serde(alias = "z")]
+    #[schemars(with = "Option<[f64; 2]>")]
+    pub y: Option<Spanned<[f64; 2]>>,
+}
+
+/// A line along a coordinate, or a point.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
+#[serde(deny_unknown_fields)]
+pub struct LineInput {
+    /// Position or extent in x (r).
+    #[serde(alias = "r")]
+    pub x: Option<Coordinate>,
+    /// Position or extent in y (z).
+    #[serde(alias = "z")]
+    pub y: Option<Coordinate>,
+}
+
+/// A position or an extent.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or an extent such as `[0.0, 1.0]`"
+)]
+pub enum Coordinate {
+    /// A position.
+    At(f64),
+    /// An extent.
+    Between([f64; 2]),
+}
+
+/// A law with its parameters.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LawInput {
+    /// Id of the law.
+    #[schemars(with = "String")]
+    pub law: Spanned<String>,
+    /// SHA-256 that its library must have, in hexadecimal digits.
+    #[schemars(with = "Option<String>")]
+    pub sha256: Option<Spanned<String>>,
+    /// What its library is made for, if not for the contract.
+    #[schemars(with = "Option<Adapter>")]
+    pub adapter: Option<Spanned<Adapter>>,
+    /// That library.
+    #[schemars(with = "Option<PathBuf>")]
+    pub library: Option<Spanned<PathBuf>>,
+    /// What describes it.
+    #[schemars(with = "Option<PathBuf>")]
+    pub sidecar: Option<Spanned<PathBuf>>,
+    /// Call it in this process.
+    #[schemars(with = "Option<bool>")]
+    pub in_process: Option<Spanned<bool>>,
+    /// Write the arguments of one call here.
+    #[schemars(with = "Option<PathBuf>")]
+    pub record: Option<Spanned<PathBuf>>,
+    /// What becomes of routines that it calls and nobody supplies.
+    #[schemars(with = "Option<Externals>")]
+    pub externals: Option<Spanned<Externals>>,
+    /// What becomes of its scratch files.
+    #[schemars(with = "Option<Scratch>")]
+    pub scratch: Option<Spanned<Scratch>>,
+    /// Its parameters.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ParameterValue>")]
+    pub parameters: ParameterTable,
+    /// Initial values of internal variables, overriding those of the law.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub initial: Named<f64>,
+}
+
+impl LawInput {
+    /// Its library, if that is made for another program.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the key that does not fit.
+    pub fn foreign(&self, source: &Source) -> Result<Option<Foreign>, Error> {
+        let keys = ForeignKeys {
+            adapter: self.adapter.as_ref(),
+            library: self.library.as_ref(),
+            sidecar: self.sidecar.as_ref(),
+            in_process: self.in_process.as_ref(),
+            record: self.record.as_ref(),
+            externals: self.externals.as_ref(),
+            scratch: self.scratch.as_ref(),
+        };
+        keys.read(source)
+    }
+}
+
+/// A group of elements.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GroupInput {
+    /// What the elements do.
+    pub formulation: Formulation,
+    /// The law, by its name under `laws`; phases may swap it.
+    #[schemars(with = "String")]
+    pub law: Spanned<String>,
+    /// Where the law is evaluated; the default depends on the formulation.
+    #[schemars(with = "Option<Integration>")]
+    pub integration: Option<Spanned<Integration>>,
+    /// Zero thickness: the line along which the elements are inserted.
+    #[schemars(with = "Option<String>")]
+    pub line: Option<Spanned<String>>,
+    /// Thin layer: direction across the layer; the shorter side if left out.
+    #[schemars(with = "Option<Axis>")]
+    pub normal: Option<Spanned<Axis>>,
+    /// Thin layer with an interface law: elasticity along the layer.
+    #[schemars(with = "Option<InPlane>")]
+    pub in_plane: Option<Spanned<InPlane>>,
+    /// Stress before the first phase, components 11 22 33 12, tension positive.
+    #[schemars(with = "Option<StressInput>")]
+    pub initial_stress: Option<Spanned<StressInput>>,
+}
+
+/// A coordinate direction.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[schemars(transform = schema::radius_and_axis_names)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// x, or r.
+    #[serde(alias = "r")]
+    X,
+    /// y, or z.
+    #[serde(alias = "z")]
+    Y,
+}
+
+/// A stress, tension positive.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct StressInput {
+    /// Along x (r).
+    #[serde(rename = "11")]
+    pub s11: f64,
+    /// Along y (z).
+    #[serde(rename = "22")]
+    pub s22: f64,
+    /// Out of plane (hoop).
+    #[serde(rename = "33")]
+    pub s33: f64,
+    /// Shear.
+    #[serde(rename = "12")]
+    pub s12: f64,
+}
+
+/// Displacements of a line held at zero.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SupportInput {
+    /// The line.
+    #[schemars(with = "String")]
+    pub line: Spanned<String>,
+    /// The components.
+    pub fixed: Vec<Axis>,
+}
+
+/// A loading phase. Loads and prescribed displacements stay until a later phase changes them.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PhaseInput {
+    /// Name, used in results.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// Number of equal increments.
+    #[schemars(with = "usize")]
+    pub increments: Spanned<usize>,
+    /// Laws of groups from this phase on.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, String>")]
+    pub laws: Named<String>,
+    /// Displacements are counted from the start of this phase.
+    #[serde(default)]
+    pub reset_displacements: bool,
+    /// Prescribed displacements, as totals at the end of the phase.
+    #[serde(default)]
+    pub displacement: Vec<DisplacementInput>,
+    /// Prescribed displacements given up from this phase on.
+    #[serde(default)]
+    pub free: Vec<FreeInput>,
+    /// Pressures, as totals at the end of the phase.
+    #[serde(default)]
+    pub pressure: Vec<PressureInput>,
+}
+
+/// Prescribed displacements of a line, m.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
+#[serde(deny_unknown_fields)]
+pub struct DisplacementInput {
+    /// The line.
+    #[schemars(with = "String")]
+    pub line: Spanned<String>,
+    /// In x (r).
+    #[serde(alias = "r")]
+    pub x: Option<f64>,
+    /// In y (z).
+    #[serde(alias = "z")]
+    pub y: Option<f64>,
+}
+
+/// Displacements of a line that become free.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FreeInput {
+    /// The line.
+    #[schemars(with = "String")]
+    pub line: Spanned<String>,
+    /// The components.
+    pub components: Vec<Axis>,
+}
+
+/// A pressure on a boundary line, kPa.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressureInput {
+    /// The line.
+    #[schemars(with = "String")]
+    pub line: Spanned<String>,
+    /// Towards the body positive.
+    pub value: f64,
+}
+
+/// A quantity written for every increment.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeInput {
+    /// Over the nodes of this line.
+    #[schemars(with = "Option<String>")]
+    pub line: Option<Spanned<String>>,
+    /// Over the integration points of this group; with a line, only its forces.
+    #[schemars(with = "Option<String>")]
+    pub group: Option<Spanned<String>>,
+    /// What.
+    #[schemars(with = "Option<String>")]
+    pub quantity: Option<Spanned<String>>,
+    /// How values become one; `sum` for forces, else `mean`.
+    pub reduce: Option<Reduce>,
+    /// Only points inside this extent (ends excluded).
+    #[serde(alias = "r")]
+    pub x: Option<[f64; 2]>,
+    /// Only points inside this extent (ends excluded).
+    #[serde(alias = "z")]
+    pub y: Option<[f64; 2]>,
+    /// Factor.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Instead of the above: a sum of other probes with factors.
+    #[schemars(with = "Option<BTreeMap<String, f64>>")]
+    pub combine: Option<Named<f64>>,
+}
+
+/// How values become one.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduce {
+    /// Arithmetic mean.
+    Mean,
+    /// Mean weighted by what each integration point stands for: area, in axisymmetry of the whole
+    /// turn; of interfaces their own area.
+    Average,
+    /// The sum of values times what they stand for: over the area, in axisymmetry over the volume
+    /// of the whole turn; of interfaces over their own area.
+    Integral,
+    /// Smallest.
+    Min,
+    /// Largest.
+    Max,
+    /// Sum.
+    Sum,
+}
+
+/// Curves of probes over another probe, or of a stress over the integration points of a cut.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FigureInput {
+    /// Name of the file, without `.svg`.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// Title; the case's if left out.
+    pub title: Option<String>,
+    /// Probe (of a cut: quantity of a point) along the horizontal axis.
+    #[schemars(with = "String")]
+    pub x: Spanned<String>,
+    /// Text of the horizontal axis.
+    pub x_label: Option<String>,
+    /// Probes (quantities) along the vertical axis.
+    #[schemars(with = "Vec<String>")]
+    pub y: Vec<Spanned<String>>,
+    /// Text of the vertical axis.
+    pub y_label: Option<String>,
+    /// Only this phase; all if left out.
+    #[schemars(with = "Option<String>")]
+    pub phase: Option<Spanned<String>>,
+    /// A cut: the integration points in it instead of probes.
+    pub points: Option<CutInput>,
+}
+
+/// Integration points inside extents (ends excluded), at chosen increments.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
+#[serde(deny_unknown_fields)]
+pub struct CutInput {
+    /// Of this group; of all if left out.
+    #[schemars(with = "Option<String>")]
+    pub group: Option<Spanned<String>>,
+    /// Extent in x (r).
+    #[serde(alias = "r")]
+    pub x: Option<[f64; 2]>,
+    /// Extent in y (z).
+    #[serde(alias = "z")]
+    pub y: Option<[f64; 2]>,
+    /// After these increments of the phase, a curve for each; after the last one if left out.
+    #[serde(default)]
+    pub increments: Vec<usize>,
+    /// Factor of what stands along the vertical axis.
+    #[serde(default = "one")]
+    pub scale: f64,
+}
+
+/// A relative error that can be aimed at.
+fn accuracy<'de, D: Deserializer<'de>>(input: D) -> Result<Option<Spanned<f64>>, D::Error> {
+    let asked = Spanned::<f64>::deserialize(input)?;
+    match *asked.get_ref() {
+        value if value > 0.0 && value <= 0.5 => Ok(Some(asked)),
+        value => Err(de::Error::custom(format!("{value:?} is outside (0, 0.5]"))),
+    }
+}
+
+fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {
+    if value >= least && value <= most {
+        return Ok(value);
+    }
+    Err(E::custom(format!(
+        "{value:?} is outside [{least:?}, {most:?}]"
+    )))
+}
+
+/// What is written.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputInput {
+    /// When the profile along interfaces is written.
+    pub profile: When,
+    /// When all integration points are written.
+    pub points: When,
+    /// When fields for a viewer are written.
+    pub fields: When,
+}
+
+/// When something is written.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum When {
+    /// Never.
+    #[default]
+    Never,
+    /// After the last increment of each phase.
+    Phases,
+    /// After every increment.
+    Increments,
+}
+
+impl When {
+    /// Whether to write after increment `i` of `n`.
+    pub fn includes(self, i: usize, n: usize) -> bool {
+        match self {
+            Self::Never => false,
+            Self::Phases => i == n,
+            Self::Increments => true,
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Elements: how nodal displacements become strains (or jumps), and stresses (or tractions)
+//! nodal forces. Physics of the material is elsewhere.
+//!
+//! Strains have components 11 22 33 12 with γ = 2ε₁₂, in axes of the element; jumps have normal
+//! and tangential components.
+
+mod joint6;
+mod quad8;
+mod shape;
+
+pub use joint6::Joint6;
+pub use quad8::Quad8;
+pub use shape::{gauss, line_shape};
+
+use crate::problem::Analysis;
+
+/// Two unit vectors: along the facet (1) and across it (2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    /// Direction of component 1, along the facet.
+    pub along: [f64; 2],
+    /// Direction of component 2, across the facet.
+    pub across: [f64; 2],
+}
+
+impl Axes {
+    /// The global axes.
+    pub const GLOBAL: Self = Self {
+        along: [1.0, 0.0],
+        across: [0.0, 1.0],
+    };
+
+    /// Axes of a facet in this direction. Both point towards increasing coordinates, so that the
+    /// shear stress of a horizontal or vertical facet is the global σ₁₂.
+    pub fn of_facet(direction: [f64; 2]) -> Self {
+        let towards_increase = |v: [f64; 2]| {
+            let length = v[0].hypot(v[1]);
+            let dominant = if v[0].abs() > v[1].abs() { v[0] } else { v[1] };
+            [
+                v[0] / length.copysign(dominant),
+                v[1] / length.copysign(dominant),
+            ]
+        };
+        Self {
+            along: towards_increase(direction),
+            across: towards_increase([-direction[1], direction[0]]),
+        }
+    }
+
+    /// Stress components in global axes of a stress in these axes.
+    pub fn stress_to_global(&self, s: [f64; 4]) -> [f64; 4] {
+        let [m, n] = [self.along, self.across];
+        let component = |i: usize, j: usize| {
+            m[i] * m[j] * s[0] + n[i] * n[j] * s[1] + (m[i] * n[j] + n[i] * m[j]) * s[3]
+        };
+        [component(0, 0), component(1, 1), s[2], component(0, 1)]
+    }
+
+    /// Stress components in these axes of a stress in global axes.
+    pub fn stress_from_global(&self, s: [f64; 4]) -> [f64; 4] {
+        let product = |a: [f64; 2], b: [f64; 2]| {
+            a[0] * (s[0] * b[0] + s[3] * b[1]) + a[1] * (s[3] * b[0] + s[1] * b[1])
+        };
+        [
+            product(self.along, self.along),
+            product(self.across, self.across),
+            s[2],
+            product(self.along, self.across),
+        ]
+    }
+}
+
+/// The elements of one group.
+pub trait Kinematics: std::fmt::Debug + Send + Sync {
+    /// Number of elements.
+    fn n_elements(&self) -> usize;
+    /// Integration points of one element.
+    fn points_per_element(&self) -> usize;
+    /// Components of strain (4) or jump (2).
+    fn n_components(&self) -> usize;
+    /// Nodes of an element.
+    fn nodes(&self, element: usize) -> &[usize];
+    /// Coordinates of an integration point.
+    fn position(&self, point: usize) -> [f64; 2];
+    /// Weight of an integration point: the volume (of an interface: the area) it stands for.
+    fn weight(&self, point: usize) -> f64;
+    /// Characteristic length of an element: the square root of its area, of an interface its
+    /// length.
+    fn length(&self, element: usize) -> f64;
+    /// Axes of an element.
+    fn axes(&self, element: usize) -> Axes;
+    /// Adds the strains (jumps) of all points under nodal displacements (two per node) to `out`.
+    fn add_gradients(&self, displacement: &[f64], out: &mut [f64]);
+    /// Adds the nodal forces that balance the stresses (tractions) of all points to `force`.
+    fn add_forces(&self, flux: &[f64], force: &mut [f64]);
+    /// Stiffness of an element from the tangents of its points (row-major), row-major, two
+    /// degrees of freedom per node, in global axes. Overwrites `out`.
+    fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]);
+
+    /// Number of integration points.
+    fn n_points(&self) -> usize {
+        self.n_elements() * self.points_per_element()
+    }
+}
+
+/// What a unit of area in the plane stands for.
+pub fn depth(analysis: Analysis, x: f64) -> f64 {
+    match analysis {
+        Analysis::Axisymmetric => 2.0 * std::f64::consts::PI * x,
+        Analysis::PlaneStrain => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn assert_close(a: [f64; 4], b: [f64; 4]) {
+        for (a, b) in a.iter().zip(b) {
+            assert_relative_eq!(*a, b, epsilon = 1e-14);
+        }
+    }
+
+    #[test]
+    fn facets_along_the_coordinates_carry_the_global_shear_stress() {
+        let stress = [1.0, 2.0, 3.0, 4.0];
+        let vertical = Axes::of_facet([0.0, -2.0]);
+        assert_close(vertical.stress_from_global(stress), [2.0, 1.0, 3.0, 4.0]);
+        let horizontal = Axes::of_facet([-1.0, 0.0]);
+        assert_close(horizontal.stress_from_global(stress), stress);
+    }
+
+    #[test]
+    fn an_inclined_facet_follows_equation_1_of_the_paper() {
+        let alpha: f64 = 0.3;
+        let (s, c) = alpha.sin_cos();
+        let [s11, s22, s12] = [1.0, 2.0, 4.0];
+        let local = Axes::of_facet([c, s]).stress_from_global([s11, s22, 3.0, s12]);
+        assert_relative_eq!(
+            local[1],
+            s * s * s11 + c * c * s22 - 2.0 * s * c * s12,
+            epsilon = 1e-14
+        );
+        let tau = -s * c * s11 + s * c * s22 + (c * c - s * s) * s12;
+        assert_relative_eq!(local[3], tau, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn turning_a_stress_there_and_back_changes_nothing() {
+        let axes = Axes::of_facet([0.6, 0.8]);
+        let stress = [1.0, -2.0, 3.0, 4.0];
+        assert_close(
+            axes.stress_to_global(axes.stress_from_global(stress)),
+            stress,
+        );
+    }
+}

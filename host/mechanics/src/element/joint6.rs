@@ -1,0 +1,170 @@
+//! Zero-thickness elements of three double nodes.
+
+use super::shape::{gauss, line_shape};
+use super::{Axes, Kinematics, depth};
+use crate::problem::{Analysis, Integration};
+use crate::mesh::Joint;
+
+/// Zero-thickness elements of one group.
+#[derive(Debug)]
+pub struct Joint6 {
+    /// Three nodes of the minus side, then the three opposite them.
+    nodes: Vec<[usize; 6]>,
+    axes: Vec<Axes>,
+    lengths: Vec<f64>,
+    points_per_element: usize,
+    points: Vec<Point>,
+}
+
+/// An integration point: jump = Σ N (u⁺ − u⁻).
+#[derive(Clone, Debug)]
+struct Point {
+    n: [f64; 3],
+    weight: f64,
+    position: [f64; 2],
+}
+
+impl Joint6 {
+    /// Elements with Gauss points, or with the nodes as points.
+    pub fn new(
+        analysis: Analysis,
+        coordinates: &[[f64; 2]],
+        joints: &[Joint],
+        integration: Integration,
+    ) -> Self {
+        let (xi, weights): (&[f64], &[f64]) = match integration {
+            Integration::Full => gauss(3),
+            Integration::Reduced => gauss(2),
+            // Simpson's rule.
+            _ => (&[-1.0, 1.0, 0.0], &[1.0 / 3.0, 1.0 / 3.0, 4.0 / 3.0]),
+        };
+        let mut points = Vec::new();
+        let mut axes = Vec::new();
+        let mut lengths = Vec::new();
+        for joint in joints {
+            let at = joint.minus.map(|n| coordinates[n]);
+            let along = [at[1][0] - at[0][0], at[1][1] - at[0][1]];
+            axes.push(Axes::of_facet(along));
+            lengths.push(along[0].hypot(along[1]));
+            for (&xi, weight) in xi.iter().zip(weights) {
+                let (n, d) = line_shape(xi);
+                let sum = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * at[i][c]).sum() };
+                let position = [sum(&n, 0), sum(&n, 1)];
+                let length = sum(&d, 0).hypot(sum(&d, 1));
+                points.push(Point {
+                    n,
+                    weight: weight * length * depth(analysis, position[0]),
+                    position,
+                });
+            }
+        }
+        let nodes = joints
+            .iter()
+            .map(|j| std::array::from_fn(|i| if i < 3 { j.minus[i] } else { j.plus[i - 3] }))
+            .collect();
+        Self {
+            nodes,
+            axes,
+            lengths,
+            points_per_element: xi.len(),
+            points,
+        }
+    }
+
+    fn points_of(&self, element: usize) -> &[Point] {
+        &self.points[element * self.points_per_element..][..self.points_per_element]
+    }
+}
+
+impl Kinematics for Joint6 {
+    fn n_elements(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn points_per_element(&self) -> usize {
+        self.points_per_element
+    }
+
+    fn n_components(&self) -> usize {
+        2
+    }
+
+    fn nodes(&self, element: usize) -> &[usize] {
+        &self.nodes[element]
+    }
+
+    fn position(&self, point: usize) -> [f64; 2] {
+        self.points[point].position
+    }
+
+    fn weight(&self, point: usize) -> f64 {
+        self.points[point].weight
+    }
+
+    fn length(&self, element: usize) -> f64 {
+        self.lengths[element]
+    }
+
+    fn axes(&self, element: usize) -> Axes {
+        self.axes[element]
+    }
+
+    fn add_gradients(&self, displacement: &[f64], out: &mut [f64]) {
+        let mut jumps = out.chunks_exact_mut(2);
+        for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
+            let u = |node: usize, c: usize| displacement[2 * node + c];
+            for (point, jump) in self.points_of(element).iter().zip(&mut jumps) {
+                let opening: [f64; 2] = std::array::from_fn(|c| {
+                    (0..3)
+                        .map(|i| point.n[i] * (u(nodes[i + 3], c) - u(nodes[i], c)))
+                        .sum()
+                });
+                jump[0] += axes.across[0] * opening[0] + axes.across[1] * opening[1];
+                jump[1] += axes.along[0] * opening[0] + axes.along[1] * opening[1];
+            }
+        }
+    }
+
+    fn add_forces(&self, flux: &[f64], force: &mut [f64]) {
+        let mut tractions = flux.chunks_exact(2);
+        for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
+            for (point, t) in self.points_of(element).iter().zip(&mut tractions) {
+                for c in 0..2 {
+                    let traction = axes.across[c] * t[0] + axes.along[c] * t[1];
+                    for i in 0..3 {
+                        let f = point.weight * point.n[i] * traction;
+                        force[2 * nodes[i] + c] -= f;
+                        force[2 * nodes[i + 3] + c] += f;
+                    }
+                }
+            }
+        }
+    }
+
+    fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        let axes = &self.axes[element];
+        let directions = [axes.across, axes.along];
+        for (point, tangent) in self.points_of(element).iter().zip(tangent.chunks_exact(4)) {
+            // The law's 2 × 2 tangent in global axes.
+            let d = |c: usize, e: usize| -> f64 {
+                let pairs = (0..2).flat_map(|i| (0..2).map(move |j| (i, j)));
+                pairs
+                    .map(|(i, j)| directions[i][c] * tangent[2 * i + j] * directions[j][e])
+                    .sum()
+            };
+            let d = [[d(0, 0), d(0, 1)], [d(1, 0), d(1, 1)]];
+            for i in 0..6 {
+                for j in 0..6 {
+                    let sign = if (i < 3) == (j < 3) { 1.0 } else { -1.0 };
+                    let weight = sign * point.weight * point.n[i % 3] * point.n[j % 3];
+                    for c in 0..2 {
+                        for e in 0..2 {
+                            out[(2 * i + c) * 12 + 2 * j + e] += weight * d[c][e];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

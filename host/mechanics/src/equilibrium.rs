@@ -1,0 +1,14 @@
+//! Finding equilibrium: Newton iterations within a step, the sparse equations they solve, and the
+//! linear part of a model that takes no part in them.
+
+mod diagnosis;
+mod linear_domain;
+mod newton;
+
+pub use linear_domain::{LinearDomain, LookedAt, Reuse, Standing};
+pub use newton::{
+    Costs, Criterion, Culprit, DomainFailure, Guess, Imbalance, Iteration, Iterations, Loads, Matrix,
+    Measure, Newton, PointPlace, Reason, Runaway, Singularity, StepFailure, StepSuccess, Symptom,
+    Unmet,
+};
+pub(crate) use newton::{ROUND_OFF, STILL_SMALL, norm};

@@ -1,0 +1,710 @@
+//! The part of a model whose laws are linear: assembled and factorised once in a phase, and
+//! condensed onto the unknowns it shares with the rest.
+//!
+//! Its equations between two states of equilibrium, with loads proportional to λ, are
+//!
+//! - K_ii Δu_i + K_ib Δu_b = Δλ r_i, K_bi Δu_i + K_bb Δu_b = Δλ r_b + Δf_b (1)
+//!
+//! with interior unknowns i, boundary unknowns b, and forces f_b from the elements beyond the
+//! boundary. r are the external forces of the phase less those of its prescribed displacements.
+//! Eliminating Δu_i leaves
+//!
+//! - S Δu_b = Δλ r' + Δf_b, r' = r_b − K_bi K_ii⁻¹ r_i (2)
+//!
+//! which is all that the iterations see. Δu_i follows from the first of (1) when it is wanted.
+//! Everything is counted from the last state that was completed.
+//! Where only some groups are looked at (the pile whose head force is wanted, not the sand), they
+//! alone are brought to the state in question, counted from the one before it; the others wait for
+//! the next complete one.
+
+use super::newton::{ACCEPTED_ROUND_OFF, DomainFailure, Loads, STILL_SMALL, last_bit_scattered, norm};
+use crate::assembly::{System, Tie};
+use crate::group::Group;
+use law::Operator;
+use algebra::{Block, Kind, Multifrontal, Pattern, Singular};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Corrections of a complete state, at most.
+const REFINEMENTS: usize = 3;
+/// A complete state whose residual is within this of the tolerance is not corrected at all.
+const REFINED: f64 = 0.1;
+/// Matrices whose factors are remembered.
+const REMEMBERED: usize = 3;
+
+/// Factors of the linear parts that were condensed last, for phases and cases with the same ones:
+/// another interface law on the same mesh, the same law under other loads.
+#[derive(Debug, Default)]
+pub struct Reuse {
+    /// The latest last.
+    known: VecDeque<Condensed>,
+    /// No other run follows.
+    pub is_last_run: bool,
+    /// Who is told beforehand how many bytes a large piece of work takes, and what it is.
+    pub announces: Option<fn(u64, &'static str)>,
+    /// Nor, in the present one, another phase.
+    pub(crate) is_last_phase: bool,
+}
+
+/// A matrix and what became of it.
+#[derive(Debug)]
+struct Condensed {
+    kind: Kind,
+    pattern: Arc<Pattern>,
+    values: Vec<f64>,
+    kept: Vec<bool>,
+    factors: Arc<Multifrontal>,
+}
+
+impl Reuse {
+    /// Says how many bytes a large piece of work takes.
+    pub(crate) fn announce(&self, bytes: u64, what: &'static str) {
+        if let Some(announces) = self.announces {
+            announces(bytes, what);
+        }
+    }
+
+    /// Whether anything follows that may find what is remembered.
+    fn may_recur(&self) -> bool {
+        !(self.is_last_run && self.is_last_phase)
+    }
+
+    /// Gives up what nothing that follows can find.
+    pub(crate) fn forget(&mut self) {
+        if !self.may_recur() {
+            self.known.clear();
+        }
+    }
+
+    /// The factors of a matrix that is known, to the bit.
+    fn find(
+        &self,
+        kind: Kind,
+        pattern: &Pattern,
+        values: &[f64],
+        kept: &[bool],
+    ) -> Option<Arc<Multifrontal>> {
+        let same = |known: &&Condensed| {
+            known.kind == kind
+                && known.kept == kept
+                && *known.pattern == *pattern
+                && known
+                    .values
+                    .iter()
+                    .map(|v| v.to_bits())
+                    .eq(values.iter().map(|v| v.to_bits()))
+        };
+        let known = self.known.iter().find(same)?;
+        Some(Arc::clone(&known.factors))
+    }
+
+    fn remember(&mut self, condensed: Condensed) {
+        if self.known.len() == REMEMBERED {
+            self.known.pop_front();
+        }
+        self.known.push_back(condensed);
+    }
+}
+
+/// Some groups of a domain, with what gives their displacements.
+#[derive(Debug)]
+struct Part {
+    /// Of every group of the model, whether it belongs to the part.
+    groups: Vec<bool>,
+    /// Equations of their unknowns and of others that are wanted.
+    wanted: Vec<usize>,
+    /// Equations inside the domain of which no other group of the domain takes part.
+    inner: Vec<usize>,
+    /// Supernodes of the wanted equations, and those above them.
+    fronts: Vec<bool>,
+}
+
+/// What results look at.
+#[derive(Clone, Copy, Debug)]
+pub struct LookedAt<'l> {
+    /// Of every group of the model, whether they do.
+    pub groups: &'l [bool],
+    /// Degrees of freedom whose displacements they give.
+    pub dofs: &'l [usize],
+}
+
+/// A state that is counted from.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Origin {
+    lambda: f64,
+    /// Displacements by degree of freedom.
+    displacement: Vec<f64>,
+    /// Displacements of the boundary since then.
+    moved: Vec<f64>,
+}
+
+/// Displacement increments since both of them, by degree of freedom, as far as groups count from
+/// there.
+struct Since {
+    complete: Option<Vec<f64>>,
+    latest: Option<Vec<f64>>,
+}
+
+/// A state to be reached.
+struct Goal<'g> {
+    /// External forces, by degree of freedom.
+    external: &'g [f64],
+    lambda: f64,
+    /// The residual is measured against forces no smaller than this.
+    scale: f64,
+    tolerance: f64,
+}
+
+/// Where a domain stands.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Standing {
+    /// The last complete state.
+    complete: Origin,
+    /// The last state in which a part of the groups was looked at; theirs counts from there.
+    latest: Origin,
+    /// Internal forces on the boundary in that state.
+    forces: Vec<f64>,
+    /// Of every group of the model, whether it belongs to that part; `None` if the latest state is
+    /// the complete one.
+    part: Option<Vec<bool>>,
+    /// Largest relative residual that had to be taken for round-off, above the tolerance; else 0.
+    pub round_off: f64,
+}
+
+/// The linear part of a model during one phase.
+#[derive(Debug)]
+pub struct LinearDomain {
+    system: System,
+    factors: Arc<Multifrontal>,
+    /// Whether the factors were made for this phase.
+    pub factorised: bool,
+    /// Largest entry of the boundary's stiffness.
+    pub largest: f64,
+    /// Largest entry of its matrix before it was condensed.
+    pub stiffest: f64,
+    /// Degrees of freedom of the boundary, in the order of the Schur complement.
+    boundary: Vec<usize>,
+    /// Of every unknown, whether it is one of them.
+    on_boundary: Vec<bool>,
+    /// L⁻¹ r_i.
+    y: Vec<f64>,
+    /// r'.
+    condensed: Vec<f64>,
+    standing: Standing,
+    /// The part that is looked at.
+    part: Option<Part>,
+    /// All groups.
+    whole: Option<Part>,
+}
+
+/// Whether condensation pays: the linear part is the larger one, and its boundary small.
+///
+/// The dense equations of the boundary must not cost more than the sparse ones they replace.
+fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
+    let dense = 5.0 * f64::sqrt(n_interior as f64);
+    n_interior > n_rest && n_boundary as f64 <= dense
+}
+
+impl LinearDomain {
+    /// Condenses the linear groups of a mesh whose nodes lie on these lines. `None` if there are
+    /// none, or if it does not pay and is not wanted `always`.
+    ///
+    /// # Errors
+    /// [`Singular`] if they are not held where they are not connected to the rest.
+    pub fn new(
+        groups: &[Group],
+        prescribed: &[bool],
+        ties: &[Tie],
+        lines: &[[u32; 2]],
+        always: bool,
+        mut reuse: Option<&mut Reuse>,
+    ) -> Result<Option<(Self, System)>, Singular> {
+        let mut system = System::new(groups, Group::is_linear, prescribed, ties, None);
+        if system.n_equations() == 0 {
+            return Ok(None);
+        }
+        let is_other = |group: &Group| !group.is_linear();
+        let rest = System::new(groups, is_other, prescribed, ties, Some(&system));
+        let n_boundary = rest.boundary().len();
+        let n_interior = system.n_equations() - n_boundary;
+        if !always && !pays(n_interior, n_boundary, rest.n_equations()) {
+            return Ok(None);
+        }
+        let mut kept = vec![false; system.n_equations()];
+        for equation in rest
+            .boundary()
+            .iter()
+            .filter_map(|&dof| system.equation(dof))
+        {
+            kept[equation] = true;
+        }
+        let symmetric = groups
+            .iter()
+            .filter(|group| group.is_linear())
+            .all(Group::is_symmetric);
+        let kind = if symmetric {
+            Kind::Symmetric
+        } else {
+            Kind::Unsymmetric
+        };
+        let mut values = Vec::new();
+        system.assemble(groups, &mut values);
+        let stiffest = values
+            .iter()
+            .fold(0.0, |most: f64, value| most.max(value.abs()));
+        let known = reuse
+            .as_ref()
+            .and_then(|reuse| reuse.find(kind, &system.pattern, &values, &kept));
+        if let Some(reuse) = &mut reuse {
+            reuse.forget();
+        }
+        let pattern = system.forget_matrix();
+        let factorised = known.is_none();
+        let factors = if let Some(factors) = known {
+            factors
+        } else {
+            let lines = system.lines(lines);
+            let mut factors = Multifrontal::new(&pattern, kind, &kept, Some(&lines))?;
+            if let Some(reuse) = &reuse {
+                reuse.announce(factors.bytes(), "factorising the linear groups");
+            }
+            let gathered = factors.gather(&values);
+            // Where nothing may find the matrix, it is given up before its factors need the room.
+            let remembered = reuse
+                .filter(|reuse| reuse.may_recur())
+                .map(|reuse| (reuse, pattern, values));
+            factors.factorise_gathered(&gathered)?;
+            drop(gathered);
+            let factors = Arc::new(factors);
+            if let Some((reuse, pattern, values)) = remembered {
+                reuse.remember(Condensed {
+                    kind,
+                    pattern,
+                    values,
+                    kept: kept.clone(),
+                    factors: Arc::clone(&factors),
+                });
+            }
+            factors
+        };
+        let free = system.free();
+        let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();
+        let largest = |largest: f64, value: &f64| largest.max(value.abs());
+        let domain = Self {
+            stiffest,
+            largest: factors.schur().iter().fold(0.0, largest),
+            standing: Standing::default(),
+            part: None,
+            whole: None,
+            boundary,
+            on_boundary: kept,
+            factors,
+            factorised,
+            system,
+            y: Vec::new(),
+            condensed: Vec::new(),
+        };
+        Ok(Some((domain, rest)))
+    }
+
+    /// The domain as a dense block in the equations of the rest.
+    pub fn block(&self, rest: &System) -> Block {
+        let equations = self.boundary.iter().filter_map(|&dof| rest.equation(dof));
+        Block::new(equations.collect(), &self.factors)
+    }
+
+    /// Stiffness of the boundary, column-major: S of (2).
+    pub fn stiffness(&self) -> &[f64] {
+        self.factors.schur()
+    }
+
+    /// Sets up a phase that starts from the groups' committed state and these displacements.
+    pub fn start(&mut self, groups: &[Group], loads: &Loads, displacement: &[f64]) {
+        let n_dofs = self.system.n_dofs();
+        let mut prescribed = vec![0.0; n_dofs];
+        for &(dof, start, end) in &loads.prescribed {
+            prescribed[dof] = end - start;
+        }
+        let mut right = vec![0.0; self.system.n_equations()];
+        self.system
+            .prescribed_forces(groups, &prescribed, &mut right);
+        let (at_start, at_end) = (loads.external(0.0), loads.external(1.0));
+        let unknowns = self.system.free().iter().zip(&self.on_boundary);
+        for (right, (&dof, on_boundary)) in right.iter_mut().zip(unknowns) {
+            *right = -*right;
+            // External forces on the boundary are left to the equations of the rest.
+            if !on_boundary {
+                *right += at_end[dof] - at_start[dof];
+            }
+        }
+        (self.y, self.condensed) = self.factors.forward(&right, None);
+        let mut internal = vec![0.0; n_dofs];
+        for (number, group) in groups.iter().enumerate() {
+            if self.system.includes(number) {
+                group
+                    .kinematics
+                    .add_forces(&group.stress.committed, &mut internal);
+            }
+        }
+        self.system.fold(&mut internal);
+        self.is_complete(0.0, displacement, &internal);
+    }
+
+    /// As [`Self::start`], within a phase.
+    pub fn restart(&mut self, groups: &[Group], loads: &Loads, standing: &Standing) {
+        self.start(groups, loads, &standing.complete.displacement);
+        self.standing = standing.clone();
+    }
+
+    /// Where a part of the groups was looked at: the forces that the domain takes from its
+    /// boundary, by degree of freedom. `None` if all groups were.
+    pub fn forces_beside(&self) -> Option<Vec<(usize, f64)>> {
+        let forces = self.boundary.iter().zip(&self.standing.forces);
+        let forces = forces.map(|(&dof, &force)| (dof, force));
+        self.standing.part.is_some().then(|| forces.collect())
+    }
+
+    /// Where the domain stands.
+    pub fn standing(&self) -> &Standing {
+        &self.standing
+    }
+
+    /// Counts from this state on.
+    fn is_complete(&mut self, lambda: f64, displacement: &[f64], internal: &[f64]) {
+        let complete = Origin {
+            lambda,
+            displacement: displacement.to_vec(),
+            moved: vec![0.0; self.boundary.len()],
+        };
+        self.standing = Standing {
+            latest: complete.clone(),
+            complete,
+            forces: self.boundary.iter().map(|&dof| internal[dof]).collect(),
+            part: None,
+            round_off: self.standing.round_off,
+        };
+    }
+
+    /// Internal forces on the boundary at load factor λ if it stays where it is, in the order of
+    /// the system's boundary.
+    pub fn forces_at(&self, lambda: f64) -> Vec<f64> {
+        // Since the latest state the boundary has not moved far: the forces of a stiff body that
+        // moves as a whole do not cancel.
+        let Origin {
+            lambda: latest,
+            moved,
+            ..
+        } = &self.standing.latest;
+        let rise = lambda - latest;
+        let forces = self.standing.forces.iter().zip(&self.condensed);
+        let mut forces: Vec<f64> = forces.map(|(force, r)| force - rise * r).collect();
+        self.add_product(moved, &mut forces);
+        forces
+    }
+
+    /// Change of the forces that the domain takes from its boundary with λ, in the order of the
+    /// system's boundary: r' of (2).
+    pub fn load_rate(&self) -> &[f64] {
+        &self.condensed
+    }
+
+    /// forces += S u.
+    pub fn add_product(&self, displacement: &[f64], forces: &mut [f64]) {
+        let n = self.boundary.len();
+        for (column, u) in self.stiffness().chunks_exact(n.max(1)).zip(displacement) {
+            for (force, s) in forces.iter_mut().zip(column) {
+                *force += s * u;
+            }
+        }
+    }
+
+    /// The boundary has moved by these increments, in the order of the system's boundary.
+    pub fn follow(&mut self, increment: &[f64]) {
+        let Standing {
+            complete, latest, ..
+        } = &mut self.standing;
+        for origin in [complete, latest] {
+            for (moved, increment) in origin.moved.iter_mut().zip(increment) {
+                *moved += increment;
+            }
+        }
+    }
+
+    /// Brings the domain's groups to load factor λ and to where the boundary is; only those that
+    /// are `looked_at` if there are others, and if that suffices. Returns their internal forces, by
+    /// degree of freedom. Displacements (by degree of freedom) of their unknowns are filled in.
+    ///
+    /// # Errors
+    /// Why the groups are not in equilibrium.
+    pub fn bring_up(
+        &mut self,
+        looked_at: Option<LookedAt<'_>>,
+        groups: &mut [Group],
+        loads: &Loads,
+        lambda: f64,
+        displacement: &mut [f64],
+        tolerance: f64,
+    ) -> Result<Vec<f64>, DomainFailure> {
+        let goal = Goal {
+            external: &loads.external(lambda),
+            lambda,
+            scale: loads.scale,
+            tolerance,
+        };
+        self.choose_part(looked_at);
+        if let Some(part) = self.part.take() {
+            let reached = self.settle(&part, groups, &goal, displacement);
+            let numbers = part.groups.clone();
+            self.part = Some(part);
+            // Where round-off alone keeps a part from equilibrium, that shows in the whole.
+            if let Ok(internal) = reached {
+                self.standing.forces = self.forces_at(lambda);
+                self.standing.latest = Origin {
+                    lambda,
+                    displacement: displacement.to_vec(),
+                    moved: vec![0.0; self.boundary.len()],
+                };
+                self.commit(groups, &numbers);
+                self.standing.part = Some(numbers);
+                return Ok(internal);
+            }
+        }
+        let all = vec![true; groups.len()];
+        let whole = match self.whole.take() {
+            Some(whole) => whole,
+            None => self.of_groups(&all, &[]),
+        };
+        let reached = self.settle(&whole, groups, &goal, displacement);
+        self.whole = Some(whole);
+        let internal = reached?;
+        self.commit(groups, &all);
+        self.is_complete(lambda, displacement, &internal);
+        Ok(internal)
+    }
+
+    fn commit(&self, groups: &mut [Group], which: &[bool]) {
+        for (number, group) in groups.iter_mut().enumerate() {
+            if self.system.includes(number) && which[number] {
+                group.commit();
+            }
+        }
+    }
+
+    /// The part that is looked at; none if it is all of the domain, or another one than that which
+    /// the latest state is of.
+    fn choose_part(&mut self, looked_at: Option<LookedAt<'_>>) {
+        let Some(LookedAt { groups, dofs }) = looked_at else {
+            self.part = None;
+            return;
+        };
+        let of_latest = self.standing.part.as_deref();
+        if of_latest.is_some_and(|latest| latest != groups) {
+            self.part = None;
+        } else if self.part.as_ref().is_none_or(|part| part.groups != groups) {
+            let mut numbered = groups.iter().enumerate();
+            let others = numbered.any(|(number, in_part)| !in_part && self.system.includes(number));
+            self.part = others.then(|| self.of_groups(groups, dofs));
+        }
+    }
+
+    fn of_groups(&self, groups: &[bool], dofs: &[usize]) -> Part {
+        let mut wanted = vec![false; self.system.n_equations()];
+        let mut shared = vec![false; self.system.n_equations()];
+        for (number, in_part) in groups.iter().enumerate() {
+            let mark = if *in_part { &mut wanted } else { &mut shared };
+            let dofs = self.system.dofs_of(number);
+            for equation in dofs.filter_map(|dof| self.system.equation(dof)) {
+                mark[equation] = true;
+            }
+        }
+        let own = |&equation: &usize| {
+            wanted[equation] && !shared[equation] && !self.on_boundary[equation]
+        };
+        let inner = (0..wanted.len()).filter(own).collect();
+        let known = dofs.iter().flat_map(|&dof| self.system.masters(dof));
+        for equation in known.filter_map(|dof| self.system.equation(dof)) {
+            wanted[equation] = true;
+        }
+        Part {
+            groups: groups.to_vec(),
+            inner,
+            fronts: self.factors.fronts_of(&wanted),
+            wanted: (0..wanted.len()).filter(|&e| wanted[e]).collect(),
+        }
+    }
+
+    /// Trial state of a part in equilibrium with its goal and where the boundary is; its internal
+    /// forces. Displacements are filled in.
+    fn settle(
+        &mut self,
+        part: &Part,
+        groups: &mut [Group],
+        goal: &Goal<'_>,
+        displacement: &mut [f64],
+    ) -> Result<Vec<f64>, DomainFailure> {
+        let increment = |origin: &Origin| self.increment(origin, part, goal.lambda, displacement);
+        let Standing {
+            complete, latest, ..
+        } = &self.standing;
+        let is_looked_at = self.of_latest(part);
+        let mut since = Since {
+            complete: (!is_looked_at).then(|| increment(complete)),
+            latest: self.standing.part.as_ref().map(|_| increment(latest)),
+        };
+        let free = self.system.free();
+        let still = vec![0.0; self.boundary.len()];
+        let mut tries = 0..REFINEMENTS;
+        let mut before = f64::INFINITY;
+        let (relative, internal) = loop {
+            let internal = self.evaluate(groups, &since, part)?;
+            let mut residual = vec![0.0; free.len()];
+            for &equation in &part.inner {
+                residual[equation] = goal.external[free[equation]] - internal[free[equation]];
+            }
+            let scale = norm(&internal).max(goal.scale).max(f64::MIN_POSITIVE);
+            let relative = norm(&residual) / scale;
+            if relative <= REFINED * goal.tolerance {
+                break (0.0, internal);
+            }
+            if relative <= goal.tolerance && before.is_finite() {
+                break (0.0, internal);
+            }
+            // A residual that no longer falls has come down to round-off.
+            if relative > 0.5 * before || tries.next().is_none() {
+                let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
+                let is_round_off = relative <= ACCEPTED_ROUND_OFF * last_bit;
+                if is_round_off && relative <= STILL_SMALL {
+                    break (relative, internal);
+                }
+                // All forces there are, are what rounding leaves of none: a body that was moved as
+                // a whole.
+                if is_round_off && ACCEPTED_ROUND_OFF * last_bit >= 1.0 {
+                    break (0.0, internal);
+                }
+                return Err(DomainFailure::Residual {
+                    left: relative,
+                    tolerance: goal.tolerance,
+                    last_bit,
+                });
+            }
+            before = relative;
+            let fronts = Some(part.fronts.as_slice());
+            let (y, _) = self.factors.forward(&residual, fronts);
+            let correction = self.factors.backward(&y, &still, fronts);
+            for increment in since.complete.iter_mut().chain(&mut since.latest) {
+                for &equation in &part.wanted {
+                    increment[free[equation]] += correction[equation];
+                }
+                self.system.follow(increment);
+            }
+        };
+        let (origin, increment) = match (&since.complete, &since.latest) {
+            (None, Some(increment)) => (latest, increment),
+            (increment, _) => (
+                complete,
+                increment.as_ref().ok_or(DomainFailure::NoState)?,
+            ),
+        };
+        for &equation in &part.wanted {
+            let dof = free[equation];
+            displacement[dof] = origin.displacement[dof] + increment[dof];
+        }
+        self.standing.round_off = self.standing.round_off.max(relative);
+        Ok(internal)
+    }
+
+    /// Whether a part is the one that the latest state is of.
+    fn of_latest(&self, part: &Part) -> bool {
+        self.standing.part.as_ref() == Some(&part.groups)
+    }
+
+    /// Displacement increments since a state, by degree of freedom: given ones, and those of a
+    /// part's unknowns as they follow from the boundary and the load factor.
+    fn increment(
+        &self,
+        origin: &Origin,
+        part: &Part,
+        lambda: f64,
+        displacement: &[f64],
+    ) -> Vec<f64> {
+        let rise = lambda - origin.lambda;
+        let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
+        let fronts = Some(part.fronts.as_slice());
+        let values = self.factors.backward(&y, &origin.moved, fronts);
+        let moved = displacement.iter().zip(&origin.displacement);
+        let mut increment: Vec<f64> = moved.map(|(u, origin)| u - origin).collect();
+        for &equation in &part.wanted {
+            increment[self.system.free()[equation]] = values[equation];
+        }
+        self.system.follow(&mut increment);
+        increment
+    }
+
+    /// Trial state of a part's groups under displacement increments; their internal forces, by
+    /// degree of freedom.
+    fn evaluate(
+        &self,
+        groups: &mut [Group],
+        since: &Since,
+        part: &Part,
+    ) -> Result<Vec<f64>, DomainFailure> {
+        let mut internal = vec![0.0; self.system.n_dofs()];
+        for (number, group) in groups.iter_mut().enumerate() {
+            if !self.system.includes(number) || !part.groups[number] {
+                continue;
+            }
+            let latest = self.standing.part.as_ref();
+            let increment = if latest.is_some_and(|latest| latest[number]) {
+                &since.latest
+            } else {
+                &since.complete
+            };
+            let increment = increment.as_ref().ok_or(DomainFailure::NoState)?;
+            group
+                .evaluate(increment, Operator::None, 0.0, 0.0)
+                .map_err(|failure| DomainFailure::Law(Box::new(failure)))?;
+            group
+                .kinematics
+                .add_forces(&group.stress.trial, &mut internal);
+        }
+        self.system.fold(&mut internal);
+        Ok(internal)
+    }
+
+    /// Change of the internal forces (2-norm) if every displacement increment is larger or smaller
+    /// by its last bit, as the sum over many elements scatters them. The trial state stays.
+    fn last_bit(
+        &self,
+        part: &Part,
+        groups: &mut [Group],
+        since: &Since,
+        internal: &[f64],
+    ) -> Result<f64, DomainFailure> {
+        let scattered = |increment: &Vec<f64>| {
+            let mut scattered = last_bit_scattered(increment);
+            self.system.follow(&mut scattered);
+            scattered
+        };
+        let scattered = Since {
+            complete: since.complete.as_ref().map(scattered),
+            latest: since.latest.as_ref().map(scattered),
+        };
+        let moved = self.evaluate(groups, &scattered, part)?;
+        self.evaluate(groups, since, part)?;
+        let dofs = part
+            .inner
+            .iter()
+            .map(|&equation| self.system.free()[equation]);
+        Ok(norm(
+            &dofs
+                .map(|dof| moved[dof] - internal[dof])
+                .collect::<Vec<f64>>(),
+        ))
+    }
+
+    /// Degrees of freedom of the domain's unknowns, boundary included.
+    pub fn unknowns(&self) -> &[usize] {
+        self.system.free()
+    }
+}

@@ -1,0 +1,817 @@
+//! A group of elements with its law: committed and trial state of every integration point.
+//!
+//! An increment starts from the committed state; every iteration computes the trial state anew
+//! from it, so a failed increment leaves nothing behind.
+
+mod layer;
+mod takeover;
+mod tangent;
+
+pub use tangent::Fault;
+
+use crate::problem::{Formulation, InPlane, Material};
+use crate::element::Kinematics;
+use law::{
+    BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls,
+};
+use abi::status::Outcome;
+use layer::Layer;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+pub use takeover::TakeOver;
+
+/// Points that one thread takes at a time.
+const BATCH: usize = 1024;
+/// Components of the strain (jump) that a linear law is tried with, and what its stress may be off
+/// its tangent's, relative to the largest of both.
+const PROBE: [f64; 4] = [1e-4, -5e-5, 2.5e-5, 7.5e-5];
+const LINEAR: f64 = 1e-8;
+
+/// Number of a batch, and where its fluxes, internal variables and operators go.
+type Batch<'a> = (usize, &'a mut [f64], &'a mut [f64], &'a mut [f64]);
+
+/// Values of all points, before and during an increment.
+#[derive(Clone, Debug, Default)]
+pub struct Field {
+    /// At the start of the increment.
+    pub committed: Vec<f64>,
+    /// As of the last iteration; empty before the first one of a phase.
+    pub trial: Vec<f64>,
+}
+
+impl Field {
+    fn new(committed: Vec<f64>) -> Self {
+        Self {
+            committed,
+            trial: Vec::new(),
+        }
+    }
+
+    /// Makes room for a trial state.
+    fn begin(&mut self) {
+        if self.trial.len() != self.committed.len() {
+            self.trial.clone_from(&self.committed);
+        }
+    }
+
+    fn commit(&mut self) {
+        if !self.trial.is_empty() {
+            self.committed.copy_from_slice(&self.trial);
+        }
+    }
+
+    fn forget_trial(&mut self) {
+        self.trial = Vec::new();
+    }
+}
+
+/// How often a group has called a law, calls included that came to nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LawCalls {
+    /// Id of the law.
+    pub law: String,
+    /// Points carried through an increment.
+    pub points: u64,
+    /// How many of them with an operator, consistent or elastic.
+    pub operators: u64,
+}
+
+/// Bytes that a group keeps for its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Bytes {
+    /// Strains, before and during an increment; of a thin layer also jumps.
+    pub strain: usize,
+    /// Stresses, before and during an increment.
+    pub stress: usize,
+    /// Internal variables, before and during an increment.
+    pub internal: usize,
+    /// Tangents.
+    pub tangents: usize,
+}
+
+/// A failed point, by element.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointFailure {
+    /// Name of the group.
+    pub group: String,
+    /// Name of the law in the case file.
+    pub law: String,
+    /// Id of the law.
+    pub law_id: String,
+    /// Element within the group, from 1.
+    pub element: usize,
+    /// Integration point within the element, from 1.
+    pub point: usize,
+    /// Coordinates.
+    pub position: [f64; 2],
+    /// What happened.
+    pub failure: BatchFailure,
+}
+
+impl std::fmt::Display for PointFailure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            group,
+            law_id,
+            element,
+            point,
+            position: [x, y],
+            failure,
+            ..
+        } = self;
+        write!(
+            f,
+            "law `{law_id}`, group `{group}`, element {element}, point {point} at ({x:.4}, {y:.4}): {}",
+            if failure.message.is_empty() {
+                "no reason given"
+            } else {
+                &failure.message
+            }
+        )
+    }
+}
+
+/// What a group carries from one increment to the next.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct GroupState<'g> {
+    /// Name of the law in the case file.
+    law: Cow<'g, str>,
+    strain: Cow<'g, [f64]>,
+    stress: Cow<'g, [f64]>,
+    internal: Cow<'g, [f64]>,
+    jump: Cow<'g, [f64]>,
+    law_calls: Cow<'g, [LawCalls]>,
+    /// Tangents, where a matrix made of them is still in use.
+    tangent: Option<Cow<'g, [f64]>>,
+}
+
+impl GroupState<'_> {
+    /// A copy that borrows nothing from the group.
+    pub fn into_owned(self) -> GroupState<'static> {
+        GroupState {
+            law: Cow::Owned(self.law.into_owned()),
+            strain: Cow::Owned(self.strain.into_owned()),
+            stress: Cow::Owned(self.stress.into_owned()),
+            internal: Cow::Owned(self.internal.into_owned()),
+            jump: Cow::Owned(self.jump.into_owned()),
+            law_calls: Cow::Owned(self.law_calls.into_owned()),
+            tangent: self.tangent.map(|tangent| Cow::Owned(tangent.into_owned())),
+        }
+    }
+}
+
+/// A group of elements.
+#[derive(Debug)]
+pub struct Group {
+    /// Name in the case file.
+    pub name: String,
+    /// What the elements do.
+    pub formulation: Formulation,
+    /// The elements.
+    pub kinematics: Box<dyn Kinematics>,
+    /// Strains (zero thickness: jumps) in axes of the elements.
+    pub strain: Field,
+    /// Stresses (zero thickness: tractions) in axes of the elements.
+    pub stress: Field,
+    /// Internal variables of the law.
+    pub internal: Field,
+    /// The law.
+    pub law: Material,
+    /// Which step and increment it is, for laws that ask.
+    pub moment: Moment,
+    /// Calls of the laws used so far; the last one is that of the current law.
+    pub law_calls: Vec<LawCalls>,
+    layer: Option<Layer>,
+    /// Where the points lie, if the law asks.
+    sites: Vec<Site>,
+    /// What it is called where calls of laws are watched.
+    watched: u64,
+    /// Tangents of the element, point by point; of a linear law, those of one element only.
+    tangent: Vec<f64>,
+    tangents_are_constant: bool,
+    /// The trial state is what the law, which starts now, makes of the committed one over a nil
+    /// increment.
+    is_asked: bool,
+}
+
+impl Group {
+    /// A group before the first phase. `stress` is in axes of the elements. `thickness` by
+    /// element makes it a thin layer.
+    ///
+    /// # Errors
+    /// The law cannot start from the stress.
+    pub fn new(
+        name: String,
+        formulation: Formulation,
+        kinematics: Box<dyn Kinematics>,
+        stress: Vec<f64>,
+        thickness: Option<(Vec<f64>, InPlane)>,
+        law: Material,
+    ) -> Result<Self, PointFailure> {
+        let n = kinematics.n_points() * kinematics.n_components();
+        let layer = thickness.map(|(thickness, in_plane)| {
+            Layer::new(thickness, in_plane, kinematics.points_per_element())
+        });
+        let mut group = Self {
+            name,
+            formulation,
+            kinematics,
+            strain: Field::new(vec![0.0; n]),
+            stress: Field::new(stress),
+            internal: Field::default(),
+            law: law.clone(),
+            moment: Moment::default(),
+            law_calls: Vec::new(),
+            layer,
+            sites: Vec::new(),
+            watched: 0,
+            tangent: Vec::new(),
+            tangents_are_constant: false,
+            is_asked: false,
+        };
+        group.start_law(law, None)?;
+        Ok(group)
+    }
+
+    /// Swaps the law. The stress stays; internal variables stay if the law is the same one (with
+    /// other parameters), else the new law starts from the current stress and jumps are counted
+    /// from here. Initial values that the case file gives hold in both cases.
+    ///
+    /// # Errors
+    /// The law cannot start from the stress.
+    pub fn set_law(&mut self, law: Material) -> Result<(), PointFailure> {
+        let same = law.built.law.description().id == self.law.built.law.description().id;
+        let kept = same.then(|| std::mem::take(&mut self.internal.committed));
+        self.start_law(law, kept)
+    }
+
+    /// The committed state; with the tangents of the last evaluation if they are wanted.
+    pub fn state(&self, with_tangents: bool) -> GroupState<'_> {
+        let jump = self.layer.as_ref().map(|layer| &layer.jump.committed[..]);
+        GroupState {
+            law: (&self.law.name).into(),
+            strain: (&self.strain.committed).into(),
+            stress: (&self.stress.committed).into(),
+            internal: (&self.internal.committed).into(),
+            jump: jump.unwrap_or_default().into(),
+            law_calls: (&self.law_calls).into(),
+            tangent: with_tangents.then(|| (&self.tangent).into()),
+        }
+    }
+
+    /// Takes over a state that [`Self::state`] gave, with the law it names (`laws`: those that the
+    /// group carries in the course of the case).
+    ///
+    /// # Errors
+    /// The state is not that of this group, or its law has no elastic operator.
+    pub fn restore(&mut self, state: GroupState<'_>, laws: &[Material]) -> Result<(), String> {
+        let wrong = || format!("the state is not that of group `{}`", self.name);
+        let known = laws.iter().chain([&self.law]);
+        let law = known.into_iter().find(|law| law.name == state.law);
+        let law = law.cloned().ok_or_else(wrong)?;
+        let n_internal = self.kinematics.n_points() * law.built.law.n_states();
+        let n_jump = self
+            .layer
+            .as_ref()
+            .map_or(0, |layer| layer.jump.committed.len());
+        if state.strain.len() != self.strain.committed.len()
+            || state.stress.len() != self.stress.committed.len()
+            || state.internal.len() != n_internal
+            || state.jump.len() != n_jump
+        {
+            return Err(wrong());
+        }
+        self.stress = Field::new(state.stress.into_owned());
+        self.start_law(law, Some(state.internal.to_vec()))
+            .map_err(|failure| failure.to_string())?;
+        // Initial values that the case file gives held at the start of the law only.
+        self.internal = Field::new(state.internal.into_owned());
+        self.strain = Field::new(state.strain.into_owned());
+        if let Some(layer) = &mut self.layer {
+            layer.jump = Field::new(state.jump.into_owned());
+        }
+        if let Some(tangent) = state.tangent {
+            if tangent.len() != self.tangent.len() {
+                return Err(format!("the state is not that of group `{}`", self.name));
+            }
+            self.tangent = tangent.into_owned();
+        }
+        self.law_calls = state.law_calls.into_owned();
+        self.forget_trial();
+        Ok(())
+    }
+
+    fn start_law(&mut self, law: Material, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
+        self.forget_trial();
+        self.law = law;
+        self.watched = calls::name(&format!("group `{}`", self.name));
+        let law = &self.law.built.law;
+        let id = &law.description().id;
+        if self.law_calls.last().is_none_or(|calls| calls.law != *id) {
+            self.law_calls.push(LawCalls {
+                law: id.clone(),
+                ..LawCalls::default()
+            });
+        }
+        let n_points = self.kinematics.n_points();
+        self.sites = if law.asks_for_sites() {
+            (0..n_points).map(|point| self.site(point)).collect()
+        } else {
+            Vec::new()
+        };
+        let starts_anew = kept.is_none();
+        let mut internal = if let Some(kept) = kept {
+            kept
+        } else {
+            let stress = (self.stress.committed.as_slice(), self.flux_place());
+            calls::of_group(self.watched, 0, self.kinematics.points_per_element());
+            law.initial_state(n_points, stress)
+                .map_err(|failure| self.locate(&failure))?
+        };
+        for &(number, value) in &self.law.initial {
+            let of_points = internal.iter_mut().skip(number).step_by(law.n_states());
+            of_points.for_each(|v| *v = value);
+        }
+        self.internal = Field::new(internal);
+        if starts_anew && self.formulation == Formulation::ZeroThickness {
+            self.strain.committed.fill(0.0);
+        }
+        let n = law.n_components();
+        let element_n = self.kinematics.n_components();
+        self.tangents_are_constant = law.formulation().linear && !self.uses_layer();
+        if self.tangents_are_constant {
+            let one = self
+                .operator_of_first_point()
+                .map_err(|failure| self.locate(&failure))?;
+            self.tangent = one.repeat(self.kinematics.points_per_element());
+            return Ok(());
+        }
+        self.tangent = vec![0.0; n_points * element_n * element_n];
+        if self.uses_layer() {
+            let mut operator = vec![0.0; n_points * n * n];
+            self.run_law(
+                Operator::Elastic,
+                self.moment.step_start,
+                0.0,
+                &mut operator,
+            )
+            .map_err(|failure| self.locate(&failure))?;
+            if let Some(layer) = &mut self.layer {
+                layer.start(&operator, starts_anew);
+            }
+            // No state of the group's before it is taken over.
+            self.is_asked = true;
+        }
+        Ok(())
+    }
+
+    fn site(&self, point: usize) -> Site {
+        let per_element = self.kinematics.points_per_element().max(1);
+        Site {
+            position: self.kinematics.position(point),
+            length: self.kinematics.length(point / per_element),
+            element: (point / per_element) as u32 + 1,
+            point: (point % per_element) as u32 + 1,
+        }
+    }
+
+    /// Whether stresses follow strains by one constant matrix.
+    pub fn is_linear(&self) -> bool {
+        self.tangents_are_constant
+    }
+
+    /// Whether the law's tangents are symmetric.
+    pub fn is_symmetric(&self) -> bool {
+        self.law.built.law.formulation().symmetric
+    }
+
+    /// A thin layer whose law is an interface law.
+    fn uses_layer(&self) -> bool {
+        self.layer.is_some() && self.law.built.law.n_components() == 2
+    }
+
+    /// Where the law's fluxes stand within the stresses: all of them, or, of a thin layer with an
+    /// interface law, components 22 (normal) and 12 (shear).
+    fn flux_place(&self) -> Strided {
+        if self.uses_layer() {
+            Strided {
+                offset: 1,
+                point: 4,
+                component: 2,
+            }
+        } else {
+            Strided::rows(self.kinematics.n_components())
+        }
+    }
+
+    /// The first point of a thin layer whose normal and shear stiffness cannot be those of an
+    /// elastic layer: (normal, shear).
+    pub fn impossible_layer(&self) -> Option<[f64; 2]> {
+        self.layer
+            .as_ref()
+            .filter(|_| self.uses_layer())
+            .and_then(Layer::impossible)
+    }
+
+    /// Computes the trial state under displacement increments (two per node) since the committed
+    /// state, and the tangents if wanted; else those of an earlier evaluation stay.
+    ///
+    /// # Errors
+    /// The worst point.
+    pub fn evaluate(
+        &mut self,
+        increment: &[f64],
+        operator: Operator,
+        time: f64,
+        time_increment: f64,
+    ) -> Result<BatchSuccess, PointFailure> {
+        self.strain.trial.clone_from(&self.strain.committed);
+        self.kinematics
+            .add_gradients(increment, &mut self.strain.trial);
+        if self.tangents_are_constant {
+            self.evaluate_linear();
+            return Ok(BatchSuccess::default());
+        }
+        if let Some(layer) = self
+            .layer
+            .as_mut()
+            .filter(|_| self.law.built.law.n_components() == 2)
+        {
+            layer.jumps_from_strains(&self.strain.committed, &self.strain.trial);
+        }
+        let mut tangent = std::mem::take(&mut self.tangent);
+        let result = if self.uses_layer() {
+            let mut operators = vec![0.0; self.kinematics.n_points() * 4];
+            let result = self.run_law(operator, time, time_increment, &mut operators);
+            if let (Ok(_), Some(layer)) = (&result, &self.layer) {
+                layer.stresses_along(&self.strain, &mut self.stress);
+                if operator != Operator::None {
+                    layer.tangents(&operators, &mut tangent);
+                }
+            }
+            result
+        } else {
+            self.run_law(operator, time, time_increment, &mut tangent)
+        };
+        self.tangent = tangent;
+        result.map_err(|failure| self.locate(&failure))
+    }
+
+    /// σ = σ₀ + D Δε.
+    fn evaluate_linear(&mut self) {
+        self.stress.begin();
+        let n = self.kinematics.n_components();
+        let points = self
+            .stress
+            .trial
+            .chunks_exact_mut(n)
+            .zip(self.stress.committed.chunks_exact(n))
+            .zip(
+                self.strain
+                    .trial
+                    .chunks_exact(n)
+                    .zip(self.strain.committed.chunks_exact(n)),
+            );
+        for ((stress, stress_0), (strain, strain_0)) in points {
+            for i in 0..n {
+                let row = &self.tangent[i * n..][..n];
+                let change: f64 = (0..n).map(|j| row[j] * (strain[j] - strain_0[j])).sum();
+                stress[i] = stress_0[i] + change;
+            }
+        }
+    }
+
+    /// The constant tangent of a linear law, held against what the law makes of a small strain.
+    fn operator_of_first_point(&mut self) -> Result<Vec<f64>, BatchFailure> {
+        let law = &self.law.built.law;
+        let n = law.n_components();
+        let zero = vec![0.0; n];
+        let strain: Vec<f64> = PROBE.iter().copied().cycle().take(n).collect();
+        let mut flux = vec![0.0; n];
+        let mut operator = vec![0.0; n * n];
+        let rows = Strided::rows(n);
+        law.integrate(
+            &Start {
+                n_points: 1,
+                gradient: (&zero, rows),
+                gradient_end: (&strain, rows),
+                flux: (&zero, rows),
+                state: &[],
+                time: 0.0,
+                time_increment: 0.0,
+                moment: self.moment,
+                sites: &[],
+            },
+            Operator::Consistent,
+            End {
+                flux: (&mut flux, rows),
+                state: &mut [],
+                operator: &mut operator,
+            },
+        )?;
+        self.count(1, Operator::Consistent);
+        let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let scale = largest(&operator) * largest(&strain);
+        for (i, row) in operator.chunks_exact(n).enumerate() {
+            let product: f64 = row.iter().zip(&strain).map(|(d, e)| d * e).sum();
+            if (flux[i] - product).abs() > LINEAR * scale {
+                return Err(BatchFailure {
+                    point: 0,
+                    outcome: Outcome::Internal,
+                    message: format!(
+                        "the law calls itself linear, but a strain of {strain:?} gives stress {} = \
+                         {:.6e} where its tangent gives {product:.6e}; `pilum check` says more",
+                        i + 1,
+                        flux[i]
+                    ),
+                    factor: None,
+                    call: None,
+                });
+            }
+        }
+        Ok(operator)
+    }
+
+    fn count(&mut self, n_points: usize, operator: Operator) {
+        if let Some(calls) = self.law_calls.last_mut() {
+            calls.points += n_points as u64;
+            if operator != Operator::None {
+                calls.operators += n_points as u64;
+            }
+        }
+    }
+
+    /// Carries all points through the law. `operators` holds room for them, wanted or not.
+    fn run_law(
+        &mut self,
+        operator: Operator,
+        time: f64,
+        time_increment: f64,
+        operators: &mut [f64],
+    ) -> Result<BatchSuccess, BatchFailure> {
+        self.count(self.kinematics.n_points(), operator);
+        for field in self.fields() {
+            field.begin();
+        }
+        let place = self.flux_place();
+        let gradient = match &self.layer {
+            Some(layer) if self.law.built.law.n_components() == 2 => &layer.jump,
+            _ => &self.strain,
+        };
+        let law = &self.law.built.law;
+        let (n, n_states) = (law.n_components(), law.n_states());
+        let rows = Strided::rows(n);
+        let (committed, state) = (&self.stress.committed, &self.internal.committed);
+        let (moment, sites) = (self.moment, &self.sites);
+        let (watched, per_element) = (self.watched, self.kinematics.points_per_element());
+        let batch = |(number, flux, state_end, operator_end): Batch<'_>| {
+            let first = number * BATCH;
+            calls::of_group(watched, first, per_element);
+            let n_points = flux.len() / place.point;
+            let points = |values: &'_ [f64], stride: usize| {
+                first * stride..values.len().min((first + n_points) * stride)
+            };
+            law.integrate(
+                &Start {
+                    n_points,
+                    gradient: (&gradient.committed[points(&gradient.committed, n)], rows),
+                    gradient_end: (&gradient.trial[points(&gradient.trial, n)], rows),
+                    flux: (&committed[points(committed, place.point)], place),
+                    state: &state[points(state, n_states)],
+                    time,
+                    time_increment,
+                    moment,
+                    sites: sites.get(first..first + n_points).unwrap_or_default(),
+                },
+                operator,
+                End {
+                    flux: (flux, place),
+                    state: state_end,
+                    operator: operator_end,
+                },
+            )
+            .map_err(|failure| BatchFailure {
+                point: first + failure.point,
+                ..failure
+            })
+            .map(|success| BatchSuccess {
+                unreliable: success.unreliable.map(|(point, why)| (first + point, why)),
+            })
+        };
+        let (flux, state_end) = (&mut self.stress.trial, &mut self.internal.trial);
+        if self.kinematics.n_points() <= BATCH {
+            return batch((0, flux, state_end, operators));
+        }
+        let mut states = state_end.chunks_mut(BATCH * n_states.max(1));
+        let work: Vec<Batch<'_>> = flux
+            .chunks_mut(BATCH * place.point)
+            .zip(operators.chunks_mut(BATCH * n * n))
+            .enumerate()
+            .map(|(number, (flux, operators))| {
+                (number, flux, states.next().unwrap_or_default(), operators)
+            })
+            .collect();
+        let outcomes: Vec<_> = work.into_par_iter().map(batch).collect();
+        let mut all = BatchSuccess::default();
+        for outcome in outcomes {
+            all.unreliable = all.unreliable.or(outcome?.unreliable);
+        }
+        Ok(all)
+    }
+
+    fn locate(&self, failure: &BatchFailure) -> PointFailure {
+        let per_element = self.kinematics.points_per_element().max(1);
+        let point = failure
+            .point
+            .min(self.kinematics.n_points().saturating_sub(1));
+        PointFailure {
+            group: self.name.clone(),
+            law: self.law.name.clone(),
+            law_id: self.law.built.law.description().id.clone(),
+            element: point / per_element + 1,
+            point: point % per_element + 1,
+            position: self.kinematics.position(point),
+            failure: BatchFailure {
+                // The law counts points of the batch; the element says more.
+                message: failure
+                    .message
+                    .strip_prefix(&format!("point {}: ", failure.point))
+                    .unwrap_or(&failure.message)
+                    .to_owned(),
+                ..failure.clone()
+            },
+        }
+    }
+
+    /// Tangents of an element's points as of the last evaluation.
+    pub fn element_tangents(&self, element: usize) -> &[f64] {
+        let n = self.kinematics.n_components();
+        let length = self.kinematics.points_per_element() * n * n;
+        let start = if self.tangents_are_constant {
+            0
+        } else {
+            element * length
+        };
+        &self.tangent[start..start + length]
+    }
+
+    /// Tangents as of the last evaluation that computed them.
+    pub fn tangents(&self) -> &[f64] {
+        &self.tangent
+    }
+
+    /// Puts tangents back that [`Self::tangents`] gave.
+    pub fn put_tangents(&mut self, tangents: Vec<f64>) {
+        debug_assert_eq!(tangents.len(), self.tangent.len());
+        self.tangent = tangents;
+    }
+
+    /// Change of the stresses under displacement increments if the tangents held: D Δε.
+    pub fn linear_change(&self, increment: &[f64]) -> Vec<f64> {
+        let n = self.kinematics.n_components();
+        let mut strain = vec![0.0; self.strain.committed.len()];
+        self.kinematics.add_gradients(increment, &mut strain);
+        let per_element = self.kinematics.points_per_element();
+        let mut change = vec![0.0; strain.len()];
+        let points = strain.chunks_exact(n).zip(change.chunks_exact_mut(n));
+        for (point, (strain, change)) in points.enumerate() {
+            let tangents = self.element_tangents(point / per_element);
+            let tangent = &tangents[point % per_element * n * n..][..n * n];
+            for (change, row) in change.iter_mut().zip(tangent.chunks_exact(n)) {
+                *change = row.iter().zip(strain).map(|(d, e)| d * e).sum();
+            }
+        }
+        change
+    }
+
+    /// What the group keeps for its points. A trial state as large comes and goes.
+    pub fn bytes(&self) -> Bytes {
+        let field = |field: &Field| size_of_val(&*field.committed);
+        let jumps = self.layer.as_ref().map_or(0, |layer| field(&layer.jump));
+        Bytes {
+            strain: field(&self.strain) + jumps,
+            stress: field(&self.stress),
+            internal: field(&self.internal),
+            tangents: size_of_val(&*self.tangent),
+        }
+    }
+
+    /// Makes the trial state the committed one.
+    pub fn commit(&mut self) {
+        self.fields().for_each(Field::commit);
+    }
+
+    /// Gives up the room of the trial state until the next one is computed.
+    pub fn forget_trial(&mut self) {
+        self.is_asked = false;
+        self.fields().for_each(Field::forget_trial);
+    }
+
+    fn fields(&mut self) -> impl Iterator<Item = &mut Field> {
+        let jump = self.layer.as_mut().map(|layer| &mut layer.jump);
+        let others = [&mut self.strain, &mut self.stress, &mut self.internal];
+        others.into_iter().chain(jump)
+    }
+
+    /// Thickness at a point of a thin layer.
+    pub fn thickness(&self, point: usize) -> Option<f64> {
+        self.layer.as_ref().map(|layer| layer.thickness_at(point))
+    }
+
+    /// Stress of a point in global axes (committed); `None` for zero-thickness elements.
+    pub fn global_stress(&self, point: usize) -> Option<[f64; 4]> {
+        let s = self.stress.committed.get(4 * point..4 * point + 4)?;
+        let axes = self
+            .kinematics
+            .axes(point / self.kinematics.points_per_element());
+        (self.kinematics.n_components() == 4)
+            .then(|| axes.stress_to_global([s[0], s[1], s[2], s[3]]))
+    }
+
+    /// Strain of a point in global axes (committed), γ = 2ε; `None` for zero-thickness elements.
+    pub fn global_strain(&self, point: usize) -> Option<[f64; 4]> {
+        let e = self.strain.committed.get(4 * point..4 * point + 4)?;
+        let axes = self
+            .kinematics
+            .axes(point / self.kinematics.points_per_element());
+        (self.kinematics.n_components() == 4).then(|| {
+            let [e_11, e_22, e_33, e_12] = axes.stress_to_global([e[0], e[1], e[2], e[3] / 2.0]);
+            [e_11, e_22, e_33, 2.0 * e_12]
+        })
+    }
+
+    /// An internal variable of a point (committed); `None` if the law has none of this id.
+    pub fn internal_variable(&self, point: usize, id: &str) -> Option<f64> {
+        let variables = &self.law.built.law.formulation().internal_variables;
+        let number = variables.iter().position(|variable| variable.id == id)?;
+        self.internal
+            .committed
+            .get(point * variables.len() + number)
+            .copied()
+    }
+
+    /// Nodal forces of this group's elements (committed), by degree of freedom.
+    pub fn forces(&self, n_dofs: usize) -> Vec<f64> {
+        let mut force = vec![0.0; n_dofs];
+        self.kinematics
+            .add_forces(&self.stress.committed, &mut force);
+        force
+    }
+
+    /// Nodal forces of some of this group's elements (committed), by degree of freedom.
+    pub fn forces_of(&self, elements: &[usize], n_dofs: usize) -> Vec<f64> {
+        let length = self.kinematics.points_per_element() * self.kinematics.n_components();
+        let mut stress = vec![0.0; self.stress.committed.len()];
+        for &element in elements {
+            let own = element * length..(element + 1) * length;
+            stress[own.clone()].copy_from_slice(&self.stress.committed[own]);
+        }
+        let mut force = vec![0.0; n_dofs];
+        self.kinematics.add_forces(&stress, &mut force);
+        force
+    }
+
+    /// Force that some of this group's zero-thickness elements exert on the side of smaller coordinates
+    /// (committed), kN. At an end that is not doubled the nodal forces of both sides cancel; the
+    /// tractions do not.
+    pub fn handed_on(&self, elements: &[usize], component: usize) -> f64 {
+        let n = self.kinematics.points_per_element();
+        let of_point = |element: usize, point: usize| {
+            let axes = self.kinematics.axes(element);
+            let [normal, tangential] = [0, 1].map(|c| self.stress.committed[2 * point + c]);
+            let traction = axes.across[component] * normal + axes.along[component] * tangential;
+            self.kinematics.weight(point) * traction
+        };
+        let of_element = |&element: &usize| {
+            let points = element * n..(element + 1) * n;
+            points.map(|point| of_point(element, point)).sum::<f64>()
+        };
+        -elements.iter().map(of_element).sum::<f64>()
+    }
+
+    /// Jump and traction (normal, tangential) of a point of a thin layer or zero-thickness
+    /// element (committed); `None` for solids.
+    pub fn jump_and_traction(&self, point: usize) -> Option<([f64; 2], [f64; 2])> {
+        match self.formulation {
+            Formulation::Solid => None,
+            Formulation::ZeroThickness => {
+                let pair = |values: &[f64]| [values[2 * point], values[2 * point + 1]];
+                Some((pair(&self.strain.committed), pair(&self.stress.committed)))
+            }
+            Formulation::ThinLayer => {
+                let layer = self.layer.as_ref()?;
+                let pair = |values: &[f64]| [values[4 * point + 1], values[4 * point + 3]];
+                let jump = if self.uses_layer() {
+                    [
+                        layer.jump.committed[2 * point],
+                        layer.jump.committed[2 * point + 1],
+                    ]
+                } else {
+                    pair(&self.strain.committed).map(|strain| strain * layer.thickness_at(point))
+                };
+                Some((jump, pair(&self.stress.committed)))
+            }
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Nodes, elements and named lines.
+
+use indexmap::IndexMap;
+
+/// What a solid element looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Shape {
+    /// 6 nodes: corners counter-clockwise, then the mid-sides that follow them.
+    Triangle,
+    /// 8 nodes: corners counter-clockwise, then the mid-sides that follow them.
+    Quad,
+}
+
+/// Edges of a quad and of a triangle: first corner, second corner, mid-side, counter-clockwise.
+const QUAD: [[usize; 3]; 4] = [[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]];
+const TRIANGLE: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
+
+impl Shape {
+    /// Edges: first corner, second corner, mid-side, counter-clockwise.
+    pub fn edges(self) -> &'static [[usize; 3]] {
+        match self {
+            Self::Triangle => &TRIANGLE,
+            Self::Quad => &QUAD,
+        }
+    }
+}
+
+/// A solid element: corners counter-clockwise, then the mid-sides that follow them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Solid {
+    nodes: [usize; 8],
+    shape: Shape,
+    /// Number of its group.
+    pub group: usize,
+}
+
+impl Solid {
+    /// An 8-node quad.
+    pub fn quad(nodes: [usize; 8], group: usize) -> Self {
+        Self {
+            nodes,
+            shape: Shape::Quad,
+            group,
+        }
+    }
+
+    /// A 6-node triangle.
+    pub fn triangle(nodes: [usize; 6], group: usize) -> Self {
+        let mut all = [0; 8];
+        all[..6].copy_from_slice(&nodes);
+        Self {
+            nodes: all,
+            shape: Shape::Triangle,
+            group,
+        }
+    }
+
+    /// What it looks like.
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// Number of corners.
+    pub fn n_corners(&self) -> usize {
+        self.shape.edges().len()
+    }
+
+    /// Its nodes.
+    pub fn nodes(&self) -> &[usize] {
+        &self.nodes[..2 * self.n_corners()]
+    }
+
+    /// Its nodes, to be replaced by others at the same places.
+    pub fn nodes_mut(&mut self) -> &mut [usize] {
+        let n = 2 * self.n_corners();
+        &mut self.nodes[..n]
+    }
+
+    /// Its corners.
+    pub fn corners(&self) -> &[usize] {
+        &self.nodes[..self.n_corners()]
+    }
+
+    /// Nodes of its edges: first corner, second corner, mid-side, counter-clockwise.
+    pub fn edges(&self) -> impl Iterator<Item = [usize; 3]> + use<'_> {
+        let edges = self.shape.edges().iter();
+        edges.map(|edge| edge.map(|i| self.nodes[i]))
+    }
+}
+
+/// A zero-thickness element of three double nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Joint {
+    /// Ends and middle on the side of smaller coordinates.
+    pub minus: [usize; 3],
+    /// The same on the other side.
+    pub plus: [usize; 3],
+    /// Number of its group.
+    pub group: usize,
+}
+
+/// A named line of any course: edges of solids, or a single node.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    /// Edges, as number of the solid and number of its edge.
+    pub edges: Vec<(usize, usize)>,
+    /// Its nodes, each once.
+    pub nodes: Vec<usize>,
+}
+
+/// A mesh in the plane.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Coordinates, m.
+    pub nodes: Vec<[f64; 2]>,
+    /// Solid elements.
+    pub solids: Vec<Solid>,
+    /// Zero-thickness elements.
+    pub joints: Vec<Joint>,
+    /// Named lines.
+    pub lines: IndexMap<String, Line>,
+}
+
+impl Mesh {
+    /// The longer side of the rectangle that holds the mesh, in m.
+    pub fn longer_side(&self) -> f64 {
+        let extent = |c: usize| {
+            let at = self.nodes.iter().map(|node| node[c]);
+            let ends = at.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
+                [low.min(at), high.max(at)]
+            });
+            ends[1] - ends[0]
+        };
+        extent(0).max(extent(1))
+    }
+
+    /// Nodes of an edge: first end, second end, middle.
+    pub fn edge(&self, (solid, edge): (usize, usize)) -> [usize; 3] {
+        let solid = &self.solids[solid];
+        solid.shape.edges()[edge].map(|i| solid.nodes[i])
+    }
+
+    /// Names a line after the edges that are chosen, of all elements in order.
+    ///
+    /// An edge is chosen by the coordinates of its ends and middle. Inner edges count once.
+    pub fn name_line(
+        &mut self,
+        name: impl Into<String>,
+        is_chosen: impl Fn([[f64; 2]; 3]) -> bool,
+    ) {
+        let mut line = Line::default();
+        let mut seen = std::collections::HashSet::new();
+        let mut known = std::collections::HashSet::new();
+        for (number, solid) in self.solids.iter().enumerate() {
+            for (edge, nodes) in solid.edges().enumerate() {
+                if is_chosen(nodes.map(|node| self.nodes[node])) && seen.insert(nodes[2]) {
+                    line.edges.push((number, edge));
+                    let own = nodes.into_iter().filter(|&node| known.insert(node));
+                    line.nodes.extend(own);
+                }
+            }
+        }
+        self.lines.insert(name.into(), line);
+    }
+}

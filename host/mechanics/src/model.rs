@@ -1,0 +1,630 @@
+//! From a problem to groups that can be computed: elements, their laws, initial stresses; and all that
+//! can be checked before the first increment.
+
+use crate::assembly::Tie;
+use crate::element::{Axes, Joint6, Kinematics, Quad8, depth, gauss, line_shape};
+use crate::group::{Group, PointFailure};
+use crate::mesh::{Mesh, Solid};
+use crate::problem::{
+    Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, Integration, Item, Key, Material,
+    Phase, Problem, Refusal, constraints, plausible, tension,
+};
+use abi::Hypothesis;
+use law::{End, Moment, Operator, Start, Strided};
+use std::collections::{HashMap, HashSet};
+
+/// A layer whose one side is so many times the other has no doubt about its normal.
+const CLEARLY: f64 = 2.0;
+/// Most increments of a phase.
+const MOST_INCREMENTS: usize = 10_000_000;
+
+/// What a problem is made of once its elements stand.
+#[derive(Debug)]
+pub struct Model {
+    /// Groups, with the laws of the first phase.
+    pub groups: Vec<Group>,
+    /// Mid-thickness nodes that follow the two faces of a thin layer.
+    pub ties: Vec<Tie>,
+    /// Of every phase but the first, the groups that take another law.
+    pub swaps: Vec<Vec<(usize, Material)>>,
+    /// What is plausible but seldom meant, in words.
+    pub warnings: Vec<String>,
+}
+
+/// Why no model can be made of a problem.
+#[derive(Clone, Debug)]
+pub enum BuildError {
+    /// A part of it does not fit.
+    Refused(Box<Refusal>),
+    /// A law cannot start from the stress it finds.
+    CannotStart(Box<PointFailure>),
+}
+
+impl From<Refusal> for BuildError {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(Box::new(refusal))
+    }
+}
+
+/// The hypothesis that a group's laws are built for. A thin layer takes interface laws and
+/// continuum laws, which `law` tells.
+pub fn hypothesis(analysis: Analysis, formulation: Formulation, is_interface_law: bool) -> Hypothesis {
+    match (formulation, analysis) {
+        (Formulation::ZeroThickness, _) => Hypothesis::Interface2d,
+        (Formulation::ThinLayer, _) if is_interface_law => Hypothesis::Interface2d,
+        (_, Analysis::Axisymmetric) => Hypothesis::Axisymmetric,
+        (_, Analysis::PlaneStrain) => Hypothesis::PlaneStrain,
+    }
+}
+
+impl Model {
+    /// Builds a model and checks everything that can be checked before the first increment.
+    ///
+    /// # Errors
+    /// The part of the problem that does not fit, or the point whose law cannot start.
+    pub fn build(problem: &Problem) -> Result<Self, BuildError> {
+        check_phases(problem)?;
+        let n = problem.groups.len();
+        let of_elements = problem.mesh.solids.iter().map(|solid| solid.group);
+        let of_joints = problem.mesh.joints.iter().map(|joint| joint.group);
+        if let Some(group) = of_elements.chain(of_joints).find(|&group| group >= n) {
+            return Err(Refusal::new(Item::Problem, Cause::NoGroup(group)).into());
+        }
+        // A phase's laws hold from it on; the first phase's replace those of the groups at once.
+        let mut swaps = vec![Vec::new(); problem.phases.len()];
+        let mut first = Vec::new();
+        for (number, group) in problem.groups.iter().enumerate() {
+            let mut own = None;
+            for (phase, input) in problem.phases.iter().enumerate() {
+                let swap = input.materials.iter().find(|(of, _)| *of == number);
+                let Some((_, material)) = swap else { continue };
+                let phase_item = Some(phase);
+                check_law(problem, number, group, material, phase_item)?;
+                if phase == 0 {
+                    own = Some(material.clone());
+                } else {
+                    swaps[phase].push((number, material.clone()));
+                }
+            }
+            first.push(match own {
+                Some(material) => material,
+                None => {
+                    check_law(problem, number, group, &group.material, None)?;
+                    group.material.clone()
+                }
+            });
+        }
+        let surroundings = Surroundings::new(problem);
+        let mut groups = Vec::new();
+        let mut ties = Ties::default();
+        for (number, material) in first.into_iter().enumerate() {
+            let builder = GroupBuilder {
+                problem,
+                mesh: &problem.mesh,
+                surroundings: &surroundings,
+                number,
+                group: &problem.groups[number],
+            };
+            groups.push(builder.build(material, &mut ties)?);
+        }
+        let ties = ties.ties;
+        let mut warnings = constraints::check(problem, &ties)?;
+        warnings.extend(plausible::warnings(problem, &groups, &swaps));
+        Ok(Self {
+            groups,
+            ties,
+            swaps,
+            warnings,
+        })
+    }
+
+    /// Refuses thin layers whose stiffnesses, known once a law has started, are impossible.
+    ///
+    /// # Errors
+    /// The material.
+    pub fn check_layers(groups: &[Group]) -> Result<(), Refusal> {
+        for group in groups {
+            if let Some(stiffness) = group.impossible_layer() {
+                let item = Item::Material(group.law.name.clone());
+                return Err(Refusal::new(item, Cause::ImpossibleLayer(stiffness)));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// References within phases, and counts.
+fn check_phases(problem: &Problem) -> Result<(), Refusal> {
+    if problem.phases.is_empty() {
+        return Err(Refusal::new(Item::Problem, Cause::NoPhase));
+    }
+    let mut middles: HashMap<usize, usize> = HashMap::new();
+    for edge in problem.mesh.solids.iter().flat_map(Solid::edges) {
+        *middles.entry(edge[2]).or_default() += 1;
+    }
+    let mut names: Vec<&str> = Vec::new();
+    for (number, phase) in problem.phases.iter().enumerate() {
+        let refuse = |cause| Err(Refusal::new(Item::Phase(number), cause));
+        let name = phase.name.as_str();
+        if name.trim().is_empty() {
+            return refuse(Cause::PhaseWithoutName);
+        }
+        if names.contains(&name) {
+            return refuse(Cause::TwoPhases(name.to_owned()));
+        }
+        names.push(name);
+        if phase.increments == 0 || phase.increments > MOST_INCREMENTS {
+            return refuse(Cause::Increments(phase.increments));
+        }
+        let n = problem.groups.len();
+        if let Some((group, _)) = phase.materials.iter().find(|(group, _)| *group >= n) {
+            return refuse(Cause::NoGroup(*group));
+        }
+        check_pressures(&problem.mesh, number, phase, &middles)?;
+    }
+    Ok(())
+}
+
+/// `middles`: how many elements have this middle of an edge.
+fn check_pressures(
+    mesh: &Mesh,
+    number: usize,
+    phase: &Phase,
+    middles: &HashMap<usize, usize>,
+) -> Result<(), Refusal> {
+    let mut lines: Vec<&str> = Vec::new();
+    for (place, input) in phase.pressure.iter().enumerate() {
+        let item = Item::Pressure(number, place);
+        let name = input.line.as_str();
+        if lines.contains(&name) {
+            return Err(Refusal::new(item, Cause::TwoPressures(name.to_owned())));
+        }
+        lines.push(name);
+        let line = constraints::line(mesh, name, &item)?;
+        let shared = |&edge: &(usize, usize)| middles[&mesh.edge(edge)[2]] > 1;
+        if line.edges.is_empty() || line.edges.iter().any(shared) {
+            return Err(Refusal::new(item, Cause::NoBoundary(name.to_owned())));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a group can carry a law.
+fn check_law(
+    problem: &Problem,
+    number: usize,
+    group: &ElementGroup,
+    material: &Material,
+    phase: Option<usize>,
+) -> Result<(), Refusal> {
+    let law = &material.built.law;
+    let refuse = |cause| {
+        let item = Item::LawOf {
+            group: number,
+            phase,
+        };
+        Err(Refusal::new(item, cause))
+    };
+    let is_interface_law = law.hypothesis() == Hypothesis::Interface2d;
+    let needed = hypothesis(problem.analysis, group.formulation, is_interface_law);
+    if law.hypothesis() != needed {
+        return refuse(Cause::OtherHypothesis {
+            material: material.name.clone(),
+            built: law.hypothesis().name(),
+            needed: needed.name(),
+        });
+    }
+    if law.formulation().local_axes && group.formulation == Formulation::Solid {
+        return refuse(Cause::LocalAxes {
+            law: law.description().id.clone(),
+            group: group.name.clone(),
+        });
+    }
+    match impossible_layer(group, material) {
+        Some(stiffness) => refuse(Cause::ImpossibleLayer(stiffness)),
+        None => Ok(()),
+    }
+}
+
+/// A thin layer with K_n ≤ 4/3 K_t has no elasticity along it. Tried out under 100 kPa; a law
+/// that cannot start from there is asked again when its phase begins.
+fn impossible_layer(group: &ElementGroup, material: &Material) -> Option<[f64; 2]> {
+    let elastic = group.in_plane != Some(InPlane::None);
+    let law = &material.built.law;
+    let applies = group.formulation == Formulation::ThinLayer && elastic;
+    if !applies || law.hypothesis() != Hypothesis::Interface2d {
+        return None;
+    }
+    let rows = Strided::rows(2);
+    let (zero, traction) = ([0.0; 2], [-100.0, 0.0]);
+    let state = law.initial_state(1, (&traction, rows)).ok()?;
+    let (mut flux, mut state_end, mut operator) = ([0.0; 2], state.clone(), [0.0; 4]);
+    let start = Start {
+        n_points: 1,
+        gradient: (&zero, rows),
+        gradient_end: (&zero, rows),
+        flux: (&traction, rows),
+        state: &state,
+        time: 0.0,
+        time_increment: 0.0,
+        moment: Moment::default(),
+        sites: &[],
+    };
+    let end = End {
+        flux: (&mut flux, rows),
+        state: &mut state_end,
+        operator: &mut operator,
+    };
+    law.integrate(&start, Operator::Elastic, end).ok()?;
+    (operator[0] <= 4.0 / 3.0 * operator[3]).then(|| [operator[0], operator[3]])
+}
+
+/// Solids of every group, and which group lies beside the middle of an edge.
+struct Surroundings {
+    of_group: Vec<Vec<usize>>,
+    beside: HashMap<usize, usize>,
+}
+
+impl Surroundings {
+    fn new(problem: &Problem) -> Self {
+        let mut of_group = vec![Vec::new(); problem.groups.len()];
+        for (number, solid) in problem.mesh.solids.iter().enumerate() {
+            of_group[solid.group].push(number);
+        }
+        // Mid-side nodes beside a zero-thickness element belong to one solid each.
+        let joints = problem.mesh.joints.iter();
+        let wanted = joints.flat_map(|joint| [joint.minus[2], joint.plus[2]]);
+        let wanted: HashSet<usize> = wanted.collect();
+        let mut beside = HashMap::new();
+        for solid in &problem.mesh.solids {
+            for [_, _, middle] in solid.edges() {
+                if wanted.contains(&middle) {
+                    beside.entry(middle).or_insert(solid.group);
+                }
+            }
+        }
+        Self { of_group, beside }
+    }
+}
+
+/// Ties so far, each degree of freedom once.
+#[derive(Default)]
+struct Ties {
+    ties: Vec<Tie>,
+    dofs: HashSet<usize>,
+}
+
+/// Which parametric direction of a quad goes across the layer.
+#[derive(Clone, Copy, PartialEq)]
+enum Across {
+    Xi,
+    Eta,
+}
+
+struct GroupBuilder<'a> {
+    problem: &'a Problem,
+    mesh: &'a Mesh,
+    surroundings: &'a Surroundings,
+    number: usize,
+    group: &'a ElementGroup,
+}
+
+impl GroupBuilder<'_> {
+    fn build(&self, material: Material, ties: &mut Ties) -> Result<Group, BuildError> {
+        let name = self.group.name.clone();
+        let formulation = self.group.formulation;
+        self.refuse_misplaced_keys()?;
+        let mut thickness = None;
+        let kinematics: Box<dyn Kinematics> = match formulation {
+            Formulation::Solid => self.solid()?,
+            Formulation::ThinLayer => {
+                let in_plane = self.group.in_plane.unwrap_or(InPlane::Elastic);
+                let (elements, t) = self.thin_layer(ties)?;
+                thickness = Some((t, in_plane));
+                elements
+            }
+            Formulation::ZeroThickness => {
+                let joints = self.mesh.joints.iter();
+                let joints: Vec<_> = joints.filter(|j| j.group == self.number).copied().collect();
+                let rule = self.integration(Integration::Nodes);
+                let analysis = self.problem.analysis;
+                Box::new(Joint6::new(analysis, &self.mesh.nodes, &joints, rule))
+            }
+        };
+        if kinematics.n_elements() == 0 {
+            return Err(self.refuse(Cause::NoElements(name)).into());
+        }
+        self.refuse_turned_signs(&material)?;
+        let stress = self.initial_stress(&*kinematics);
+        Group::new(name, formulation, kinematics, stress, thickness, material)
+            .map_err(|failure| BuildError::CannotStart(Box::new(failure)))
+    }
+
+    /// The group does not fit.
+    fn refuse(&self, cause: Cause) -> Refusal {
+        Refusal::new(Item::Group(self.number), cause)
+    }
+
+    /// What is said of the group under a key does not fit.
+    fn refuse_key(&self, key: Key, cause: Cause) -> Refusal {
+        Refusal::new(Item::GroupKey(self.number, key), cause)
+    }
+
+    fn integration(&self, default: Integration) -> Integration {
+        self.group.integration.unwrap_or(default)
+    }
+
+    /// Keys and values that do not go with the formulation.
+    fn refuse_misplaced_keys(&self) -> Result<(), Refusal> {
+        let ElementGroup {
+            formulation,
+            integration,
+            normal,
+            in_plane,
+            ..
+        } = self.group;
+        let misplaced = |key| Err(self.refuse_key(key, Cause::Misplaced(key, *formulation)));
+        if *formulation != Formulation::ThinLayer {
+            if normal.is_some() {
+                return misplaced(Key::Normal);
+            }
+            if in_plane.is_some() {
+                return misplaced(Key::InPlane);
+            }
+        }
+        let fits = match integration {
+            None | Some(Integration::Full | Integration::Reduced) => true,
+            Some(Integration::Mean) => *formulation == Formulation::ThinLayer,
+            Some(Integration::Nodes) => *formulation == Formulation::ZeroThickness,
+        };
+        if fits {
+            Ok(())
+        } else {
+            misplaced(Key::Integration)
+        }
+    }
+
+    fn solids(&self) -> impl Iterator<Item = &Solid> {
+        let own = self.surroundings.of_group[self.number].iter();
+        own.map(|&number| &self.mesh.solids[number])
+    }
+
+    /// The group's quads; a group of triangles is refused for this `cause`.
+    fn quads(&self, cause: fn(String) -> Cause) -> Result<Vec<[usize; 8]>, Refusal> {
+        let nodes = self.solids().map(|solid| solid.nodes().try_into().ok());
+        let nodes: Option<Vec<[usize; 8]>> = nodes.collect();
+        nodes.ok_or_else(|| self.refuse(cause(self.group.name.clone())))
+    }
+
+    fn bad_shape(&self) -> Refusal {
+        self.refuse(Cause::BadShape(self.group.name.clone()))
+    }
+
+    fn solid(&self) -> Result<Box<dyn Kinematics>, Refusal> {
+        let nodes = self.quads(Cause::MixedShapes)?;
+        let n = if self.integration(Integration::Full) == Integration::Reduced {
+            2
+        } else {
+            3
+        };
+        let axes = vec![Axes::GLOBAL; nodes.len()];
+        let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
+        let elements = Quad8::new(analysis, coordinates, nodes, axes, |_| (n, n));
+        Ok(Box::new(elements.map_err(|_| self.bad_shape())?))
+    }
+
+    /// Elements in axes of the layer, and their thickness.
+    fn thin_layer(&self, ties: &mut Ties) -> Result<(Box<dyn Kinematics>, Vec<f64>), Refusal> {
+        let nodes = self.quads(Cause::LayerOfTriangles)?;
+        let (mut axes, mut across, mut thickness) = (vec![], vec![], vec![]);
+        for nodes in &nodes {
+            let (direction, t) = self.across(nodes)?;
+            let at = |i: usize| self.mesh.nodes[nodes[i]];
+            // Ends of the mid-surface.
+            let (a, b) = match direction {
+                Across::Xi => (at(4), at(6)),
+                Across::Eta => (at(7), at(5)),
+            };
+            axes.push(Axes::of_facet([b[0] - a[0], b[1] - a[1]]));
+            across.push(direction);
+            thickness.push(t);
+        }
+        self.refuse_normal_along()?;
+        let integration = self.integration(Integration::Full);
+        if integration == Integration::Mean {
+            for (nodes, across) in nodes.iter().zip(&across) {
+                tie_middles(nodes, *across, ties);
+            }
+        }
+        let rule = |element: usize| match (integration, across[element]) {
+            (Integration::Reduced, _) => (2, 2),
+            (Integration::Mean, Across::Xi) => (1, 3),
+            (Integration::Mean, Across::Eta) => (3, 1),
+            _ => (3, 3),
+        };
+        let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
+        let elements = Quad8::new(analysis, coordinates, nodes, axes, rule);
+        Ok((Box::new(elements.map_err(|_| self.bad_shape())?), thickness))
+    }
+
+    /// Refuses a `normal` in whose direction the layer is longer than along it: clearly so, since a
+    /// square is a layer too, and whatever the shape of its elements.
+    fn refuse_normal_along(&self) -> Result<(), Refusal> {
+        let Some(normal) = self.group.normal else {
+            return Ok(());
+        };
+        for extent in self.extents() {
+            let [width, height] = extent;
+            let (across, along, other) = match normal {
+                Axis::X => (width, height, Axis::Y),
+                Axis::Y => (height, width, Axis::X),
+            };
+            if across > CLEARLY * along {
+                let group = self.group.name.clone();
+                let cause = Cause::NormalAlong {
+                    group,
+                    extent,
+                    other,
+                };
+                return Err(self.refuse_key(Key::Normal, cause));
+            }
+        }
+        Ok(())
+    }
+
+    /// Width and height of each connected part of the group.
+    fn extents(&self) -> Vec<[f64; 2]> {
+        let mut of_node: HashMap<usize, usize> = HashMap::new();
+        // Lower and upper corner of each part, and the part that it has become one with.
+        let mut parts: Vec<([[f64; 2]; 2], usize)> = Vec::new();
+        let root = |parts: &[([[f64; 2]; 2], usize)], mut part: usize| {
+            while parts[part].1 != part {
+                part = parts[part].1;
+            }
+            part
+        };
+        for solid in self.solids() {
+            let new = parts.len();
+            let corners = solid.nodes().iter().map(|&node| self.mesh.nodes[node]);
+            let corners: Vec<[f64; 2]> = corners.collect();
+            let end = |c: usize, f: fn(f64, f64) -> f64| {
+                corners.iter().map(|at| at[c]).fold(corners[0][c], f)
+            };
+            let lower = [end(0, f64::min), end(1, f64::min)];
+            parts.push(([lower, [end(0, f64::max), end(1, f64::max)]], new));
+            for &node in solid.nodes() {
+                let other = *of_node.entry(node).or_insert(new);
+                let (a, b) = (root(&parts, other), root(&parts, new));
+                if a != b {
+                    let [low, high] = parts[b].0;
+                    let into = &mut parts[a].0;
+                    for c in 0..2 {
+                        into[0][c] = into[0][c].min(low[c]);
+                        into[1][c] = into[1][c].max(high[c]);
+                    }
+                    parts[b].1 = a;
+                }
+            }
+        }
+        let own = parts.iter().enumerate();
+        own.filter(|(number, (_, root))| number == root)
+            .map(|(_, ([low, high], _))| [high[0] - low[0], high[1] - low[1]])
+            .collect()
+    }
+
+    /// Refuses an initial stress that the law cannot stand, though it stands it with compression as
+    /// a negative number.
+    fn refuse_turned_signs(&self, material: &Material) -> Result<(), Refusal> {
+        let Some(stress) = self.group.initial_stress else {
+            return Ok(());
+        };
+        match tension::turned(&material.built.law, self.group.formulation, stress) {
+            None => Ok(()),
+            Some(refusal) => {
+                let cause = Cause::TurnedSigns {
+                    group: self.group.name.clone(),
+                    material: material.name.clone(),
+                    refusal,
+                };
+                Err(self.refuse_key(Key::InitialStress, cause))
+            }
+        }
+    }
+
+    /// The direction across a layer, and the thickness: the distance between its two faces.
+    fn across(&self, nodes: &[usize; 8]) -> Result<(Across, f64), Refusal> {
+        let at = |i: usize| self.mesh.nodes[nodes[i]];
+        let distance = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]).hypot(b[1] - a[1]);
+        let (along_xi, along_eta) = (distance(at(7), at(5)), distance(at(4), at(6)));
+        match self.group.normal {
+            Some(normal) => {
+                let xi_is_x = (at(5)[0] - at(7)[0]).abs() >= (at(5)[1] - at(7)[1]).abs();
+                let xi = (normal == Axis::X) == xi_is_x;
+                Ok(if xi {
+                    (Across::Xi, along_xi)
+                } else {
+                    (Across::Eta, along_eta)
+                })
+            }
+            None if along_xi < 0.8 * along_eta => Ok((Across::Xi, along_xi)),
+            None if along_eta < 0.8 * along_xi => Ok((Across::Eta, along_eta)),
+            None => Err(self.refuse(Cause::WhichWayAcross {
+                group: self.group.name.clone(),
+                sides: [along_xi, along_eta],
+            })),
+        }
+    }
+
+    /// Initial stress of all points, in axes of the elements. A zero-thickness element without
+    /// one of its own starts with that of the ground on its two sides, projected on its facet.
+    fn initial_stress(&self, kinematics: &dyn Kinematics) -> Vec<f64> {
+        let given = self.group.initial_stress;
+        let mut stress = Vec::with_capacity(kinematics.n_components() * kinematics.n_points());
+        for point in 0..kinematics.n_points() {
+            let element = point / kinematics.points_per_element();
+            let axes = kinematics.axes(element);
+            if kinematics.n_components() == 4 {
+                stress.extend(axes.stress_from_global(given.unwrap_or_default()));
+            } else {
+                let beside = || self.stress_beside(kinematics.nodes(element));
+                let [_, normal, _, shear] =
+                    axes.stress_from_global(given.unwrap_or_else(beside));
+                stress.extend([normal, shear]);
+            }
+        }
+        stress
+    }
+
+    /// Mean of the initial stresses on the two sides of a zero-thickness element.
+    fn stress_beside(&self, nodes: &[usize]) -> [f64; 4] {
+        let beside = [nodes[2], nodes[5]].map(|middle| {
+            let group = self.surroundings.beside.get(&middle);
+            let group = group.map(|&group| &self.problem.groups[group]);
+            group
+                .and_then(|group| group.initial_stress)
+                .unwrap_or_default()
+        });
+        std::array::from_fn(|c| f64::midpoint(beside[0][c], beside[1][c]))
+    }
+}
+
+/// Ties the two mid-thickness nodes of a quad to the corners on either side.
+fn tie_middles(nodes: &[usize; 8], across: Across, ties: &mut Ties) {
+    let middles = match across {
+        Across::Xi => [(4, 0, 1), (6, 3, 2)],
+        Across::Eta => [(7, 0, 3), (5, 1, 2)],
+    };
+    for (middle, a, b) in middles {
+        for c in 0..2 {
+            let dof = 2 * nodes[middle] + c;
+            if ties.dofs.insert(dof) {
+                let masters = [(2 * nodes[a] + c, 0.5), (2 * nodes[b] + c, 0.5)];
+                ties.ties.push(Tie { dof, masters });
+            }
+        }
+    }
+}
+
+/// Nodal forces of a unit pressure on a boundary line.
+pub fn unit_pressure(analysis: Analysis, mesh: &Mesh, edges: &[(usize, usize)]) -> Vec<f64> {
+    let mut force = vec![0.0; 2 * mesh.nodes.len()];
+    for &edge in edges {
+        let nodes = mesh.edge(edge);
+        let (points, weights) = gauss(3);
+        for (&xi, weight) in points.iter().zip(weights) {
+            let (n, d) = line_shape(xi);
+            let sum = |f: &[f64; 3], c: usize| -> f64 {
+                (0..3).map(|i| f[i] * mesh.nodes[nodes[i]][c]).sum()
+            };
+            // Edges run counter-clockwise: (dy, −dx) points outward, the pressure inward.
+            let inward = [-sum(&d, 1), sum(&d, 0)];
+            let weight = weight * depth(analysis, sum(&n, 0));
+            for i in 0..3 {
+                for c in 0..2 {
+                    force[2 * nodes[i] + c] += weight * n[i] * inward[c];
+                }
+            }
+        }
+    }
+    force
+}

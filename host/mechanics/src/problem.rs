@@ -1,0 +1,285 @@
+//! What is to be computed, as plain values: mesh, groups with their laws, supports, phases with their
+//! loads, settings. Units: kN, m, kPa; tension positive.
+
+pub(crate) mod constraints;
+mod held;
+pub(crate) mod plausible;
+mod refusal;
+pub(crate) mod tension;
+
+pub use refusal::{Cause, Item, Key, Refusal};
+
+use crate::mesh::Mesh;
+use crate::settings::Settings;
+use law::BuiltLaw;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// A problem. It says what there is and what happens to it, and can be changed until a
+/// [`Simulation`](crate::Simulation) is made of it.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// Kinematics of the plane.
+    pub analysis: Analysis,
+    /// Nodes, elements, named lines.
+    pub mesh: Mesh,
+    /// Groups of elements; elements of the mesh name them by number.
+    pub groups: Vec<ElementGroup>,
+    /// Displacements held at zero from the start.
+    pub supports: Vec<Support>,
+    /// Loading phases, in order.
+    pub phases: Vec<Phase>,
+    /// How equilibrium is sought.
+    pub settings: Settings,
+}
+
+impl Problem {
+    /// A problem without groups, supports and phases yet.
+    pub fn new(analysis: Analysis, mesh: Mesh) -> Self {
+        Self {
+            analysis,
+            mesh,
+            groups: Vec::new(),
+            supports: Vec::new(),
+            phases: Vec::new(),
+            settings: Settings::default(),
+        }
+    }
+}
+
+/// A law with its values, as groups use it.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Its name, for messages and results; phases that give a group a material of the same law keep
+    /// its internal variables.
+    pub name: String,
+    /// The law.
+    pub built: Arc<BuiltLaw>,
+    /// Initial values of internal variables that override the law's own, by number.
+    pub initial: Vec<(usize, f64)>,
+}
+
+impl Material {
+    /// A law under a name.
+    pub fn new(name: impl Into<String>, built: impl Into<Arc<BuiltLaw>>) -> Self {
+        Self {
+            name: name.into(),
+            built: built.into(),
+            initial: Vec::new(),
+        }
+    }
+
+    /// With another initial value of an internal variable; `None` if the law has no such variable.
+    #[must_use]
+    pub fn starting_with(mut self, id: &str, value: f64) -> Option<Self> {
+        let variables = &self.built.law.formulation().internal_variables;
+        let number = variables.iter().position(|variable| variable.id == id)?;
+        self.initial.push((number, value));
+        Some(self)
+    }
+}
+
+/// A group of elements.
+#[derive(Clone, Debug)]
+pub struct ElementGroup {
+    /// Name, for messages and results.
+    pub name: String,
+    /// What the elements do.
+    pub formulation: Formulation,
+    /// Their law before the first phase, or in it if it takes another.
+    pub material: Material,
+    /// Where the law is evaluated; `None`: all Gauss points of solids and layers, the nodes of
+    /// zero-thickness elements.
+    pub integration: Option<Integration>,
+    /// Thin layer: direction across the layer; `None`: that of the shorter sides.
+    pub normal: Option<Axis>,
+    /// Thin layer with an interface law: elasticity along the layer; `None`: that of (18), (19).
+    pub in_plane: Option<InPlane>,
+    /// Stress before the first phase, components 11 22 33 12 in global axes, kPa. `None`: zero; of
+    /// zero-thickness elements that of the ground on their two sides.
+    pub initial_stress: Option<[f64; 4]>,
+}
+
+impl ElementGroup {
+    /// A group with what is usual for its formulation.
+    pub fn new(name: impl Into<String>, formulation: Formulation, material: Material) -> Self {
+        Self {
+            name: name.into(),
+            formulation,
+            material,
+            integration: None,
+            normal: None,
+            in_plane: None,
+            initial_stress: None,
+        }
+    }
+}
+
+/// Displacements of a line held at zero.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Support {
+    /// The line.
+    pub line: String,
+    /// The components.
+    pub fixed: Vec<Axis>,
+}
+
+/// A loading phase. Loads and prescribed displacements stay until a later phase changes them.
+#[derive(Clone, Debug)]
+pub struct Phase {
+    /// Name, for messages and results.
+    pub name: String,
+    /// Number of equal increments.
+    pub increments: usize,
+    /// Laws of groups, by number, from this phase on.
+    pub materials: Vec<(usize, Material)>,
+    /// Displacements are counted from the start of this phase.
+    pub reset_displacements: bool,
+    /// Prescribed displacements, as totals at the end of the phase.
+    pub displacement: Vec<Displacement>,
+    /// Prescribed displacements given up from this phase on.
+    pub free: Vec<Free>,
+    /// Pressures, as totals at the end of the phase.
+    pub pressure: Vec<Pressure>,
+}
+
+impl Phase {
+    /// A phase in which nothing changes.
+    pub fn new(name: impl Into<String>, increments: usize) -> Self {
+        Self {
+            name: name.into(),
+            increments,
+            materials: Vec::new(),
+            reset_displacements: false,
+            displacement: Vec::new(),
+            free: Vec::new(),
+            pressure: Vec::new(),
+        }
+    }
+}
+
+/// Prescribed displacements of a line, m.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Displacement {
+    /// The line.
+    pub line: String,
+    /// In x (r).
+    pub x: Option<f64>,
+    /// In y (z).
+    pub y: Option<f64>,
+}
+
+/// Displacements of a line that become free.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Free {
+    /// The line.
+    pub line: String,
+    /// The components.
+    pub components: Vec<Axis>,
+}
+
+/// A pressure on a boundary line, kPa.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pressure {
+    /// The line.
+    pub line: String,
+    /// Towards the body positive.
+    pub value: f64,
+}
+
+/// A coordinate direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// x, or r.
+    X,
+    /// y, or z.
+    Y,
+}
+
+impl Axis {
+    /// Its name in an analysis.
+    pub fn name(self, analysis: Analysis) -> &'static str {
+        match (self, analysis) {
+            (Self::X, Analysis::PlaneStrain) => "x",
+            (Self::X, Analysis::Axisymmetric) => "r",
+            (Self::Y, Analysis::PlaneStrain) => "y",
+            (Self::Y, Analysis::Axisymmetric) => "z",
+        }
+    }
+}
+
+/// Kinematics of the plane.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Analysis {
+    /// x is the radius r, y the axis z; integrals over the whole turn.
+    Axisymmetric,
+    /// Unit thickness.
+    PlaneStrain,
+}
+
+impl Analysis {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Axisymmetric => "axisymmetric",
+            Self::PlaneStrain => "plane_strain",
+        }
+    }
+
+    /// The unit of a force: of the whole turn, or of a unit thickness.
+    pub fn force_unit(self) -> &'static str {
+        match self {
+            Self::Axisymmetric => "kN",
+            Self::PlaneStrain => "kN/m",
+        }
+    }
+}
+
+/// What the elements of a group do.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Formulation {
+    /// 8-node quads with a continuum law in global axes.
+    Solid,
+    /// 8-node quads of a thin layer, with an interface law or a continuum law in its own axes.
+    ThinLayer,
+    /// Three double nodes with an interface law.
+    ZeroThickness,
+}
+
+impl Formulation {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Solid => "solid",
+            Self::ThinLayer => "thin_layer",
+            Self::ZeroThickness => "zero_thickness",
+        }
+    }
+}
+
+/// Where the law is evaluated.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Integration {
+    /// 3 × 3 Gauss points (zero thickness: 3 Gauss points).
+    Full,
+    /// 2 × 2 Gauss points (zero thickness: 2 Gauss points).
+    Reduced,
+    /// Thin layer: 3 points along the layer on its mid-surface, mid-thickness nodes tied.
+    Mean,
+    /// Zero thickness: the three nodes (Newton–Cotes).
+    Nodes,
+}
+
+/// Elasticity along a thin layer with an interface law.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum InPlane {
+    /// E*, ν* of equations (18), (19).
+    Elastic,
+    /// None: stresses along the layer stay as they are.
+    None,
+}

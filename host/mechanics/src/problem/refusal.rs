@@ -1,0 +1,409 @@
+//! Why a problem cannot be computed: what is wrong, and with which part of it.
+
+use super::{Analysis, Axis, Formulation};
+use std::fmt;
+
+/// A part of a problem, by number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Item {
+    /// All of it.
+    Problem,
+    /// A group.
+    Group(usize),
+    /// What is said of a group under this key.
+    GroupKey(usize, Key),
+    /// The law of a group: its own, or that of a phase.
+    LawOf {
+        /// The group.
+        group: usize,
+        /// The phase, if it is not the group's own.
+        phase: Option<usize>,
+    },
+    /// A material, by name.
+    Material(String),
+    /// A support.
+    Support(usize),
+    /// A phase.
+    Phase(usize),
+    /// A prescribed displacement of a phase.
+    Displacement(usize, usize),
+    /// A displacement that a phase frees.
+    Free(usize, usize),
+    /// A pressure of a phase.
+    Pressure(usize, usize),
+}
+
+/// What is said of a group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Key {
+    /// Where the law is evaluated.
+    Integration,
+    /// Direction across a layer.
+    Normal,
+    /// Elasticity along a layer.
+    InPlane,
+    /// Stress before the first phase.
+    InitialStress,
+}
+
+/// A part of a problem that does not fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Which.
+    pub item: Item,
+    /// Why.
+    pub cause: Cause,
+}
+
+impl Refusal {
+    pub(crate) fn new(item: Item, cause: Cause) -> Self {
+        Self { item, cause }
+    }
+}
+
+/// Why a part of a problem does not fit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cause {
+    /// There is no phase.
+    NoPhase,
+    /// A phase is called nothing.
+    PhaseWithoutName,
+    /// Two phases have one name.
+    TwoPhases(String),
+    /// A number of increments that cannot be meant.
+    Increments(usize),
+    /// There is no such line; there are these.
+    NoLine {
+        /// The one that was asked for.
+        name: String,
+        /// Those that there are.
+        known: Vec<String>,
+    },
+    /// An element or a phase names a group that there is not.
+    NoGroup(usize),
+    /// A line has two pressures in one phase.
+    TwoPressures(String),
+    /// A line under pressure is no boundary.
+    NoBoundary(String),
+    /// A pressure acts on nodes that are held against it.
+    LostPressure(String),
+    /// A group has no elements.
+    NoElements(String),
+    /// A group has elements of several shapes.
+    MixedShapes(String),
+    /// A thin layer has elements that are no quads.
+    LayerOfTriangles(String),
+    /// Something that does not go with the formulation.
+    Misplaced(Key, Formulation),
+    /// An element is degenerate or reaches the other side of the axis.
+    BadShape(String),
+    /// A layer whose normal goes along it; sizes in m.
+    NormalAlong {
+        /// The group.
+        group: String,
+        /// Extent in x and y.
+        extent: [f64; 2],
+        /// The other direction.
+        other: Axis,
+    },
+    /// A layer element whose shape does not say which way is across.
+    WhichWayAcross {
+        /// The group.
+        group: String,
+        /// Its two sides.
+        sides: [f64; 2],
+    },
+    /// An initial stress that the law stands only with compression negative.
+    TurnedSigns {
+        /// The group.
+        group: String,
+        /// Its material.
+        material: String,
+        /// What the law says.
+        refusal: String,
+    },
+    /// A layer's stiffness K_n ≤ 4/3 K_t, kPa/m.
+    ImpossibleLayer([f64; 2]),
+    /// A law in axes of a layer for solids.
+    LocalAxes {
+        /// The law.
+        law: String,
+        /// The group.
+        group: String,
+    },
+    /// A law that was built for another hypothesis than the group's.
+    OtherHypothesis {
+        /// The material.
+        material: String,
+        /// What it was built for.
+        built: &'static str,
+        /// What the group needs.
+        needed: &'static str,
+    },
+    /// A support, or freed displacements, without components.
+    NoComponents {
+        /// The line.
+        line: String,
+        /// Of a displacement that is freed.
+        is_free: bool,
+    },
+    /// A displacement is freed that nothing holds, in this direction.
+    NothingHolds(String, &'static str),
+    /// A displacement is freed and prescribed at once.
+    FreeForNothing {
+        /// The line that is freed.
+        line: String,
+        /// The direction.
+        axis: &'static str,
+        /// The line that prescribes it.
+        by: String,
+    },
+    /// A displacement without a value.
+    NoValue(String, Analysis),
+    /// A displacement where a support holds.
+    HasSupport {
+        /// The line.
+        line: String,
+        /// The node.
+        at: [f64; 2],
+        /// The direction.
+        axis: &'static str,
+    },
+    /// Two displacements of one node.
+    TwoDisplacements {
+        /// The lines.
+        lines: [String; 2],
+        /// The node.
+        at: [f64; 2],
+        /// The direction.
+        axis: &'static str,
+        /// What they prescribe, m.
+        values: [f64; 2],
+    },
+    /// The middle of a layer with mean strain is held alone.
+    Tied {
+        /// The phase.
+        phase: String,
+        /// The node.
+        at: [f64; 2],
+    },
+    /// A part of the model is not held.
+    Loose {
+        /// The phase.
+        phase: String,
+        /// Groups of the part and its middle; `None`: it is the whole model.
+        part: Option<(Vec<String>, [f64; 2])>,
+        /// The direction, or `None` for a rotation.
+        axis: Option<&'static str>,
+    },
+}
+
+impl Key {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Integration => "this `integration`",
+            Self::Normal => "`normal`",
+            Self::InPlane => "`in_plane`",
+            Self::InitialStress => "`initial_stress`",
+        }
+    }
+}
+
+impl fmt::Display for Cause {
+    #[expect(clippy::too_many_lines, reason = "one sentence for each")]
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoPhase => write!(f, "there is no [[phase]]"),
+            Self::PhaseWithoutName => write!(f, "a phase needs a name"),
+            Self::TwoPhases(name) => write!(f, "two phases are called `{name}`"),
+            Self::Increments(n) => write!(f, "`increments` is {n}, expected 1 to 10000000"),
+            Self::NoLine { name, .. } => write!(f, "there is no line `{name}`"),
+            Self::NoGroup(number) => write!(f, "there is no group with the number {number}"),
+            Self::TwoPressures(line) => {
+                write!(f, "line `{line}` has two pressures in this phase")
+            }
+            Self::NoBoundary(line) => {
+                write!(f, "a pressure needs a boundary, line `{line}` is not")
+            }
+            Self::LostPressure(line) => write!(
+                f,
+                "the pressure on line `{line}` has no effect: its displacement against it is held \
+                 or prescribed as long as it lasts"
+            ),
+            Self::NoElements(group) => write!(f, "no element belongs to group `{group}`"),
+            Self::MixedShapes(group) => write!(
+                f,
+                "group `{group}` has triangles and quads; elements of a group have one shape"
+            ),
+            Self::LayerOfTriangles(group) => write!(
+                f,
+                "group `{group}` is a thin layer, which is made of quads, and has triangles"
+            ),
+            Self::Misplaced(key, formulation) => write!(
+                f,
+                "{} does not go with the formulation `{}`",
+                key.name(),
+                formulation.name()
+            ),
+            Self::BadShape(group) => write!(
+                f,
+                "an element of group `{group}` is degenerate or reaches the other side of the axis"
+            ),
+            Self::NormalAlong {
+                group,
+                extent: [width, height],
+                ..
+            } => write!(
+                f,
+                "`normal`: group `{group}` is {width:.6} by {height:.6} m, its longer side would be \
+                 its thickness"
+            ),
+            Self::WhichWayAcross {
+                group,
+                sides: [xi, eta],
+            } => write!(
+                f,
+                "an element of group `{group}` is {xi:.6} by {eta:.6} m: which way is across the \
+                 layer?"
+            ),
+            Self::TurnedSigns {
+                group,
+                material,
+                refusal,
+            } => write!(
+                f,
+                "`initial_stress` of group `{group}`: law `{material}` cannot stand it: {refusal}"
+            ),
+            Self::ImpossibleLayer([k_n, k_t]) => write!(
+                f,
+                "a thin layer needs K_n > 4/3 K_t for its elasticity along the layer (E* > 0, \
+                 equation 18): K_n = {k_n:.6e}, K_t = {k_t:.6e} kPa/m"
+            ),
+            Self::LocalAxes { law, group } => write!(
+                f,
+                "law `{law}` works in axes of a layer, the formulation `solid` of group `{group}` \
+                 has none"
+            ),
+            Self::OtherHypothesis {
+                material,
+                built,
+                needed,
+            } => write!(
+                f,
+                "material `{material}` was built for {built}, its group needs {needed}"
+            ),
+            Self::NoComponents { line, is_free } => {
+                if *is_free {
+                    write!(f, "`free` of line `{line}`: `components` is empty")
+                } else {
+                    write!(f, "`fixed` is empty for line `{line}`")
+                }
+            }
+            Self::NothingHolds(line, axis) => {
+                write!(f, "`free` of line `{line}`: nothing holds it in {axis}")
+            }
+            Self::FreeForNothing { line, axis, by } => write!(
+                f,
+                "`free` of line `{line}` has no effect in {axis}: in the same phase `displacement` \
+                 of line `{by}` prescribes it"
+            ),
+            Self::NoValue(line, _) => write!(f, "the displacement of line `{line}` has no value"),
+            Self::HasSupport {
+                line,
+                at: [x, y],
+                axis,
+            } => write!(
+                f,
+                "the node at ({x}, {y}) of line `{line}` has a support in {axis}"
+            ),
+            Self::TwoDisplacements {
+                lines: [line, other],
+                at: [x, y],
+                axis,
+                values: [value, earlier],
+            } => write!(
+                f,
+                "the node at ({x}, {y}) of line `{line}` gets {value} m in {axis}, and {earlier} m \
+                 by line `{other}`"
+            ),
+            Self::Tied { phase, at: [x, y] } => write!(
+                f,
+                "phase `{phase}`: the node at ({x}, {y}) in the middle of a layer with \
+                 `integration = \"mean\"` follows the layer's faces and cannot be held alone"
+            ),
+            Self::Loose { phase, part, axis } => {
+                write!(f, "phase `{phase}`: nothing holds ")?;
+                match part {
+                    None => write!(f, "the model ")?,
+                    Some((groups, [x, y])) => {
+                        let names: Vec<String> =
+                            groups.iter().map(|name| format!("`{name}`")).collect();
+                        let groups = if names.len() == 1 { "group" } else { "groups" };
+                        write!(
+                            f,
+                            "{groups} {} around ({x:.4}, {y:.4}), which touches nothing else, ",
+                            names.join(", ")
+                        )?;
+                    }
+                }
+                match axis {
+                    Some(axis) => write!(f, "in {axis}"),
+                    None => write!(f, "against turning"),
+                }
+            }
+        }
+    }
+}
+
+impl Cause {
+    /// What the user could do, if something is known.
+    pub fn hint(&self) -> Option<String> {
+        let hint = match self {
+            Self::LostPressure(_) => {
+                "leave the pressure or the displacement out; `reaction_…` of the line is what it \
+                 takes to hold it"
+            }
+            Self::NormalAlong { other, .. } => {
+                let other = other.name(Analysis::PlaneStrain);
+                return Some(format!(
+                    "the normal goes across the layer: `normal = \"{other}\"`, or leave it out"
+                ));
+            }
+            Self::WhichWayAcross { .. } => {
+                "say `normal = \"x\"` or `normal = \"y\"` for the group"
+            }
+            Self::TurnedSigns { .. } => {
+                "tension is positive: compression is written as a negative number"
+            }
+            Self::ImpossibleLayer(_) => {
+                "raise the normal stiffness, or set `in_plane = \"none\"` for the group"
+            }
+            Self::LocalAxes { .. } => "use the formulation `thin_layer`",
+            Self::MixedShapes(_) => "make two groups of it",
+            Self::FreeForNothing { .. } => {
+                "leave one of the two out; a displacement stays until a phase frees it"
+            }
+            Self::NoValue(_, analysis) => {
+                let [x, y] = [Axis::X, Axis::Y].map(|axis| axis.name(*analysis));
+                return Some(format!("give `{x}`, `{y}`, or both"));
+            }
+            Self::HasSupport { .. } => {
+                "a support holds it at 0 throughout, unless a phase frees it"
+            }
+            Self::Tied { .. } => "hold the nodes on both faces too, or leave this one free",
+            Self::Loose { .. } => {
+                "hold a line with [[supports]], or prescribe its displacement"
+            }
+            _ => return None,
+        };
+        Some(hint.to_owned())
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.cause.fmt(f)
+    }
+}
+
+impl std::error::Error for Refusal {}

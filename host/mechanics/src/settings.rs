@@ -1,0 +1,152 @@
+//! How equilibrium is sought.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize, de};
+use std::fmt::Debug;
+
+/// Solver settings.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Which matrix the iterations use.
+    pub method: Method,
+    /// Largest residual force, relative to the largest of the forces in play (2-norms).
+    #[serde(deserialize_with = "tolerance")]
+    pub force_tolerance: f64,
+    /// Largest correction, relative to the displacement increment (2-norms).
+    #[serde(deserialize_with = "tolerance")]
+    pub displacement_tolerance: f64,
+    /// Iterations after which an increment is cut back; those of the method if left out.
+    #[serde(deserialize_with = "iterations")]
+    pub max_iterations: Option<usize>,
+    /// An increment is halved at most so many times.
+    #[serde(deserialize_with = "halvings")]
+    pub max_halvings: u32,
+    /// Whether to search along a correction that makes the residual grow.
+    pub line_search: bool,
+    /// Whether to relax viscously where Newton iterations come to a standstill.
+    pub relaxation: bool,
+    /// What leads from one equilibrium to the next where the load alone cannot.
+    pub control: Control,
+    /// What becomes of linear groups.
+    pub equations: Equations,
+}
+
+impl Settings {
+    /// Iterations after which an increment is cut back.
+    pub fn max_iterations(&self) -> usize {
+        self.max_iterations
+            .unwrap_or_else(|| self.method.max_iterations())
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            force_tolerance: 1e-9,
+            displacement_tolerance: 1e-7,
+            max_iterations: None,
+            max_halvings: 10,
+            line_search: true,
+            equations: Equations::Auto,
+            relaxation: true,
+            control: Control::Load,
+        }
+    }
+}
+
+/// Which matrix the iterations use.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Consistent tangents; those of an earlier iteration, or of the step before, as long as each
+    /// correction takes nearly all of the residual away.
+    #[default]
+    Auto,
+    /// Consistent tangents at every iteration.
+    Newton,
+    /// Consistent tangents at the first iteration of every step.
+    ModifiedNewton,
+    /// The elastic stiffness, factorised once a phase.
+    InitialStress,
+    /// Consistent tangents of an earlier iteration, renewed where there is no progress; the
+    /// corrections are accelerated by what the last ones achieved.
+    QuasiNewton,
+}
+
+impl Method {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Newton => "newton",
+            Self::ModifiedNewton => "modified_newton",
+            Self::InitialStress => "initial_stress",
+            Self::QuasiNewton => "quasi_newton",
+        }
+    }
+
+    /// Whether iterations fall back on consistent tangents wherever others do worse.
+    pub fn is_newton(self) -> bool {
+        matches!(self, Self::Auto | Self::Newton)
+    }
+
+    /// Iterations that are allowed by default: the slower the method, the more.
+    pub fn max_iterations(self) -> usize {
+        match self {
+            Self::Auto | Self::Newton => 25,
+            Self::ModifiedNewton => 200,
+            Self::InitialStress => 1000,
+            Self::QuasiNewton => 100,
+        }
+    }
+}
+
+/// What leads from one equilibrium to the next.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Control {
+    /// The load factor, increment by increment.
+    #[default]
+    Load,
+    /// The load factor; where it leads no further, the arc length of the path of equilibrium, on
+    /// which the load may fall and rise again.
+    ArcLength,
+}
+
+/// How the equations of a phase are set up.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Equations {
+    /// Condensed where that is expected to be faster.
+    #[default]
+    Auto,
+    /// Linear groups are factorised once a phase and condensed onto what they share with the others.
+    Condensed,
+    /// All groups are assembled and factorised at every iteration.
+    Sparse,
+}
+
+/// A tolerance: not below what double precision reaches, and not above the quantity itself.
+fn tolerance<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
+    within(f64::deserialize(input)?, 1e-14, 1.0)
+}
+
+fn iterations<'de, D: Deserializer<'de>>(input: D) -> Result<Option<usize>, D::Error> {
+    within(usize::deserialize(input)?, 1, 10_000).map(Some)
+}
+
+/// A step halved more often than this hardly moves the load factor in double precision.
+fn halvings<'de, D: Deserializer<'de>>(input: D) -> Result<u32, D::Error> {
+    within(u32::deserialize(input)?, 0, 40)
+}
+
+fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {
+    if value >= least && value <= most {
+        return Ok(value);
+    }
+    Err(E::custom(format!(
+        "{value:?} is outside [{least:?}, {most:?}]"
+    )))
+}

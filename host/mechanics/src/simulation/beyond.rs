@@ -1,0 +1,150 @@
+//! Results beyond what the theory of small strains, or any material, covers. They are computed all
+//! the same, and said.
+
+use crate::problem::{Analysis, Formulation};
+use crate::element::depth;
+use crate::group::Group;
+use crate::mesh::Mesh;
+use crate::problem::plausible::{LARGE, implausible_stiffness};
+use std::collections::HashSet;
+
+/// Share of the bodies' area that may be strained more than that: at a corner such as a pile's toe
+/// strains grow without bound as elements shrink, over an area that vanishes.
+const SHARE: f64 = 0.01;
+
+/// The worst of a run so far.
+#[derive(Debug, Default)]
+pub(super) struct Beyond {
+    /// Share of the bodies' area with large strains, and the largest strain, with group and place.
+    strained: Option<(f64, f64, String, [f64; 2])>,
+    /// Largest displacement, and the longer side of the mesh.
+    moved: Option<[f64; 2]>,
+    /// Largest jump by the length of its interface, with both and the group.
+    slipped: Option<(f64, [f64; 2], String)>,
+    /// Laws whose stiffness has been looked at.
+    known: HashSet<String>,
+    /// What is to be said of them.
+    stiffness: Vec<String>,
+}
+
+impl Beyond {
+    /// Looks at a state of equilibrium.
+    pub(super) fn look(
+        &mut self,
+        mesh: &Mesh,
+        analysis: Analysis,
+        groups: &[Group],
+        displacement: &[f64],
+    ) {
+        self.strains(analysis, groups);
+        self.displacements(mesh, displacement);
+        for group in groups {
+            if group.formulation != Formulation::Solid {
+                self.jumps(analysis, group);
+            } else if self.known.insert(group.law.name.clone()) {
+                // Linear laws that are there from the start were looked at before it.
+                self.stiffness.extend(implausible_stiffness(group));
+            }
+        }
+    }
+
+    /// Laws that are not to be spoken of again.
+    pub(super) fn knows(&mut self, groups: &[Group]) {
+        let linear = groups.iter().filter(|group| group.is_linear());
+        self.known
+            .extend(linear.map(|group| group.law.name.clone()));
+    }
+
+    fn strains(&mut self, analysis: Analysis, groups: &[Group]) {
+        let (mut area, mut strained) = (0.0, 0.0);
+        let mut largest = (0.0, "", [0.0; 2]);
+        for group in groups
+            .iter()
+            .filter(|g| g.formulation == Formulation::Solid)
+        {
+            let strains = group.strain.committed.chunks_exact(4);
+            for (point, e) in strains.enumerate() {
+                let position = group.kinematics.position(point);
+                let own = group.kinematics.weight(point) / depth(analysis, position[0]);
+                // The largest principal strain, whatever the axes.
+                let (mean, radius) = (
+                    f64::midpoint(e[0], e[1]),
+                    f64::hypot((e[0] - e[1]) / 2.0, e[3] / 2.0),
+                );
+                let strain = (mean.abs() + radius).max(e[2].abs());
+                area += own;
+                if strain > LARGE {
+                    strained += own;
+                }
+                if strain > largest.0 {
+                    largest = (strain, group.name.as_str(), position);
+                }
+            }
+        }
+        let (strain, group, position) = largest;
+        if strained > self.strained.as_ref().map_or(0.0, |worst| worst.0 * area) {
+            self.strained = Some((strained / area, strain, group.to_owned(), position));
+        }
+    }
+
+    fn displacements(&mut self, mesh: &Mesh, displacement: &[f64]) {
+        let side = mesh.longer_side();
+        let largest = displacement.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
+        if largest > LARGE * side && self.moved.is_none_or(|[worst, _]| largest > worst) {
+            self.moved = Some([largest, side]);
+        }
+    }
+
+    fn jumps(&mut self, analysis: Analysis, group: &Group) {
+        let (mut length, mut largest) = (0.0, 0.0_f64);
+        for point in 0..group.kinematics.n_points() {
+            let Some((jump, _)) = group.jump_and_traction(point) else {
+                return;
+            };
+            let [r, _] = group.kinematics.position(point);
+            let thickness = group.thickness(point).unwrap_or(1.0);
+            let around = depth(analysis, r);
+            if around > 0.0 {
+                length += group.kinematics.weight(point) / around / thickness;
+            }
+            largest = jump.iter().fold(largest, |m, j| m.max(j.abs()));
+        }
+        let ratio = largest / length;
+        if ratio > LARGE && self.slipped.as_ref().is_none_or(|worst| ratio > worst.0) {
+            self.slipped = Some((ratio, [largest, length], group.name.clone()));
+        }
+    }
+
+    /// All there is to say.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut bodies = Vec::new();
+        if let Some((share, strain, group, [x, y])) = &self.strained
+            && *share > SHARE
+        {
+            bodies.push(format!(
+                "{:.1} % of the bodies are strained by more than {LARGE}, group `{group}` at \
+                 ({x:.4}, {y:.4}) by {strain:.3}",
+                100.0 * share
+            ));
+        }
+        if let Some([largest, side]) = self.moved {
+            bodies.push(format!(
+                "a node moves by {largest:.4e} m, the model is {side:.4} m long"
+            ));
+        }
+        let mut warnings = self.stiffness.clone();
+        if !bodies.is_empty() {
+            warnings.push(format!(
+                "beyond the theory of small strains: {}",
+                bodies.join("; ")
+            ));
+        }
+        if let Some((_, [jump, length], group)) = &self.slipped {
+            warnings.push(format!(
+                "beyond the theory of small displacements: the two sides of group `{group}` move \
+                 against each other by {jump:.4e} m, it is {length:.4} m long"
+            ));
+        }
+        warnings
+    }
+}

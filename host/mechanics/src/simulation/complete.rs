@@ -1,0 +1,164 @@
+//! Taking over a step, and completing a state: what a linear domain left out of the iterations, the
+//! reactions, the balance of all forces.
+
+use super::phase::PhaseEquations;
+use super::{Part, Simulation, UnderWay, statics};
+use crate::assembly::fold;
+use crate::equilibrium::{LinearDomain, Loads, LookedAt, Reason, StepSuccess, norm};
+use std::time::Instant;
+
+impl Simulation {
+    /// Takes over a step: the groups that took part in it, and the displacements they know.
+    pub(super) fn accept(
+        &mut self,
+        success: &StepSuccess,
+        phase: &mut UnderWay,
+        lambda: f64,
+    ) {
+        let (equations, loads) = (&mut phase.equations, &phase.course.loads);
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            if equations.system.includes(number) {
+                group.commit();
+            }
+        }
+        let tolerance = self.problem.settings.force_tolerance.max(success.round_off);
+        equations.measured = Some((success.scales.clone(), tolerance));
+        if let Some(domain) = &mut equations.domain {
+            let boundary = equations.places.boundary.iter();
+            let moved: Vec<f64> = boundary.map(|&place| success.increment[place]).collect();
+            domain.follow(&moved);
+        }
+        let places = &equations.places;
+        places.add(&success.increment, &mut self.displacement);
+        let ends = loads.force_start.iter().zip(&loads.force_end);
+        for (force, (start, end)) in self.force.iter_mut().zip(ends) {
+            *force = start + lambda * (end - start);
+        }
+        if lambda >= 1.0 {
+            // Totals that were asked for are met exactly, whatever the increments added up to.
+            for &(dof, _, end) in &loads.prescribed {
+                self.displacement[dof] = end;
+            }
+        }
+    }
+
+    /// Completes the state at the phase's load factor: what a linear domain left out of the iterations, and
+    /// the reactions (internal less external forces, by degree of freedom). Where only a part is
+    /// `looked_at`, the rest of the domain may stay where it was.
+    ///
+    /// # Errors
+    /// Why the domain is not in equilibrium.
+    pub(super) fn complete(
+        &mut self,
+        phase: &mut UnderWay,
+        looked_at: Option<&Part>,
+    ) -> Result<(), Reason> {
+        let UnderWay {
+            equations,
+            course,
+            record,
+            ..
+        } = phase;
+        let (loads, lambda) = (&course.loads, course.lambda);
+        let started = Instant::now();
+        let mut reaction = vec![0.0; self.displacement.len()];
+        for (number, group) in self.groups.iter().enumerate() {
+            if equations.system.includes(number) {
+                let stress = &group.stress.committed;
+                group.kinematics.add_forces(stress, &mut reaction);
+            }
+        }
+        fold(&self.ties, &mut reaction);
+        // Where a part of a domain is looked at, the forces on its boundary stand for the rest.
+        let mut beside = None;
+        if let Some(domain) = &mut equations.domain {
+            let tolerance = self.problem.settings.force_tolerance;
+            let looked_at = looked_at.map(|part| LookedAt {
+                groups: &part.groups,
+                dofs: &part.dofs,
+            });
+            let (groups, displacement) = (&mut self.groups, &mut self.displacement);
+            let internal = domain
+                .bring_up(looked_at, groups, loads, lambda, displacement, tolerance)
+                .map_err(Reason::Domain)?;
+            beside = domain.forces_beside();
+            if beside.is_none() {
+                for (reaction, internal) in reaction.iter_mut().zip(&internal) {
+                    *reaction += internal;
+                }
+            }
+            self.check_balance(equations, loads, lambda, &reaction, beside.as_deref())?;
+            if beside.is_some() {
+                for (reaction, internal) in reaction.iter_mut().zip(&internal) {
+                    *reaction += internal;
+                }
+            }
+        } else {
+            self.check_balance(equations, loads, lambda, &reaction, beside.as_deref())?;
+        }
+        equations.system.follow(&mut self.displacement);
+        for (force, external) in reaction.iter_mut().zip(&self.force) {
+            *force -= external;
+        }
+        record.costs.laws += started.elapsed();
+        self.reaction = reaction;
+        Ok(())
+    }
+
+    /// Holds reactions against loads, by the internal forces of the groups that were evaluated and
+    /// those that the domain `beside` them takes.
+    ///
+    /// # Errors
+    /// What does not balance.
+    fn check_balance(
+        &self,
+        equations: &PhaseEquations,
+        loads: &Loads,
+        lambda: f64,
+        internal: &[f64],
+        beside: Option<&[(usize, f64)]>,
+    ) -> Result<(), Reason> {
+        let Some((scales, tolerance)) = &equations.measured else {
+            return Ok(());
+        };
+        let mut external = loads.external(lambda);
+        for &(dof, force) in beside.unwrap_or_default() {
+            external[dof] -= force;
+        }
+        let mut is_free = vec![false; external.len()];
+        let of_domain = equations.domain.iter().filter(|_| beside.is_none());
+        let of_domain = of_domain.flat_map(LinearDomain::unknowns);
+        for &dof in equations.system.free().iter().chain(of_domain) {
+            is_free[dof] = true;
+        }
+        let supports = || {
+            let prescribed = self.prescribed.keys();
+            prescribed.map(|&dof| (dof, internal[dof]))
+        };
+        let unknowns = || {
+            let numbered = is_free.iter().enumerate().filter(|(_, is_free)| **is_free);
+            numbered.map(|(dof, _)| (dof, external[dof]))
+        };
+        // Supports may be those of several bodies: they are added up together.
+        let bound = statics::Bound {
+            scale: scales.iter().copied().fold(0.0, f64::hypot),
+            tolerance: *tolerance,
+            with_domain: equations.domain.is_some() && beside.is_none(),
+            last_bit: equations
+                .domain
+                .iter()
+                .filter(|_| beside.is_none())
+                .map(|domain| domain.stiffest * norm(&self.displacement))
+                .sum(),
+        };
+        let model = statics::Model {
+            analysis: self.problem.analysis,
+            nodes: &self.problem.mesh.nodes,
+            turns_freely: self.turns_freely,
+        };
+        match statics::complaint(model, supports(), unknowns(), bound) {
+            None => Ok(()),
+            Some(imbalance) => Err(Reason::Unbalanced(imbalance)),
+        }
+    }
+}

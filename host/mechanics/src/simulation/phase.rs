@@ -1,0 +1,401 @@
+//! A phase: its equations, its loads, and what is out of balance as it begins.
+
+use super::{Simulation, UnderWay, Warning, Watch, PhaseRecord, method};
+use super::history::History;
+use super::state::PhaseCourse;
+use crate::assembly::{Bodies, Places, System, fold};
+use crate::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
+use crate::error::Error;
+use crate::group::Group;
+use crate::model::unit_pressure;
+use crate::problem::Axis;
+use crate::settings::Equations;
+use algebra::{LinearSolver, Singular, mesh_lines};
+
+/// The equations of one phase.
+#[derive(Debug)]
+pub(super) struct PhaseEquations {
+    /// Unknowns of the groups that iterate.
+    pub(super) system: System,
+    pub(super) places: Places,
+    /// The groups that do not.
+    pub(super) domain: Option<LinearDomain>,
+    pub(super) solver: LinearSolver,
+    /// What the solver holds factorised.
+    pub(super) matrix: Matrix,
+    /// What the residual of the last step was measured against, by body, and its tolerance; nothing
+    /// before the first step.
+    pub(super) measured: Option<(Vec<f64>, f64)>,
+    /// Forces out of balance at the start, relative to the forces in play.
+    out_of_balance: f64,
+    n_unknowns: usize,
+    /// Factorisations and fallbacks in the phase that the solver does not count, modulo 2⁶⁴.
+    counted: [u64; 2],
+}
+
+impl PhaseEquations {
+    fn n(&self) -> usize {
+        self.n_unknowns
+    }
+
+    /// Factorisations and fallbacks since the equations were set up.
+    fn counts(&self) -> [u64; 2] {
+        let domain = self.domain.as_ref().is_some_and(|domain| domain.factorised);
+        let factorisations = self.solver.factorisations + u64::from(domain);
+        [factorisations, self.solver.fallbacks]
+    }
+
+    /// The record of the phase with all that has been counted.
+    pub(super) fn counted_in(&self, record: &PhaseRecord) -> PhaseRecord {
+        let [factorisations, fallbacks] = self.counts();
+        PhaseRecord {
+            factorisations: self.counted[0].wrapping_add(factorisations),
+            fallbacks: self.counted[1].wrapping_add(fallbacks),
+            ..record.clone()
+        }
+    }
+}
+
+impl Simulation {
+    /// Begins the next phase: its laws, its loads, its equations.
+    pub(super) fn begin_phase(&mut self, watch: &mut dyn Watch) -> Result<(), Error> {
+        let number = self.done;
+        let input = &self.problem.phases[number];
+        let (name, increments) = (input.name.clone(), input.increments);
+        watch.phase(&name, increments);
+        let loads = self.start(number, watch)?;
+        let (equations, loads) = self.equations_of(number, loads, None)?;
+        let imbalance = equations.out_of_balance;
+        if imbalance > 1e-6 {
+            watch.warning(&Warning::OutOfBalance(name.clone(), imbalance));
+        }
+        let record = PhaseRecord {
+            method: self.settings().method,
+            ..PhaseRecord::new(&name, equations.n(), imbalance)
+        };
+        let course = PhaseCourse {
+            loads,
+            increment: 0,
+            lambda: 0.0,
+            step: 1.0 / increments as f64,
+            history: History::default(),
+            domain: None,
+            has_matrix: false,
+            largest: 0.0,
+            record,
+        };
+        self.enter(number, equations, course, watch);
+        Ok(())
+    }
+
+    /// Takes up a phase where it stands.
+    pub(super) fn resume_phase(&mut self, number: usize, course: PhaseCourse) -> Result<(), Error> {
+        let loads = course.loads.clone();
+        let (equations, _) = self.equations_of(number, loads, Some(&course))?;
+        self.enter(number, equations, course, &mut ());
+        Ok(())
+    }
+
+    fn enter(
+        &mut self,
+        number: usize,
+        equations: PhaseEquations,
+        course: PhaseCourse,
+        watch: &mut dyn Watch,
+    ) {
+        if let Some(other) = method::other(self.problem.settings.method, &self.groups) {
+            watch.warning(&other);
+        }
+        self.done = number;
+        self.under_way = Some(UnderWay {
+            number,
+            equations,
+            record: course.record.clone(),
+            course,
+        });
+    }
+
+    /// Ends a phase, be it as it may.
+    pub(super) fn end_phase(&mut self, phase: UnderWay, watch: &mut dyn Watch) {
+        for group in &self.groups {
+            for note in group.law.built.law.take_notes() {
+                watch.warning(&Warning::Note(note));
+            }
+        }
+        let UnderWay {
+            number,
+            equations,
+            record,
+            ..
+        } = phase;
+        let of_domain = equations
+            .domain
+            .as_ref()
+            .map_or(0.0, |d| d.standing().round_off);
+        let left = of_domain.max(record.round_off);
+        if left > 0.0 {
+            watch.warning(&Warning::RoundOff {
+                phase: record.name.clone(),
+                tolerance: self.problem.settings.force_tolerance,
+                left,
+            });
+        }
+        self.time += 1.0;
+        self.done = number + 1;
+        let (mesh, analysis) = (&self.problem.mesh, self.problem.analysis);
+        self.beyond
+            .look(mesh, analysis, &self.groups, &self.displacement);
+        watch.phase_ends(equations.counted_in(&record));
+    }
+
+    fn equations_of(
+        &mut self,
+        number: usize,
+        loads: Loads,
+        course: Option<&PhaseCourse>,
+    ) -> Result<(PhaseEquations, Loads), Error> {
+        let n_dofs = self.displacement.len();
+        let is_prescribed = (0..n_dofs).map(|dof| self.prescribed.contains_key(&dof));
+        let is_prescribed: Vec<bool> = is_prescribed.collect();
+        self.equations(number, &is_prescribed, loads, course)
+            .map_err(|Singular| Error::Singular {
+                phase: self.problem.phases[number].name.clone(),
+            })
+    }
+
+    /// Degrees of freedom of a line's nodes.
+    pub(super) fn dofs(&self, line: &str, components: &[Axis]) -> Vec<usize> {
+        let nodes = self
+            .problem
+            .mesh
+            .lines
+            .get(line)
+            .map_or(&[][..], |line| &line.nodes);
+        let offset = |axis: &Axis| usize::from(*axis == Axis::Y);
+        nodes
+            .iter()
+            .flat_map(|&n| components.iter().map(move |c| 2 * n + offset(c)))
+            .collect()
+    }
+
+    /// Loads of a phase; takes over its changes of constraints.
+    pub(super) fn loads(&mut self, number: usize) -> Loads {
+        let phase = self.problem.phases[number].clone();
+        if phase.reset_displacements {
+            self.displacement.fill(0.0);
+            self.prescribed.values_mut().for_each(|value| *value = 0.0);
+        }
+        for input in &phase.free {
+            for dof in self.dofs(&input.line, &input.components) {
+                self.prescribed.remove(&dof);
+            }
+        }
+        for input in &phase.displacement {
+            for (value, axis) in [(input.x, Axis::X), (input.y, Axis::Y)] {
+                if let Some(value) = value {
+                    for dof in self.dofs(&input.line, &[axis]) {
+                        self.prescribed.insert(dof, value);
+                    }
+                }
+            }
+        }
+        let force_start = self.force.clone();
+        for input in &phase.pressure {
+            self.pressure
+                .insert(input.line.clone(), input.value);
+        }
+        let mut force_end = vec![0.0; self.displacement.len()];
+        for (line, value) in &self.pressure {
+            if let Some(line) = self.problem.mesh.lines.get(line) {
+                let unit = unit_pressure(self.problem.analysis, &self.problem.mesh, &line.edges);
+                force_end
+                    .iter_mut()
+                    .zip(unit)
+                    .for_each(|(force, unit)| *force += value * unit);
+            }
+        }
+        Loads {
+            force_start,
+            force_end,
+            prescribed: self
+                .prescribed
+                .iter()
+                .map(|(&dof, &end)| (dof, self.displacement[dof], end))
+                .collect(),
+            out_of_balance: Vec::new(),
+            scale: 0.0,
+            largest: Vec::new(),
+        }
+    }
+
+    /// The equations of a phase, at its start or where it stands; the loads with what is out of
+    /// balance at its start.
+    fn equations(
+        &mut self,
+        number: usize,
+        is_prescribed: &[bool],
+        mut loads: Loads,
+        course: Option<&PhaseCourse>,
+    ) -> Result<(PhaseEquations, Loads), Singular> {
+        let (groups, ties) = (&self.groups, &self.ties);
+        let lines = mesh_lines(&self.problem.mesh.nodes);
+        self.reuse.is_last_phase = number + 1 == self.problem.phases.len();
+        let wanted = self.problem.settings.equations;
+        let condensed = if wanted == Equations::Sparse {
+            None
+        } else {
+            // Groups that are held by the others alone cannot be condensed.
+            let always = wanted == Equations::Condensed;
+            let reuse = Some(&mut self.reuse);
+            LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
+        };
+        self.reuse.forget();
+        let (system, mut domain) = match condensed {
+            Some((domain, system)) => (system, Some(domain)),
+            None => (
+                System::new(groups, |_| true, is_prescribed, ties, None),
+                None,
+            ),
+        };
+        let all_symmetric = groups
+            .iter()
+            .all(|group| group.is_linear() && group.is_symmetric());
+        let symmetric = domain.is_none() && all_symmetric;
+        let own_lines = system.lines(&lines);
+        let own_lines = Some(own_lines.as_slice());
+        let solver = match &domain {
+            Some(domain) => {
+                LinearSolver::with_block(&system.pattern, own_lines, domain.block(&system))?
+            }
+            None => LinearSolver::new(&system.pattern, symmetric, own_lines)?,
+        };
+        self.reuse
+            .announce(solver.bytes(), "factorising the equations");
+        let mut unknowns = system.free().to_vec();
+        unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
+        unknowns.sort_unstable();
+        unknowns.dedup();
+        let out_of_balance = match course {
+            Some(course) => course.record.out_of_balance,
+            None => self.out_of_balance(&unknowns, &mut loads),
+        };
+        let standing = course.and_then(|course| course.domain.as_ref());
+        if let Some(domain) = &mut domain {
+            match standing {
+                Some(standing) => domain.restart(&self.groups, &loads, standing),
+                None => domain.start(&self.groups, &loads, &self.displacement),
+            }
+        }
+        let bodies = Bodies::new(
+            &self.groups,
+            &self.ties,
+            &self.problem.mesh.nodes,
+            is_prescribed,
+        );
+        let mut equations = PhaseEquations {
+            places: Places::new(&system, is_prescribed).of(&bodies, &system),
+            system,
+            domain,
+            solver,
+            matrix: Matrix::resumed(course.map_or(0.0, |course| course.largest)),
+            measured: None,
+            out_of_balance,
+            n_unknowns: unknowns.len(),
+            counted: [0; 2],
+        };
+        if let Some(course) = course {
+            if course.has_matrix {
+                let settings = self.settings();
+                let restored = Newton::new(
+                    (&equations.system, &equations.places),
+                    equations.domain.as_ref(),
+                    (&mut equations.solver, &mut equations.matrix),
+                    &mut self.groups,
+                    &settings,
+                    &mut Costs::default(),
+                )
+                .restore_matrix();
+                restored.map_err(|_| Singular)?;
+            }
+            // What was counted before counts on, without what it took to get here again.
+            let [factorisations, fallbacks] = equations.counts();
+            equations.counted = [
+                course.record.factorisations.wrapping_sub(factorisations),
+                course.record.fallbacks.wrapping_sub(fallbacks),
+            ];
+        }
+        Ok((equations, loads))
+    }
+
+    /// Internal less external forces at the start of a phase where nothing holds them (after a
+    /// swap of laws, a support given up, an initial stress). Returns their size relative to the
+    /// forces in play.
+    fn out_of_balance(&mut self, unknowns: &[usize], loads: &mut Loads) -> f64 {
+        let n_dofs = self.displacement.len();
+        let mut internal = vec![0.0; n_dofs];
+        for group in &self.groups {
+            group
+                .kinematics
+                .add_forces(&group.stress.committed, &mut internal);
+        }
+        fold(&self.ties, &mut internal);
+        loads.out_of_balance = vec![0.0; n_dofs];
+        let (mut rest, mut against_end, mut play) = (0.0, 0.0, 0.0);
+        for &dof in unknowns {
+            let difference = internal[dof] - loads.force_start[dof];
+            loads.out_of_balance[dof] = difference;
+            rest += difference * difference;
+            against_end += (internal[dof] - loads.force_end[dof]).powi(2);
+        }
+        for (internal, external) in internal.iter().zip(&loads.force_start) {
+            play += f64::max(internal * internal, external * external);
+        }
+        // Where nothing is left of earlier forces, what remains of them is round-off.
+        let left_of = |earlier: f64| ROUND_OFF * earlier / self.problem.settings.force_tolerance;
+        let now = f64::sqrt(play);
+        loads.scale = now.max(left_of(self.largest_force));
+        let both = internal.iter().zip(&loads.force_start);
+        let now_by_dof = both.map(|(internal, external)| internal.abs().max(external.abs()));
+        let now_by_dof: Vec<f64> = now_by_dof.collect();
+        let earlier = now_by_dof.iter().zip(&self.largest_forces);
+        loads.largest = earlier
+            .map(|(now, &earlier)| now.max(left_of(earlier)))
+            .collect();
+        self.largest_force = self.largest_force.max(now);
+        for (largest, now) in self.largest_forces.iter_mut().zip(now_by_dof) {
+            *largest = largest.max(now);
+        }
+        // An initial stress that the loads of its own phase balance is in balance.
+        let rest = rest.min(against_end);
+        if play > 0.0 {
+            f64::sqrt(rest) / self.largest_force
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Whether a rotation of all nodes about one of them is no strain in a group's elements.
+pub(super) fn turns_freely(group: &Group, nodes: &[[f64; 2]]) -> bool {
+    let Some(&[x, y]) = nodes.first() else {
+        return true;
+    };
+    let gradients = |turn: [f64; 4]| {
+        let moved = |node: &[f64; 2]| {
+            let (x, y) = (node[0] - x, node[1] - y);
+            [turn[0] * x + turn[1] * y, turn[2] * x + turn[3] * y]
+        };
+        let displacement: Vec<f64> = nodes.iter().flat_map(moved).collect();
+        let mut strains = vec![0.0; group.strain.committed.len()];
+        group.kinematics.add_gradients(&displacement, &mut strains);
+        strains
+            .iter()
+            .fold(0.0, |largest: f64, e| largest.max(e.abs()))
+    };
+    // A shear of the same displacements for comparison.
+    let (turned, sheared) = (
+        gradients([0.0, -1.0, 1.0, 0.0]),
+        gradients([0.0, 1.0, 1.0, 0.0]),
+    );
+    turned <= 1e-6 * sheared.max(1.0)
+}

@@ -1,0 +1,50 @@
+//! What a phase took.
+
+use crate::equilibrium::Costs;
+use crate::settings::Method;
+use serde::{Deserialize, Serialize};
+
+/// A phase, for the record.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct PhaseRecord {
+    /// Name.
+    pub name: String,
+    /// Which matrix the iterations used.
+    pub method: Method,
+    /// Unknowns.
+    pub equations: usize,
+    /// Forces out of balance at its start, relative to the forces in play.
+    pub out_of_balance: f64,
+    /// Increments that reached equilibrium.
+    pub increments: usize,
+    /// Iterations of these, failed attempts included.
+    pub iterations: usize,
+    /// Steps repeated with a smaller length.
+    pub cut_backs: usize,
+    /// Steps with results that a law calls inaccurate.
+    pub unreliable: usize,
+    /// Steps that viscous relaxation led to equilibrium.
+    pub relaxed: usize,
+    /// Largest relative residual that was taken for round-off in the steps' iterations.
+    pub round_off: f64,
+    /// Steps along the path of equilibrium under arc-length control.
+    pub arc_length: usize,
+    /// Matrices factorised.
+    pub factorisations: u64,
+    /// How many of them needed full row exchanges.
+    pub fallbacks: u64,
+    /// Costs by part.
+    pub costs: Costs,
+}
+
+impl PhaseRecord {
+    /// A phase that begins.
+    pub fn new(name: &str, equations: usize, out_of_balance: f64) -> Self {
+        Self {
+            name: name.to_owned(),
+            equations,
+            out_of_balance,
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! All that a simulation needs to go on from a whole increment as if it had never stopped.
+
+use super::{History, PhaseRecord, Simulation};
+use crate::equilibrium::{Loads, Standing};
+use crate::error::Error;
+use crate::group::{Group, GroupState};
+use crate::problem::Material;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+/// State of a simulation after a whole increment. Copies are independent of each other.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct State<'s> {
+    /// Number of the phase, from 0.
+    pub phase: usize,
+    groups: Vec<GroupState<'s>>,
+    displacement: Cow<'s, [f64]>,
+    prescribed: Cow<'s, BTreeMap<usize, f64>>,
+    pressure: Cow<'s, BTreeMap<String, f64>>,
+    force: Cow<'s, [f64]>,
+    /// Pseudo-time at the start of the phase.
+    time: f64,
+    largest_force: f64,
+    course: Cow<'s, PhaseCourse>,
+}
+
+/// Where a phase stands.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct PhaseCourse {
+    /// Loads of the phase.
+    pub(super) loads: Loads,
+    /// Whole increments done.
+    pub(super) increment: usize,
+    /// Load factor reached.
+    pub(super) lambda: f64,
+    /// Length of the next step.
+    pub(super) step: f64,
+    /// The last steps.
+    pub(super) history: History,
+    /// Where the linear domain stands.
+    pub(super) domain: Option<Standing>,
+    /// A matrix of the groups' tangents is in use.
+    pub(super) has_matrix: bool,
+    /// Largest entry of the last matrix, whether it is in use or not.
+    pub(super) largest: f64,
+    /// The phase so far.
+    pub(super) record: PhaseRecord,
+}
+
+impl State<'_> {
+    /// Whole increments of the phase that are done.
+    pub fn increment(&self) -> usize {
+        self.course.increment
+    }
+
+    /// A copy that borrows nothing from the simulation.
+    pub fn into_owned(self) -> State<'static> {
+        State {
+            phase: self.phase,
+            groups: self
+                .groups
+                .into_iter()
+                .map(GroupState::into_owned)
+                .collect(),
+            displacement: Cow::Owned(self.displacement.into_owned()),
+            prescribed: Cow::Owned(self.prescribed.into_owned()),
+            pressure: Cow::Owned(self.pressure.into_owned()),
+            force: Cow::Owned(self.force.into_owned()),
+            time: self.time,
+            largest_force: self.largest_force,
+            course: Cow::Owned(self.course.into_owned()),
+        }
+    }
+}
+
+impl Simulation {
+    /// The state after the last whole increment; `None` before the first one.
+    pub fn state(&mut self) -> Option<State<'static>> {
+        self.note_course();
+        let state = self.borrowed_state().map(State::into_owned);
+        self.forget_course();
+        state
+    }
+
+    /// Completes what the course of the phase says of its equations.
+    pub(super) fn note_course(&mut self) {
+        let method = self.settings().method;
+        if let Some(phase) = &mut self.under_way {
+            let (equations, course) = (&phase.equations, &mut phase.course);
+            course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
+            course.has_matrix = equations.matrix.is_kept(method);
+            course.largest = equations.matrix.largest();
+            course.record = equations.counted_in(&phase.record);
+        }
+    }
+
+    /// Gives up the copy that [`Self::note_course`] made.
+    pub(super) fn forget_course(&mut self) {
+        if let Some(phase) = &mut self.under_way {
+            phase.course.domain = None;
+        }
+    }
+
+    /// The state, after [`Self::note_course`].
+    pub(super) fn borrowed_state(&self) -> Option<State<'_>> {
+        let phase = self.under_way.as_ref().filter(|p| p.course.increment > 0)?;
+        let has_matrix = phase.course.has_matrix;
+        Some(State {
+            phase: phase.number,
+            groups: self.groups.iter().map(|g| g.state(has_matrix)).collect(),
+            displacement: (&self.displacement).into(),
+            prescribed: Cow::Borrowed(&self.prescribed),
+            pressure: Cow::Borrowed(&self.pressure),
+            force: (&self.force).into(),
+            time: self.time,
+            largest_force: self.largest_force,
+            course: Cow::Borrowed(&phase.course),
+        })
+    }
+
+    /// Goes back, or on, to a state of a simulation of the same problem.
+    ///
+    /// # Errors
+    /// [`Error::OtherState`] if it is of another problem; [`Error::Singular`].
+    pub fn go_to(&mut self, state: State<'_>) -> Result<(), Error> {
+        let n_dofs = self.displacement.len();
+        let course = &state.course;
+        let sizes = [
+            &state.displacement[..],
+            &state.force,
+            &course.loads.force_start,
+        ];
+        let is_other = state.phase >= self.problem.phases.len()
+            || state.groups.len() != self.groups.len()
+            || sizes.iter().any(|v| v.len() != n_dofs);
+        if is_other {
+            let message = "the checkpoint is not that of this mesh; run without --resume";
+            return Err(Error::OtherState(message.to_owned()));
+        }
+        self.under_way = None;
+        let groups = self.groups.iter_mut().zip(state.groups).enumerate();
+        for (number, (group, state)) in groups {
+            let swaps = self.swaps.iter().flatten();
+            let laws = swaps.filter(|(g, _)| *g == number);
+            let laws: Vec<Material> = laws.map(|(_, law)| law.clone()).collect();
+            let first = self.first_materials[number].clone();
+            let laws: Vec<Material> = laws.into_iter().chain([first]).collect();
+            group.restore(state, &laws).map_err(Error::OtherState)?;
+        }
+        self.displacement = state.displacement.into_owned();
+        self.prescribed = state.prescribed.into_owned();
+        self.pressure = state.pressure.into_owned();
+        self.force = state.force.into_owned();
+        self.time = state.time;
+        self.largest_force = state.largest_force;
+        self.largest_forces.clone_from(&state.course.loads.largest);
+        self.groups.iter_mut().for_each(Group::forget_trial);
+        self.resume_phase(state.phase, state.course.into_owned())
+    }
+}

@@ -1,0 +1,112 @@
+//! What a simulation should tell those who started it.
+
+use crate::error::Place;
+use crate::group::TakeOver;
+use crate::settings::Method;
+use std::fmt;
+
+/// Something that should be known of a simulation under way.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Warning {
+    /// What a law has to say beside its answers.
+    Note(String),
+    /// A phase starts out of balance, by this share of the forces in play.
+    OutOfBalance(String, f64),
+    /// Another method than was asked for iterates, since the tangents of a law are approximate.
+    OtherMethod {
+        /// The law.
+        law: String,
+        /// The method that iterates.
+        method: Method,
+        /// The one that was asked for.
+        asked: Method,
+    },
+    /// The tolerance of the residual is below round-off.
+    RoundOff {
+        /// The phase.
+        phase: String,
+        /// What was asked for.
+        tolerance: f64,
+        /// What is left.
+        left: f64,
+    },
+    /// Viscous relaxation led to the equilibrium of this increment.
+    Relaxed(Place),
+    /// A law changed the process, which was set right.
+    Restored(Place, String),
+    /// What a law, which starts in this phase, makes of the stresses it finds.
+    TookOver(String, TakeOver),
+    /// A law could not be asked that; this is what it says.
+    Unasked(String, String),
+    /// The path of equilibrium was followed, from one load factor, between two others.
+    FollowedPath {
+        /// The increment.
+        place: Place,
+        /// Load factor of the phase from which the load could not simply rise.
+        start: f64,
+        /// Lowest and highest load factor on the path.
+        between: [f64; 2],
+    },
+}
+
+impl Warning {
+    /// Whether it is enough to say this once, however often it comes.
+    pub fn is_said_once(&self) -> bool {
+        matches!(self, Self::OtherMethod { .. })
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Note(note) => write!(f, "{note}"),
+            Self::OutOfBalance(phase, share) => write!(
+                f,
+                "phase `{phase}` starts out of balance: {:.2} % of the forces in play, carried to \
+                 equilibrium in its course",
+                100.0 * share
+            ),
+            Self::OtherMethod { law, method, asked } => write!(
+                f,
+                "the tangents of law `{law}` are approximate: method `{}` stands for `{}`",
+                method.name(),
+                asked.name()
+            ),
+            Self::RoundOff {
+                phase,
+                tolerance,
+                left,
+            } => write!(
+                f,
+                "phase `{phase}`: `force_tolerance` {tolerance:.1e} is below round-off: a residual of \
+                 {left:.1e} is left, which is the last bit of the displacements"
+            ),
+            Self::Relaxed(place) => write!(
+                f,
+                "{place}: Newton iterations came to a standstill; viscous relaxation led to the next \
+                 equilibrium; others may lie near, and which one is found depends on the course of \
+                 the relaxation: run it with other increments, or in another unit of stress, and hold \
+                 the results against each other"
+            ),
+            Self::Restored(place, change) => write!(f, "{place}: {change}"),
+            Self::TookOver(phase, change) => write!(
+                f,
+                "phase `{phase}`: {change}, carried to equilibrium in the phase's course"
+            ),
+            Self::Unasked(phase, reason) => write!(
+                f,
+                "phase `{phase}`: {reason}\n  over a nil increment, so that what the law makes of the \
+                 stresses it finds comes in the first increment, unannounced"
+            ),
+            Self::FollowedPath {
+                place,
+                start,
+                between: [lowest, highest],
+            } => write!(
+                f,
+                "{place}: the load could not simply rise from {start:.4} of the phase; the path of \
+                 equilibrium was followed between {lowest:.4} and {highest:.4} (path.csv)"
+            ),
+        }
+    }
+}
