@@ -484,26 +484,6 @@ pub struct ProbeInput {
     pub combine: Option<Named<f64>>,
 }
 
-/// How values become one.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-pub enum Reduce {
-    /// Arithmetic mean.
-    Mean,
-    /// Mean weighted by what each integration point stands for: area, in axisymmetry of the whole
-    /// turn; of interfaces their own area.
-    Average,
-    /// The sum of values times what they stand for: over the area, in axisymmetry over the volume
-    /// of the whole turn; of interfaces over their own area.
-    Integral,
-    /// Smallest.
-    Min,
-    /// Largest.
-    Max,
-    /// Sum.
-    Sum,
-}
-
 /// Curves of probes over another probe, or of a stress over the integration points of a cut.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -568,40 +548,4 @@ fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: 
     Err(E::custom(format!(
         "{value:?} is outside [{least:?}, {most:?}]"
     )))
-}
-
-/// What is written.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct OutputInput {
-    /// When the profile along interfaces is written.
-    pub profile: When,
-    /// When all integration points are written.
-    pub points: When,
-    /// When fields for a viewer are written.
-    pub fields: When,
-}
-
-/// When something is written.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum When {
-    /// Never.
-    #[default]
-    Never,
-    /// After the last increment of each phase.
-    Phases,
-    /// After every increment.
-    Increments,
-}
-
-impl When {
-    /// Whether to write after increment `i` of `n`.
-    pub fn includes(self, i: usize, n: usize) -> bool {
-        match self {
-            Self::Never => false,
-            Self::Phases => i == n,
-            Self::Increments => true,
-        }
-    }
 }

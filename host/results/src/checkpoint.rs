@@ -4,22 +4,17 @@
 //! The file is written whole or not at all, and carries a checksum and the identity of its run:
 //! program, case and libraries. What the results files held at that moment is part of it.
 
-use crate::case::Case;
-use crate::error::{Error, Place};
-use crate::group::GroupState;
-use crate::model::Model;
-use crate::output::{PhaseRecord, ResultsState, begin, unwritable};
-use crate::plugin::{hexadecimal, hexadecimal_sha256};
-use crate::run::History;
-use crate::solver::{Loads, Standing};
+use crate::recorder::ResultsState;
+use law::{hexadecimal, hexadecimal_sha256};
+use mechanics::State;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
+use text::Error;
+use text::write::begin;
 
 /// Name of the file in a results folder.
 pub const FILE_NAME: &str = "checkpoint.bin";
@@ -27,7 +22,7 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of the file: the format.
 const NAME: &[u8] = b"pilum checkpoint ";
 /// The same with its version.
-const HEAD: &[u8] = b"pilum checkpoint 4\n";
+const HEAD: &[u8] = b"pilum checkpoint 5\n";
 
 /// Bytes that are summed and written at a time: they stay in the processor's cache.
 const PIECE: usize = 1 << 17;
@@ -41,53 +36,7 @@ pub struct Checkpoint<'c> {
     /// Warnings so far.
     pub warnings: Cow<'c, [String]>,
     /// The run; `None` if it has come to its end.
-    pub run: Option<RunState<'c>>,
-}
-
-/// State of a run.
-#[derive(Debug, Serialize, Deserialize)]
-pub struct RunState<'c> {
-    /// Number of the phase, from 0.
-    pub phase: usize,
-    /// Groups.
-    pub groups: Vec<GroupState<'c>>,
-    /// Displacements by degree of freedom.
-    pub displacement: Cow<'c, [f64]>,
-    /// Prescribed displacements by degree of freedom.
-    pub prescribed: Cow<'c, BTreeMap<usize, f64>>,
-    /// Pressures by line.
-    pub pressure: Cow<'c, BTreeMap<String, f64>>,
-    /// External forces by degree of freedom.
-    pub force: Cow<'c, [f64]>,
-    /// Pseudo-time at the start of the phase.
-    pub time: f64,
-    /// Largest of the forces (2-norms) at the start of any phase so far.
-    pub largest_force: f64,
-    /// Where the phase stands.
-    pub course: Cow<'c, PhaseCourse>,
-}
-
-/// Where a phase stands.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct PhaseCourse {
-    /// Loads of the phase.
-    pub loads: Loads,
-    /// Whole increments done.
-    pub increment: usize,
-    /// Load factor reached.
-    pub lambda: f64,
-    /// Length of the next step.
-    pub step: f64,
-    /// The last steps.
-    pub history: History,
-    /// Where the linear domain stands.
-    pub domain: Option<Standing>,
-    /// A matrix of the groups' tangents is in use.
-    pub has_matrix: bool,
-    /// Largest entry of the last matrix, whether it is in use or not.
-    pub largest: f64,
-    /// The phase so far.
-    pub record: PhaseRecord,
+    pub run: Option<State<'c>>,
 }
 
 impl<'c> Checkpoint<'c> {
@@ -96,7 +45,7 @@ impl<'c> Checkpoint<'c> {
         identity: &'c str,
         results: ResultsState,
         warnings: &'c [String],
-        run: Option<RunState<'c>>,
+        run: Option<State<'c>>,
     ) -> Self {
         Self {
             identity: identity.into(),
@@ -118,7 +67,7 @@ impl<'c> Checkpoint<'c> {
             .and_then(|()| std::fs::rename(&partial, &path))
             .map_err(|error| {
                 let _ = std::fs::remove_file(&partial);
-                unwritable(&path, error)
+                Error::unwritable(&path, error)
             })
     }
 
@@ -177,15 +126,6 @@ impl<'c> Checkpoint<'c> {
         }
         Ok(Some(checkpoint))
     }
-
-    /// The increment it was made after, for messages.
-    pub fn place(&self, case: &Case) -> Option<Place> {
-        let run = self.run.as_ref()?;
-        Some(Place {
-            phase: case.file.phases.get(run.phase)?.name.get_ref().clone(),
-            increment: run.course.increment,
-        })
-    }
 }
 
 /// A file with the checksum of what is written into it.
@@ -215,27 +155,6 @@ fn decode(bytes: &[u8]) -> Option<Checkpoint<'static>> {
     let (checksum, body) = rest.split_at_checked(64)?;
     (hexadecimal_sha256(body).as_bytes() == checksum).then_some(())?;
     postcard::from_bytes(body).ok()
-}
-
-/// What must be the same for a run to go on: the program, the case with its variant, the bytes of
-/// its libraries and of their sidecars, and the parameters.
-pub fn identity(case: &Case, model: &Model) -> String {
-    let mut text = format!("pilum {}\n", env!("CARGO_PKG_VERSION"));
-    text += case.variant.as_deref().unwrap_or_default();
-    text += "\n";
-    for ((name, hypothesis), built) in &model.laws {
-        let library = built.law.library();
-        let (sha256, sidecar) = (library.sha256(), library.sidecar_sha256());
-        // What a sidecar says of a library is not part of its bytes.
-        let sidecar = sidecar.unwrap_or_default();
-        let _ = writeln!(text, "{name} {hypothesis} {sha256} {sidecar}");
-        for parameter in &built.parameters {
-            let _ = writeln!(text, "{} {:x}", parameter.id, parameter.value.to_bits());
-        }
-    }
-    let _ = writeln!(text, "{:?}", case.file.chosen);
-    text += case.source.text();
-    hexadecimal_sha256(text.as_bytes())
 }
 
 #[cfg(test)]

@@ -3,69 +3,35 @@
 //! is in its file. What an earlier run left in the folder is removed first, unless it is resumed:
 //! then the files go on from where its last checkpoint saw them.
 
-mod fields;
-mod figure;
-mod file;
-mod leftovers;
-mod points;
-mod profile;
-mod summary;
-
-pub(crate) use figure::COLOURS;
-pub use figure::{Figures, check_figures, check_table_figures};
-pub use file::refuse_other;
-pub(crate) use file::{Identity, check_own, identity};
-pub(crate) use file::{begin, is_same, replace};
-pub use summary::PhaseRecord;
-
-use crate::case::{Case, Control, OutputInput, When};
-use crate::error::{Error, Place};
-use crate::group::Group;
-use crate::mesh::Mesh;
-use crate::model::Model;
-use crate::probe::{Probes, Snapshot};
-use crate::solver::Iteration;
-use fields::{Fields, Written};
-use figure::Curve;
-use file::{Appended, Extent};
-use points::Points;
-use profile::Profile;
+use crate::fields::{self, Fields, Written};
+use crate::figure::{Curve, Figures};
+use crate::file::{self, Appended, Extent};
+use crate::leftovers;
+use crate::points::Points;
+use crate::probe::Probes;
+use crate::profile::Profile;
+use crate::summary::{About, Course, Ending, Stopped, Summary};
+use crate::table::number;
+use crate::wanted::{Output, Wanted, When};
+use mechanics::equilibrium::Iteration;
+use mechanics::group::Group;
+use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
+use mechanics::{Place, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use summary::{Course, Stopped, Summary};
-
-/// A number with 17 significant digits: reading it back gives the same bits.
-pub fn number(value: f64) -> String {
-    // The shortest digits that read back to the same bits, filled up: much faster than the first
-    // 17 digits of the exact value, which are no more exact.
-    let shortest = format!("{value:e}");
-    let (digits, exponent) = shortest.split_once('e').unwrap_or((&shortest, "0"));
-    let dot = if digits.contains('.') { "" } else { "." };
-    let length = 18 + usize::from(value.is_sign_negative());
-    let missing = length.saturating_sub(digits.len() + dot.len());
-    format!("{digits}{dot}{:0<missing$}e{exponent}", "")
-}
-
-/// An increment of a phase, for the record.
-#[derive(Clone, Debug, Default)]
-pub struct IncrementRecord {
-    /// Pseudo-time at its end.
-    pub time: f64,
-    /// Values of the probes.
-    pub probes: Vec<Option<f64>>,
-    /// Iterations, failed attempts included.
-    pub iterations: usize,
-    /// A law called a result inaccurate.
-    pub warning: Option<String>,
-}
+use text::Error;
+use text::write::replace;
 
 /// The results of a run, as they are written.
 #[derive(Debug)]
-pub struct Results {
+pub struct Recorder {
     folder: PathBuf,
-    settings: OutputInput,
+    settings: Output,
+    probes: Probes,
+    /// What the probes look at.
+    looked_at: simulation::Part,
     history: Table,
     path: Option<Table>,
     profile: Option<Profile>,
@@ -113,21 +79,21 @@ impl ResultsState {
     }
 
     /// The figures of the run.
-    pub fn figures(self, case: &Case, probes: &Probes) -> Figures {
-        let mut figures = empty_figures(case, probes);
+    pub fn figures(self, wanted: &Wanted) -> Figures {
+        let mut figures = empty_figures(wanted);
         figures.restore(self.curves);
         figures
     }
 }
 
-fn empty_figures(case: &Case, probes: &Probes) -> Figures {
-    let names = probes.names().map(str::to_owned).collect();
-    Figures::new(&case.file.title, &case.file.figures, names)
+fn empty_figures(wanted: &Wanted) -> Figures {
+    let names = wanted.probes.names().map(str::to_owned).collect();
+    Figures::new(&wanted.title, &wanted.figures, names)
 }
 
 /// A CSV file.
 #[derive(Debug)]
-struct Table {
+pub(crate) struct Table {
     file: Appended,
     /// Rows that are not in the file yet.
     rows: csv::Writer<Vec<u8>>,
@@ -135,7 +101,7 @@ struct Table {
 
 impl Table {
     /// Begins a file with a head; or, `from` what it held, goes on after that of an earlier run's.
-    fn begin<'a>(
+    pub(crate) fn begin<'a>(
         path: PathBuf,
         columns: impl IntoIterator<Item = &'a str>,
         from: Option<Extent>,
@@ -151,14 +117,14 @@ impl Table {
         Ok(table)
     }
 
-    fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(&mut self, cells: I) -> Result<(), Error> {
+    pub(crate) fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(&mut self, cells: I) -> Result<(), Error> {
         self.rows
             .write_record(cells)
-            .map_err(|error| unwritable(self.file.path(), std::io::Error::other(error)))
+            .map_err(|error| Error::unwritable(self.file.path(), std::io::Error::other(error)))
     }
 
     /// Writes the rows that are waiting, all of them or none.
-    fn flush(&mut self) -> Result<(), Error> {
+    pub(crate) fn flush(&mut self) -> Result<(), Error> {
         let rows = std::mem::replace(&mut self.rows, csv::Writer::from_writer(Vec::new()));
         let rows = rows
             .into_inner()
@@ -167,23 +133,17 @@ impl Table {
     }
 
     /// Waits until everything is on the disk.
-    fn sync(&self) -> Result<Extent, Error> {
+    pub(crate) fn sync(&self) -> Result<Extent, Error> {
         self.file.sync()
     }
 }
 
-pub(crate) fn unwritable(path: &Path, source: std::io::Error) -> Error {
-    Error::Unwritable {
-        path: path.to_owned(),
-        source,
-    }
-}
-
 /// Ids of the internal variables of all laws that these groups ever carry, each once.
-fn internal_variables(model: &Model, of: impl Fn(&Group) -> bool) -> Vec<String> {
-    let first = model.groups.iter().map(|group| (group, &group.law));
-    let swapped = model.swaps.iter().flatten();
-    let swapped = swapped.map(|(group, law)| (&model.groups[*group], law));
+pub(crate) fn internal_variables(simulation: &Simulation, of: impl Fn(&Group) -> bool) -> Vec<String> {
+    let groups = simulation.groups();
+    let first = groups.iter().map(|group| (group, &group.law));
+    let swapped = simulation.swaps().iter().flatten();
+    let swapped = swapped.map(|(group, law)| (&groups[*group], law));
     let mut ids: Vec<String> = Vec::new();
     for (_, law) in first.chain(swapped).filter(|(group, _)| of(group)) {
         for variable in &law.built.law.formulation().internal_variables {
@@ -205,21 +165,21 @@ impl LogFile {
     }
 }
 
-impl Results {
+impl Recorder {
     /// Creates the folder and its files, and removes those of an earlier run.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn create(
         folder: &Path,
-        case: &Case,
-        model: &Model,
-        probes: &Probes,
+        wanted: Wanted,
+        about: &About,
+        simulation: &Simulation,
     ) -> Result<Self, Error> {
-        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error))?;
+        std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
         let log = LogFile(Appended::begin_locked(folder.join("log.jsonl"), false)?);
         leftovers::remove(folder)?;
-        Self::begin(folder, case, model, probes, log, None)
+        Self::begin(folder, wanted, about, simulation, log, None)
     }
 
     /// Takes over the results that an interrupted run of the same case left in the folder, as
@@ -229,27 +189,28 @@ impl Results {
     /// [`Error::Unwritable`].
     pub fn resume(
         folder: &Path,
-        case: &Case,
-        model: &Model,
-        probes: &Probes,
+        wanted: Wanted,
+        about: &About,
+        simulation: &Simulation,
         state: ResultsState,
     ) -> Result<Self, Error> {
         let log = Appended::begin_locked(folder.join("log.jsonl"), true)?;
         // Nothing is cut to its length before all are known to be good.
         state.check(folder)?;
         let log = LogFile(log.go_on(state.log)?);
-        Self::begin(folder, case, model, probes, log, Some(state))
+        Self::begin(folder, wanted, about, simulation, log, Some(state))
     }
 
     fn begin(
         folder: &Path,
-        case: &Case,
-        model: &Model,
-        probes: &Probes,
+        wanted: Wanted,
+        about: &About,
+        simulation: &Simulation,
         log: LogFile,
         state: Option<ResultsState>,
     ) -> Result<Self, Error> {
-        let settings = case.file.output;
+        let settings = wanted.output;
+        let probes = &wanted.probes;
         let columns = ["phase", "increment", "time"]
             .into_iter()
             .chain(probes.names())
@@ -261,21 +222,27 @@ impl Results {
             .chain(probes.names())
             .chain(["iterations"]);
         let path_from = at.and_then(|state| state.path);
-        let follows = case.file.solver.control == Control::ArcLength;
-        let path = follows
+        let path = wanted
+            .follows_path
             .then(|| Table::begin(folder.join("path.csv"), path_columns, path_from))
             .transpose()?;
+        let from = at.and_then(|state| state.profile);
+        let profile = Profile::begin(folder, settings.profile, simulation, from)?;
+        let from = at.and_then(|state| state.points);
+        let points = Points::begin(folder, settings.points, simulation, from)?;
         let mut results = Self {
             history: Table::begin(folder.join("history.csv"), columns, history_from)?,
             path,
-            profile: Profile::begin(folder, settings.profile, model, at.and_then(|s| s.profile))?,
-            points: Points::begin(folder, settings.points, model, at.and_then(|s| s.points))?,
-            fields: Fields::create(folder, settings.fields, model),
+            profile,
+            points,
+            fields: Fields::create(folder, settings.fields),
             log,
-            summary: Summary::new(case, model, probes),
-            figures: empty_figures(case, probes),
+            summary: Summary::new(about, &wanted, simulation),
+            figures: empty_figures(&wanted),
             folder: folder.to_owned(),
             settings,
+            looked_at: probes.looks_at(simulation.groups()),
+            probes: wanted.probes,
             seconds: Duration::ZERO,
         };
         if let Some(state) = state {
@@ -287,8 +254,6 @@ impl Results {
             }
         }
         write_summary(folder, &results.summary.running())?;
-        #[cfg(unix)]
-        crate::memory::writes(Some(folder));
         Ok(results)
     }
 
@@ -360,15 +325,15 @@ impl Results {
         }))
     }
 
-    /// Groups that this increment's results look at, one of `of`, beside those that its probes
-    /// look at. `None`: all of them.
+    /// What the results look at in a state; `None`: all of it.
     pub fn looks_at(
         &self,
-        place: &Place,
-        of: usize,
-        probed: &[bool],
+        when: simulation::When<'_>,
         groups: &[Group],
-    ) -> Option<Vec<bool>> {
+    ) -> Option<simulation::Part> {
+        let simulation::When::Increment { place, of } = when else {
+            return Some(self.looked_at.clone());
+        };
         let asks = |when: When| when.includes(place.increment, of);
         let all = (self.fields.is_some() && asks(self.settings.fields))
             || (self.points.is_some() && asks(self.settings.points))
@@ -377,9 +342,9 @@ impl Results {
         if all {
             return None;
         }
-        let mut looked_at = probed.to_vec();
+        let mut looked_at = self.looked_at.clone();
         if self.profile.is_some() && asks(self.settings.profile) {
-            for (looked_at, group) in looked_at.iter_mut().zip(groups) {
+            for (looked_at, group) in looked_at.groups.iter_mut().zip(groups) {
                 *looked_at |= group.jump_and_traction(0).is_some();
             }
         }
@@ -389,14 +354,15 @@ impl Results {
     /// Writes a step of a run under arc-length control, in an increment that it leads to.
     ///
     /// # Errors
-    /// [`Error::Unwritable`].
+    /// [`Fault`].
     pub fn step(
         &mut self,
         place: &Place,
         load_factor: f64,
-        probes: &[Option<f64>],
         iterations: usize,
-    ) -> Result<(), Error> {
+        snapshot: &Snapshot<'_>,
+    ) -> Result<(), Fault> {
+        let probes = self.values(place, snapshot)?;
         let Some(path) = &mut self.path else {
             return Ok(());
         };
@@ -409,7 +375,23 @@ impl Results {
         row.extend(values.map(Option::unwrap_or_default));
         row.push(iterations.to_string());
         path.row(&row)?;
-        path.flush()
+        Ok(path.flush()?)
+    }
+
+    /// Values of the probes.
+    fn values(
+        &self,
+        place: &Place,
+        snapshot: &Snapshot<'_>,
+    ) -> Result<Vec<Option<f64>>, Fault> {
+        let values = self.probes.values(snapshot);
+        match self.probes.overflow(&values) {
+            None => Ok(values),
+            Some(probe) => Err(Fault::Overflow {
+                probe: probe.to_owned(),
+                place: place.clone(),
+            }),
+        }
     }
 
     /// Notes the last state of equilibrium of a phase that cannot go on, and writes its fields if
@@ -422,20 +404,18 @@ impl Results {
         place: &Place,
         load_factor: f64,
         time: f64,
-        probes: Vec<Option<f64>>,
         snapshot: &Snapshot<'_>,
-        mesh: &Mesh,
     ) -> Result<(), Error> {
         self.summary.course.stopped = Some(Stopped {
             phase: place.phase.clone(),
             load_factor,
             time,
-            probes,
+            probes: self.probes.values(snapshot),
         });
         if let Some(fields) = &mut self.fields
             && fields.last() != Some(time)
         {
-            fields.write(time, snapshot, mesh)?;
+            fields.write(time, snapshot)?;
         }
         Ok(())
     }
@@ -443,46 +423,43 @@ impl Results {
     /// Writes an increment that reached equilibrium.
     ///
     /// # Errors
-    /// [`Error::Unwritable`].
+    /// [`Fault`].
     pub fn increment(
         &mut self,
-        place: &Place,
-        of: usize,
-        record: &IncrementRecord,
+        increment: &Increment,
         snapshot: &Snapshot<'_>,
-        mesh: &Mesh,
-    ) -> Result<(), Error> {
+    ) -> Result<(), Fault> {
+        let Increment {
+            place, of, time, ..
+        } = increment;
+        let probes = self.values(place, snapshot)?;
         let start = Instant::now();
         let mut row = vec![
             place.phase.clone(),
             place.increment.to_string(),
-            number(record.time),
+            number(*time),
         ];
-        row.extend(
-            record
-                .probes
-                .iter()
-                .map(|value| value.map(number).unwrap_or_default()),
-        );
-        row.push(record.iterations.to_string());
+        let values = probes.iter().map(|value| value.map(number));
+        row.extend(values.map(Option::unwrap_or_default));
+        row.push(increment.iterations.to_string());
         self.history.row(&row)?;
         self.history.flush()?;
-        if self.settings.profile.includes(place.increment, of)
+        if self.settings.profile.includes(place.increment, *of)
             && let Some(profile) = &mut self.profile
         {
             profile.write(place, snapshot.groups)?;
         }
-        if self.settings.points.includes(place.increment, of)
+        if self.settings.points.includes(place.increment, *of)
             && let Some(points) = &mut self.points
         {
             points.write(place, snapshot.groups)?;
         }
-        if self.settings.fields.includes(place.increment, of)
+        if self.settings.fields.includes(place.increment, *of)
             && let Some(fields) = &mut self.fields
         {
-            fields.write(record.time, snapshot, mesh)?;
+            fields.write(*time, snapshot)?;
         }
-        if let Some(warning) = &record.warning {
+        if let Some(warning) = &increment.unreliable {
             self.log.line(&json!({
                 "event": "unreliable",
                 "phase": place.phase,
@@ -490,9 +467,9 @@ impl Results {
                 "reason": warning,
             }))?;
         }
-        self.summary.last_increment(place, record);
-        self.figures.increment(place, &record.probes);
-        self.figures.cuts(place, of, snapshot.groups);
+        self.figures.increment(place, &probes);
+        self.figures.cuts(place, *of, snapshot.groups);
+        self.summary.last_increment(increment, probes);
         self.seconds += start.elapsed();
         Ok(())
     }
@@ -527,20 +504,38 @@ impl Results {
         groups: &[Group],
         total: Duration,
         warnings: &[String],
-        error: Option<&Error>,
+        ending: &Ending,
     ) -> Result<(), Error> {
         let drawn = self.figures.draw(&self.folder);
         let summary = self
             .summary
-            .finish(groups, [total, self.seconds], warnings, error);
+            .finish(groups, [total, self.seconds], warnings, ending);
         let logged = self
             .log
             .line(&json!({ "event": "end", "status": summary["status"] }));
         // A log that takes no more must not leave a run that seems to go on.
         write_summary(&self.folder, &summary)?;
-        #[cfg(unix)]
-        crate::memory::writes(None);
         logged.and(drawn)
+    }
+}
+
+/// Why something that happened could not be written.
+#[derive(Debug)]
+pub enum Fault {
+    /// A file.
+    File(Error),
+    /// The value of a probe is too large for a number.
+    Overflow {
+        /// The probe.
+        probe: String,
+        /// Where.
+        place: Place,
+    },
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::File(error)
     }
 }
 
@@ -549,16 +544,13 @@ impl Results {
 ///
 /// # Errors
 /// [`Error::Unwritable`].
-pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
+pub fn remove_comparison(folder: &Path, figures: &[&str]) -> Result<(), Error> {
     if !folder.is_dir() {
         return Ok(());
     }
-    let is_figure = |stem: &str| {
-        let mut figures = case.file.figures.iter();
-        figures.any(|figure| figure.name.get_ref() == stem)
-    };
     leftovers::remove_if(folder, |name| {
-        name == "report.html" || name.strip_suffix(".svg").is_some_and(is_figure)
+        let figure = name.strip_suffix(".svg");
+        name == "report.html" || figure.is_some_and(|stem| figures.contains(&stem))
     })
 }
 
@@ -566,7 +558,7 @@ pub fn remove_comparison(folder: &Path, case: &Case) -> Result<(), Error> {
 ///
 /// # Errors
 /// [`Error::Unreadable`] or [`Error::Unwritable`].
-pub fn end_summary(folder: &Path, error: &Error) -> Result<bool, Error> {
+pub fn end_summary(folder: &Path, ending: &Ending) -> Result<bool, Error> {
     let path = folder.join("summary.json");
     if !path.is_file() {
         return Ok(false);
@@ -578,8 +570,8 @@ pub fn end_summary(folder: &Path, error: &Error) -> Result<bool, Error> {
     let Ok(Value::Object(mut summary)) = serde_json::from_str(&text) else {
         return Ok(false);
     };
-    summary.insert("status".to_owned(), summary::status(Some(error)).into());
-    summary.insert("error".to_owned(), error.to_string().into());
+    summary.insert("status".to_owned(), ending.status.into());
+    summary.insert("error".to_owned(), json!(ending.error));
     write_summary(folder, &summary.into())?;
     Ok(true)
 }
@@ -591,38 +583,5 @@ fn write_summary(folder: &Path, summary: &Value) -> Result<(), Error> {
     let text = serde_json::to_string_pretty(summary)
         .map_err(|error| Error::Internal(error.to_string()))?;
     replace(&partial, text + "\n")?;
-    std::fs::rename(&partial, &path).map_err(|error| unwritable(&path, error))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_17_digits_and_read_back() {
-        let values = [
-            0.0,
-            -0.0,
-            1.0,
-            -1.0,
-            0.1,
-            -2.5e-7,
-            1.0 / 3.0,
-            f64::MAX,
-            f64::MIN_POSITIVE,
-            5e-324,
-            -1e22,
-        ];
-        for value in values {
-            let text = number(value);
-            let digits = text.split('e').next().unwrap();
-            assert_eq!(
-                digits.chars().filter(char::is_ascii_digit).count(),
-                17,
-                "{text}"
-            );
-            let back: f64 = text.parse().unwrap();
-            assert_eq!(back.to_bits(), value.to_bits(), "{text}");
-        }
-    }
+    std::fs::rename(&partial, &path).map_err(|error| Error::unwritable(&path, error))
 }

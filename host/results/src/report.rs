@@ -17,8 +17,8 @@ mod results;
 mod short;
 mod table;
 
-use crate::error::Error;
-use crate::output::replace;
+use text::Error;
+use text::write::replace;
 use budget::Budget;
 use results::Run;
 use std::path::{Path, PathBuf};

@@ -6,16 +6,16 @@
 //! pile's toe: its elements stand on the side of greater z there. Sides are told edge by edge along
 //! the line, so it may be of any shape.
 
-use crate::mesh::{Line, Mesh};
+use mechanics::mesh::{Line, Mesh};
 use std::collections::{HashMap, HashSet, VecDeque};
 
 /// What of a group counts at a line that lies inside it.
 #[derive(Debug)]
-pub(super) struct Section {
+pub struct Section {
     /// Elements, by their number within the group.
-    pub(super) elements: Vec<usize>,
+    pub elements: Vec<usize>,
     /// Nodes at which their forces are summed.
-    pub(super) nodes: HashSet<usize>,
+    pub nodes: HashSet<usize>,
 }
 
 /// A place in the plane; nodes that were doubled share it.
@@ -23,19 +23,19 @@ type At = [u64; 2];
 
 /// The part of group `number` that a line inside it cuts off. `None` if the line only follows the
 /// group's outline, or touches it.
-pub(super) fn section(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
-    of_quads(mesh, line, number).or_else(|| of_joints(mesh, line, number))
+pub fn section(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
+    of_solids(mesh, line, number).or_else(|| of_joints(mesh, line, number))
 }
 
 fn at(mesh: &Mesh, node: usize) -> At {
     mesh.nodes[node].map(f64::to_bits)
 }
 
-fn of_quads(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
+fn of_solids(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
     let mut sides: HashMap<At, usize> = HashMap::new();
     let own = || {
         let edges = line.edges.iter();
-        edges.filter(|(quad, _)| mesh.quads[*quad].group == number)
+        edges.filter(|(quad, _)| mesh.solids[*quad].group == number)
     };
     for &edge in own() {
         *sides.entry(at(mesh, mesh.edge(edge)[2])).or_default() += 1;
@@ -51,7 +51,7 @@ fn of_quads(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
     };
     let edges: Vec<(usize, usize)> = own().filter(counted).copied().collect();
     let quads: HashSet<usize> = edges.iter().map(|(quad, _)| *quad).collect();
-    let of_group = mesh.quads.iter().enumerate();
+    let of_group = mesh.solids.iter().enumerate();
     let of_group = of_group.filter(|(_, quad)| quad.group == number);
     let elements = of_group
         .enumerate()
@@ -154,7 +154,7 @@ fn counts_on_the_left(mesh: &Mesh, piece: &[(usize, usize, usize)]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{EDGES, Quad};
+    use mechanics::mesh::Solid;
 
     /// A ring of four quads between squares of half-widths 1 and 2, and the square inside, all of
     /// one group.
@@ -177,10 +177,7 @@ mod tests {
             };
             let all: Vec<[f64; 2]> = corners.into_iter().chain((0..4).map(middle)).collect();
             let nodes: Vec<usize> = all.into_iter().map(|[x, y]| node(x, y)).collect();
-            Quad {
-                nodes: nodes.try_into().unwrap(),
-                group: 0,
-            }
+            Solid::quad(nodes.try_into().unwrap(), 0)
         };
         let inner = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         let mut quads = vec![quad(inner)];
@@ -189,13 +186,13 @@ mod tests {
             let outer = |p: [f64; 2]| [2.0 * p[0], 2.0 * p[1]];
             quads.push(quad([outer(a), outer(b), b, a]));
         }
-        mesh.quads = quads;
+        mesh.solids = quads;
         mesh
     }
 
     /// All edges whose middle is in the list.
     fn line(mesh: &Mesh, middles: &[[f64; 2]]) -> Line {
-        let all = (0..mesh.quads.len()).flat_map(|q| (0..EDGES.len()).map(move |e| (q, e)));
+        let all = (0..mesh.solids.len()).flat_map(|q| (0..4).map(move |e| (q, e)));
         let on = |&edge: &(usize, usize)| middles.contains(&mesh.nodes[mesh.edge(edge)[2]]);
         Line {
             edges: all.filter(on).collect(),

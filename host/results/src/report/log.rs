@@ -3,7 +3,7 @@
 use super::budget::Budget;
 use super::short::Short;
 use super::table::Broken;
-use crate::file::open_regular;
+use text::file::open_regular;
 use serde::Serialize;
 use serde_json::Value;
 use std::io::{self, BufRead, BufReader};

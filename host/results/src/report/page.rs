@@ -7,7 +7,7 @@ use super::log::Log;
 use super::profile::Profile;
 use super::results::{Ending, History, Run, entries, list, text};
 use super::short::display;
-use crate::error::Error;
+use text::Error;
 use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
 use serde::Serialize;

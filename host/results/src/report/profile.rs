@@ -8,7 +8,7 @@ use super::budget::Budget;
 use super::results::Times;
 use super::short::{Short, thinned};
 use super::table::{Row, Table};
-use crate::error::Error;
+use text::Error;
 use serde::Serialize;
 use std::path::Path;
 

@@ -6,7 +6,7 @@ use super::log::Log;
 use super::profile::Profile;
 use super::short::{Short, extremes, thinned};
 use super::table::Table;
-use crate::error::Error;
+use text::Error;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};

@@ -1,8 +1,8 @@
 //! Reading the CSV files of a run, whatever has become of them, and however long they are: row by
 //! row, never as a whole.
 
-use crate::error::{Error, Source};
-use crate::file::open_regular;
+use text::{Error, Source};
+use text::file::open_regular;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};

@@ -1,18 +1,18 @@
 //! Curves of probes, or of stresses along a cut, as SVG.
 
-use super::replace;
-use crate::case::{Case, CutInput, FigureInput};
-use crate::error::{Error, Place, Source, suggestion};
-use crate::group::Group;
-use crate::probe::Probes;
+use crate::wanted::{Cut, Figure};
+use mechanics::Place;
+use mechanics::group::Group;
 use plotters::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use text::Error;
+use text::write::replace;
 
 /// Size of a figure in points.
 const SIZE: (u32, u32) = (640, 420);
 /// Colours that stay apart for most eyes and in grey (Okabe & Ito), then some more.
-pub(crate) const COLOURS: [RGBColor; 10] = [
+pub const COLOURS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -27,7 +27,7 @@ pub(crate) const COLOURS: [RGBColor; 10] = [
 
 /// A curve with its name.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Curve {
+pub(crate) struct Curve {
     /// Name, for the legend.
     name: String,
     /// Points in order.
@@ -45,145 +45,23 @@ struct Labels {
     y: String,
 }
 
-/// What can be drawn along a cut; `k_0` is the ratio of radial to vertical stress.
-const CUT_QUANTITIES: [&str; 7] = [
-    "x",
-    "y",
-    "stress_11",
-    "stress_22",
-    "stress_33",
-    "stress_12",
-    "k_0",
-];
-
-/// Refuses figures whose probes or phase do not exist, or two with one name.
-///
-/// # Errors
-/// [`Error::Input`] at the name.
-pub fn check_figures(case: &Case, probes: &Probes) -> Result<(), Error> {
-    let source = &case.source;
-    let names: Vec<&str> = probes.names().collect();
-    let phases: Vec<&str> = case
-        .file
-        .phases
-        .iter()
-        .map(|phase| phase.name.get_ref().as_str())
-        .collect();
-    check_names(source, &case.file.figures)?;
-    for figure in &case.file.figures {
-        match figure.points {
-            None => check_columns(source, figure, "probe", &names)?,
-            Some(_) => check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?,
-        }
-        if let Some(group) = figure.points.as_ref().and_then(|cut| cut.group.as_ref())
-            && !case.file.groups.contains_key(group.get_ref().as_str())
-        {
-            let groups: Vec<&str> = case
-                .file
-                .groups
-                .keys()
-                .map(|k| k.get_ref().as_str())
-                .collect();
-            return Err(source
-                .error(
-                    group.span(),
-                    format!("there is no group `{}`", group.get_ref()),
-                )
-                .hint(suggestion(group.get_ref(), groups))
-                .into());
-        }
-        if let Some(phase) = &figure.phase
-            && !phases.contains(&phase.get_ref().as_str())
-        {
-            return Err(source
-                .error(
-                    phase.span(),
-                    format!("there is no phase `{}`", phase.get_ref()),
-                )
-                .hint(suggestion(phase.get_ref(), phases))
-                .into());
-        }
-    }
-    Ok(())
-}
-
-/// Refuses figures of a table whose columns do not exist, or two with one name.
-///
-/// # Errors
-/// [`Error::Input`] at the name.
-pub fn check_table_figures(
-    source: &Source,
-    figures: &[FigureInput],
-    columns: &[&str],
-) -> Result<(), Error> {
-    check_names(source, figures)?;
-    for figure in figures {
-        check_columns(source, figure, "column", columns)?;
-        if let Some(phase) = &figure.phase {
-            let message = "a driver has no phases";
-            return Err(source.error(phase.span(), message).into());
-        }
-        if figure.points.is_some() {
-            let message = "a driver has one point, there is no cut through it";
-            return Err(source.error(figure.name.span(), message).into());
-        }
-    }
-    Ok(())
-}
-
-fn check_names(source: &Source, figures: &[FigureInput]) -> Result<(), Error> {
-    let mut seen: Vec<&str> = Vec::new();
-    for figure in figures {
-        let name = figure.name.get_ref().as_str();
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        if name.is_empty() || !name.chars().all(plain) {
-            let message = format!("`{name}` cannot be a file's name: letters, digits, _ and -");
-            return Err(source.error(figure.name.span(), message).into());
-        }
-        if seen.contains(&name) {
-            let message = format!("two figures are called `{name}`");
-            return Err(source.error(figure.name.span(), message).into());
-        }
-        seen.push(name);
-    }
-    Ok(())
-}
-
-fn check_columns(
-    source: &Source,
-    figure: &FigureInput,
-    kind: &str,
-    known: &[&str],
-) -> Result<(), Error> {
-    for wanted in figure.y.iter().chain([&figure.x]) {
-        if !known.contains(&wanted.get_ref().as_str()) {
-            let message = format!("there is no {kind} `{}`", wanted.get_ref());
-            return Err(source
-                .error(wanted.span(), message)
-                .hint(suggestion(wanted.get_ref(), known.to_vec()))
-                .into());
-        }
-    }
-    Ok(())
-}
-
 /// The figures of a run, filled as it goes.
 #[derive(Clone, Debug)]
 pub struct Figures {
     title: String,
-    drawn: Vec<(FigureInput, Vec<Curve>)>,
+    drawn: Vec<(Figure, Vec<Curve>)>,
     names: Vec<String>,
 }
 
 impl Figures {
     /// Figures whose curves are still empty. Values come in the order of `names`.
-    pub(crate) fn new(title: &str, figures: &[FigureInput], names: Vec<String>) -> Self {
-        let curves = |figure: &FigureInput| {
+    pub fn new(title: &str, figures: &[Figure], names: Vec<String>) -> Self {
+        let curves = |figure: &Figure| {
             if figure.points.is_some() {
                 return Vec::new();
             }
-            let named = |y: &toml::Spanned<String>| Curve {
-                name: y.get_ref().clone(),
+            let named = |y: &String| Curve {
+                name: y.clone(),
                 points: Vec::new(),
             };
             figure.y.iter().map(named).collect()
@@ -196,7 +74,7 @@ impl Figures {
     }
 
     /// The curves so far, figure by figure.
-    pub(super) fn curves(&self) -> Vec<Vec<Curve>> {
+    pub(crate) fn curves(&self) -> Vec<Vec<Curve>> {
         self.drawn
             .iter()
             .map(|(_, curves)| curves.clone())
@@ -204,20 +82,20 @@ impl Figures {
     }
 
     /// Takes the curves of the same figures of an interrupted run.
-    pub(super) fn restore(&mut self, all: Vec<Vec<Curve>>) {
+    pub(crate) fn restore(&mut self, all: Vec<Vec<Curve>>) {
         for ((_, curves), restored) in self.drawn.iter_mut().zip(all) {
             *curves = restored;
         }
     }
 
-    pub(super) fn increment(&mut self, place: &Place, values: &[Option<f64>]) {
+    pub(crate) fn increment(&mut self, place: &Place, values: &[Option<f64>]) {
         self.add(values, |figure| {
             figure.points.is_none() && drawn_in(figure, &place.phase)
         });
     }
 
     /// Takes a row of values for the figures that want it.
-    pub(crate) fn add(&mut self, values: &[Option<f64>], wanted: impl Fn(&FigureInput) -> bool) {
+    pub fn add(&mut self, values: &[Option<f64>], wanted: impl Fn(&Figure) -> bool) {
         for (figure, curves) in &mut self.drawn {
             if !wanted(figure) {
                 continue;
@@ -227,7 +105,7 @@ impl Figures {
                 values[number]
             };
             for curve in curves {
-                if let (Some(x), Some(y)) = (value(figure.x.get_ref()), value(&curve.name)) {
+                if let (Some(x), Some(y)) = (value(&figure.x), value(&curve.name)) {
                     curve.points.push((x, y));
                 }
             }
@@ -235,29 +113,29 @@ impl Figures {
     }
 
     /// Whether cuts are asked for after this increment, one of `of`.
-    pub(super) fn cuts_at(&self, place: &Place, of: usize) -> bool {
+    pub(crate) fn cuts_at(&self, place: &Place, of: usize) -> bool {
         let mut figures = self.drawn.iter();
         figures.any(|(figure, _)| cut_at(figure, place, of).is_some())
     }
 
     /// Takes the cuts that are asked for after this increment, one of `of`.
-    pub(super) fn cuts(&mut self, place: &Place, of: usize, groups: &[Group]) {
+    pub(crate) fn cuts(&mut self, place: &Place, of: usize, groups: &[Group]) {
         let Place { phase, increment } = place;
         for (figure, curves) in &mut self.drawn {
             let Some(cut) = cut_at(figure, place, of) else {
                 continue;
             };
             for y in &figure.y {
-                let y = y.get_ref();
+                let y = y;
                 curves.push(Curve {
                     name: format!("{y}, {phase} {increment}"),
-                    points: cut_points(cut, [figure.x.get_ref(), y], groups),
+                    points: cut_points(cut, [&figure.x, y], groups),
                 });
             }
         }
     }
 
-    pub(crate) fn draw(&self, folder: &Path) -> Result<(), Error> {
+    pub fn draw(&self, folder: &Path) -> Result<(), Error> {
         for (figure, curves) in &self.drawn {
             draw_file(folder, figure, &self.title, curves)?;
         }
@@ -278,7 +156,7 @@ impl Figures {
                 let same = figures
                     .drawn
                     .iter()
-                    .find(|(f, _)| f.name.get_ref() == figure.name.get_ref());
+                    .find(|(f, _)| f.name == figure.name);
                 let same = same
                     .map(|(_, curves)| curves.as_slice())
                     .unwrap_or_default();
@@ -300,12 +178,12 @@ impl Figures {
     }
 }
 
-fn drawn_in(figure: &FigureInput, phase: &str) -> bool {
-    figure.phase.as_ref().is_none_or(|p| p.get_ref() == phase)
+fn drawn_in(figure: &Figure, phase: &str) -> bool {
+    figure.phase.as_ref().is_none_or(|p| p == phase)
 }
 
 /// The cut that a figure takes after this increment, one of `of`.
-fn cut_at<'f>(figure: &'f FigureInput, place: &Place, of: usize) -> Option<&'f CutInput> {
+fn cut_at<'f>(figure: &'f Figure, place: &Place, of: usize) -> Option<&'f Cut> {
     let cut = figure.points.as_ref()?;
     let Place { phase, increment } = place;
     let last = cut.increments.is_empty() && *increment == of;
@@ -313,12 +191,12 @@ fn cut_at<'f>(figure: &'f FigureInput, place: &Place, of: usize) -> Option<&'f C
 }
 
 /// Two quantities at the points of a cut, by increasing first one.
-fn cut_points(cut: &CutInput, quantities: [&str; 2], groups: &[Group]) -> Vec<(f64, f64)> {
+fn cut_points(cut: &Cut, quantities: [&str; 2], groups: &[Group]) -> Vec<(f64, f64)> {
     let inside = |extent: Option<[f64; 2]>, c| extent.is_none_or(|[from, to]| from < c && c < to);
     let wanted = |group: &&Group| {
         cut.group
             .as_ref()
-            .is_none_or(|g| g.get_ref() == &group.name)
+            .is_none_or(|g| *g == group.name)
     };
     let mut points = Vec::new();
     for group in groups.iter().filter(wanted) {
@@ -350,17 +228,17 @@ fn cut_points(cut: &CutInput, quantities: [&str; 2], groups: &[Group]) -> Vec<(f
 
 fn draw_file(
     folder: &Path,
-    figure: &FigureInput,
+    figure: &Figure,
     title: &str,
     curves: &[Curve],
 ) -> Result<(), Error> {
-    let path = folder.join(format!("{}.svg", figure.name.get_ref()));
+    let path = folder.join(format!("{}.svg", figure.name));
     let labels = Labels {
         title: figure.title.clone().unwrap_or_else(|| title.to_owned()),
         x: figure
             .x_label
             .clone()
-            .unwrap_or_else(|| figure.x.get_ref().clone()),
+            .unwrap_or_else(|| figure.x.clone()),
         y: figure.y_label.clone().unwrap_or_default(),
     };
     let text = svg(&labels, curves)

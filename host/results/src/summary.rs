@@ -1,185 +1,170 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
-use super::IncrementRecord;
-use crate::case::{Analysis, Case, FigureInput, GroupInput, Method, ProbeInput, Reduce};
-use crate::error::{Error, Place};
-use crate::group::Group;
-use crate::input::BuiltLaw;
-use crate::model::Model;
-use crate::plugin::hexadecimal_sha256;
-use crate::probe::Probes;
-use crate::solver::Costs;
+use crate::wanted::{Figure, Wanted};
+use indexmap::IndexMap;
+use law::BuiltLaw;
+use mechanics::group::Group;
+use mechanics::simulation::{Increment, PhaseRecord};
+use mechanics::{Place, Settings, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
-use toml::Spanned;
 
-/// A phase, for the record.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct PhaseRecord {
-    /// Name.
-    pub name: String,
-    /// Which matrix the iterations used.
-    pub method: Method,
-    /// Unknowns.
-    pub equations: usize,
-    /// Forces out of balance at its start, relative to the forces in play.
-    pub out_of_balance: f64,
-    /// Increments that reached equilibrium.
-    pub increments: usize,
-    /// Iterations of these, failed attempts included.
-    pub iterations: usize,
-    /// Steps repeated with a smaller length.
-    pub cut_backs: usize,
-    /// Steps with results that a law calls inaccurate.
-    pub unreliable: usize,
-    /// Steps that viscous relaxation led to equilibrium.
-    pub relaxed: usize,
-    /// Largest relative residual that was taken for round-off in the steps' iterations.
-    pub round_off: f64,
-    /// Steps along the path of equilibrium under arc-length control.
-    pub arc_length: usize,
-    /// Matrices factorised.
-    pub factorisations: u64,
-    /// How many of them needed full row exchanges.
-    pub fallbacks: u64,
-    /// Costs by part.
-    pub costs: Costs,
-    /// Values of the probes after its last increment.
-    pub probes: Vec<Option<f64>>,
+/// What the record says of a run beside what the simulation knows.
+#[derive(Clone, Debug, Default)]
+pub struct About {
+    /// Name of the case.
+    pub case: String,
+    /// Name of the variant, if it is one.
+    pub variant: Option<String>,
+    /// What the case is.
+    pub title: String,
+    /// SHA-256 of the text of its files.
+    pub sha256: String,
+    /// Those files: path and text, the case itself last.
+    pub files: Vec<(String, String)>,
+    /// Of every group the name of its law, and those of the laws that phases give it, by phase.
+    pub laws_of_groups: Vec<(String, Vec<(String, String)>)>,
+    /// All laws used, by name and hypothesis.
+    pub laws: IndexMap<(String, &'static str), Arc<BuiltLaw>>,
+    /// Units of the probes, where factors leave no doubt.
+    pub probe_units: Vec<(String, Option<String>)>,
+    /// Settings that a study has chosen.
+    pub chosen: Option<Value>,
 }
 
-impl PhaseRecord {
-    /// A phase that begins.
-    pub fn new(name: &str, equations: usize, out_of_balance: f64) -> Self {
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ending {
+    /// In a word.
+    pub status: &'static str,
+    /// What went wrong, if something did.
+    pub error: Option<String>,
+}
+
+impl Ending {
+    /// A run that came to its end.
+    pub fn done() -> Self {
         Self {
-            name: name.to_owned(),
-            method: Method::default(),
-            equations,
-            out_of_balance,
-            increments: 0,
-            iterations: 0,
-            cut_backs: 0,
-            unreliable: 0,
-            relaxed: 0,
-            round_off: 0.0,
-            arc_length: 0,
-            factorisations: 0,
-            fallbacks: 0,
-            costs: Costs::default(),
-            probes: Vec::new(),
+            status: "done",
+            error: None,
         }
     }
 }
 
 /// What is known of a run so far.
 #[derive(Debug)]
-pub(super) struct Summary {
+pub(crate) struct Summary {
     head: Map<String, Value>,
     probe_names: Vec<String>,
-    pub(super) course: Course,
+    pub(crate) course: Course,
 }
 
 /// The last state of equilibrium of a phase that could not go on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct Stopped {
-    pub(super) phase: String,
-    pub(super) load_factor: f64,
-    pub(super) time: f64,
-    pub(super) probes: Vec<Option<f64>>,
+pub(crate) struct Stopped {
+    pub(crate) phase: String,
+    pub(crate) load_factor: f64,
+    pub(crate) time: f64,
+    pub(crate) probes: Vec<Option<f64>>,
 }
 
 /// What has happened so far.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Course {
-    phases: Vec<PhaseRecord>,
+pub(crate) struct Course {
+    /// Phases, with the values of the probes after their last increments.
+    phases: Vec<(PhaseRecord, Vec<Option<f64>>)>,
     last: Option<(Place, Vec<Option<f64>>)>,
     /// Where a phase could not go on.
-    pub(super) stopped: Option<Stopped>,
+    pub(crate) stopped: Option<Stopped>,
     /// By phase, the first increment with a result that a law calls inaccurate, and why.
     unreliable: Vec<(Place, String)>,
 }
 
 impl Summary {
-    pub(super) fn new(case: &Case, model: &Model, probes: &Probes) -> Self {
-        let laws: Map<String, Value> = model
+    pub(crate) fn new(about: &About, wanted: &Wanted, simulation: &Simulation) -> Self {
+        let laws: Map<String, Value> = about
             .laws
             .iter()
             .map(|((name, hypothesis), built)| (format!("{name} ({hypothesis})"), law(built)))
             .collect();
-        let elements: Map<String, Value> = model
-            .groups
-            .iter()
+        let of_groups = simulation.groups().iter();
+        let elements: Map<String, Value> = of_groups
             .map(|g| (g.name.clone(), g.kinematics.n_elements().into()))
             .collect();
+        let problem = simulation.problem();
         let mut head = Map::new();
-        head.insert(
-            "program".to_owned(),
+        let mut say = |key: &str, value: Value| head.insert(key.to_owned(), value);
+        say(
+            "program",
             json!(format!("pilum {}", env!("CARGO_PKG_VERSION"))),
         );
-        head.insert("case".to_owned(), json!(case.name()));
-        head.insert("variant".to_owned(), json!(case.variant));
-        head.insert("title".to_owned(), json!(case.file.title));
-        head.insert(
-            "case_sha256".to_owned(),
-            json!(hexadecimal_sha256(case.source.text().as_bytes())),
-        );
-        head.insert("case_files".to_owned(), case_files(case));
-        head.insert("analysis".to_owned(), json!(analysis(case)));
-        head.insert("groups".to_owned(), groups(case, model));
-        head.insert("solver".to_owned(), solver(case));
-        if let Some(chosen) = &case.file.chosen {
-            head.insert("accuracy".to_owned(), json!(chosen));
+        say("case", json!(about.case));
+        say("variant", json!(about.variant));
+        say("title", json!(about.title));
+        say("case_sha256", json!(about.sha256));
+        let file = |(path, text): &(String, String)| json!({ "path": path, "text": text });
+        say("case_files", about.files.iter().map(file).collect());
+        say("analysis", json!(problem.analysis.name()));
+        say("groups", groups(about, simulation));
+        say("solver", solver(&problem.settings));
+        if let Some(chosen) = &about.chosen {
+            say("accuracy", chosen.clone());
         }
-        head.insert("figures".to_owned(), figures(case));
-        let pictures = case.file.figures.iter();
-        let pictures: Vec<String> = pictures
-            .map(|figure| format!("{}.svg", figure.name.get_ref()))
+        say("figures", figures(&wanted.figures));
+        let pictures = wanted.figures.iter();
+        let pictures = pictures.map(|figure| format!("{}.svg", figure.name));
+        say("pictures", json!(pictures.collect::<Vec<String>>()));
+        let units = about.probe_units.iter();
+        let units: Map<String, Value> = units
+            .map(|(name, unit)| (name.clone(), json!(unit)))
             .collect();
-        head.insert("pictures".to_owned(), json!(pictures));
-        head.insert("probe_units".to_owned(), probe_units(case, model));
-        head.insert("laws".to_owned(), laws.into());
-        head.insert(
-            "mesh".to_owned(),
+        say("probe_units", units.into());
+        say("laws", laws.into());
+        say(
+            "mesh",
             json!({
-                "nodes": model.mesh.nodes.len(),
-                "elements": model.mesh.quads.len() + model.mesh.joints.len(),
+                "nodes": problem.mesh.nodes.len(),
+                "elements": problem.mesh.solids.len() + problem.mesh.joints.len(),
                 "elements_by_group": elements,
             }),
         );
         Self {
             head,
-            probe_names: probes.names().map(str::to_owned).collect(),
+            probe_names: wanted.probes.names().map(str::to_owned).collect(),
             course: Course::default(),
         }
     }
 
     /// What is known before the first increment.
-    pub(super) fn running(&self) -> Value {
+    pub(crate) fn running(&self) -> Value {
         let mut summary = self.head.clone();
         summary.insert("status".to_owned(), json!("running"));
         summary.into()
     }
 
-    pub(super) fn last_increment(&mut self, place: &Place, record: &IncrementRecord) {
-        self.course.last = Some((place.clone(), record.probes.clone()));
+    pub(crate) fn last_increment(&mut self, increment: &Increment, probes: Vec<Option<f64>>) {
+        let place = &increment.place;
+        self.course.last = Some((place.clone(), probes));
         let is_first = self
             .course
             .unreliable
             .last()
             .is_none_or(|(p, _)| p.phase != place.phase);
-        if let Some(why) = record.warning.as_ref().filter(|_| is_first) {
+        if let Some(why) = increment.unreliable.as_ref().filter(|_| is_first) {
             self.course.unreliable.push((place.clone(), why.clone()));
         }
     }
 
     /// Warnings about results that laws call inaccurate, one for each phase that has any.
-    pub(super) fn unreliable(&self) -> Vec<String> {
+    pub(crate) fn unreliable(&self) -> Vec<String> {
         let phases = self
             .course
             .phases
             .iter()
+            .map(|(phase, _)| phase)
             .filter(|phase| phase.unreliable > 0);
         let warning = |phase: &PhaseRecord| {
             let first = self
@@ -200,14 +185,14 @@ impl Summary {
         phases.map(warning).collect()
     }
 
-    pub(super) fn phase(&mut self, record: PhaseRecord) {
+    pub(crate) fn phase(&mut self, record: PhaseRecord) {
         let last = self
             .course
             .last
             .as_ref()
             .filter(|(place, _)| place.phase == record.name);
         let probes = last.map(|(_, probes)| probes.clone()).unwrap_or_default();
-        self.course.phases.push(PhaseRecord { probes, ..record });
+        self.course.phases.push((record, probes));
     }
 
     fn probes(&self, values: &[Option<f64>]) -> Value {
@@ -219,22 +204,22 @@ impl Summary {
     }
 
     /// The whole summary. `seconds`: in total, and for output.
-    pub(super) fn finish(
+    pub(crate) fn finish(
         &self,
         groups: &[Group],
         [total, output]: [Duration; 2],
         warnings: &[String],
-        error: Option<&Error>,
+        ending: &Ending,
     ) -> Value {
         let mut summary = self.head.clone();
-        summary.insert("status".to_owned(), status(error).into());
-        summary.insert("error".to_owned(), json!(error.map(ToString::to_string)));
+        summary.insert("status".to_owned(), ending.status.into());
+        summary.insert("error".to_owned(), json!(ending.error));
         summary.insert("warnings".to_owned(), json!(warnings));
         let phases: Vec<Value> = self
             .course
             .phases
             .iter()
-            .map(|p| {
+            .map(|(p, probes)| {
                 json!({
                     "name": p.name,
                     "method": p.method.name(),
@@ -254,7 +239,7 @@ impl Summary {
                         "assembly": p.costs.assembly.as_secs_f64(),
                         "equations": p.costs.equations.as_secs_f64(),
                     },
-                    "probes": self.probes(&p.probes),
+                    "probes": self.probes(probes),
                 })
             })
             .collect();
@@ -302,17 +287,6 @@ impl Summary {
     }
 }
 
-/// How a run ended, in a word.
-pub(super) fn status(error: Option<&Error>) -> &'static str {
-    match error {
-        None => "done",
-        Some(Error::NoEquilibrium { .. }) => "no equilibrium",
-        Some(Error::Plugin { .. }) => "plugin trouble",
-        Some(error) if error.is_stop() => "interrupted",
-        Some(_) => "stopped",
-    }
-}
-
 /// Points carried through every law, and how many of them with an operator, by the law's id.
 fn law_calls(groups: &[Group]) -> Value {
     let mut totals: BTreeMap<&str, [u64; 2]> = BTreeMap::new();
@@ -331,51 +305,27 @@ fn law_calls(groups: &[Group]) -> Value {
         .into()
 }
 
-/// The case file after those it is based on.
-fn case_files(case: &Case) -> Value {
-    let source = &case.source;
-    let files = source.files().map(|range| {
-        let text = &source.text()[range.clone()];
-        json!({ "path": source.path_at(&range).display().to_string(), "text": text })
-    });
-    files.collect()
-}
-
-fn analysis(case: &Case) -> &'static str {
-    match case.file.analysis {
-        Analysis::Axisymmetric => "axisymmetric",
-        Analysis::PlaneStrain => "plane_strain",
-    }
-}
-
-/// Groups in the order of the file, which is that of the numbers in the fields.
-fn groups(case: &Case, model: &Model) -> Value {
-    let groups = case.file.groups.iter().zip(&model.groups);
-    let describe = |((name, input), group): (_, &Group)| {
-        let (name, input): (&Spanned<String>, &Spanned<GroupInput>) = (name, input);
-        let swaps: Map<String, Value> = case
-            .file
-            .phases
-            .iter()
-            .filter_map(|phase| {
-                let (_, law) = phase.laws.iter().find(|(key, _)| *key == name)?;
-                Some((phase.name.get_ref().clone(), json!(law.get_ref())))
-            })
+/// Groups in the order of the problem, which is that of the numbers in the fields.
+fn groups(about: &About, simulation: &Simulation) -> Value {
+    let groups = simulation.groups().iter().zip(&about.laws_of_groups);
+    let describe = |(group, (law, from_phase)): (&Group, &(String, Vec<(String, String)>))| {
+        let swaps = from_phase.iter();
+        let swaps: Map<String, Value> = swaps
+            .map(|(phase, law)| (phase.clone(), json!(law)))
             .collect();
         json!({
-            "name": name.get_ref(),
-            "formulation": input.get_ref().formulation.name(),
+            "name": group.name,
+            "formulation": group.formulation.name(),
             "elements": group.kinematics.n_elements(),
             "points_per_element": group.kinematics.points_per_element(),
-            "law": input.get_ref().law.get_ref(),
+            "law": law,
             "laws_from_phase": swaps,
         })
     };
     groups.map(describe).collect()
 }
 
-fn solver(case: &Case) -> Value {
-    let solver = &case.file.solver;
+fn solver(solver: &Settings) -> Value {
     json!({
         "method": solver.method.name(),
         "force_tolerance": solver.force_tolerance,
@@ -390,103 +340,20 @@ fn solver(case: &Case) -> Value {
 }
 
 /// Figures of probes; those of cuts have nothing in `history.csv`.
-fn figures(case: &Case) -> Value {
-    let figure = |figure: &FigureInput| {
-        let y: Vec<&String> = figure.y.iter().map(Spanned::get_ref).collect();
+fn figures(figures: &[Figure]) -> Value {
+    let figure = |figure: &Figure| {
         json!({
-            "name": figure.name.get_ref(),
+            "name": figure.name,
             "title": figure.title,
-            "x": figure.x.get_ref(),
+            "x": figure.x,
             "x_label": figure.x_label,
-            "y": y,
+            "y": figure.y,
             "y_label": figure.y_label,
-            "phase": figure.phase.as_ref().map(Spanned::get_ref),
+            "phase": figure.phase,
         })
     };
-    let of_probes = case.file.figures.iter().filter(|f| f.points.is_none());
+    let of_probes = figures.iter().filter(|f| f.points.is_none());
     of_probes.map(figure).collect()
-}
-
-/// Units of the probes, where factors leave no doubt.
-fn probe_units(case: &Case, model: &Model) -> Value {
-    let mut units: Map<String, Value> = Map::new();
-    for (name, input) in &case.file.probes {
-        let input = input.get_ref();
-        let unit = match &input.combine {
-            None => measured_unit(case, model, input),
-            Some(terms) => {
-                let of = |name: &Spanned<String>| units.get(name.get_ref())?.as_str();
-                let first = terms.keys().next().and_then(of);
-                let alike = terms
-                    .iter()
-                    .all(|(name, factor)| of(name) == first && is(factor.get_ref().abs(), 1.0));
-                first.filter(|_| alike).map(str::to_owned)
-            }
-        };
-        let unit = unit.and_then(|unit| scaled_unit(unit, input.scale.abs()));
-        units.insert(name.get_ref().clone(), json!(unit));
-    }
-    units.into()
-}
-
-fn measured_unit(case: &Case, model: &Model, input: &ProbeInput) -> Option<String> {
-    let quantity = input.quantity.as_ref()?.get_ref().as_str();
-    let kind = quantity.split('_').next().unwrap_or_default();
-    let of_points = input.line.is_none();
-    if of_points && input.reduce == Some(Reduce::Integral) {
-        // Over an interface's area a traction is a force.
-        return (kind == "traction").then(|| force_unit(case).to_owned());
-    }
-    if of_points && input.reduce == Some(Reduce::Sum) {
-        return None;
-    }
-    let mut variables = model
-        .laws
-        .values()
-        .flat_map(|built| &built.law.formulation().internal_variables);
-    let variable = variables.find(|variable| of_points && variable.id == quantity);
-    let unit = match (kind, variable) {
-        (_, Some(variable)) => &variable.unit,
-        ("stress" | "traction", None) => "kPa",
-        ("strain", None) => "-",
-        ("jump" | "displacement", None) => "m",
-        ("reaction" | "force", None) => force_unit(case),
-        _ => return None,
-    };
-    Some(unit.to_owned())
-}
-
-/// The unit of a force.
-fn force_unit(case: &Case) -> &'static str {
-    match case.file.analysis {
-        Analysis::Axisymmetric => "kN",
-        Analysis::PlaneStrain => "kN/m",
-    }
-}
-
-/// The unit of a quantity times a factor.
-fn scaled_unit(unit: String, factor: f64) -> Option<String> {
-    if is(factor, 1.0) {
-        return Some(unit);
-    }
-    let scaled = [
-        ("m", 1e3, "mm"),
-        ("m", 1e2, "cm"),
-        ("kPa", 1e-3, "MPa"),
-        ("kPa", 1e3, "Pa"),
-        ("kN", 1e-3, "MN"),
-        ("kN", 1e3, "N"),
-        ("-", 1e2, "%"),
-    ];
-    scaled
-        .iter()
-        .find(|(of, by, _)| *of == unit && is(factor, *by))
-        .map(|(_, _, scaled)| (*scaled).to_owned())
-}
-
-/// Equal but for rounding.
-fn is(value: f64, expected: f64) -> bool {
-    (value - expected).abs() <= 1e-12 * expected
 }
 
 fn law(built: &BuiltLaw) -> Value {
@@ -571,11 +438,12 @@ mod tests {
                 phase: phase.to_owned(),
                 increment,
             };
-            let record = IncrementRecord {
-                warning: warning.map(str::to_owned),
-                ..IncrementRecord::default()
+            let increment = Increment {
+                place,
+                unreliable: warning.map(str::to_owned),
+                ..Increment::default()
             };
-            summary.last_increment(&place, &record);
+            summary.last_increment(&increment, Vec::new());
         }
         for (phase, unreliable) in [("a", 3), ("b", 0), ("c", 1)] {
             summary.phase(PhaseRecord {

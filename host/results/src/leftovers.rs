@@ -1,15 +1,14 @@
 //! What an earlier run left in a results folder, and what must not be mistaken for results of the
 //! next one.
 
-use super::unwritable;
-use crate::error::Error;
 use std::ffi::OsStr;
 use std::path::Path;
+use text::Error;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
 /// are begun anew by each.
 const NAMES: [&str; 9] = [
-    crate::capsule::FILE_NAME,
+    law::capsule::FILE_NAME,
     crate::checkpoint::FILE_NAME,
     "path.csv",
     "profile.csv",
@@ -25,7 +24,7 @@ const NAMES: [&str; 9] = [
 ///
 /// # Errors
 /// [`Error::Unwritable`].
-pub(super) fn remove(folder: &Path) -> Result<(), Error> {
+pub(crate) fn remove(folder: &Path) -> Result<(), Error> {
     let pictures = pictures(folder);
     let ours = |name: &str| {
         NAMES.contains(&name) || is_field(name) || pictures.iter().any(|picture| picture == name)
@@ -34,14 +33,14 @@ pub(super) fn remove(folder: &Path) -> Result<(), Error> {
 }
 
 /// Removes files of these names where there are any.
-pub(super) fn remove_if(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<(), Error> {
-    let unreadable = |error| unwritable(folder, error);
+pub(crate) fn remove_if(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<(), Error> {
+    let unreadable = |error| Error::unwritable(folder, error);
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
         let is_folder = entry.file_type().map_err(unreadable)?.is_dir();
         if !is_folder && entry.file_name().to_str().is_some_and(&ours) {
             let path = entry.path();
-            std::fs::remove_file(&path).map_err(|error| unwritable(&path, error))?;
+            std::fs::remove_file(&path).map_err(|error| Error::unwritable(&path, error))?;
         }
     }
     Ok(())

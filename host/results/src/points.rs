@@ -1,34 +1,34 @@
-//! Values along interfaces.
+//! Stresses at all integration points.
 
-use super::file::Extent;
-use super::{Table, internal_variables, number};
-use crate::case::When;
-use crate::error::{Error, Place};
-use crate::group::Group;
-use crate::model::Model;
+use crate::file::Extent;
+use crate::recorder::{Table, internal_variables};
+use crate::table::number;
+use crate::wanted::When;
+use mechanics::group::Group;
+use mechanics::{Place, Simulation};
 use std::path::Path;
+use text::Error;
 
-/// `profile.csv`: one row per integration point of every thin layer and zero-thickness group.
+/// `points.csv`: one row per integration point of every group that has a stress.
 #[derive(Debug)]
-pub(super) struct Profile {
-    pub(super) table: Table,
+pub(crate) struct Points {
+    pub(crate) table: Table,
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,
 }
 
-impl Profile {
-    /// As [`Table::begin`]. `None` if it is not asked for or there is no interface.
-    pub(super) fn begin(
+impl Points {
+    /// As [`Table::begin`]. `None` if it is not asked for.
+    pub(crate) fn begin(
         folder: &Path,
         when: When,
-        model: &Model,
+        simulation: &Simulation,
         from: Option<Extent>,
     ) -> Result<Option<Self>, Error> {
-        let is_interface = |group: &Group| group.jump_and_traction(0).is_some();
-        if when == When::Never || !model.groups.iter().any(is_interface) {
+        if when == When::Never {
             return Ok(None);
         }
-        let variables = internal_variables(model, is_interface);
+        let variables = internal_variables(simulation, |group| group.global_stress(0).is_some());
         let columns = [
             "phase",
             "increment",
@@ -37,29 +37,25 @@ impl Profile {
             "point",
             "x",
             "y",
-            "s",
-            "jump_n",
-            "jump_t",
-            "traction_n",
-            "traction_t",
+            "stress_11",
+            "stress_22",
+            "stress_33",
+            "stress_12",
         ];
         let columns = columns
             .into_iter()
             .chain(variables.iter().map(String::as_str));
-        let table = Table::begin(folder.join("profile.csv"), columns, from)?;
+        let table = Table::begin(folder.join("points.csv"), columns, from)?;
         Ok(Some(Self { table, variables }))
     }
 
-    pub(super) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
+    pub(crate) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
         for group in groups {
             let per_element = group.kinematics.points_per_element();
             for point in 0..group.kinematics.n_points() {
-                let Some((jump, traction)) = group.jump_and_traction(point) else {
+                let Some(stress) = group.global_stress(point) else {
                     break;
                 };
-                let [x, y] = group.kinematics.position(point);
-                let along = group.kinematics.axes(point / per_element).along;
-                let s = along[0] * x + along[1] * y;
                 let mut row = vec![
                     place.phase.clone(),
                     place.increment.to_string(),
@@ -67,8 +63,8 @@ impl Profile {
                     (point / per_element + 1).to_string(),
                     (point % per_element + 1).to_string(),
                 ];
-                let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]];
-                row.extend(values.map(number));
+                row.extend(group.kinematics.position(point).map(number));
+                row.extend(stress.map(number));
                 row.extend(self.variables.iter().map(|id| {
                     group
                         .internal_variable(point, id)

@@ -1,33 +1,35 @@
-//! Stresses at all integration points.
+//! Values along interfaces.
 
-use super::file::Extent;
-use super::{Table, internal_variables, number};
-use crate::case::When;
-use crate::error::{Error, Place};
-use crate::group::Group;
-use crate::model::Model;
+use crate::file::Extent;
+use crate::recorder::{Table, internal_variables};
+use crate::table::number;
+use crate::wanted::When;
+use mechanics::group::Group;
+use mechanics::{Place, Simulation};
 use std::path::Path;
+use text::Error;
 
-/// `points.csv`: one row per integration point of every group that has a stress.
+/// `profile.csv`: one row per integration point of every thin layer and zero-thickness group.
 #[derive(Debug)]
-pub(super) struct Points {
-    pub(super) table: Table,
+pub(crate) struct Profile {
+    pub(crate) table: Table,
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,
 }
 
-impl Points {
-    /// As [`Table::begin`]. `None` if it is not asked for.
-    pub(super) fn begin(
+impl Profile {
+    /// As [`Table::begin`]. `None` if it is not asked for or there is no interface.
+    pub(crate) fn begin(
         folder: &Path,
         when: When,
-        model: &Model,
+        simulation: &Simulation,
         from: Option<Extent>,
     ) -> Result<Option<Self>, Error> {
-        if when == When::Never {
+        let is_interface = |group: &Group| group.jump_and_traction(0).is_some();
+        if when == When::Never || !simulation.groups().iter().any(is_interface) {
             return Ok(None);
         }
-        let variables = internal_variables(model, |group| group.global_stress(0).is_some());
+        let variables = internal_variables(simulation, is_interface);
         let columns = [
             "phase",
             "increment",
@@ -36,25 +38,29 @@ impl Points {
             "point",
             "x",
             "y",
-            "stress_11",
-            "stress_22",
-            "stress_33",
-            "stress_12",
+            "s",
+            "jump_n",
+            "jump_t",
+            "traction_n",
+            "traction_t",
         ];
         let columns = columns
             .into_iter()
             .chain(variables.iter().map(String::as_str));
-        let table = Table::begin(folder.join("points.csv"), columns, from)?;
+        let table = Table::begin(folder.join("profile.csv"), columns, from)?;
         Ok(Some(Self { table, variables }))
     }
 
-    pub(super) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
+    pub(crate) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
         for group in groups {
             let per_element = group.kinematics.points_per_element();
             for point in 0..group.kinematics.n_points() {
-                let Some(stress) = group.global_stress(point) else {
+                let Some((jump, traction)) = group.jump_and_traction(point) else {
                     break;
                 };
+                let [x, y] = group.kinematics.position(point);
+                let along = group.kinematics.axes(point / per_element).along;
+                let s = along[0] * x + along[1] * y;
                 let mut row = vec![
                     place.phase.clone(),
                     place.increment.to_string(),
@@ -62,8 +68,8 @@ impl Points {
                     (point / per_element + 1).to_string(),
                     (point % per_element + 1).to_string(),
                 ];
-                row.extend(group.kinematics.position(point).map(number));
-                row.extend(stress.map(number));
+                let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]];
+                row.extend(values.map(number));
                 row.extend(self.variables.iter().map(|id| {
                     group
                         .internal_variable(point, id)

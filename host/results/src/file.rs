@@ -2,14 +2,13 @@
 //! only if they still hold what they held. Nothing is written through a link: what it leads to
 //! belongs to somebody else.
 
-use super::unwritable;
-use crate::error::Error;
-use text::write::{Identity, begin, check_own, identity, other};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use text::Error;
+use text::write::{Identity, begin, check_own, identity, other};
 
 /// Bytes read at a time where a file is summed.
 const PIECE: usize = 1 << 16;
@@ -74,14 +73,14 @@ impl Sum {
 
 /// How much a file held, and its sum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Extent {
-    pub(super) length: u64,
-    pub(super) sum: u64,
+pub(crate) struct Extent {
+    pub(crate) length: u64,
+    pub(crate) sum: u64,
 }
 
 /// A file that is appended to.
 #[derive(Debug)]
-pub(super) struct Appended {
+pub(crate) struct Appended {
     path: PathBuf,
     file: File,
     own: Identity,
@@ -95,15 +94,15 @@ impl Appended {
     ///
     /// # Errors
     /// [`Error::Unwritable`]; [`Error::Usage`] if it no longer holds that.
-    pub(super) fn begin(path: PathBuf, from: Option<Extent>) -> Result<Self, Error> {
+    pub(crate) fn begin(path: PathBuf, from: Option<Extent>) -> Result<Self, Error> {
         let Some(extent) = from else {
-            let file = begin(&path).map_err(|error| unwritable(&path, error))?;
+            let file = begin(&path).map_err(|error| Error::unwritable(&path, error))?;
             return Ok(Self::new(path, file));
         };
         let mut options = OpenOptions::new();
         refuse_link(&path)?;
         let opened = options.read(true).write(true).open(&path);
-        let file = opened.map_err(|error| unwritable(&path, error))?;
+        let file = opened.map_err(|error| Error::unwritable(&path, error))?;
         Self::new(path, file).go_on(extent)
     }
 
@@ -112,8 +111,8 @@ impl Appended {
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub(super) fn begin_locked(path: PathBuf, goes_on: bool) -> Result<Self, Error> {
-        let failed = |error| unwritable(&path, error);
+    pub(crate) fn begin_locked(path: PathBuf, goes_on: bool) -> Result<Self, Error> {
+        let failed = |error| Error::unwritable(&path, error);
         // A link is not opened, not even to see whether another run writes there.
         match path.symlink_metadata() {
             Ok(_) if goes_on => refuse_link(&path)?,
@@ -149,9 +148,9 @@ impl Appended {
     ///
     /// # Errors
     /// [`Error::Unwritable`]; [`Error::Usage`] if it does not begin with that.
-    pub(super) fn go_on(mut self, extent: Extent) -> Result<Self, Error> {
+    pub(crate) fn go_on(mut self, extent: Extent) -> Result<Self, Error> {
         let summed = sum_of(&mut self.file, extent.length);
-        self.sum = summed.map_err(|error| unwritable(&self.path, error))?;
+        self.sum = summed.map_err(|error| Error::unwritable(&self.path, error))?;
         self.length = extent.length;
         if self.extent() != extent {
             return Err(changed(&self.path));
@@ -159,11 +158,11 @@ impl Appended {
         self.file
             .set_len(extent.length)
             .and_then(|()| self.file.seek(SeekFrom::Start(extent.length)))
-            .map_err(|error| unwritable(&self.path, error))?;
+            .map_err(|error| Error::unwritable(&self.path, error))?;
         Ok(self)
     }
 
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
@@ -179,12 +178,12 @@ impl Appended {
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub(super) fn append(&mut self, text: &[u8]) -> Result<(), Error> {
+    pub(crate) fn append(&mut self, text: &[u8]) -> Result<(), Error> {
         check_own(&self.file, self.own, self.length)
-            .map_err(|error| unwritable(&self.path, error))?;
+            .map_err(|error| Error::unwritable(&self.path, error))?;
         if let Err(error) = self.file.write_all(text) {
             let _ = self.file.set_len(self.length);
-            return Err(unwritable(&self.path, error));
+            return Err(Error::unwritable(&self.path, error));
         }
         self.length += text.len() as u64;
         self.sum.add(text);
@@ -195,9 +194,9 @@ impl Appended {
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub(super) fn sync(&self) -> Result<Extent, Error> {
+    pub(crate) fn sync(&self) -> Result<Extent, Error> {
         let synced = self.file.sync_data();
-        synced.map_err(|error| unwritable(&self.path, error))?;
+        synced.map_err(|error| Error::unwritable(&self.path, error))?;
         Ok(self.extent())
     }
 }
@@ -223,12 +222,12 @@ fn lock(file: &File) -> io::Result<()> {
 ///
 /// # Errors
 /// [`Error::Unreadable`]; [`Error::Usage`] if it does not.
-pub(super) fn check(path: &Path, extent: Extent) -> Result<(), Error> {
+pub(crate) fn check(path: &Path, extent: Extent) -> Result<(), Error> {
     let unreadable = |source| Error::Unreadable {
         path: path.to_owned(),
         source,
     };
-    let mut file = crate::file::open_regular(path).map_err(unreadable)?;
+    let mut file = text::file::open_regular(path).map_err(unreadable)?;
     let sum = sum_of(&mut file, extent.length).map_err(unreadable)?;
     if sum.value() == extent.sum {
         Ok(())
@@ -241,7 +240,7 @@ pub(super) fn check(path: &Path, extent: Extent) -> Result<(), Error> {
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub(super) fn check_length(path: &Path, length: u64) -> Result<(), Error> {
+pub(crate) fn check_length(path: &Path, length: u64) -> Result<(), Error> {
     match path.metadata() {
         Ok(found) if found.is_file() && found.len() == length => Ok(()),
         _ => Err(changed(path)),
@@ -270,15 +269,15 @@ fn sum_of(file: &mut File, length: u64) -> io::Result<Sum> {
 
 fn refuse_link(path: &Path) -> Result<(), Error> {
     let found = path.symlink_metadata();
-    let found = found.map_err(|error| unwritable(path, error))?;
+    let found = found.map_err(|error| Error::unwritable(path, error))?;
     if found.is_symlink() || has_other_names(&found) {
         let why = "it is a link: results are not written through one";
-        return Err(unwritable(path, io::Error::other(why)));
+        return Err(Error::unwritable(path, io::Error::other(why)));
     }
     if found.is_file() {
         Ok(())
     } else {
-        Err(unwritable(path, other()))
+        Err(Error::unwritable(path, other()))
     }
 }
 

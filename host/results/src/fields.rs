@@ -1,30 +1,31 @@
 //! Fields for viewers that read VTK files: `fields.pvd` lists one `fields_<n>.vtu` per time.
 
-use super::{file, replace};
-use crate::case::When;
-use crate::error::Error;
-use crate::mesh::Mesh;
-use crate::model::Model;
-use crate::probe::Snapshot;
+use crate::file;
+use crate::wanted::When;
+use mechanics::problem::Formulation;
+use mechanics::simulation::Snapshot;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use text::Error;
+use text::write::replace;
 
 /// VTK's numbers for cells with these nodes.
 const QUADRATIC_QUAD: u8 = 23;
 const QUADRATIC_EDGE: u8 = 21;
+const QUADRATIC_TRIANGLE: u8 = 22;
 
 /// Fields at the times asked for.
 #[derive(Debug)]
-pub(super) struct Fields {
+pub(crate) struct Fields {
     folder: PathBuf,
     /// Files written so far.
-    pub(super) written: Vec<Written>,
+    pub(crate) written: Vec<Written>,
 }
 
 /// A file of fields.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(super) struct Written {
+pub(crate) struct Written {
     time: f64,
     length: u64,
 }
@@ -37,7 +38,7 @@ fn file_name(number: usize) -> String {
 ///
 /// # Errors
 /// The first that is not.
-pub(super) fn check(folder: &Path, written: &[Written]) -> Result<(), Error> {
+pub(crate) fn check(folder: &Path, written: &[Written]) -> Result<(), Error> {
     for (number, written) in written.iter().enumerate() {
         file::check_length(&folder.join(file_name(number)), written.length)?;
     }
@@ -46,21 +47,16 @@ pub(super) fn check(folder: &Path, written: &[Written]) -> Result<(), Error> {
 
 impl Fields {
     /// `None` if fields are not asked for.
-    pub(super) fn create(folder: &Path, when: When, _: &Model) -> Option<Self> {
+    pub(crate) fn create(folder: &Path, when: When) -> Option<Self> {
         (when != When::Never).then(|| Self {
             folder: folder.to_owned(),
             written: Vec::new(),
         })
     }
 
-    pub(super) fn write(
-        &mut self,
-        time: f64,
-        snapshot: &Snapshot<'_>,
-        mesh: &Mesh,
-    ) -> Result<(), Error> {
+    pub(crate) fn write(&mut self, time: f64, snapshot: &Snapshot<'_>) -> Result<(), Error> {
         let path = self.folder.join(file_name(self.written.len()));
-        let text = unstructured_grid(snapshot, mesh);
+        let text = unstructured_grid(snapshot);
         replace(&path, &text)?;
         self.written.push(Written {
             time,
@@ -80,7 +76,7 @@ impl Fields {
     }
 
     /// The time written last.
-    pub(super) fn last(&self) -> Option<f64> {
+    pub(crate) fn last(&self) -> Option<f64> {
         self.written.last().map(|written| written.time)
     }
 }
@@ -124,24 +120,25 @@ fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Cells stand group by group, as `cell_data` has them.
-fn unstructured_grid(snapshot: &Snapshot<'_>, mesh: &Mesh) -> String {
+fn unstructured_grid(snapshot: &Snapshot<'_>) -> String {
+    let mesh = snapshot.mesh;
     let mut connectivity = String::new();
     let (mut offsets, mut types, mut groups) = (Vec::new(), Vec::new(), Vec::new());
     let mut end = 0;
     for (number, group) in snapshot.groups.iter().enumerate() {
         for element in 0..group.kinematics.n_elements() {
             let nodes = group.kinematics.nodes(element);
-            let is_quad = nodes.len() == 8;
-            let shown = if is_quad { nodes } else { &nodes[..3] };
+            let is_joint = group.formulation == Formulation::ZeroThickness;
+            let shown = if is_joint { &nodes[..3] } else { nodes };
             for node in shown {
                 let _ = write!(connectivity, "{node} ");
             }
             end += shown.len();
             offsets.push(end);
-            types.push(if is_quad {
-                QUADRATIC_QUAD
-            } else {
-                QUADRATIC_EDGE
+            types.push(match shown.len() {
+                3 => QUADRATIC_EDGE,
+                6 => QUADRATIC_TRIANGLE,
+                _ => QUADRATIC_QUAD,
             });
             groups.push(number);
         }

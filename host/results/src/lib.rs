@@ -1,0 +1,23 @@
+//! Results of a simulation in a folder: tables, fields, pictures, a summary, checkpoints, and the report
+//! that is made of them. They listen to a simulation and know nothing of the file it came from.
+
+pub mod checkpoint;
+mod fields;
+pub mod figure;
+mod file;
+mod leftovers;
+mod points;
+pub mod probe;
+mod profile;
+mod recorder;
+pub mod report;
+mod summary;
+mod table;
+pub mod wanted;
+
+pub use checkpoint::Checkpoint;
+pub use figure::Figures;
+pub use recorder::{Fault, Recorder, ResultsState, end_summary, remove_comparison};
+pub use summary::{About, Ending};
+pub use table::number;
+pub use wanted::Wanted;

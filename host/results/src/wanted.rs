@@ -1,0 +1,112 @@
+//! What results a run is to write, as plain values.
+
+use crate::probe::Probes;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The results that are wanted.
+#[derive(Debug)]
+pub struct Wanted {
+    /// When the larger tables and the fields are written.
+    pub output: Output,
+    /// Numbers for every increment.
+    pub probes: Probes,
+    /// Title of figures that have none of their own.
+    pub title: String,
+    /// Curves that are drawn.
+    pub figures: Vec<Figure>,
+    /// Whether steps along the path of equilibrium are written, too.
+    pub follows_path: bool,
+}
+
+/// Curves of columns over another one, or of a stress over the integration points of a cut.
+#[derive(Clone, Debug, Default)]
+pub struct Figure {
+    /// Name of the file, without `.svg`.
+    pub name: String,
+    /// Title, if not the common one.
+    pub title: Option<String>,
+    /// Column (of a cut: quantity of a point) along the horizontal axis.
+    pub x: String,
+    /// Text of the horizontal axis; the name if left out.
+    pub x_label: Option<String>,
+    /// Columns (quantities) along the vertical axis.
+    pub y: Vec<String>,
+    /// Text of the vertical axis.
+    pub y_label: Option<String>,
+    /// Only this phase; all if left out.
+    pub phase: Option<String>,
+    /// The integration points of a cut instead of columns.
+    pub points: Option<Cut>,
+}
+
+/// Integration points inside extents (ends excluded), at chosen increments.
+#[derive(Clone, Debug, Default)]
+pub struct Cut {
+    /// Of this group; of all if left out.
+    pub group: Option<String>,
+    /// Extent in x (r).
+    pub x: Option<[f64; 2]>,
+    /// Extent in y (z).
+    pub y: Option<[f64; 2]>,
+    /// After these increments of the phase, a curve for each; after the last one if there is none.
+    pub increments: Vec<usize>,
+    /// Factor of what stands along the vertical axis.
+    pub scale: f64,
+}
+
+/// How values become one.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduce {
+    /// Arithmetic mean.
+    Mean,
+    /// Mean weighted by what each integration point stands for: area, in axisymmetry of the whole
+    /// turn; of interfaces their own area.
+    Average,
+    /// The sum of values times what they stand for: over the area, in axisymmetry over the volume
+    /// of the whole turn; of interfaces over their own area.
+    Integral,
+    /// Smallest.
+    Min,
+    /// Largest.
+    Max,
+    /// Sum.
+    Sum,
+}
+
+/// What is written.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// When the profile along interfaces is written.
+    pub profile: When,
+    /// When all integration points are written.
+    pub points: When,
+    /// When fields for a viewer are written.
+    pub fields: When,
+}
+
+/// When something is written.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum When {
+    /// Never.
+    #[default]
+    Never,
+    /// After the last increment of each phase.
+    Phases,
+    /// After every increment.
+    Increments,
+}
+
+impl When {
+    /// Whether to write after increment `i` of `n`.
+    pub fn includes(self, i: usize, n: usize) -> bool {
+        match self {
+            Self::Never => false,
+            Self::Phases => i == n,
+            Self::Increments => true,
+        }
+    }
+}
