@@ -1,17 +1,18 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
-pub(crate) mod base;
-
-use crate::error::{Error, Source};
-use crate::input::{ForeignKeys, Named, ParameterTable, ParameterValue};
-use crate::plugin::adapter::{Adapter, Externals, Foreign, Scratch};
-use crate::schema;
+use crate::material::{ForeignKeys, ParameterTable, ParameterValue};
+use crate::{Error, schema};
+use law::adapter::{Adapter, Externals, Foreign, Scratch};
+use mechanics::Settings;
+use mechanics::problem::{self, Analysis, Formulation, InPlane, Integration};
+use results::wanted::{Output, Reduce};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
+use text::{Named, Source, base};
 use toml::Spanned;
 
 /// What a driver file looks like among case files.
@@ -36,7 +37,7 @@ impl Case {
     /// Reads a case file, or `case.toml` in a folder: one case, or one for each `[[variant]]`.
     ///
     /// # Errors
-    /// [`Error::Unreadable`], or [`Error::Input`] at the place that does not fit.
+    /// [`text::Error::Unreadable`], or [`text::Error::Input`] at the place that does not fit.
     pub fn load(path: &Path) -> Result<Vec<Self>, Error> {
         let path = if path.is_dir() {
             path.join("case.toml")
@@ -49,8 +50,8 @@ impl Case {
     /// Takes the text of a case file.
     ///
     /// # Errors
-    /// [`Error::Input`] at the place that does not fit.
-    pub(crate) fn of(source: Source) -> Result<Vec<Self>, Error> {
+    /// [`text::Error::Input`] at the place that does not fit.
+    pub fn of(source: Source) -> Result<Vec<Self>, Error> {
         let (source, files) = base::read_kind(source, &DRIVER)?;
         let case = |(variant, file)| Self {
             source: source.clone(),
@@ -86,7 +87,7 @@ impl Case {
     /// Folders with law libraries, relative to the file that names them.
     ///
     /// # Errors
-    /// [`Error::Input`] if there is no such folder.
+    /// [`text::Error::Input`] if there is no such folder.
     pub fn law_folders(&self) -> Result<Vec<PathBuf>, Error> {
         let folder = |written: &Spanned<PathBuf>| {
             let file = self.source.path_at(&written.span());
@@ -140,10 +141,10 @@ pub struct CaseFile {
     pub figures: Vec<FigureInput>,
     /// Solver settings.
     #[serde(default)]
-    pub solver: SolverInput,
+    pub solver: Settings,
     /// What is written.
     #[serde(default)]
-    pub output: OutputInput,
+    pub output: Output,
     /// Relative error of the probes that the run may have; settings that reach it are then found
     /// by a study before the run.
     #[serde(default, deserialize_with = "accuracy")]
@@ -305,7 +306,7 @@ impl LawInput {
     /// Its library, if that is made for another program.
     ///
     /// # Errors
-    /// [`Error::Input`] at the key that does not fit.
+    /// [`text::Error::Input`] at the key that does not fit.
     pub fn foreign(&self, source: &Source) -> Result<Option<Foreign>, Error> {
         let keys = ForeignKeys {
             adapter: self.adapter.as_ref(),
@@ -357,6 +358,15 @@ pub enum Axis {
     /// y, or z.
     #[serde(alias = "z")]
     Y,
+}
+
+impl From<Axis> for problem::Axis {
+    fn from(axis: Axis) -> Self {
+        match axis {
+            Axis::X => Self::X,
+            Axis::Y => Self::Y,
+        }
+    }
 }
 
 /// A stress, tension positive.

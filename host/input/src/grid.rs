@@ -1,11 +1,13 @@
 //! Meshes of columns and rows: grid, regions, lines, and elements inserted along lines.
 
-use super::{EDGES, Joint, Line, Mesh, Quad};
-use crate::case::{Analysis, CaseFile, Coordinate, Formulation, LineInput, MeshInput};
-use crate::case::{PartInput, RegionInput};
-use crate::error::{Error, Source, suggestion};
+use crate::Error;
+use crate::build::line;
+use crate::case::{CaseFile, Coordinate, LineInput, MeshInput, PartInput, RegionInput};
 use indexmap::IndexMap;
+use mechanics::mesh::{Joint, Line, Mesh, Solid};
+use mechanics::problem::{Analysis, Formulation};
 use std::collections::HashMap;
+use text::{Source, suggestion};
 use toml::Spanned;
 
 /// Most columns times rows.
@@ -15,7 +17,11 @@ const FARTHEST: f64 = 1e9;
 /// Two coordinates are the same within this fraction of the mesh's size.
 const SAME: f64 = 1e-9;
 
-pub(super) fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
+/// The mesh of a case.
+///
+/// # Errors
+/// [`text::Error::Input`] at the key that does not fit.
+pub fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
     let input = &file.mesh;
     let (x, y) = grids(source, file)?;
     let groups = element_groups(source, file, &x, &y)?;
@@ -51,12 +57,12 @@ fn insert_joints(source: &Source, file: &CaseFile, mesh: &mut Mesh) -> Result<()
     for (number, (name, group)) in file.groups.iter().enumerate() {
         let group = group.get_ref();
         match (group.formulation, &group.line) {
-            (Formulation::ZeroThickness, Some(line)) => {
-                let edges = &mesh.line(source, line)?.edges;
+            (Formulation::ZeroThickness, Some(along)) => {
+                let edges = &line(mesh, source, along)?.edges;
                 let cut = Cut {
                     group: number,
                     name,
-                    line,
+                    line: along,
                 };
                 let Some(&first) = edges.first() else {
                     return Err(wrong(&cut, "the line is a point"));
@@ -376,10 +382,8 @@ fn quads(x: &[f64], y: &[f64], groups: &[usize]) -> Mesh {
                 at(1, 2),
                 at(0, 1),
             ];
-            mesh.quads.push(Quad {
-                nodes,
-                group: groups[row * n_columns + column],
-            });
+            let group = groups[row * n_columns + column];
+            mesh.solids.push(Solid::quad(nodes, group));
         }
     }
     mesh
@@ -423,9 +427,9 @@ fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, 
             let along_y = matches!(line.x, Some(Coordinate::At(_)));
             grid_line(grids[usize::from(!along_y)], at, tolerance)?;
             let mut edges = Vec::new();
-            for (q, quad) in mesh.quads.iter().enumerate() {
-                for (e, edge) in EDGES.iter().enumerate() {
-                    if edge.iter().all(|&i| on(quad.nodes[i])) {
+            for (q, quad) in mesh.solids.iter().enumerate() {
+                for (e, edge) in quad.edges().enumerate() {
+                    if edge.into_iter().all(on) {
                         edges.push((q, e));
                     }
                 }
@@ -503,8 +507,8 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), Fault> {
     let across = across(mesh, edges[0]);
     // Every edge of the line belongs to two quads; the one with smaller coordinates is `minus`.
     let centre = |q: usize| {
-        let nodes = mesh.quads[q].nodes;
-        [0, 1].map(|c| nodes[..4].iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / 4.0)
+        let corners = mesh.solids[q].corners();
+        [0, 1].map(|c| corners.iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / 4.0)
     };
     let mut sides: HashMap<usize, Vec<Edge>> = HashMap::new();
     for &(q, e) in &edges {
@@ -560,17 +564,13 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), Fault> {
     }
     // Quads on the far side of the line take the copies, also those that touch it in one node.
     let position = mesh.nodes[joints[0].minus[0]][across];
-    for q in 0..mesh.quads.len() {
-        let nodes = mesh.quads[q].nodes;
-        let at = nodes[..4]
-            .iter()
-            .map(|&n| mesh.nodes[n][across])
-            .sum::<f64>()
-            / 4.0;
+    for quad in &mut mesh.solids {
+        let corners = quad.corners().iter();
+        let at = corners.map(|&n| mesh.nodes[n][across]).sum::<f64>() / 4.0;
         if at > position {
-            for i in 0..8 {
-                if let Some(&new) = copy.get(&nodes[i]) {
-                    mesh.quads[q].nodes[i] = new;
+            for node in quad.nodes_mut() {
+                if let Some(&new) = copy.get(node) {
+                    *node = new;
                 }
             }
         }
@@ -597,20 +597,15 @@ fn split(mesh: &mut Mesh, cuts: &[Cut<'_>]) -> Result<(), Fault> {
 
 /// Whether a node lies on an edge that only one quad has.
 fn boundary_nodes(mesh: &Mesh) -> Vec<bool> {
+    let edges = || mesh.solids.iter().flat_map(Solid::edges);
     let mut owners: HashMap<usize, usize> = HashMap::new();
-    for quad in &mesh.quads {
-        for edge in EDGES {
-            *owners.entry(quad.nodes[edge[2]]).or_default() += 1;
-        }
+    for [_, _, middle] in edges() {
+        *owners.entry(middle).or_default() += 1;
     }
     let mut on_boundary = vec![false; mesh.nodes.len()];
-    for quad in &mesh.quads {
-        for edge in EDGES {
-            if owners[&quad.nodes[edge[2]]] == 1 {
-                for i in edge {
-                    on_boundary[quad.nodes[i]] = true;
-                }
-            }
+    for edge in edges().filter(|edge| owners[&edge[2]] == 1) {
+        for node in edge {
+            on_boundary[node] = true;
         }
     }
     on_boundary

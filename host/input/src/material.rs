@@ -1,20 +1,14 @@
-//! What all input files share: reading TOML with the place of every error, and building laws from
-//! their parameters.
+//! Laws as files name them: where their libraries are, and what their parameters are.
 
-mod wording;
-
-use crate::error::{Error, Source, suggestion};
-use crate::plugin::adapter::{Adapter, Externals, Foreign, Scratch};
-use crate::plugin::{Law, LawDescription, LoadedLaw, ParameterDescription, SearchPath};
+use crate::Error;
 use abi::Hypothesis;
-use indexmap::IndexMap;
+use law::adapter::{Adapter, Externals, Foreign, Scratch};
+use law::{BuildCause, BuildFailure, BuiltLaw, LoadedLaw, SearchPath, Value};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
+use text::{Named, Source};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 
 /// The value of a parameter as written in a file.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
@@ -43,33 +37,11 @@ pub fn set_parameters(table: &mut ParameterTable, values: &[(String, ParameterVa
     }
 }
 
-/// A parameter as it was used, for the record.
-#[derive(Clone, Debug, PartialEq)]
-pub struct UsedParameter {
-    /// Identifier.
-    pub id: String,
-    /// Value; NaN if it was left out and has no default.
-    pub value: f64,
-    /// It was left out.
-    pub by_default: bool,
-}
-
-/// A law built from a file, with what the user should know about its parameters.
-#[derive(Debug)]
-pub struct BuiltLaw {
-    /// The law.
-    pub law: Law,
-    /// Parameters in declared order.
-    pub parameters: Vec<UsedParameter>,
-    /// Values outside their usual range, in words.
-    pub warnings: Vec<String>,
-}
-
 /// Fixes the parameters of a law under a hypothesis.
 ///
 /// # Errors
-/// [`Error::Plugin`] if the library is defective; [`Error::Input`] if the
-/// hypothesis or a parameter does not fit, at its place in the file.
+/// [`law::Error::Library`] if the library is defective; [`text::Error::Input`] if the hypothesis or a
+/// parameter does not fit, at its place in the file.
 pub fn build_law(
     source: &Source,
     loaded: &LoadedLaw,
@@ -77,98 +49,57 @@ pub fn build_law(
     hypothesis: Hypothesis,
     parameters: &ParameterTable,
 ) -> Result<BuiltLaw, Error> {
-    let description = loaded.description();
-    if description.formulation(hypothesis).is_none() {
-        let message = if description.formulations.is_empty() {
-            format!("law `{}`: {}", description.id, description.doc)
-        } else {
-            format!(
-                "law `{}` is made for {}, expected {}",
-                description.id,
-                description.hypotheses(),
-                hypothesis.name()
-            )
-        };
-        return Err(source.error(id.span(), message).into());
+    try_law(loaded, hypothesis, parameters)
+        .map_err(|failure| place_failure(source, id, parameters, &failure))
+}
+
+/// The same, with what does not fit as data.
+pub(crate) fn try_law(
+    loaded: &LoadedLaw,
+    hypothesis: Hypothesis,
+    parameters: &ParameterTable,
+) -> Result<BuiltLaw, BuildFailure> {
+    let given = parameters.iter();
+    let given = given.map(|(key, value)| (key.get_ref().as_str(), Value::from(value.get_ref())));
+    loaded.with(hypothesis, &given.collect::<Vec<_>>())
+}
+
+/// The error of a law that cannot be built, at its place in the file.
+pub(crate) fn place_failure(
+    source: &Source,
+    id: &Spanned<String>,
+    parameters: &ParameterTable,
+    failure: &BuildFailure,
+) -> Error {
+    if let BuildCause::Library { .. } = failure.cause {
+        return law::Error::library(failure.to_string()).into();
     }
-    let mut used = Vec::new();
-    let mut warnings = loaded.library().warnings().to_vec();
-    refuse_unknown(source, description, parameters)?;
-    for declared in &description.parameters {
-        let given = parameters
-            .iter()
-            .find(|(key, _)| key.get_ref() == &declared.id);
-        let value = match given {
-            Some((_, value)) => {
-                let number = number(source, declared, value)?;
-                if !declared.usual.contain(number) {
-                    warnings.push(format!(
-                        "law `{}`: {} = {} is outside its usual range {}",
-                        description.id,
-                        declared.id,
-                        with_unit(number, declared),
-                        declared.usual
-                    ));
-                }
-                number
-            }
-            None => match declared.default {
-                Some(default) => default,
-                None if declared.optional => f64::NAN,
-                None => {
-                    return Err(source
-                        .error(
-                            id.span(),
-                            format!(
-                                "law `{}` needs parameter `{}` [{}]: {}",
-                                description.id, declared.id, declared.unit, declared.doc
-                            ),
-                        )
-                        .hint(format!("it needs: {}", needed(description)))
-                        .into());
-                }
-            },
-        };
-        used.push(UsedParameter {
-            id: declared.id.clone(),
-            value,
-            by_default: given.is_none(),
-        });
+    let mut given = parameters.iter();
+    let given = given.find(|(key, _)| Some(key.get_ref()) == failure.parameter.as_ref());
+    let span = match (&failure.cause, given) {
+        (BuildCause::Unknown(_), Some((key, _))) => key.span(),
+        (_, Some((_, value))) => value.span(),
+        (BuildCause::Radians(_), None) => 0..0,
+        (_, None) => id.span(),
+    };
+    let mut error = source.error(span, failure.to_string());
+    if let BuildCause::OutOfBounds { doc, .. } = &failure.cause {
+        error = error.label(doc.clone());
     }
-    refuse_radians(source, description, &used, parameters)?;
-    let values: Vec<f64> = used.iter().map(|p| p.value).collect();
-    let law = loaded.build(hypothesis, &values).map_err(|failure| {
-        if failure.library_at_fault {
-            return Error::plugin(format!(
-                "law `{}` of library {}: {}",
-                description.id,
-                loaded.library().path().display(),
-                failure.reason
-            ));
+    match failure.hint() {
+        Some(hint) => error.hint(hint).into(),
+        None => error.into(),
+    }
+}
+
+impl From<&ParameterValue> for Value {
+    fn from(value: &ParameterValue) -> Self {
+        match value {
+            ParameterValue::Number(number) => Self::Number(*number),
+            ParameterValue::Integer(number) => Self::Number(*number as f64),
+            ParameterValue::Label(label) => Self::Label(label.clone()),
         }
-        let place = failure.parameter.as_deref().and_then(|id| {
-            parameters
-                .iter()
-                .find(|(key, _)| key.get_ref() == id)
-                .map(|(_, value)| value.span())
-        });
-        source
-            .error(
-                place.unwrap_or_else(|| id.span()),
-                format!(
-                    "law `{}` refuses its parameters: {}",
-                    description.id, failure.reason
-                ),
-            )
-            .into()
-    })?;
-    let id = &description.id;
-    warnings.extend(law.changes().iter().map(|it| format!("law `{id}`: {it}")));
-    Ok(BuiltLaw {
-        law,
-        parameters: used,
-        warnings,
-    })
+    }
 }
 
 /// Finds a law; a missing one is reported with its place in the file.
@@ -183,14 +114,12 @@ pub(crate) fn find_law(
         Some(foreign) => search.foreign_law(id.get_ref(), foreign),
     };
     found.map_err(|error| match error {
-        Error::Plugin { message, hint } => {
+        law::Error::Library { message, hint } => {
             let place = source.place(&id.span());
-            Error::Plugin {
-                message: format!("{message}\n  needed by {place}"),
-                hint,
-            }
+            let message = format!("{message}\n  needed by {place}");
+            law::Error::Library { message, hint }.into()
         }
-        other => other,
+        other => other.into(),
     })
 }
 
@@ -217,7 +146,7 @@ impl ForeignKeys<'_> {
     /// The library; `None` if it is one of the contract. Paths are relative to the file.
     ///
     /// # Errors
-    /// [`Error::Input`] at a key that misses another, or a file that is not there.
+    /// [`text::Error::Input`] at a key that misses another, or a file that is not there.
     pub(crate) fn read(self, source: &Source) -> Result<Option<Foreign>, Error> {
         let path = |written: &Spanned<PathBuf>| {
             let file = source.path_at(&written.span());
@@ -312,129 +241,4 @@ impl ForeignKeys<'_> {
         }
         Ok(())
     }
-}
-
-fn refuse_unknown(
-    source: &Source,
-    description: &LawDescription,
-    parameters: &ParameterTable,
-) -> Result<(), Error> {
-    let ids: Vec<&str> = description
-        .parameters
-        .iter()
-        .map(|p| p.id.as_str())
-        .collect();
-    match parameters
-        .keys()
-        .find(|key| !ids.contains(&key.get_ref().as_str()))
-    {
-        None => Ok(()),
-        Some(key) => Err(source
-            .error(
-                key.span(),
-                format!(
-                    "law `{}` has no parameter `{}`",
-                    description.id,
-                    key.get_ref()
-                ),
-            )
-            .hint(suggestion(key.get_ref(), ids))
-            .into()),
-    }
-}
-
-fn needed(description: &LawDescription) -> String {
-    let needed: Vec<String> = description
-        .parameters
-        .iter()
-        .filter(|p| p.default.is_none() && !p.optional)
-        .map(|p| format!("{} [{}]", p.id, p.unit))
-        .collect();
-    needed.join(", ")
-}
-
-/// The number that a written value stands for, within its bounds.
-fn number(
-    source: &Source,
-    declared: &ParameterDescription,
-    value: &Spanned<ParameterValue>,
-) -> Result<f64, Error> {
-    let id = &declared.id;
-    let choices: Vec<&str> = declared.choices.iter().map(String::as_str).collect();
-    let error = |message: String| source.error(value.span(), message);
-    let number = match value.get_ref() {
-        ParameterValue::Label(label) => {
-            return match choices.iter().position(|choice| choice == label) {
-                Some(index) => Ok(index as f64),
-                None if choices.is_empty() => {
-                    let message = format!("`{id}`: found the text \"{label}\", expected a number");
-                    Err(error(message).into())
-                }
-                None => Err(error(format!("`{id}` has no choice `{label}`"))
-                    .hint(suggestion(label, choices))
-                    .into()),
-            };
-        }
-        ParameterValue::Number(number) => *number,
-        ParameterValue::Integer(number) => *number as f64,
-    };
-    if !choices.is_empty() {
-        return Err(error(format!("`{id}` is one of {}", choices.join(", "))).into());
-    }
-    if !number.is_finite() || !declared.bounds.contain(number) {
-        let bounds = declared.bounds;
-        return Err(error(format!(
-            "`{id}`: {} is outside {bounds}",
-            with_unit(number, declared)
-        ))
-        .label(declared.doc.clone())
-        .into());
-    }
-    Ok(number)
-}
-
-/// A value with its unit, if it has one.
-fn with_unit(value: f64, declared: &ParameterDescription) -> String {
-    let number = if value == 0.0 || (1e-6..1e10).contains(&value.abs()) {
-        value.to_string()
-    } else {
-        format!("{value:e}")
-    };
-    match declared.unit.as_str() {
-        "" | "-" => number,
-        unit => format!("{number} {unit}"),
-    }
-}
-
-/// Refuses angles that can only be meant in radians: none of them reaches π/2 degrees.
-fn refuse_radians(
-    source: &Source,
-    description: &LawDescription,
-    used: &[UsedParameter],
-    parameters: &ParameterTable,
-) -> Result<(), Error> {
-    let largest = description
-        .parameters
-        .iter()
-        .zip(used)
-        .filter(|(declared, _)| declared.unit == "deg")
-        .map(|(_, used)| used)
-        .max_by(|a, b| a.value.total_cmp(&b.value));
-    let Some(UsedParameter { id, value, .. }) = largest else {
-        return Ok(());
-    };
-    if !(0.05..=std::f64::consts::FRAC_PI_2).contains(value) {
-        return Ok(());
-    }
-    let place = parameters.iter().find(|(key, _)| key.get_ref() == id);
-    Err(source
-        .error(
-            place.map_or(0..0, |(_, value)| value.span()),
-            format!("`{id}`: {value} deg looks like an angle in radians"),
-        )
-        .hint(format!(
-            "angles are given in degrees: {:.1}?",
-            value.to_degrees()
-        ))
-        .into())
 }

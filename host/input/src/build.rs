@@ -1,0 +1,420 @@
+//! From a case file to a problem in memory and the results that are wanted of it; and back: which place
+//! of the file an error of the problem is about.
+
+use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput, StressInput};
+use crate::material::{find_law, place_failure, try_law};
+use crate::{Error, figures, grid, probes};
+use abi::Hypothesis;
+use abi::status::Outcome;
+use indexmap::IndexMap;
+use law::{BuildCause, BuiltLaw, LoadedLaw, Pins, SearchPath, hexadecimal_sha256};
+use mechanics::group::PointFailure;
+use mechanics::mesh::{Line, Mesh};
+use mechanics::problem::{
+    Axis, Cause, Displacement, ElementGroup, Formulation, Free, Item, Key, Material, Phase,
+    Pressure, Problem, Refusal, Support,
+};
+use mechanics::settings::Control;
+use mechanics::{Simulation, model};
+use results::{About, Wanted};
+use std::ops::Range;
+use std::sync::Arc;
+use text::{Source, suggestion};
+use toml::Spanned;
+
+/// Laws by name and hypothesis.
+pub type Laws = IndexMap<(String, &'static str), Arc<BuiltLaw>>;
+
+/// A problem that was read from a case file.
+#[derive(Clone, Debug)]
+pub struct Posed {
+    /// The problem.
+    pub problem: Problem,
+    /// All laws used.
+    pub laws: Laws,
+}
+
+/// The line of this name.
+///
+/// # Errors
+/// [`text::Error::Input`] with the names there are.
+pub(crate) fn line<'m>(
+    mesh: &'m Mesh,
+    source: &Source,
+    name: &Spanned<String>,
+) -> Result<&'m Line, Error> {
+    mesh.lines.get(name.get_ref()).ok_or_else(|| {
+        let names: Vec<&str> = mesh.lines.keys().map(String::as_str).collect();
+        let message = format!("there is no line `{}`", name.get_ref());
+        let error = source.error(name.span(), message);
+        error.hint(suggestion(name.get_ref(), names)).into()
+    })
+}
+
+impl Case {
+    /// The problem that the file poses: its mesh, its laws with their parameters, its phases.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] at the place that does not fit; [`law::Error::Library`].
+    pub fn pose(&self) -> Result<Posed, Error> {
+        let Self { source, file, .. } = self;
+        let mesh = grid::build(source, file)?;
+        let pins = file.laws.values().map(Spanned::get_ref);
+        let pins = Pins::of(source, pins.map(|law| (&law.law, law.sha256.as_ref())))?;
+        let search = SearchPath::new(&self.law_folders()?).pinned(pins);
+        let mut shelf = LawShelf {
+            source,
+            file,
+            search,
+            laws: IndexMap::new(),
+        };
+        refuse_unknown_groups(source, file)?;
+        let mut phases: Vec<Phase> = file.phases.iter().map(phase).collect();
+        let mut groups = Vec::new();
+        for (number, (name, group)) in file.groups.iter().enumerate() {
+            let input = group.get_ref();
+            shelf.entry(&input.law)?;
+            // A law that the first phase replaces is never used, and not loaded.
+            let mut own = None;
+            for (phase, into) in file.phases.iter().zip(&mut phases) {
+                let mut laws = phase.laws.iter();
+                let swap = laws.find(|(key, _)| key.get_ref() == name.get_ref());
+                if let Some((_, law)) = swap {
+                    let material = shelf.material(name, input, law)?;
+                    own.get_or_insert_with(|| material.clone());
+                    into.materials.push((number, material));
+                } else if own.is_none() {
+                    own = Some(shelf.material(name, input, &input.law)?);
+                }
+            }
+            let material = match own {
+                Some(material) => material,
+                None => shelf.material(name, input, &input.law)?,
+            };
+            groups.push(ElementGroup {
+                name: name.get_ref().clone(),
+                formulation: input.formulation,
+                material,
+                integration: input.integration.as_ref().map(|i| *i.get_ref()),
+                normal: input.normal.as_ref().map(|n| (*n.get_ref()).into()),
+                in_plane: input.in_plane.as_ref().map(|i| *i.get_ref()),
+                initial_stress: input.initial_stress.as_ref().map(|s| stress(*s.get_ref())),
+            });
+        }
+        let supports = file.supports.iter().map(|support| Support {
+            line: support.line.get_ref().clone(),
+            fixed: support.fixed.iter().map(|&axis| axis.into()).collect(),
+        });
+        Ok(Posed {
+            problem: Problem {
+                analysis: file.analysis,
+                mesh,
+                groups,
+                supports: supports.collect(),
+                phases,
+                settings: file.solver,
+            },
+            laws: shelf.laws,
+        })
+    }
+
+    /// The results that the file asks for, of its simulation.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] at the probe or figure that does not fit.
+    pub fn wanted(&self, simulation: &Simulation) -> Result<Wanted, Error> {
+        let probes = probes::resolve(self, simulation)?;
+        figures::check_figures(self, &probes)?;
+        Ok(Wanted {
+            output: self.file.output,
+            probes,
+            title: self.file.title.clone(),
+            figures: self.file.figures.iter().map(Into::into).collect(),
+            follows_path: self.file.solver.control == Control::ArcLength,
+        })
+    }
+
+    /// What the record of a run says of the case.
+    pub fn about(&self, laws: &Laws) -> About {
+        let Self { source, file, .. } = self;
+        let files = source.files().map(|range| {
+            let path = source.path_at(&range).display().to_string();
+            (path, source.text()[range].to_owned())
+        });
+        let laws_of = |(name, group): (&Spanned<String>, &Spanned<GroupInput>)| {
+            let from_phase = file.phases.iter().filter_map(|phase| {
+                let (_, law) = phase.laws.iter().find(|(key, _)| *key == name)?;
+                Some((phase.name.get_ref().clone(), law.get_ref().clone()))
+            });
+            (group.get_ref().law.get_ref().clone(), from_phase.collect())
+        };
+        About {
+            case: self.name(),
+            variant: self.variant.clone(),
+            title: file.title.clone(),
+            sha256: hexadecimal_sha256(source.text().as_bytes()),
+            files: files.collect(),
+            laws_of_groups: file.groups.iter().map(laws_of).collect(),
+            laws: laws.clone(),
+            probe_units: probes::units(self, laws),
+            chosen: file
+                .chosen
+                .as_ref()
+                .map(|chosen| serde_json::json!(chosen)),
+        }
+    }
+
+    /// What is plausible in the case but seldom meant, beside what its problem is warned of.
+    pub fn warnings(&self, simulation: &Simulation) -> Vec<String> {
+        probes::reactions(self, &simulation.problem().mesh)
+    }
+
+    /// An error of the case's problem or simulation, at its place in the file where it has one.
+    pub fn place(&self, error: mechanics::Error) -> Error {
+        match error {
+            mechanics::Error::Refused(refusal) => self.place_refusal(&refusal),
+            mechanics::Error::CannotStart(failure) => self.cannot_start(failure),
+            other => other.into(),
+        }
+    }
+
+    fn place_refusal(&self, refusal: &Refusal) -> Error {
+        let error = self
+            .source
+            .error(self.span(&refusal.item, &refusal.cause), refusal.to_string());
+        let hint = match &refusal.cause {
+            Cause::NoLine { name, known } => {
+                let known = known.iter().map(String::as_str).collect::<Vec<_>>();
+                Some(suggestion(name, known))
+            }
+            cause => cause.hint(),
+        };
+        match hint {
+            Some(hint) => error.hint(hint).into(),
+            None => error.into(),
+        }
+    }
+
+    /// Where a part of the problem is written.
+    fn span(&self, item: &Item, cause: &Cause) -> Range<usize> {
+        let file = &self.file;
+        let group = |number: usize| file.groups.get_index(number);
+        let found = match item {
+            Item::Problem => None,
+            Item::Group(number) => group(*number).map(|(name, _)| name.span()),
+            Item::GroupKey(number, key) => group(*number).and_then(|(name, group)| {
+                let group = group.get_ref();
+                let span = match key {
+                    Key::Integration => group.integration.as_ref().map(Spanned::span),
+                    Key::Normal => group.normal.as_ref().map(Spanned::span),
+                    Key::InPlane => group.in_plane.as_ref().map(Spanned::span),
+                    Key::InitialStress => group.initial_stress.as_ref().map(Spanned::span),
+                };
+                span.or_else(|| Some(name.span()))
+            }),
+            Item::LawOf { group: of, phase } => group(*of).and_then(|(name, group)| {
+                let swap = || {
+                    let laws = &file.phases.get((*phase)?)?.laws;
+                    laws.iter().find(|(key, _)| *key == name)
+                };
+                let own = || group.get_ref().law.span();
+                Some(swap().map_or_else(own, |(_, law)| law.span()))
+            }),
+            Item::Material(name) => {
+                let mut laws = file.laws.keys();
+                laws.find(|key| key.get_ref() == name).map(Spanned::span)
+            }
+            Item::Support(number) => file.supports.get(*number).map(|s| s.line.span()),
+            Item::Phase(number) => file.phases.get(*number).map(|phase| match cause {
+                Cause::Increments(_) => phase.increments.span(),
+                _ => phase.name.span(),
+            }),
+            Item::Displacement(phase, number) => file.phases.get(*phase).and_then(|phase| {
+                let input = phase.displacement.get(*number)?;
+                Some(input.line.span())
+            }),
+            Item::Free(phase, number) => file.phases.get(*phase).and_then(|phase| {
+                let input = phase.free.get(*number)?;
+                Some(input.line.span())
+            }),
+            Item::Pressure(phase, number) => file.phases.get(*phase).and_then(|phase| {
+                let input = phase.pressure.get(*number)?;
+                Some(input.line.span())
+            }),
+        };
+        found.unwrap_or(0..0)
+    }
+
+    /// The error of a law that cannot start from the stress it finds: at the law's place in the
+    /// file, if that is what the law says.
+    fn cannot_start(&self, failure: Box<PointFailure>) -> Error {
+        let mut laws = self.file.laws.iter();
+        let entry = laws.find(|(key, _)| key.get_ref() == &failure.law);
+        let outcome = failure.failure.outcome;
+        let error = mechanics::Error::CannotStart(failure);
+        match entry {
+            Some((_, law)) if matches!(outcome, Outcome::Domain | Outcome::Parameter) => {
+                let span = law.get_ref().law.span();
+                self.source.error(span, error.to_string()).into()
+            }
+            _ => error.into(),
+        }
+    }
+}
+
+/// Groups whose laws phases swap must be there.
+fn refuse_unknown_groups(source: &Source, file: &CaseFile) -> Result<(), Error> {
+    let names = || file.groups.keys().map(|key| key.get_ref().as_str());
+    for group in file.phases.iter().flat_map(|phase| phase.laws.keys()) {
+        if !names().any(|name| name == group.get_ref()) {
+            let message = format!("there is no group `{}`", group.get_ref());
+            return Err(source
+                .error(group.span(), message)
+                .hint(suggestion(group.get_ref(), names().collect::<Vec<_>>()))
+                .into());
+        }
+    }
+    Ok(())
+}
+
+/// A phase without its laws.
+fn phase(input: &PhaseInput) -> Phase {
+    let axes = |axes: &[crate::case::Axis]| -> Vec<Axis> {
+        axes.iter().map(|&axis| axis.into()).collect()
+    };
+    let displacement = input.displacement.iter().map(|input| Displacement {
+        line: input.line.get_ref().clone(),
+        x: input.x,
+        y: input.y,
+    });
+    let free = input.free.iter().map(|input| Free {
+        line: input.line.get_ref().clone(),
+        components: axes(&input.components),
+    });
+    let pressure = input.pressure.iter().map(|input| Pressure {
+        line: input.line.get_ref().clone(),
+        value: input.value,
+    });
+    Phase {
+        name: input.name.get_ref().clone(),
+        increments: *input.increments.get_ref(),
+        materials: Vec::new(),
+        reset_displacements: input.reset_displacements,
+        displacement: displacement.collect(),
+        free: free.collect(),
+        pressure: pressure.collect(),
+    }
+}
+
+/// Components 11 22 33 12.
+fn stress(s: StressInput) -> [f64; 4] {
+    [s.s11, s.s22, s.s33, s.s12]
+}
+
+/// Laws built so far; each once for every hypothesis.
+struct LawShelf<'a> {
+    source: &'a Source,
+    file: &'a CaseFile,
+    search: SearchPath,
+    laws: Laws,
+}
+
+impl<'a> LawShelf<'a> {
+    /// What the file says under a law's name.
+    fn entry(&self, name: &Spanned<String>) -> Result<&'a LawInput, Error> {
+        let laws = &self.file.laws;
+        let entry = laws.iter().find(|(key, _)| key.get_ref() == name.get_ref());
+        entry.map(|(_, entry)| entry.get_ref()).ok_or_else(|| {
+            let names: Vec<&str> = laws.keys().map(|k| k.get_ref().as_str()).collect();
+            let message = format!("there is no law `{}` under [laws]", name.get_ref());
+            self.source
+                .error(name.span(), message)
+                .hint(suggestion(name.get_ref(), names))
+                .into()
+        })
+    }
+
+    /// The law without its parameters.
+    fn loaded(&self, entry: &LawInput) -> Result<LoadedLaw, Error> {
+        let foreign = entry.foreign(self.source)?;
+        find_law(self.source, &self.search, &entry.law, foreign.as_ref())
+    }
+
+    /// The law of this name, for a group.
+    fn material(
+        &mut self,
+        group_name: &Spanned<String>,
+        group: &GroupInput,
+        name: &Spanned<String>,
+    ) -> Result<Material, Error> {
+        let entry = self.entry(name)?;
+        let is_interface_law = group.formulation == Formulation::ThinLayer
+            && self.loaded(entry).is_ok_and(|law| {
+                let offered = law.description().formulation(Hypothesis::Interface2d);
+                offered.is_some()
+            });
+        let hypothesis = model::hypothesis(self.file.analysis, group.formulation, is_interface_law);
+        let key = (name.get_ref().clone(), hypothesis.name());
+        let built = if let Some(built) = self.laws.get(&key) {
+            Arc::clone(built)
+        } else {
+            let parameters = &entry.parameters;
+            let loaded = self.loaded(entry)?;
+            let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
+                let error = place_failure(self.source, &entry.law, parameters, &failure);
+                if matches!(failure.cause, BuildCause::Hypothesis { .. }) {
+                    self.explain(error, group_name, group, name)
+                } else {
+                    error
+                }
+            })?;
+            let built = Arc::new(built);
+            self.laws.insert(key, Arc::clone(&built));
+            built
+        };
+        let mut material = Material::new(name.get_ref(), built);
+        for (variable, value) in &entry.initial {
+            if !value.get_ref().is_finite() {
+                let message = "expected a finite number";
+                return Err(self.source.error(value.span(), message).into());
+            }
+            let law = Arc::clone(&material.built);
+            let id = variable.get_ref();
+            material = material
+                .starting_with(id, *value.get_ref())
+                .ok_or_else(|| {
+                    let variables = &law.law.formulation().internal_variables;
+                    let ids: Vec<&str> = variables.iter().map(|v| v.id.as_str()).collect();
+                    let message = format!(
+                        "law `{}` has no internal variable `{id}`",
+                        law.law.description().id
+                    );
+                    let error = self.source.error(variable.span(), message);
+                    Error::from(error.hint(suggestion(id, ids)))
+                })?;
+        }
+        Ok(material)
+    }
+
+    /// Adds what the group expects to an error about the law's hypothesis.
+    fn explain(
+        &self,
+        error: Error,
+        name: &Spanned<String>,
+        group: &GroupInput,
+        law: &Spanned<String>,
+    ) -> Error {
+        let Error::Text(text::Error::Input(input)) = error else {
+            return error;
+        };
+        let label = format!("taken by group `{}`", name.get_ref());
+        let input = self.source.mark(*input, law.span(), label);
+        let hint = format!(
+            "group `{}` has the formulation `{}` in the analysis `{}`",
+            name.get_ref(),
+            group.formulation.name(),
+            self.file.analysis.name()
+        );
+        input.hint(hint).into()
+    }
+}

@@ -1,0 +1,157 @@
+//! Figures as files ask for them.
+
+use crate::Error;
+use crate::case::{Case, CutInput, FigureInput};
+use results::probe::Probes;
+use results::wanted::{Cut, Figure};
+use text::{Source, suggestion};
+use toml::Spanned;
+
+/// What can be drawn along a cut; `k_0` is the ratio of radial to vertical stress.
+const CUT_QUANTITIES: [&str; 7] = [
+    "x",
+    "y",
+    "stress_11",
+    "stress_22",
+    "stress_33",
+    "stress_12",
+    "k_0",
+];
+
+/// Refuses figures whose probes or phase do not exist, or two with one name.
+///
+/// # Errors
+/// [`text::Error::Input`] at the name.
+pub fn check_figures(case: &Case, probes: &Probes) -> Result<(), Error> {
+    let source = &case.source;
+    let names: Vec<&str> = probes.names().collect();
+    let phases: Vec<&str> = case
+        .file
+        .phases
+        .iter()
+        .map(|phase| phase.name.get_ref().as_str())
+        .collect();
+    check_names(source, &case.file.figures)?;
+    for figure in &case.file.figures {
+        match figure.points {
+            None => check_columns(source, figure, "probe", &names)?,
+            Some(_) => check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?,
+        }
+        if let Some(group) = figure.points.as_ref().and_then(|cut| cut.group.as_ref())
+            && !case.file.groups.contains_key(group.get_ref().as_str())
+        {
+            let groups: Vec<&str> = case
+                .file
+                .groups
+                .keys()
+                .map(|k| k.get_ref().as_str())
+                .collect();
+            return Err(source
+                .error(
+                    group.span(),
+                    format!("there is no group `{}`", group.get_ref()),
+                )
+                .hint(suggestion(group.get_ref(), groups))
+                .into());
+        }
+        if let Some(phase) = &figure.phase
+            && !phases.contains(&phase.get_ref().as_str())
+        {
+            return Err(source
+                .error(
+                    phase.span(),
+                    format!("there is no phase `{}`", phase.get_ref()),
+                )
+                .hint(suggestion(phase.get_ref(), phases))
+                .into());
+        }
+    }
+    Ok(())
+}
+
+/// Refuses figures of a table whose columns do not exist, or two with one name.
+///
+/// # Errors
+/// [`text::Error::Input`] at the name.
+pub fn check_table_figures(
+    source: &Source,
+    figures: &[FigureInput],
+    columns: &[&str],
+) -> Result<(), Error> {
+    check_names(source, figures)?;
+    for figure in figures {
+        check_columns(source, figure, "column", columns)?;
+        if let Some(phase) = &figure.phase {
+            let message = "a driver has no phases";
+            return Err(source.error(phase.span(), message).into());
+        }
+        if figure.points.is_some() {
+            let message = "a driver has one point, there is no cut through it";
+            return Err(source.error(figure.name.span(), message).into());
+        }
+    }
+    Ok(())
+}
+
+fn check_names(source: &Source, figures: &[FigureInput]) -> Result<(), Error> {
+    let mut seen: Vec<&str> = Vec::new();
+    for figure in figures {
+        let name = figure.name.get_ref().as_str();
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || !name.chars().all(plain) {
+            let message = format!("`{name}` cannot be a file's name: letters, digits, _ and -");
+            return Err(source.error(figure.name.span(), message).into());
+        }
+        if seen.contains(&name) {
+            let message = format!("two figures are called `{name}`");
+            return Err(source.error(figure.name.span(), message).into());
+        }
+        seen.push(name);
+    }
+    Ok(())
+}
+
+fn check_columns(
+    source: &Source,
+    figure: &FigureInput,
+    kind: &str,
+    known: &[&str],
+) -> Result<(), Error> {
+    for wanted in figure.y.iter().chain([&figure.x]) {
+        if !known.contains(&wanted.get_ref().as_str()) {
+            let message = format!("there is no {kind} `{}`", wanted.get_ref());
+            return Err(source
+                .error(wanted.span(), message)
+                .hint(suggestion(wanted.get_ref(), known.to_vec()))
+                .into());
+        }
+    }
+    Ok(())
+}
+
+impl From<&FigureInput> for Figure {
+    fn from(input: &FigureInput) -> Self {
+        Self {
+            name: input.name.get_ref().clone(),
+            title: input.title.clone(),
+            x: input.x.get_ref().clone(),
+            x_label: input.x_label.clone(),
+            y: input.y.iter().map(|y| y.get_ref().clone()).collect(),
+            y_label: input.y_label.clone(),
+            phase: input.phase.as_ref().map(|phase| phase.get_ref().clone()),
+            points: input.points.as_ref().map(Cut::from),
+        }
+    }
+}
+
+impl From<&CutInput> for Cut {
+    fn from(input: &CutInput) -> Self {
+        Self {
+            group: input.group.as_ref().map(Spanned::get_ref).cloned(),
+            x: input.x,
+            y: input.y,
+            increments: input.increments.clone(),
+            scale: input.scale,
+        }
+    }
+}
