@@ -1,39 +1,43 @@
 //! The driver file: reading it, and checking everything that can be checked before the first call.
+//!
+//! What a driver is and does is [`point`]'s; here is where in a file it stands.
 
-use super::frame::Frame;
-use super::restrictions::Restrictions;
-use super::{N_MAX, Vector};
-use crate::case::{FigureInput, base};
-use crate::error::{Error, Source, suggestion};
-use crate::input::{self, BuiltLaw, ForeignKeys, Named, ParameterTable, ParameterValue};
-use crate::lock::Pins;
-use crate::plugin::adapter::{Adapter, Externals, Scratch};
-use crate::plugin::{Law, SearchPath, Strided};
+mod path;
+
+use crate::Error;
+use crate::case::FigureInput;
+use crate::material::{
+    self, BuiltLaw, ForeignKeys, ParameterTable, ParameterValue, build_law, find_law,
+};
 use crate::schema;
-use abi::Hypothesis;
-use abi::status::Outcome;
 use indexmap::IndexMap;
+use law::adapter::{Adapter, Externals, Scratch};
+use law::{Pins, SearchPath};
+use path::{finite, hypothesis, initial_flux, segments};
+use point::{Segment, Vector};
+use results::figure::check_table_figures;
+use results::point_figure::drawable;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use text::base::{OtherKind, read_kind};
+use text::{Named, Source, suggestion};
 use toml::Spanned;
 
 /// What a case file looks like among driver files.
-const CASE: base::OtherKind = base::OtherKind {
+const CASE: OtherKind = OtherKind {
     keys: &["analysis", "mesh", "groups", "supports", "phase"],
     message: "this is a case file; expected a driver file, which leads a law at one point",
     command: "pilum run",
 };
 
-/// Most increments of one file; a slip of the pen beyond.
-const MAX_INCREMENTS: usize = 100_000_000;
-
 /// The keys of a driver file. Units: kPa, m; angles in degrees; tension and opening positive.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct File {
+#[schemars(rename = "File")]
+pub(crate) struct DriverFile {
     /// Id of the law.
     #[schemars(with = "String")]
     law: Spanned<String>,
@@ -136,87 +140,54 @@ struct ControlTable {
     stress: Option<Spanned<f64>>,
 }
 
-/// How one component is led through a segment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Control {
-    /// The flux stays what it is at the start of the segment.
-    Keep,
-    /// Gradient at the end of the segment.
-    Gradient(f64),
-    /// Flux at the end of the segment.
-    Flux(f64),
-    /// The flux changes by −stiffness × jump.
-    Stiffness(f64),
-    /// Change of the gradient over the segment.
-    GradientBy(f64),
-    /// Change of the flux over the segment.
-    FluxBy(f64),
-}
-
-/// A stretch of the path.
-#[derive(Clone, Debug)]
-pub(super) struct Segment {
-    pub(super) increments: usize,
-    pub(super) control: [Control; N_MAX],
-    /// Number of the step that it is part of, from 1.
-    pub(super) step: u32,
-    /// Increments of that step before it.
-    pub(super) first: usize,
-    /// What the components are.
-    pub(super) frame: Frame,
-    /// Time of an increment.
-    pub(super) time_increment: f64,
-    /// What holds in place of the controls.
-    pub(super) restrictions: Option<Restrictions>,
-}
-
-/// A driver file, checked, with its law built.
+/// A driver with the file that it was read from.
 #[derive(Debug)]
 pub struct Driver {
-    pub(super) law: Law,
-    pub(super) warnings: Vec<String>,
-    pub(super) flux: Vector,
-    pub(super) internal: Vec<f64>,
-    pub(super) segments: Vec<Segment>,
-    pub(super) variant: Option<String>,
-    pub(super) title: String,
-    pub(super) figures: Vec<FigureInput>,
+    point: point::Driver,
+    title: String,
+    figures: Vec<FigureInput>,
     source: Source,
     place_of_initial: Range<usize>,
-    file: File,
-    /// Who may want it to stop.
-    pub(super) stop: crate::stop::Stop,
+    /// What the file says, if it is a driver file.
+    file: Option<DriverFile>,
 }
 
 impl Driver {
     /// Reads a driver file and builds its law: one driver, or one for each `[[variant]]`.
     ///
     /// # Errors
-    /// [`Error::Unreadable`], and those of [`Driver::from_source`].
+    /// The file cannot be read, and those of [`Driver::from_source`].
     pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
         Self::variants(Source::read(path)?, true)
     }
 
     /// As [`Driver::read`], whatever the lock beside the file says.
-    pub(crate) fn read_unlocked(path: &Path) -> Result<Vec<Self>, Error> {
+    ///
+    /// # Errors
+    /// As [`Driver::read`].
+    pub fn read_unlocked(path: &Path) -> Result<Vec<Self>, Error> {
         Self::variants(Source::read(path)?, false)
     }
 
     /// Takes the text of a driver file without variants and builds its law.
     ///
     /// # Errors
-    /// [`Error::Input`] at the place that does not fit; [`Error::Plugin`] if the law is not found
-    /// or its library is defective; [`Error::Usage`] if the file has variants.
+    /// At the place that does not fit; the law is not found or its library is defective; the file has
+    /// variants.
     pub fn from_source(source: &Source) -> Result<Self, Error> {
         let mut drivers = Self::variants(source.clone(), true)?;
         match (drivers.pop(), drivers.is_empty()) {
             (Some(driver), true) => Ok(driver),
-            _ => Err(Error::Usage("the driver has several variants".to_owned())),
+            _ => Err(text::Error::Usage("the driver has several variants".to_owned()).into()),
         }
     }
 
-    pub(crate) fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
-        let (source, files) = base::read_kind(source, &CASE)?;
+    /// Takes the text of a driver file. `locked`: the lock beside it is honoured.
+    ///
+    /// # Errors
+    /// As [`Driver::read`].
+    pub fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
+        let (source, files) = read_kind(source, &CASE)?;
         let driver = |(variant, file)| Self::build(&source, variant, file, locked);
         files.into_iter().map(driver).collect()
     }
@@ -224,10 +195,9 @@ impl Driver {
     fn build(
         source: &Source,
         variant: Option<String>,
-        file: File,
+        file: DriverFile,
         locked: bool,
     ) -> Result<Self, Error> {
-        let given = file.clone();
         let hypothesis = hypothesis(source, &file.hypothesis)?;
         let segments = segments(source, &file, hypothesis)?;
         let place_of_initial = file
@@ -262,86 +232,61 @@ impl Driver {
             scratch: file.scratch.as_ref(),
         };
         let foreign = keys.read(source)?;
-        let loaded = input::find_law(source, &search, &file.law, foreign.as_ref())?;
-        let built = input::build_law(source, &loaded, &file.law, hypothesis, &file.parameters)?;
-        let mut driver = Self {
-            law: built.law,
-            warnings: built.warnings,
-            flux,
-            internal: Vec::new(),
-            segments,
-            variant,
-            title: file.title,
-            figures: file.figures,
+        let loaded = find_law(source, &search, &file.law, foreign.as_ref())?;
+        let built = build_law(source, &loaded, &file.law, hypothesis, &file.parameters)?;
+        let place = (source, &place_of_initial);
+        let mut point = started(built, &flux, segments).map_err(|error| located(place, error))?;
+        let internal = internal(source, &point, &initial.internal)?;
+        point.set_internal(internal)?;
+        point.set_variant(variant);
+        let names = drawable(&point);
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        check_table_figures(source, &file.figures, &names)?;
+        Ok(Self {
+            point,
+            title: file.title.clone(),
+            figures: file.figures.clone(),
             source: source.clone(),
             place_of_initial,
-            file: given,
-            stop: crate::stop::Stop::never(),
-        };
-        driver.internal = driver.initial_internal(&initial.internal)?;
-        driver.check_figures(source)?;
-        Ok(driver)
+            file: Some(file),
+        })
     }
 
     /// A driver whose path is not written in a driver file.
-    pub(super) fn assembled(
+    pub(crate) fn assembled(
         source: &Source,
-        id: Spanned<String>,
         built: BuiltLaw,
         (flux, internal): (Vector, Vec<f64>),
         segments: Vec<Segment>,
     ) -> Result<Self, Error> {
-        let file = File {
-            hypothesis: Spanned::new(0..0, built.law.hypothesis().name().to_owned()),
-            law: id,
-            sha256: None,
-            adapter: None,
-            library: None,
-            sidecar: None,
-            in_process: None,
-            record: None,
-            externals: None,
-            scratch: None,
-            title: String::new(),
-            law_path: Vec::new(),
-            parameters: ParameterTable::new(),
-            initial: None,
-            segment: Vec::new(),
-            figures: Vec::new(),
-        };
-        let mut driver = Self {
-            law: built.law,
-            warnings: built.warnings,
-            flux,
-            internal: Vec::new(),
-            segments,
-            variant: None,
+        let place_of_initial = 0..0;
+        let place = (source, &place_of_initial);
+        // The law may refuse the stress, whatever its variables.
+        let mut point = started(built, &flux, segments).map_err(|error| located(place, error))?;
+        point.set_internal(internal)?;
+        Ok(Self {
+            point,
             title: String::new(),
             figures: Vec::new(),
             source: source.clone(),
-            place_of_initial: 0..0,
-            file,
-            stop: crate::stop::Stop::never(),
-        };
-        // The law may refuse the stress, whatever its variables.
-        driver.initial_internal(&Named::new())?;
-        driver.internal = internal;
-        Ok(driver)
+            place_of_initial,
+            file: None,
+        })
+    }
+
+    /// The driver itself.
+    pub fn point(&self) -> &point::Driver {
+        &self.point
+    }
+
+    /// The driver itself.
+    pub fn point_mut(&mut self) -> &mut point::Driver {
+        &mut self.point
     }
 
     /// Path of the file.
-    pub(super) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         self.source.path()
-    }
-
-    /// The law.
-    pub fn law(&self) -> &Law {
-        &self.law
-    }
-
-    /// Name of the variant, if the file stands for several drivers.
-    pub fn variant(&self) -> Option<&str> {
-        self.variant.as_deref()
     }
 
     /// Title.
@@ -349,319 +294,75 @@ impl Driver {
         &self.title
     }
 
-    /// Increments of each segment.
-    pub fn segment_increments(&self) -> Vec<usize> {
-        self.segments.iter().map(|s| s.increments).collect()
-    }
-
-    /// Follows the same path in other increments, one number for each segment.
-    pub fn set_increments(&mut self, increments: &[usize]) {
-        for (segment, &increments) in self.segments.iter_mut().zip(increments) {
-            segment.increments = increments.max(1);
-        }
-    }
-
-    /// The value of a parameter of the law, of a choice its number: as in the file, or the law's
-    /// default.
-    pub fn parameter(&self, id: &str) -> Option<f64> {
-        let mut declared = self.law.description().parameters.iter();
-        let declared = declared.find(|p| p.id == id)?;
-        let mut written = self.file.parameters.iter();
-        match written.find(|(key, _)| key.get_ref() == id) {
-            None => declared.default,
-            Some((_, value)) => match value.get_ref() {
-                ParameterValue::Number(number) => Some(*number),
-                ParameterValue::Integer(number) => Some(*number as f64),
-                ParameterValue::Label(label) => {
-                    let number = declared.choices.iter().position(|choice| choice == label);
-                    number.map(|number| number as f64)
-                }
-            },
-        }
+    /// Curves of its columns.
+    pub fn figures(&self) -> &[FigureInput] {
+        &self.figures
     }
 
     /// The same path with other values of some parameters.
     ///
     /// # Errors
-    /// [`Error::Input`] if the law does not take them.
+    /// The law does not take them; the driver was not read from a driver file.
     pub fn with_parameters(&self, values: &[(String, ParameterValue)]) -> Result<Self, Error> {
-        let mut file = self.file.clone();
-        input::set_parameters(&mut file.parameters, values);
-        let mut driver = Self::build(&self.source, self.variant.clone(), file, true)?;
-        driver.set_increments(&self.segment_increments());
-        driver.stop = self.stop.clone();
+        let Some(mut file) = self.file.clone() else {
+            let message = format!("{} is no driver file", self.path().display());
+            return Err(text::Error::Usage(message).into());
+        };
+        material::set_parameters(&mut file.parameters, values);
+        let variant = self.point.variant().map(str::to_owned);
+        let mut driver = Self::build(&self.source, variant, file, true)?;
+        let point = driver.point_mut();
+        point.set_increments(&self.point.segment_increments());
+        point.stop_on(self.point.stop());
         Ok(driver)
     }
 
-    /// Lets the driver be stopped on its way.
-    pub fn stop_on(&mut self, stop: &crate::stop::Stop) {
-        self.stop = stop.clone();
-    }
-
-    /// Number of increments of all segments.
-    pub fn n_increments(&self) -> usize {
-        self.segments.iter().map(|segment| segment.increments).sum()
-    }
-
-    /// An error about the initial state.
-    pub(super) fn initial_error(&self, why: &str) -> Error {
-        self.source
-            .error(
-                self.place_of_initial.clone(),
-                format!(
-                    "law `{}` refuses the initial state: {why}",
-                    self.law.description().id
-                ),
-            )
-            .hint("tension is positive; a compressive stress is negative")
-            .into()
-    }
-
-    fn initial_internal(&self, given: &Named<f64>) -> Result<Vec<f64>, Error> {
-        let n = self.law.n_components();
-        let mut internal = self
-            .law
-            .initial_state(1, (&self.flux[..n], Strided::rows(n)))
-            .map_err(|failure| match failure.outcome {
-                Outcome::Domain | Outcome::Numeric | Outcome::CutStep => {
-                    self.initial_error(&failure.message)
-                }
-                outcome => Error::plugin(format!(
-                    "law `{}` of library {}: the initial state failed ({outcome:?}): {}",
-                    self.law.description().id,
-                    self.law.library().path().display(),
-                    failure.message
-                )),
-            })?;
-        let variables = &self.law.formulation().internal_variables;
-        for (name, value) in given {
-            let Some(number) = variables.iter().position(|v| &v.id == name.get_ref()) else {
-                return Err(self
-                    .source
-                    .error(
-                        name.span(),
-                        format!(
-                            "law `{}` has no internal variable `{}`",
-                            self.law.description().id,
-                            name.get_ref()
-                        ),
-                    )
-                    .hint(suggestion(
-                        name.get_ref(),
-                        variables.iter().map(|v| v.id.as_str()),
-                    ))
-                    .into());
-            };
-            internal[number] = finite(&self.source, name.get_ref(), value)?;
-        }
-        Ok(internal)
+    /// An error of the driver, at its place in the file if it has one there.
+    pub fn located(&self, error: point::Error) -> Error {
+        located((&self.source, &self.place_of_initial), error)
     }
 }
 
-fn hypothesis(source: &Source, name: &Spanned<String>) -> Result<Hypothesis, Error> {
-    Hypothesis::ALL
-        .into_iter()
-        .find(|h| h.name() == name.get_ref())
-        .ok_or_else(|| {
-            source
-                .error(
-                    name.span(),
-                    format!("there is no hypothesis `{}`", name.get_ref()),
-                )
-                .hint(suggestion(
-                    name.get_ref(),
-                    Hypothesis::ALL.map(Hypothesis::name),
-                ))
-                .into()
-        })
+/// A driver that starts from the internal variables that its law gives.
+fn started(
+    built: BuiltLaw,
+    flux: &Vector,
+    segments: Vec<Segment>,
+) -> Result<point::Driver, point::Error> {
+    let n = built.law.n_components();
+    let mut point = point::Driver::new(built.law, &flux[..n], segments)?;
+    point.set_notes(built.warnings);
+    Ok(point)
 }
 
-fn finite(source: &Source, what: &str, value: &Spanned<f64>) -> Result<f64, Error> {
-    let number = *value.get_ref();
-    if number.is_finite() {
-        Ok(number)
-    } else {
-        Err(source
-            .error(value.span(), format!("`{what}`: {number} is not finite"))
-            .into())
+/// An error of a driver, at the place of its initial state if it is about that.
+fn located((source, initial): (&Source, &Range<usize>), error: point::Error) -> Error {
+    if !matches!(error, point::Error::InitialState { .. }) {
+        return error.into();
+    }
+    let in_file = source.error(initial.clone(), error.to_string());
+    match error.hint() {
+        Some(hint) => in_file.hint(hint).into(),
+        None => in_file.into(),
     }
 }
 
-/// Number of the component that a key names.
-fn component(
-    source: &Source,
-    name: &Spanned<String>,
-    hypothesis: Hypothesis,
-) -> Result<usize, Error> {
-    let names = hypothesis.components();
-    names
-        .iter()
-        .position(|candidate| candidate == name.get_ref())
-        .ok_or_else(|| {
-            source
-                .error(
-                    name.span(),
-                    format!(
-                        "there is no component `{}` under {}",
-                        name.get_ref(),
-                        hypothesis.name()
-                    ),
-                )
-                .hint(format!("components: {}", names.join(", ")))
-                .into()
-        })
-}
-
-fn initial_flux(
-    source: &Source,
-    initial: &Initial,
-    hypothesis: Hypothesis,
-) -> Result<Vector, Error> {
-    let (_, word) = words(hypothesis);
-    let (fits, misfit) = if hypothesis == Hypothesis::Interface2d {
-        (&initial.traction, &initial.stress)
-    } else {
-        (&initial.stress, &initial.traction)
-    };
-    if let Some(misfit) = misfit {
-        return Err(source
-            .error(
-                misfit.span(),
-                format!(
-                    "under {} the initial state is a {word}, components {}",
-                    hypothesis.name(),
-                    hypothesis.components().join(", ")
-                ),
-            )
-            .into());
+/// Internal variables as given, and the law's where nothing is.
+fn internal(source: &Source, point: &point::Driver, given: &Named<f64>) -> Result<Vec<f64>, Error> {
+    let mut internal = point.internal().to_vec();
+    let variables = &point.law().formulation().internal_variables;
+    for (name, value) in given {
+        let Some(number) = variables.iter().position(|v| &v.id == name.get_ref()) else {
+            let message = format!(
+                "law `{}` has no internal variable `{}`",
+                point.law().description().id,
+                name.get_ref()
+            );
+            let known = variables.iter().map(|v| v.id.as_str());
+            let hint = suggestion(name.get_ref(), known);
+            return Err(source.error(name.span(), message).hint(hint).into());
+        };
+        internal[number] = finite(source, name.get_ref(), value)?;
     }
-    let mut flux = [0.0; N_MAX];
-    for (name, value) in fits.iter().flat_map(Spanned::get_ref) {
-        flux[component(source, name, hypothesis)?] = finite(source, name.get_ref(), value)?;
-    }
-    Ok(flux)
-}
-
-fn segments(source: &Source, file: &File, hypothesis: Hypothesis) -> Result<Vec<Segment>, Error> {
-    if file.segment.is_empty() {
-        return Err(source
-            .error(file.law.span(), "the driver has no [[segment]]")
-            .hint("a path is a list of [[segment]] tables with `increments` and `control`")
-            .into());
-    }
-    let mut total = 0_usize;
-    let mut number = 0;
-    file.segment
-        .iter()
-        .map(|table| {
-            let increments = usize::try_from(*table.increments.get_ref()).unwrap_or(0);
-            total = total.saturating_add(increments);
-            if increments == 0 || total > MAX_INCREMENTS {
-                return Err(source
-                    .error(
-                        table.increments.span(),
-                        format!(
-                            "`increments`: {} is outside [1, {MAX_INCREMENTS}], all segments \
-                             together",
-                            table.increments.get_ref()
-                        ),
-                    )
-                    .into());
-            }
-            let mut control = [Control::Keep; N_MAX];
-            if hypothesis == Hypothesis::PlaneStrain {
-                control[OUT_OF_PLANE] = Control::Gradient(0.0);
-            }
-            for (name, written) in &table.control {
-                let i = component(source, name, hypothesis)?;
-                control[i] = read_control(source, name.get_ref(), written, hypothesis)?;
-                if hypothesis == Hypothesis::PlaneStrain
-                    && i == OUT_OF_PLANE
-                    && control[i] != Control::Gradient(0.0)
-                {
-                    return Err(source
-                        .error(
-                            written.span(),
-                            "the strain 33 is 0 in plane strain and cannot be controlled",
-                        )
-                        .hint("leave `33` out, write `{ strain = 0.0 }`, or use another hypothesis")
-                        .into());
-                }
-            }
-            number += 1;
-            Ok(Segment {
-                increments,
-                control,
-                step: number,
-                first: 0,
-                frame: Frame::Cartesian,
-                time_increment: 1.0,
-                restrictions: None,
-            })
-        })
-        .collect()
-}
-
-/// Number of the component 33.
-const OUT_OF_PLANE: usize = 2;
-
-fn read_control(
-    source: &Source,
-    component: &str,
-    written: &Spanned<ControlTable>,
-    hypothesis: Hypothesis,
-) -> Result<Control, Error> {
-    type Kind = fn(f64) -> Control;
-    let table = written.get_ref();
-    let interface = hypothesis == Hypothesis::Interface2d;
-    // Keyword, value, whether it is made for interfaces, what it becomes.
-    let kinds: [(&str, &Option<Spanned<f64>>, bool, Kind); 5] = [
-        ("jump", &table.jump, true, Control::Gradient),
-        ("traction", &table.traction, true, Control::Flux),
-        ("stiffness", &table.stiffness, true, Control::Stiffness),
-        ("strain", &table.strain, false, Control::Gradient),
-        ("stress", &table.stress, false, Control::Flux),
-    ];
-    let choices: Vec<&str> = kinds
-        .iter()
-        .filter(|kind| kind.2 == interface)
-        .map(|kind| kind.0)
-        .collect();
-    let mut given = kinds
-        .iter()
-        .filter_map(|(keyword, value, fits, kind)| Some((keyword, value.as_ref()?, fits, kind)));
-    let (Some((keyword, value, fits, kind)), None) = (given.next(), given.next()) else {
-        return Err(source
-            .error(
-                written.span(),
-                format!(
-                    "component `{component}` needs exactly one control, one of {}",
-                    choices.join(", ")
-                ),
-            )
-            .into());
-    };
-    if *fits != interface {
-        return Err(source
-            .error(
-                value.span(),
-                format!(
-                    "component `{component}` cannot be controlled by `{keyword}` under {}",
-                    hypothesis.name()
-                ),
-            )
-            .hint(format!("it is controlled by one of {}", choices.join(", ")))
-            .into());
-    }
-    let number = finite(source, keyword, value)?;
-    if *keyword == "stiffness" && number < 0.0 {
-        return Err(source
-            .error(
-                value.span(),
-                format!("`stiffness`: {number} kPa/m is outside [0, ∞)"),
-            )
-            .hint("the traction changes by −stiffness × jump")
-            .into());
-    }
-    Ok(kind(number))
+    Ok(internal)
 }

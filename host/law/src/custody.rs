@@ -39,7 +39,7 @@ pub fn begin() {
 ///
 /// # Errors
 /// What cannot be set back.
-pub(crate) fn restore() -> Result<Vec<String>, String> {
+pub fn restore() -> Result<Vec<String>, String> {
     let Some(start) = AT_START.get() else {
         return Ok(Vec::new());
     };
