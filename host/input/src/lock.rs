@@ -5,11 +5,11 @@
 //! `case.lock` runs with those libraries or not at all.
 
 use crate::case::Case;
-use crate::error::{Error, Source};
-use crate::input;
-use crate::plugin::{LoadedLaw, SearchPath};
-use crate::point::Driver;
-use serde::{Deserialize, Serialize};
+use crate::driver::Driver;
+use crate::material::find_law;
+use crate::{Error, is_driver};
+use law::{LoadedLaw, Pins, SearchPath, lock_path};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -34,9 +34,9 @@ pub fn write(path: &Path) -> Result<PathBuf, Error> {
     } else {
         path.to_owned()
     };
-    let laws = if crate::trade_off::is_driver(&path)? {
+    let laws = if is_driver(&path)? {
         let drivers = Driver::read_unlocked(&path)?;
-        let laws = drivers.iter().map(|driver| driver.law().loaded().clone());
+        let laws = drivers.iter().map(|driver| driver.point().law().loaded().clone());
         laws.collect()
     } else {
         laws_of_case(&path)?
@@ -55,16 +55,13 @@ pub fn write(path: &Path) -> Result<PathBuf, Error> {
         entries.insert(&description.id, entry);
     }
     let table = BTreeMap::from([("law", entries.into_values().collect::<Vec<_>>())]);
-    let laws = toml::to_string(&table).map_err(|why| Error::Internal(why.to_string()))?;
-    let text = format!(
+    let laws = toml::to_string(&table).map_err(|why| Error::internal(why.to_string()))?;
+    let content = format!(
         "# Written by `pilum lock`: the libraries that {} runs with.\nversion = 1\n\n{laws}",
         path.file_name().unwrap_or_default().to_string_lossy(),
     );
     let lock = lock_path(&path);
-    std::fs::write(&lock, text).map_err(|source| Error::Unwritable {
-        path: lock.clone(),
-        source,
-    })?;
+    std::fs::write(&lock, content).map_err(|why| text::Error::unwritable(&lock, why))?;
     Ok(lock)
 }
 
@@ -87,7 +84,7 @@ fn laws_of_case(path: &Path) -> Result<Vec<LoadedLaw>, Error> {
                 let law = law.get_ref();
                 let foreign = law.foreign(&case.source)?;
                 let (source, id) = (&case.source, &law.law);
-                laws.push(input::find_law(source, &search, id, foreign.as_ref())?);
+                laws.push(find_law(source, &search, id, foreign.as_ref())?);
             }
         }
     }

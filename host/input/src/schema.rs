@@ -5,7 +5,7 @@
 //! only where there is neither.
 
 use crate::case::CaseFile;
-use crate::point::DriverFile;
+use crate::driver::DriverFile;
 use schemars::generate::SchemaSettings;
 use schemars::transform::{Transform, transform_subschemas};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -14,7 +14,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 /// What a schema is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
     /// Case files, for `pilum run`.
     Case,

@@ -6,6 +6,8 @@ mod fields;
 pub mod figure;
 mod file;
 mod leftovers;
+pub mod point_figure;
+pub mod point_table;
 mod points;
 pub mod probe;
 mod profile;

@@ -5,118 +5,28 @@
 //! whatever follows on the line is a remark, unless it is another number. Components are 11 22 33 12 13 23, tension positive,
 //! γ = 2ε. What is not read is refused with its line.
 
-use super::file::{Control, Driver, Segment};
-use super::frame::Frame;
-use super::restrictions::Restrictions;
-use super::{N_MAX, Vector};
-use crate::error::{Error, Source};
-use crate::input::{self, ParameterTable, ParameterValue};
-use crate::lock::Pins;
-use crate::plugin::SearchPath;
-use crate::plugin::adapter::{Adapter, Foreign};
+mod lines;
+mod restrictions;
+
+use crate::Error;
+use crate::driver::Driver;
+use crate::material::{ParameterTable, ParameterValue, build_law, find_law};
 use abi::Hypothesis;
+use law::adapter::{Adapter, Foreign};
+use law::{Library, Pins, SearchPath};
+use lines::Lines;
+use point::{Control, Frame, N_MAX, Restrictions, Segment, Vector};
+use restrictions::restrictions;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::path::Path;
+use text::Source;
 use toml::Spanned;
 
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 10_000_000;
 /// Most stretches of a path that are kept, repeated ones and those of waves written out.
 const MAX_SEGMENTS: usize = 200_000;
-
-/// Lines of a file, with their places.
-struct Lines<'a> {
-    source: &'a Source,
-    rest: std::vec::IntoIter<(Range<usize>, &'a str)>,
-    end: usize,
-}
-
-impl<'a> Lines<'a> {
-    fn new(source: &'a Source) -> Self {
-        let text = source.text();
-        let mut at = 0;
-        let mut lines = Vec::new();
-        for line in text.split_inclusive('\n') {
-            let shown = line.trim_end();
-            lines.push((at..at + shown.len(), shown));
-            at += line.len();
-        }
-        Self {
-            source,
-            rest: lines.into_iter(),
-            end: text.len(),
-        }
-    }
-
-    /// The next line that is not blank.
-    fn next(&mut self) -> Option<(Range<usize>, &'a str)> {
-        self.rest.find(|(_, line)| !line.trim().is_empty())
-    }
-
-    fn expect(&mut self, what: &str) -> Result<(Range<usize>, &'a str), Error> {
-        self.next().ok_or_else(|| {
-            let message = format!("the file ends where {what} is expected");
-            self.source.error(self.end..self.end, message).into()
-        })
-    }
-
-    /// `N` numbers at the start of the next line.
-    fn numbers<const N: usize>(&mut self, what: &str) -> Result<(Range<usize>, [f64; N]), Error> {
-        let (at, line) = self.expect(what)?;
-        let numbers = self.numbers_of(&at, line, what)?;
-        Ok((at, numbers))
-    }
-
-    /// `N` numbers at the start of a line.
-    fn numbers_of<const N: usize>(
-        &self,
-        at: &Range<usize>,
-        line: &str,
-        what: &str,
-    ) -> Result<[f64; N], Error> {
-        let mut words = line
-            .split(|c: char| c.is_whitespace() || c == ',')
-            .filter(|word| !word.is_empty());
-        let mut numbers = [0.0; N];
-        for number in &mut numbers {
-            let Some(value) = words.next().and_then(real) else {
-                return self.refuse(at.clone(), format!("expected {what}"));
-            };
-            *number = value;
-        }
-        match words.next().filter(|word| real(word).is_some()) {
-            None => Ok(numbers),
-            Some(word) => self.refuse(
-                at.clone(),
-                format!("`{word}` is a number too many, expected {what}"),
-            ),
-        }
-    }
-
-    fn count(&mut self, what: &str) -> Result<usize, Error> {
-        let (at, [n]) = self.numbers(what)?;
-        self.whole(&at, n, what)
-    }
-
-    fn whole(&self, at: &Range<usize>, n: f64, what: &str) -> Result<usize, Error> {
-        if n.fract() == 0.0 && (0.0..=MAX_INCREMENTS as f64).contains(&n) {
-            return Ok(n as usize);
-        }
-        let message = format!("{n} is no number for {what}");
-        Err(self.source.error(at.clone(), message).into())
-    }
-
-    fn refuse<T>(&self, at: Range<usize>, message: impl Into<String>) -> Result<T, Error> {
-        Err(self.source.error(at, message).into())
-    }
-}
-
-/// A number as Fortran writes it: `1.5d-3` too. A colon ends it.
-fn real(word: &str) -> Option<f64> {
-    let word = word.split(':').next()?.replace(['d', 'D'], "e");
-    word.parse().ok().filter(|value: &f64| value.is_finite())
-}
 
 /// A keyword with its step.
 #[derive(Clone, Debug)]
@@ -138,8 +48,8 @@ impl Driver {
     /// this UMAT.
     ///
     /// # Errors
-    /// [`Error::Unreadable`]; [`Error::Input`] at what is not understood or cannot be done;
-    /// [`Error::Plugin`].
+    /// A file cannot be read; what is not understood or cannot be done, at its place; the library
+    /// cannot be used.
     pub fn read_incremental(test: &Path, umat: &Path) -> Result<Self, Error> {
         let source = Source::read(test)?;
         let segments = segments(&source)?;
@@ -153,11 +63,11 @@ impl Driver {
             externals: None,
             scratch: None,
         };
-        let library = crate::plugin::Library::open_foreign(&foreign, |_| Ok(()))?;
+        let library = Library::open_foreign(&foreign, |_| Ok(()))?;
         let id = library.laws().next().map(|law| law.id.clone());
         let id = Spanned::new(0..0, id.unwrap_or_default());
         let search = SearchPath::new(&[]).pinned(Pins::default());
-        let loaded = input::find_law(&source, &search, &id, Some(&foreign))?;
+        let loaded = find_law(&source, &search, &id, Some(&foreign))?;
         let ids: Vec<String> = loaded
             .description()
             .parameters
@@ -167,7 +77,7 @@ impl Driver {
 
         let parameters_file = Source::read(&test.with_file_name("parameters.inp"))?;
         let (name, parameters) = parameters(&parameters_file, &ids)?;
-        let mut built = input::build_law(
+        let mut built = build_law(
             &parameters_file,
             &loaded,
             &id,
@@ -183,7 +93,7 @@ impl Driver {
         }
         let initial = Source::read(&test.with_file_name("initialconditions.inp"))?;
         let (flux, internal) = initial_conditions(&initial, built.law.n_states())?;
-        Self::assembled(&source, id, built, (flux, internal), segments)
+        Self::assembled(&source, built, (flux, internal), segments)
     }
 }
 
@@ -191,8 +101,8 @@ impl Driver {
     /// Increments of a test; the two files beside it are read for `n` parameters and variables.
     ///
     /// # Errors
-    /// [`Error::Input`] at what is not understood or cannot be done.
-    pub(crate) fn parse_incremental(
+    /// At what is not understood or cannot be done.
+    pub fn parse_incremental(
         [test, material, initial]: [&Source; 3],
         n: usize,
     ) -> Result<usize, Error> {
@@ -424,81 +334,6 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
         }
     }
     Ok(step)
-}
-
-/// Six lines like `-sd1 + 3.0*sd3 + 2e4*ed2 = -10`: sums of changes of stresses `sd1` to `sd6` and of
-/// strains `ed1` to `ed6` over the step. A remark begins with `#` or `!`.
-fn restrictions(lines: &mut Lines<'_>) -> Result<Restrictions, Error> {
-    let mut restrictions = Restrictions::default();
-    for i in 0..N_MAX {
-        let (at, line) = lines.expect("a restriction, of which there are six")?;
-        let text = line.split(['#', '!']).next().unwrap_or_default();
-        let Some((left, right)) = text.split_once('=') else {
-            return lines.refuse(at, "a restriction has a `=`");
-        };
-        let packed = |text: &str| text.split_whitespace().collect::<String>();
-        restrictions.change[i] = match real(&packed(right)) {
-            Some(value) if !right.contains(':') => value,
-            _ => {
-                let message = format!("`{}` is no number", right.trim());
-                return lines.refuse(at, message);
-            }
-        };
-        for (sign, term) in terms(&packed(left)) {
-            let (factor, name) = match term.split_once('*') {
-                Some((factor, name)) => (real(factor), name),
-                None => (Some(1.0), term),
-            };
-            let number = name.get(2..).and_then(|number| number.parse().ok());
-            let row = match (name.get(..2), number, factor) {
-                (Some("sd"), Some(1..=6), Some(_)) => &mut restrictions.stress[i],
-                (Some("ed"), Some(1..=6), Some(_)) => &mut restrictions.strain[i],
-                _ => {
-                    let message = format!("`{term}` is no change, or a number times one");
-                    let error = lines.source.error(at, message);
-                    let hint = "sd1 to sd6 are the changes of stresses 11 22 33 12 13 23, ed1 to ed6 of \
-                                strains, γ for shear";
-                    return Err(error.hint(hint).into());
-                }
-            };
-            row[number.unwrap_or(1) - 1] += sign * factor.unwrap_or_default();
-        }
-        let row = restrictions.stress[i].iter().chain(&restrictions.strain[i]);
-        if row.into_iter().all(|factor| *factor == 0.0) {
-            return lines.refuse(at, "the restriction restricts nothing");
-        }
-    }
-    Ok(restrictions)
-}
-
-/// The summands of a sum, with their signs. A sign within a number like `1e-3` is part of it.
-fn terms(sum: &str) -> Vec<(f64, &str)> {
-    let bytes = sum.as_bytes();
-    let is_exponent = |at: usize| {
-        let digit = |i: usize| {
-            bytes
-                .get(i)
-                .is_some_and(|c| c.is_ascii_digit() || *c == b'.')
-        };
-        at >= 2 && matches!(bytes[at - 1], b'e' | b'E' | b'd' | b'D') && digit(at - 2)
-    };
-    let mut starts: Vec<usize> = (0..bytes.len())
-        .filter(|&i| matches!(bytes[i], b'+' | b'-') && !is_exponent(i))
-        .collect();
-    if starts.first() != Some(&0) {
-        starts.insert(0, 0);
-    }
-    let ends = starts.iter().skip(1).copied().chain([sum.len()]);
-    let pieces = starts
-        .iter()
-        .zip(ends)
-        .map(|(start, end)| &sum[*start..end]);
-    pieces
-        .map(|piece| match piece.strip_prefix('-') {
-            Some(term) => (-1.0, term),
-            None => (1.0, piece.strip_prefix('+').unwrap_or(piece)),
-        })
-        .collect()
 }
 
 fn flag(lines: &Lines<'_>, at: &Range<usize>, value: f64) -> Result<bool, Error> {

@@ -1,6 +1,7 @@
 //! Combinations of stress components that are controlled in place of the components themselves.
 
-use super::{N_MAX, Vector};
+use crate::state::{N_MAX, Vector};
+use abi::Hypothesis;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
@@ -11,7 +12,7 @@ const SQRT_3: f64 = 1.732_050_807_568_877_2;
 /// Coordinates of a segment. With flux components M σ, strains go by M⁻ᵀ, so that the work stays.
 /// Shear components are the same in all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Frame {
+pub enum Frame {
     /// The components themselves.
     #[default]
     Cartesian,
@@ -25,13 +26,19 @@ pub(super) enum Frame {
 
 impl Frame {
     /// Names of its components, if they are not those of the hypothesis.
-    pub(super) fn components(self) -> Option<[&'static str; N_MAX]> {
+    fn components(self) -> Option<[&'static str; N_MAX]> {
         match self {
             Self::Cartesian => None,
             Self::Roscoe => Some(["p", "q", "z", "12", "13", "23"]),
             Self::RoscoeIsomorph => Some(["P", "Q", "Z", "12", "13", "23"]),
             Self::Rendulic => Some(["a", "r", "z", "12", "13", "23"]),
         }
+    }
+
+    /// Name of a component.
+    pub(crate) fn component(self, number: usize, hypothesis: Hypothesis) -> &'static str {
+        let names = self.components();
+        names.map_or_else(|| hypothesis.components()[number], |names| names[number])
     }
 
     /// M.
@@ -71,22 +78,22 @@ impl Frame {
     }
 
     /// The components of a flux in this frame.
-    pub(super) fn flux(self, cartesian: &Vector) -> Vector {
+    pub(crate) fn flux(self, cartesian: &Vector) -> Vector {
         self.times(&self.matrix(), cartesian)
     }
 
     /// The flux of components in this frame.
-    pub(super) fn cartesian_flux(self, components: &Vector) -> Vector {
+    pub(crate) fn cartesian_flux(self, components: &Vector) -> Vector {
         self.times(&self.inverse(), components)
     }
 
     /// The components of a gradient in this frame.
-    pub(super) fn gradient(self, cartesian: &Vector) -> Vector {
+    pub(crate) fn gradient(self, cartesian: &Vector) -> Vector {
         self.times(&self.inverse().transpose(), cartesian)
     }
 
     /// The gradient of components in this frame.
-    pub(super) fn cartesian_gradient(self, components: &Vector) -> Vector {
+    pub(crate) fn cartesian_gradient(self, components: &Vector) -> Vector {
         self.times(&self.matrix().transpose(), components)
     }
 
@@ -98,7 +105,7 @@ impl Frame {
     }
 
     /// M D Mᵀ of a row-major operator.
-    pub(super) fn operator(self, operator: &mut [f64]) {
+    pub(crate) fn operator(self, operator: &mut [f64]) {
         if self == Self::Cartesian || operator.len() != N_MAX * N_MAX {
             return;
         }

@@ -1,26 +1,26 @@
 //! Linear restrictions between the changes of stress and strain over a segment, in place of
 //! components that are controlled: A Δσ + B Δε = b, as many as there are components.
 
-use super::equilibrium::Point;
-use super::{N_MAX, Vector};
+use crate::state::{N_MAX, Point, Vector};
 
-type Rows = [Vector; N_MAX];
+/// A square matrix, row by row.
+pub type Rows = [Vector; N_MAX];
 
 /// Restrictions in three dimensions; γ = 2ε.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Restrictions {
-    /// A.
-    pub(super) stress: Rows,
-    /// B.
-    pub(super) strain: Rows,
+pub struct Restrictions {
+    /// A, row by row.
+    pub stress: Rows,
+    /// B, row by row.
+    pub strain: Rows,
     /// b, reached at the end of the segment.
-    pub(super) change: Vector,
+    pub change: Vector,
 }
 
 impl Restrictions {
     /// The same, every row multiplied so that it compares with stresses: its largest factor of a
     /// stress is 1, or of a strain a modulus.
-    pub(super) fn scaled(&self, modulus: f64) -> Self {
+    pub(crate) fn scaled(&self, modulus: f64) -> Self {
         let mut scaled = self.clone();
         for i in 0..N_MAX {
             let stress = self.stress[i].iter().map(|a| a.abs());
@@ -35,7 +35,7 @@ impl Restrictions {
     }
 
     /// A Δσ + B Δε between two states.
-    pub(super) fn answer(&self, from: &Point, to: &Point) -> Vector {
+    pub(crate) fn answer(&self, from: &Point, to: &Point) -> Vector {
         std::array::from_fn(|i| {
             (0..N_MAX)
                 .map(|j| {
@@ -47,7 +47,7 @@ impl Restrictions {
     }
 
     /// A C + B in place of a tangent C, row by row.
-    pub(super) fn operator(&self, operator: &mut [f64]) {
+    pub(crate) fn operator(&self, operator: &mut [f64]) {
         let tangent = operator.to_vec();
         for i in 0..N_MAX {
             for j in 0..N_MAX {

@@ -14,7 +14,7 @@ const MET: f64 = 1e-9;
 
 /// Sizes given to a path up to the end of an increment.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Anchor {
+pub(crate) struct Anchor {
     /// Largest flux that it started from or was asked for.
     flux: f64,
     /// Largest gradient prescribed.
@@ -25,22 +25,22 @@ pub(super) struct Anchor {
 
 impl Anchor {
     /// Takes in a flux that the path starts from, or is asked for.
-    pub(super) fn flux(&mut self, flux: f64) {
+    pub(crate) fn flux(&mut self, flux: f64) {
         self.flux = self.flux.max(flux.abs());
     }
 
     /// Takes in a prescribed gradient.
-    pub(super) fn reach(&mut self, gradient: f64) {
+    pub(crate) fn reach(&mut self, gradient: f64) {
         self.reach = self.reach.max(gradient.abs());
     }
 
     /// Takes in a stiffness.
-    pub(super) fn modulus(&mut self, modulus: f64) {
+    pub(crate) fn modulus(&mut self, modulus: f64) {
         self.modulus = self.modulus.max(modulus);
     }
 
     /// A flux that was found, as far as what was given explains it.
-    pub(super) fn flux_of(&self, found: f64) -> f64 {
+    pub(crate) fn flux_of(&self, found: f64) -> f64 {
         let explained = MARGIN * (self.flux + self.modulus * self.reach);
         // Where there is no stiffness, or nothing was given, there is nothing to go by.
         if self.modulus > 0.0 && explained > 0.0 {
@@ -51,7 +51,7 @@ impl Anchor {
     }
 
     /// A gradient that was found, as far as what was given explains it.
-    pub(super) fn reach_of(&self, found: f64) -> f64 {
+    pub(crate) fn reach_of(&self, found: f64) -> f64 {
         let explained = MARGIN * self.reach + FREE * self.flux / self.modulus;
         // Not a number, too, without stiffness.
         if explained > 0.0 {
@@ -63,7 +63,7 @@ impl Anchor {
 
     /// How far from its goal a component may be after an increment: whatever the tolerance of the
     /// iterations was. `found`: the largest flux; `round_off`: of a sum, relative.
-    pub(super) fn bound(&self, goal: f64, found: f64, round_off: f64) -> f64 {
+    pub(crate) fn bound(&self, goal: f64, found: f64, round_off: f64) -> f64 {
         let flux = self.flux.max(goal.abs()).max(self.flux_of(found));
         MET * flux + 2.0 * round_off * MARGIN * self.modulus * self.reach
     }

@@ -1,6 +1,6 @@
-//! The table of results: one row per increment, as comma-separated values.
+//! The table of a driver: one row per increment, as comma-separated values.
 
-use super::{Driver, file::words};
+use point::{Driver, Row};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
@@ -8,49 +8,20 @@ use std::time::{Duration, Instant};
 /// Rows wait in memory no longer than this.
 const FLUSH_EVERY: Duration = Duration::from_millis(200);
 
-/// One row of results.
-#[derive(Clone, Copy, Debug)]
-pub struct Row<'a> {
-    /// Increment, counted through all segments; 0 is the initial state.
-    pub increment: usize,
-    /// Jumps or strains.
-    pub gradient: &'a [f64],
-    /// Tractions or stresses.
-    pub flux: &'a [f64],
-    /// Internal variables.
-    pub internal: &'a [f64],
-    /// Calls of the law that the increment took.
-    pub iterations: usize,
-}
-
-impl Driver {
-    /// Names of the columns between `increment` and `iterations`.
-    pub fn columns(&self) -> Vec<String> {
-        let hypothesis = self.law.hypothesis();
-        let (gradient, flux) = words(hypothesis);
-        let components = hypothesis.components();
-        let named = |word| components.iter().map(move |c| format!("{word}_{c}"));
-        let variables = &self.law.formulation().internal_variables;
-        named(gradient)
-            .chain(named(flux))
-            .chain(variables.iter().map(|v| v.id.clone()))
-            .collect()
-    }
-}
-
 /// Writes rows with 17 significant digits.
 #[derive(Debug)]
 pub struct Table<W: Write> {
     out: W,
     pending: String,
     flushed: Instant,
-    /// The driver came through a pipe: it cannot be followed once more if a law ends the process.
+    /// The driver cannot be followed once more if a law ends the process: no row waits.
     is_only_once: bool,
 }
 
 impl<W: Write> Table<W> {
-    /// Starts with the names of the columns.
-    pub fn new(out: W, driver: &Driver) -> Self {
+    /// Starts with the names of the columns. `is_only_once`: the driver came through a pipe, say, so
+    /// that every row is handed over at once.
+    pub fn new(out: W, driver: &Driver, is_only_once: bool) -> Self {
         let mut pending = String::from("increment");
         for column in driver.columns() {
             pending.push(',');
@@ -61,7 +32,7 @@ impl<W: Write> Table<W> {
             out,
             pending,
             flushed: Instant::now(),
-            is_only_once: !driver.path().is_file(),
+            is_only_once,
         }
     }
 

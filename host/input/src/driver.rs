@@ -1,0 +1,368 @@
+//! The driver file: reading it, and checking everything that can be checked before the first call.
+//!
+//! What a driver is and does is [`point`]'s; here is where in a file it stands.
+
+mod path;
+
+use crate::Error;
+use crate::case::FigureInput;
+use crate::material::{
+    self, ForeignKeys, ParameterTable, ParameterValue, build_law, find_law,
+};
+use crate::schema;
+use indexmap::IndexMap;
+use law::adapter::{Adapter, Externals, Scratch};
+use law::{BuiltLaw, Pins, SearchPath};
+use path::{finite, hypothesis, initial_flux, segments};
+use point::{Segment, Vector};
+use crate::figures::check_table_figures;
+use results::point_figure::drawable;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use text::base::{OtherKind, read_kind};
+use text::{Named, Source, suggestion};
+use toml::Spanned;
+
+/// What a case file looks like among driver files.
+const CASE: OtherKind = OtherKind {
+    keys: &["analysis", "mesh", "groups", "supports", "phase"],
+    message: "this is a case file; expected a driver file, which leads a law at one point",
+    command: "pilum run",
+};
+
+/// The keys of a driver file. Units: kPa, m; angles in degrees; tension and opening positive.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "File")]
+pub(crate) struct DriverFile {
+    /// Id of the law.
+    #[schemars(with = "String")]
+    law: Spanned<String>,
+    /// SHA-256 of the law's library; another one is refused.
+    #[schemars(with = "Option<String>")]
+    sha256: Option<Spanned<String>>,
+    /// What the law's library is made for, if not for the contract.
+    #[schemars(with = "Option<Adapter>")]
+    adapter: Option<Spanned<Adapter>>,
+    /// That library.
+    #[schemars(with = "Option<PathBuf>")]
+    library: Option<Spanned<PathBuf>>,
+    /// What describes it.
+    #[schemars(with = "Option<PathBuf>")]
+    sidecar: Option<Spanned<PathBuf>>,
+    /// Call it in this process.
+    #[schemars(with = "Option<bool>")]
+    in_process: Option<Spanned<bool>>,
+    /// Write the arguments of one call here.
+    #[schemars(with = "Option<PathBuf>")]
+    record: Option<Spanned<PathBuf>>,
+    /// What becomes of routines that it calls and nobody supplies.
+    #[schemars(with = "Option<Externals>")]
+    externals: Option<Spanned<Externals>>,
+    /// What becomes of its scratch files.
+    #[schemars(with = "Option<Scratch>")]
+    scratch: Option<Spanned<Scratch>>,
+    /// What the driver is.
+    #[serde(default)]
+    title: String,
+    /// Folders with law libraries, relative to the file.
+    #[serde(default)]
+    #[schemars(with = "Vec<PathBuf>")]
+    law_path: Vec<Spanned<PathBuf>>,
+    /// Hypothesis: what is led, and its components.
+    #[schemars(with = "schema::HypothesisName")]
+    hypothesis: Spanned<String>,
+    /// Parameters of the law.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ParameterValue>")]
+    parameters: ParameterTable,
+    /// The initial state; 0 where nothing is given.
+    #[schemars(with = "Option<Initial>")]
+    initial: Option<Spanned<Initial>>,
+    /// The path, segment after segment.
+    #[serde(default)]
+    segment: Vec<SegmentTable>,
+    /// Curves of columns of the table.
+    #[serde(default, rename = "figure")]
+    figures: Vec<FigureInput>,
+}
+
+/// The initial state.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Initial {
+    /// Traction of an interface, kPa, by component `n`, `t`.
+    #[schemars(with = "Option<schema::Components<f64>>")]
+    traction: Option<Spanned<Named<f64>>>,
+    /// Stress of a solid, kPa, by component `11` to `23`.
+    #[schemars(with = "Option<schema::Components<f64>>")]
+    stress: Option<Spanned<Named<f64>>>,
+    /// Internal variables of the law, by id.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    internal: Named<f64>,
+}
+
+/// A stretch of the path.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SegmentTable {
+    /// Number of equal increments.
+    #[schemars(with = "i64", range(min = 1))]
+    increments: Spanned<i64>,
+    /// How each component is led; one without control keeps its traction or stress.
+    #[schemars(with = "schema::Components<ControlTable>")]
+    control: IndexMap<Spanned<String>, Spanned<ControlTable>>,
+}
+
+/// How one component is led: exactly one of these, as the total at the end of the segment.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
+struct ControlTable {
+    /// Interfaces: jump, m.
+    #[schemars(with = "Option<f64>")]
+    jump: Option<Spanned<f64>>,
+    /// Interfaces: traction, kPa.
+    #[schemars(with = "Option<f64>")]
+    traction: Option<Spanned<f64>>,
+    /// Interfaces: the traction changes by −stiffness × jump, kPa/m.
+    #[schemars(with = "Option<f64>")]
+    stiffness: Option<Spanned<f64>>,
+    /// Solids: strain.
+    #[schemars(with = "Option<f64>")]
+    strain: Option<Spanned<f64>>,
+    /// Solids: stress, kPa.
+    #[schemars(with = "Option<f64>")]
+    stress: Option<Spanned<f64>>,
+}
+
+/// A driver with the file that it was read from.
+#[derive(Debug)]
+pub struct Driver {
+    point: point::Driver,
+    title: String,
+    figures: Vec<FigureInput>,
+    source: Source,
+    place_of_initial: Range<usize>,
+    /// What the file says, if it is a driver file.
+    file: Option<DriverFile>,
+}
+
+impl Driver {
+    /// Reads a driver file and builds its law: one driver, or one for each `[[variant]]`.
+    ///
+    /// # Errors
+    /// The file cannot be read, and those of [`Driver::from_source`].
+    pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
+        Self::variants(Source::read(path)?, true)
+    }
+
+    /// As [`Driver::read`], whatever the lock beside the file says.
+    ///
+    /// # Errors
+    /// As [`Driver::read`].
+    pub fn read_unlocked(path: &Path) -> Result<Vec<Self>, Error> {
+        Self::variants(Source::read(path)?, false)
+    }
+
+    /// Takes the text of a driver file without variants and builds its law.
+    ///
+    /// # Errors
+    /// At the place that does not fit; the law is not found or its library is defective; the file has
+    /// variants.
+    pub fn from_source(source: &Source) -> Result<Self, Error> {
+        let mut drivers = Self::variants(source.clone(), true)?;
+        match (drivers.pop(), drivers.is_empty()) {
+            (Some(driver), true) => Ok(driver),
+            _ => Err(text::Error::Usage("the driver has several variants".to_owned()).into()),
+        }
+    }
+
+    /// Takes the text of a driver file. `locked`: the lock beside it is honoured.
+    ///
+    /// # Errors
+    /// As [`Driver::read`].
+    pub fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
+        let (source, files) = read_kind(source, &CASE)?;
+        let driver = |(variant, file)| Self::build(&source, variant, file, locked);
+        files.into_iter().map(driver).collect()
+    }
+
+    fn build(
+        source: &Source,
+        variant: Option<String>,
+        file: DriverFile,
+        locked: bool,
+    ) -> Result<Self, Error> {
+        let hypothesis = hypothesis(source, &file.hypothesis)?;
+        let segments = segments(source, &file, hypothesis)?;
+        let place_of_initial = file
+            .initial
+            .as_ref()
+            .map_or_else(|| file.law.span(), Spanned::span);
+        let none = Initial::default();
+        let initial = file.initial.as_ref().map_or(&none, Spanned::get_ref);
+        let flux = initial_flux(source, initial, hypothesis)?;
+
+        let folder = |written: &Spanned<PathBuf>| {
+            let file = source.path_at(&written.span());
+            file.parent()
+                .unwrap_or(Path::new(""))
+                .join(written.get_ref())
+        };
+        let folders: Vec<PathBuf> = file.law_path.iter().map(folder).collect();
+        let law = std::iter::once((&file.law, file.sha256.as_ref()));
+        let pins = if locked {
+            Pins::of(source, law)?
+        } else {
+            Pins::given(source, law)?
+        };
+        let search = SearchPath::new(&folders).pinned(pins);
+        let keys = ForeignKeys {
+            adapter: file.adapter.as_ref(),
+            library: file.library.as_ref(),
+            sidecar: file.sidecar.as_ref(),
+            in_process: file.in_process.as_ref(),
+            record: file.record.as_ref(),
+            externals: file.externals.as_ref(),
+            scratch: file.scratch.as_ref(),
+        };
+        let foreign = keys.read(source)?;
+        let loaded = find_law(source, &search, &file.law, foreign.as_ref())?;
+        let built = build_law(source, &loaded, &file.law, hypothesis, &file.parameters)?;
+        let place = (source, &place_of_initial);
+        let mut point = started(built, &flux, segments).map_err(|error| located(place, error))?;
+        let internal = internal(source, &point, &initial.internal)?;
+        point.set_internal(internal)?;
+        point.set_variant(variant);
+        let names = drawable(&point);
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        check_table_figures(source, &file.figures, &names)?;
+        Ok(Self {
+            point,
+            title: file.title.clone(),
+            figures: file.figures.clone(),
+            source: source.clone(),
+            place_of_initial,
+            file: Some(file),
+        })
+    }
+
+    /// A driver whose path is not written in a driver file.
+    pub(crate) fn assembled(
+        source: &Source,
+        built: BuiltLaw,
+        (flux, internal): (Vector, Vec<f64>),
+        segments: Vec<Segment>,
+    ) -> Result<Self, Error> {
+        let place_of_initial = 0..0;
+        let place = (source, &place_of_initial);
+        // The law may refuse the stress, whatever its variables.
+        let mut point = started(built, &flux, segments).map_err(|error| located(place, error))?;
+        point.set_internal(internal)?;
+        Ok(Self {
+            point,
+            title: String::new(),
+            figures: Vec::new(),
+            source: source.clone(),
+            place_of_initial,
+            file: None,
+        })
+    }
+
+    /// The driver itself.
+    pub fn point(&self) -> &point::Driver {
+        &self.point
+    }
+
+    /// The driver itself.
+    pub fn point_mut(&mut self) -> &mut point::Driver {
+        &mut self.point
+    }
+
+    /// Path of the file.
+    pub fn path(&self) -> &Path {
+        self.source.path()
+    }
+
+    /// Title.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Curves of its columns.
+    pub fn figures(&self) -> &[FigureInput] {
+        &self.figures
+    }
+
+    /// The same path with other values of some parameters.
+    ///
+    /// # Errors
+    /// The law does not take them; the driver was not read from a driver file.
+    pub fn with_parameters(&self, values: &[(String, ParameterValue)]) -> Result<Self, Error> {
+        let Some(mut file) = self.file.clone() else {
+            let message = format!("{} is no driver file", self.path().display());
+            return Err(text::Error::Usage(message).into());
+        };
+        material::set_parameters(&mut file.parameters, values);
+        let variant = self.point.variant().map(str::to_owned);
+        let mut driver = Self::build(&self.source, variant, file, true)?;
+        let point = driver.point_mut();
+        point.set_increments(&self.point.segment_increments());
+        point.stop_on(self.point.stop());
+        Ok(driver)
+    }
+
+    /// An error of the driver, at its place in the file if it has one there.
+    pub fn located(&self, error: point::Error) -> Error {
+        located((&self.source, &self.place_of_initial), error)
+    }
+}
+
+/// A driver that starts from the internal variables that its law gives.
+fn started(
+    built: BuiltLaw,
+    flux: &Vector,
+    segments: Vec<Segment>,
+) -> Result<point::Driver, point::Error> {
+    let n = built.law.n_components();
+    let mut point = point::Driver::new(built.law, &flux[..n], segments)?;
+    point.set_notes(built.warnings);
+    Ok(point)
+}
+
+/// An error of a driver, at the place of its initial state if it is about that.
+fn located((source, initial): (&Source, &Range<usize>), error: point::Error) -> Error {
+    if !matches!(error, point::Error::InitialState { .. }) {
+        return error.into();
+    }
+    let in_file = source.error(initial.clone(), error.to_string());
+    match error.hint() {
+        Some(hint) => in_file.hint(hint).into(),
+        None => in_file.into(),
+    }
+}
+
+/// Internal variables as given, and the law's where nothing is.
+fn internal(source: &Source, point: &point::Driver, given: &Named<f64>) -> Result<Vec<f64>, Error> {
+    let mut internal = point.internal().to_vec();
+    let variables = &point.law().formulation().internal_variables;
+    for (name, value) in given {
+        let Some(number) = variables.iter().position(|v| &v.id == name.get_ref()) else {
+            let message = format!(
+                "law `{}` has no internal variable `{}`",
+                point.law().description().id,
+                name.get_ref()
+            );
+            let known = variables.iter().map(|v| v.id.as_str());
+            let hint = suggestion(name.get_ref(), known);
+            return Err(source.error(name.span(), message).hint(hint).into());
+        };
+        internal[number] = finite(source, name.get_ref(), value)?;
+    }
+    Ok(internal)
+}

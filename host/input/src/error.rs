@@ -1,0 +1,186 @@
+//! What can go wrong from a file to a result, by who has to act; the program's exit code follows.
+
+use law::Stopped;
+use miette::Diagnostic;
+use text::{InputError, add_hint};
+use thiserror::Error;
+
+/// Any error of the host.
+#[derive(Debug, Error, Diagnostic)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file, or what was asked for, is wrong.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Text(#[from] text::Error),
+    /// A library cannot be used, or broke the contract.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Law(law::Error),
+    /// A point did not come to the end of its path.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Point(Box<point::Error>),
+    /// A simulation did not come to its end.
+    #[error("{error}")]
+    Simulation {
+        /// Why.
+        error: Box<mechanics::Error>,
+        /// What the user could do.
+        #[help]
+        hint: Option<String>,
+    },
+    /// The user stopped the work in the middle.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+impl From<InputError> for Error {
+    fn from(error: InputError) -> Self {
+        text::Error::from(error).into()
+    }
+}
+
+impl From<law::Error> for Error {
+    fn from(error: law::Error) -> Self {
+        match error {
+            law::Error::Text(error) => Self::Text(error),
+            law::Error::Stopped(stopped) => Self::Stopped(stopped),
+            error @ law::Error::Library { .. } => Self::Law(error),
+        }
+    }
+}
+
+impl From<point::Error> for Error {
+    fn from(error: point::Error) -> Self {
+        Self::Point(Box::new(error))
+    }
+}
+
+impl From<mechanics::Error> for Error {
+    fn from(error: mechanics::Error) -> Self {
+        let hint = hint(&error).map(str::to_owned);
+        let error = Box::new(error);
+        Self::Simulation { error, hint }
+    }
+}
+
+/// What the user could do about an error of a simulation, whatever it is of.
+fn hint(error: &mechanics::Error) -> Option<&'static str> {
+    match error {
+        mechanics::Error::CannotStart(failure)
+            if failure.failure.outcome == abi::status::Outcome::CutStep =>
+        {
+            Some("a law must accept a zero increment when its phase begins")
+        }
+        mechanics::Error::Singular { .. } => Some("a part of the model is not supported"),
+        mechanics::Error::NoEquilibrium(_) => Some(
+            "results up to the last whole increment in equilibrium are written, the last \
+             equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
+        ),
+        mechanics::Error::Interrupted { .. } => Some("go on with --resume"),
+        mechanics::Error::Stopped { .. } => Some(
+            "the last equilibrium is `stopped_at` in summary.json; go on with --resume",
+        ),
+        _ => None,
+    }
+}
+
+/// Who has to act.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Whoever wrote the input; places that cannot be read or written included.
+    Input,
+    /// Nobody: there is no equilibrium.
+    NoEquilibrium,
+    /// The author of a library.
+    Library,
+    /// We.
+    Internal,
+    /// Nobody: stopped as asked.
+    Stopped,
+}
+
+impl Error {
+    /// What was asked for does not fit what there is.
+    pub fn usage(message: impl Into<String>) -> Self {
+        text::Error::Usage(message.into()).into()
+    }
+
+    /// A defect of the program.
+    pub fn internal(message: impl Into<String>) -> Self {
+        text::Error::Internal(message.into()).into()
+    }
+
+    /// Trouble with a library, without a hint.
+    pub fn library(message: impl Into<String>) -> Self {
+        law::Error::library(message).into()
+    }
+
+    /// Adds what the user could do.
+    #[must_use]
+    pub fn with_hint(self, more: &str) -> Self {
+        match self {
+            Self::Text(error) => error.with_hint(more).into(),
+            Self::Law(error) => error.with_hint(more).into(),
+            Self::Point(error) => error.with_hint(more).into(),
+            Self::Simulation { error, mut hint } => {
+                add_hint(&mut hint, more);
+                Self::Simulation { error, hint }
+            }
+            Self::Stopped(stopped) => stopped.into(),
+        }
+    }
+
+    /// Who has to act.
+    pub fn kind(&self) -> Kind {
+        use abi::status::Outcome;
+        match self {
+            Self::Text(text::Error::Internal(_)) => Kind::Internal,
+            Self::Text(_) => Kind::Input,
+            Self::Law(_) => Kind::Library,
+            Self::Stopped(_) => Kind::Stopped,
+            Self::Point(error) => match &**error {
+                point::Error::Misuse { .. } | point::Error::InitialState { .. } => Kind::Input,
+                point::Error::Failure(failure) => match failure.cause {
+                    point::Cause::Stopped => Kind::Stopped,
+                    point::Cause::NoEquilibrium(_) => Kind::NoEquilibrium,
+                    _ => Kind::Library,
+                },
+            },
+            Self::Simulation { error, .. } => match &**error {
+                mechanics::Error::Refused(_) | mechanics::Error::OtherState(_) => Kind::Input,
+                mechanics::Error::CannotStart(failure)
+                    if failure.failure.outcome != Outcome::CutStep =>
+                {
+                    Kind::Library
+                }
+                mechanics::Error::CannotStart(_)
+                | mechanics::Error::Singular { .. }
+                | mechanics::Error::NoEquilibrium(_) => Kind::NoEquilibrium,
+                mechanics::Error::Law { .. } | mechanics::Error::Process { .. } => Kind::Library,
+                mechanics::Error::Interrupted { .. } | mechanics::Error::Stopped { .. } => {
+                    Kind::Stopped
+                }
+                mechanics::Error::Halted => Kind::Internal,
+            },
+        }
+    }
+
+    /// Whether the user stopped the work: nothing is wrong with it.
+    pub fn is_stop(&self) -> bool {
+        self.kind() == Kind::Stopped
+    }
+
+    /// The program's exit code: 1 bad input (places that cannot be read or written included), 2 no
+    /// equilibrium, 3 plugin trouble, 4 internal, 130 stopped as asked (as shells say it of Ctrl-C).
+    pub fn exit_code(&self) -> u8 {
+        match self.kind() {
+            Kind::Input => 1,
+            Kind::NoEquilibrium => 2,
+            Kind::Library => 3,
+            Kind::Internal => 4,
+            Kind::Stopped => 130,
+        }
+    }
+}

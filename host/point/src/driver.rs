@@ -1,0 +1,225 @@
+//! What is followed: a law, where it starts, and its path.
+
+use crate::error::{Cause, Error, Failure, Misuse, Moved, Place, Warning};
+use crate::path::{self, Segment};
+use crate::search::Search;
+use crate::state::{N_MAX, Point, Vector};
+use abi::status::Outcome;
+use law::{Law, Stop, Strided};
+
+/// Relative change of the initial flux that is worth a warning.
+const OUTSIDE: f64 = 1e-9;
+
+/// One law at one integration point, its initial state, and the path that leads it from there.
+///
+/// The gradient starts from 0. See the [crate] for units and signs.
+#[derive(Debug)]
+pub struct Driver {
+    pub(crate) law: Law,
+    pub(crate) segments: Vec<Segment>,
+    notes: Vec<String>,
+    variant: Option<String>,
+    flux: Vector,
+    internal: Vec<f64>,
+    stop: Stop,
+}
+
+impl Driver {
+    /// A law that starts from a flux (one value for each component of its hypothesis, kPa) with the
+    /// internal variables that it gives to it, and is led through segments.
+    ///
+    /// # Errors
+    /// [`Error::Misuse`] if flux or segments do not fit; [`Error::InitialState`] if the law refuses
+    /// the flux; [`Error::Failure`] if it breaks down over it.
+    pub fn new(law: Law, flux: &[f64], segments: Vec<Segment>) -> Result<Self, Error> {
+        path::check(&segments, law.hypothesis())?;
+        let n = law.n_components();
+        finite(flux, n)?;
+        let mut padded = [0.0; N_MAX];
+        padded[..n].copy_from_slice(flux);
+        let mut driver = Self {
+            law,
+            segments,
+            notes: Vec::new(),
+            variant: None,
+            flux: padded,
+            internal: Vec::new(),
+            stop: Stop::never(),
+        };
+        driver.internal = driver.internal_of_law()?;
+        Ok(driver)
+    }
+
+    /// Starts from these internal variables, in the law's order, instead of those that it gives.
+    ///
+    /// # Errors
+    /// [`Error::Misuse`]: not as many as the law has, or not finite.
+    pub fn set_internal(&mut self, internal: Vec<f64>) -> Result<(), Error> {
+        finite(&internal, self.law.n_states())?;
+        self.internal = internal;
+        Ok(())
+    }
+
+    /// What is known before the first call and belongs among the warnings.
+    pub fn set_notes(&mut self, notes: Vec<String>) {
+        self.notes = notes;
+    }
+
+    /// Tells the driver from others of the same kind: messages begin with the name.
+    pub fn set_variant(&mut self, variant: Option<String>) {
+        self.variant = variant;
+    }
+
+    /// Lets the driver be stopped on its way.
+    pub fn stop_on(&mut self, stop: &Stop) {
+        self.stop = stop.clone();
+    }
+
+    /// Follows the same path in other increments, one number for each segment, at least 1.
+    pub fn set_increments(&mut self, increments: &[usize]) {
+        for (segment, &increments) in self.segments.iter_mut().zip(increments) {
+            segment.increments = increments.max(1);
+        }
+    }
+
+    /// The law.
+    pub fn law(&self) -> &Law {
+        &self.law
+    }
+
+    /// The path.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// The flux that it starts from, by component.
+    pub fn flux(&self) -> &[f64] {
+        &self.flux[..self.law.n_components()]
+    }
+
+    /// The internal variables that it starts from, in the law's order.
+    pub fn internal(&self) -> &[f64] {
+        &self.internal
+    }
+
+    /// What tells it from other drivers.
+    pub fn variant(&self) -> Option<&str> {
+        self.variant.as_deref()
+    }
+
+    /// Who may want it to stop.
+    pub fn stop(&self) -> &Stop {
+        &self.stop
+    }
+
+    /// Increments of each segment.
+    pub fn segment_increments(&self) -> Vec<usize> {
+        self.segments.iter().map(|s| s.increments).collect()
+    }
+
+    /// Number of increments of all segments.
+    pub fn n_increments(&self) -> usize {
+        self.segments.iter().map(|segment| segment.increments).sum()
+    }
+
+    /// The value of a parameter of the law, of a choice its number; `None` if there is no such
+    /// parameter, or it is left to the law.
+    pub fn parameter(&self, id: &str) -> Option<f64> {
+        let declared = &self.law.description().parameters;
+        let number = declared.iter().position(|p| p.id == id)?;
+        let value = *self.law.parameters().get(number)?;
+        (!value.is_nan()).then_some(value)
+    }
+
+    /// Asks the law for an update of no size from the initial state, as [`Driver::run`] does first.
+    ///
+    /// # Errors
+    /// As [`Driver::run`] before its first increment.
+    pub fn check(&self) -> Result<Vec<Warning>, Error> {
+        self.start().map(|(_, _, warnings)| warnings)
+    }
+
+    /// The initial state, checked by an update of no size.
+    pub(crate) fn start(&self) -> Result<(Point, Search<'_>, Vec<Warning>), Error> {
+        let point = Point {
+            gradient: [0.0; N_MAX],
+            flux: self.flux,
+            internal: self.internal.clone(),
+        };
+        let mut search = Search::new(&self.law, &point);
+        search.stop = self.stop.clone();
+        let notes = self.notes.iter().cloned();
+        let mut warnings: Vec<Warning> = notes.map(Warning::Note).collect();
+        let failure = |cause| self.failure(Place::Start, cause, Vec::new());
+        let answer = search
+            .at_rest(&point)
+            .map_err(|fatal| failure(Cause::Law(*fatal)))?;
+        let Some(returned) = answer else {
+            if self.stop.is_asked() {
+                return Err(failure(Cause::Stopped));
+            }
+            let refusal = search.take_obstacle().refusal;
+            return Err(self.refused(refusal.map(|refusal| refusal.message).unwrap_or_default()));
+        };
+        let n = self.law.n_components();
+        let scale = self.flux.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
+        if (0..n).any(|i| (returned[i] - self.flux[i]).abs() > OUTSIDE * scale) {
+            let moved = Moved {
+                law: self.law.description().id.clone(),
+                hypothesis: self.law.hypothesis(),
+                given: self.flux[..n].to_vec(),
+                returned: returned[..n].to_vec(),
+            };
+            // Those of other programs are given a time in this call, in which they may creep.
+            warnings.push(if self.law.library().foreign().is_some() {
+                Warning::DoesNotLast(moved)
+            } else {
+                Warning::OutsideSurface(moved)
+            });
+        }
+        Ok((point, search, warnings))
+    }
+
+    /// The internal variables that the law gives to the initial flux.
+    fn internal_of_law(&self) -> Result<Vec<f64>, Error> {
+        let flux = (self.flux(), Strided::rows(self.law.n_components()));
+        self.law
+            .initial_state(1, flux)
+            .map_err(|failure| match failure.outcome {
+                Outcome::Domain | Outcome::Numeric | Outcome::CutStep => {
+                    self.refused(failure.message)
+                }
+                _ => self.failure(Place::Start, Cause::InitialState(failure), Vec::new()),
+            })
+    }
+
+    fn refused(&self, reason: String) -> Error {
+        Error::InitialState {
+            law: self.law.description().id.clone(),
+            reason,
+        }
+    }
+
+    pub(crate) fn failure(&self, place: Place, cause: Cause, warnings: Vec<Warning>) -> Error {
+        Error::Failure(Box::new(Failure {
+            variant: self.variant.clone(),
+            place,
+            law: self.law.description().id.clone(),
+            library: self.law.library().path().to_owned(),
+            hypothesis: self.law.hypothesis(),
+            cause,
+            warnings,
+            advice: None,
+        }))
+    }
+}
+
+/// So many values, all finite.
+fn finite(values: &[f64], expected: usize) -> Result<(), Misuse> {
+    let given = values.len();
+    if given != expected {
+        return Err(Misuse::Length { given, expected });
+    }
+    let infinite = values.iter().find(|value| !value.is_finite());
+    infinite.map_or(Ok(()), |value| Err(Misuse::NotFinite(*value)))
+}

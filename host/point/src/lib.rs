@@ -1,0 +1,61 @@
+//! One law along a path at one integration point, in memory, with mixed control of its components.
+//!
+//! A [`Driver`] leads a point through [`Segment`]s; each component follows a gradient (a jump or
+//! strain), a flux (a traction or stress), or a stiffness ([`Control`]). [`Driver::run`] follows the
+//! path and hands out a [`Row`] for each increment.
+//!
+//! Units are m and kPa, shear strains are γ = 2ε; opening and tension are positive. Components are
+//! those of the law's [hypothesis](abi::Hypothesis::components), in their order; arrays over them
+//! are padded to [`N_MAX`]. An increment lasts one unit of time unless its segment says otherwise.
+//!
+//! What goes wrong comes back as data ([`Error`]): where ([`Place`]), with which law, why ([`Cause`]),
+//! and the call of the law behind it. Its `Display` says the same in a sentence.
+//!
+//! ```no_run
+//! use abi::Hypothesis;
+//! use law::SearchPath;
+//! use point::{Control, Driver, Error, Segment};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A triaxial test: 100 kPa all around, then 10 % of compression in 200 increments. E and ν.
+//! let three_d = Hypothesis::ThreeD;
+//! let law = SearchPath::new(&[]).law("elastic")?.build(three_d, &[2e4, 0.3]);
+//! let law = law.map_err(|failure| failure.reason)?;
+//! let compression = Segment::new(three_d, 1, 200).lead(0, Control::Gradient(-0.1));
+//! let start = [-100.0, -100.0, -100.0, 0.0, 0.0, 0.0];
+//! let driver = Driver::new(law, &start, vec![compression])?;
+//! let mut curve = Vec::new();
+//! let course = driver.run(|row| {
+//!     curve.push((row.gradient[0], row.flux[0]));
+//!     Ok::<(), Error>(())
+//! })?;
+//! assert_eq!(course.increments, 200);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! In the order in which data flows: [`path`](Segment), `driver`, `course` (rows), `walk` (increments
+//! in steps), `search` (the equilibrium of a step).
+
+mod anchor;
+mod course;
+mod driver;
+mod error;
+mod frame;
+mod path;
+mod restrictions;
+mod search;
+mod silence;
+mod state;
+mod walk;
+mod words;
+
+pub use course::{Course, Row};
+pub use driver::Driver;
+pub use error::{
+    Cause, Criterion, Error, Failure, Misuse, Moved, NoEquilibrium, Place, Unmet, Warning,
+};
+pub use frame::Frame;
+pub use path::{Control, MAX_INCREMENTS, Segment};
+pub use restrictions::{Restrictions, Rows};
+pub use state::{N_MAX, Vector};

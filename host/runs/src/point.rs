@@ -1,0 +1,425 @@
+//! Runs of drivers: one law at one integration point, from a file to tables and figures.
+
+use crate::Error;
+use input::driver::Driver;
+use law::Stop;
+use law::adapter::{self, Adapter};
+use law::capsule::{self, Capsule};
+use point::Course;
+use results::figure::Figures;
+use results::point_figure::{draw_row, drawable};
+use results::point_table::Table;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use text::suggestion;
+use text::write::{Identity, check_own, identity, is_same};
+
+/// What came out of a driver file.
+#[derive(Clone, Debug)]
+pub struct PointReport {
+    /// Name of the variant, if the file stands for several drivers.
+    pub variant: Option<String>,
+    /// Law.
+    pub law: String,
+    /// Version of the law.
+    pub version: String,
+    /// Library the law comes from.
+    pub library: PathBuf,
+    /// SHA-256 of the library.
+    pub sha256: String,
+    /// Hypothesis.
+    pub hypothesis: &'static str,
+    /// Increments done.
+    pub increments: usize,
+    /// Calls of the law.
+    pub calls: usize,
+    /// Steps repeated with a smaller size.
+    pub cut_backs: usize,
+    /// Columns of the last row, with their values.
+    pub last: Vec<(String, f64)>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Where the rows are, unless they went to the standard output.
+    pub csv: Option<PathBuf>,
+}
+
+impl PointReport {
+    fn new(driver: &point::Driver, course: Course) -> Self {
+        let law = driver.law();
+        Self {
+            variant: driver.variant().map(str::to_owned),
+            law: law.description().id.clone(),
+            version: law.description().version.clone(),
+            library: law.library().path().to_owned(),
+            sha256: law.library().sha256().to_owned(),
+            hypothesis: law.hypothesis().name(),
+            increments: course.increments,
+            calls: course.calls,
+            cut_backs: course.cut_backs,
+            last: driver.columns().into_iter().zip(course.last).collect(),
+            warnings: course.warnings.iter().map(ToString::to_string).collect(),
+            csv: None,
+        }
+    }
+}
+
+impl fmt::Display for PointReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(variant) = &self.variant {
+            write!(f, "variant {variant}: ")?;
+        }
+        writeln!(
+            f,
+            "law `{}` {} of {}, {}",
+            self.law,
+            self.version,
+            self.library.display(),
+            self.hypothesis
+        )?;
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        write!(
+            f,
+            "{} increments, {} calls of the law, {} cut-backs",
+            self.increments, self.calls, self.cut_backs
+        )?;
+        for (name, value) in &self.last {
+            write!(f, "\n  {name:<20} {value:>14.6e}")?;
+        }
+        if let Some(csv) = &self.csv {
+            write!(f, "\nrows in {}", csv.display())?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs a driver file without variants. Rows go to `csv`, or to the standard output.
+///
+/// # Errors
+/// As [`run_file_variants`].
+pub fn run_file(path: &Path, csv: Option<&Path>) -> Result<PointReport, Error> {
+    let mut last = None;
+    run_file_variants(path, None, csv, |report| last = Some(report.clone()))?;
+    last.ok_or_else(|| text::Error::Internal("a driver file without drivers".to_owned()).into())
+}
+
+/// Runs a driver file: all its variants one after the other, or one of them. Rows go to `csv`, or
+/// to the standard output; of several variants to `csv` with `_<variant>` before its ending.
+/// Figures stand beside `csv`, each with the curves of all variants.
+///
+/// # Errors
+/// Bad input and trouble with libraries, before anything is written; what cannot be written; a
+/// driver that does not come to its end, after the rows and curves found until then have been
+/// written.
+pub fn run_file_variants(
+    path: &Path,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+    report: impl FnMut(&PointReport),
+) -> Result<(), Error> {
+    run_file_until(path, variant, csv, &Stop::never(), report)
+}
+
+/// As [`run_file_variants`], to be stopped on its way.
+///
+/// # Errors
+/// As [`run_file_variants`]; also that it was stopped, after the rows found until then have been
+/// written.
+pub fn run_file_until(
+    path: &Path,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+    stop: &Stop,
+    mut report: impl FnMut(&PointReport),
+) -> Result<(), Error> {
+    let mut drivers = Driver::read(path)?;
+    for driver in &mut drivers {
+        driver.point_mut().stop_on(stop);
+    }
+    run_all(drivers, path, variant, csv, &mut report)
+}
+
+/// Runs input of the IncrementalDriver of A. Niemunis with a UMAT. Rows go to `csv`, or to the
+/// standard output.
+///
+/// # Errors
+/// As [`run_file_until`].
+pub fn run_incremental(
+    path: &Path,
+    umat: &Path,
+    csv: Option<&Path>,
+    stop: &Stop,
+    mut report: impl FnMut(&PointReport),
+) -> Result<(), Error> {
+    let mut driver = Driver::read_incremental(path, umat)?;
+    driver.point_mut().stop_on(stop);
+    run_all(vec![driver], path, None, csv, &mut report)
+}
+
+fn run_all(
+    drivers: Vec<Driver>,
+    path: &Path,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+    report: &mut dyn FnMut(&PointReport),
+) -> Result<(), Error> {
+    let names: Vec<String> = drivers.iter().filter_map(name).map(str::to_owned).collect();
+    let drivers = chosen(drivers, &names, variant)?;
+    check_recording(&drivers)?;
+    for driver in &drivers {
+        let checked = driver.point().check();
+        checked.map_err(|error| driver.located(error))?;
+    }
+    match csv {
+        Some(csv) => run_to_files(&drivers, path, csv, report),
+        None => run_to_stdout(&drivers, path, &names, report),
+    }
+}
+
+/// Name of the variant.
+fn name(driver: &Driver) -> Option<&str> {
+    driver.point().variant()
+}
+
+/// All drivers, or the variant that is wanted.
+fn chosen(
+    mut drivers: Vec<Driver>,
+    names: &[String],
+    variant: Option<&str>,
+) -> Result<Vec<Driver>, Error> {
+    if let Some(wanted) = variant {
+        drivers.retain(|driver| name(driver) == Some(wanted));
+        if drivers.is_empty() {
+            let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
+            return Err(usage(format!("there is no variant `{wanted}`: {known}")));
+        }
+    }
+    Ok(drivers)
+}
+
+/// Only one run of a UMAT can be recorded.
+fn check_recording(drivers: &[Driver]) -> Result<(), Error> {
+    if adapter::is_recorded_to().is_none() {
+        return Ok(());
+    }
+    let [driver] = drivers else {
+        return Err(usage("--record is for one run: name one with --variant"));
+    };
+    let law = driver.point().law();
+    let foreign = law.library().foreign();
+    if foreign.is_none_or(|foreign| foreign.adapter != Adapter::Umat) {
+        let id = &law.description().id;
+        return Err(usage(format!("--record: law `{id}` is no UMAT")));
+    }
+    Ok(())
+}
+
+fn run_to_stdout(
+    drivers: &[Driver],
+    path: &Path,
+    names: &[String],
+    report: &mut dyn FnMut(&PointReport),
+) -> Result<(), Error> {
+    let [driver] = drivers else {
+        return Err(usage(format!(
+            "{} has variants: give --csv FILE for all of them, or --variant NAME for one of {}",
+            path.display(),
+            names.join(", ")
+        )));
+    };
+    let name = Path::new("the standard output");
+    let mut figures = empty_figures(driver);
+    match follow(driver, crate::supervision::stdout(), name, &mut figures) {
+        Ok(done) => {
+            report(&done);
+            Ok(())
+        }
+        // Whoever reads the rows has read enough.
+        Err(Ended::Unwritable(source)) if source.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(ended) => Err(ended.at(name)),
+    }
+}
+
+fn run_to_files(
+    drivers: &[Driver],
+    path: &Path,
+    csv: &Path,
+    report: &mut dyn FnMut(&PointReport),
+) -> Result<(), Error> {
+    let alone = drivers.len() == 1;
+    let target = |driver: &Driver| match name(driver) {
+        Some(variant) if !alone => with_suffix(csv, variant),
+        _ => csv.to_owned(),
+    };
+    for driver in drivers {
+        let csv = target(driver);
+        if is_same(path, &csv) {
+            return Err(usage(format!(
+                "--csv {} would overwrite the driver file",
+                csv.display()
+            )));
+        }
+    }
+    let mut drawn = Vec::new();
+    let outcome = drivers.iter().try_for_each(|driver| {
+        let csv = target(driver);
+        // A capsule of an earlier run must not be mistaken for one of this.
+        let _ = std::fs::remove_file(csv.with_extension(capsule::FILE_NAME));
+        let file = File::create(&csv).map_err(|source| text::Error::unwritable(&csv, source))?;
+        let mut figures = empty_figures(driver);
+        let out = Guarded {
+            own: identity(&file),
+            file,
+            length: 0,
+        };
+        let result = follow(driver, out, &csv, &mut figures);
+        drawn.push((name(driver).unwrap_or_default().to_owned(), figures));
+        let mut done = result.map_err(|ended| ended.at(&csv))?;
+        done.csv = Some(csv);
+        report(&done);
+        Ok(())
+    });
+    let folder = csv.parent().unwrap_or(Path::new(""));
+    let figures = match drawn.as_slice() {
+        [(_, figures)] if alone => figures.draw(folder),
+        several => Figures::draw_overlaid(folder, several),
+    };
+    outcome.and(figures.map_err(Error::from))
+}
+
+fn usage(message: impl Into<String>) -> Error {
+    text::Error::Usage(message.into()).into()
+}
+
+/// `a/b.csv` to `a/b_<variant>.csv`.
+fn with_suffix(csv: &Path, variant: &str) -> PathBuf {
+    let mut name = csv.file_stem().unwrap_or_default().to_owned();
+    name.push("_");
+    name.push(variant);
+    if let Some(ending) = csv.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    csv.with_file_name(name)
+}
+
+/// A file that is written to only as long as it is what was opened, and with what belongs to the
+/// process as it was.
+struct Guarded {
+    file: File,
+    own: Identity,
+    length: u64,
+}
+
+impl Write for Guarded {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        law::custody::restore().map_err(io::Error::other)?;
+        check_own(&self.file, self.own, self.length)?;
+        let n = self.file.write(bytes)?;
+        self.length += n as u64;
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Follows a driver and writes its rows as comma-separated values; `name` is for messages, and a
+/// capsule is written beside it if it is a file.
+///
+/// # Errors
+/// As [`run_file_until`]; the rows found until then have been written.
+pub fn write_csv(driver: &Driver, out: impl Write, name: &Path) -> Result<PointReport, Error> {
+    follow(driver, out, name, &mut empty_figures(driver)).map_err(|ended| ended.at(name))
+}
+
+/// The figures of a driver, still without curves.
+fn empty_figures(driver: &Driver) -> Figures {
+    Figures::new(driver.title(), driver.figures(), drawable(driver.point()))
+}
+
+/// Why a table ends early.
+enum Ended {
+    Unwritable(io::Error),
+    Failed(Error),
+}
+
+impl Ended {
+    fn at(self, name: &Path) -> Error {
+        match self {
+            Self::Unwritable(source) => text::Error::unwritable(name, source).into(),
+            Self::Failed(error) => error,
+        }
+    }
+}
+
+/// Why no more rows come.
+enum NoMore {
+    Unwritable(io::Error),
+    Point(point::Error),
+}
+
+impl From<point::Error> for NoMore {
+    fn from(error: point::Error) -> Self {
+        Self::Point(error)
+    }
+}
+
+fn follow(
+    driver: &Driver,
+    out: impl Write,
+    name: &Path,
+    figures: &mut Figures,
+) -> Result<PointReport, Ended> {
+    let point = driver.point();
+    // What came through a pipe cannot be read once more.
+    let mut table = Table::new(out, point, !driver.path().is_file());
+    let has_figures = !driver.figures().is_empty();
+    let result = point.run(|row| {
+        if has_figures {
+            draw_row(point, figures, row);
+        }
+        table.write(row).map_err(NoMore::Unwritable)
+    });
+    if !matches!(result, Err(NoMore::Unwritable(_))) {
+        table.flush().map_err(Ended::Unwritable)?;
+    }
+    match result {
+        Ok(course) => Ok(PointReport::new(point, course)),
+        Err(NoMore::Unwritable(source)) => Err(Ended::Unwritable(source)),
+        Err(NoMore::Point(error)) => {
+            let error = with_capsule(driver, error, name).map_err(Ended::Failed)?;
+            Err(Ended::Failed(driver.located(error).into()))
+        }
+    }
+}
+
+/// Writes the call of the law behind an error beside a table that is a file, and says so. A table on
+/// the standard output has no place beside it.
+fn with_capsule(driver: &Driver, error: point::Error, name: &Path) -> Result<point::Error, Error> {
+    let capsule = error.failed_call().and_then(|(failure, call)| {
+        let mut origin = vec![("driver", driver.path().display().to_string().into())];
+        origin.extend(
+            failure
+                .variant
+                .iter()
+                .map(|v| ("variant", v.as_str().into())),
+        );
+        origin.push(("place", failure.place.to_string().into()));
+        Capsule::of(driver.point().law(), call, origin)
+    });
+    let Some(capsule) = capsule.filter(|_| name.is_file()) else {
+        return Ok(error);
+    };
+    let file = name.with_extension(capsule::FILE_NAME);
+    capsule.write(&file)?;
+    let hint = format!(
+        "`pilum replay {}` repeats the call that failed",
+        file.display()
+    );
+    Ok(error.with_hint(&hint))
+}
