@@ -30,9 +30,28 @@ pub enum Error {
         #[help]
         hint: Option<String>,
     },
+    /// A call that was repeated fails.
+    #[error("law `{law}` fails: {outcome}")]
+    CallFails {
+        /// Id of the law.
+        law: String,
+        /// Name of the outcome.
+        outcome: &'static str,
+        /// The law cannot follow; else it, or its library, is at fault.
+        cannot_follow: bool,
+    },
     /// The user stopped the work in the middle.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+    /// The user ended the program at once, during these calls of laws if there were any.
+    #[error("{}stopped at once, as asked", during.as_ref().map(|calls| format!("{calls}: ")).unwrap_or_default())]
+    #[diagnostic(help(
+        "a run has all its rows and goes on with --resume; a driver lacks those of the last 0.2 s"
+    ))]
+    StoppedAtOnce {
+        /// The calls, in words.
+        during: Option<String>,
+    },
 }
 
 impl From<InputError> for Error {
@@ -128,7 +147,9 @@ impl Error {
                 add_hint(&mut hint, more);
                 Self::Simulation { error, hint }
             }
-            Self::Stopped(stopped) => stopped.into(),
+            other @ (Self::CallFails { .. } | Self::Stopped(_) | Self::StoppedAtOnce { .. }) => {
+                other
+            }
         }
     }
 
@@ -139,7 +160,12 @@ impl Error {
             Self::Text(text::Error::Internal(_)) => Kind::Internal,
             Self::Text(_) => Kind::Input,
             Self::Law(_) => Kind::Library,
-            Self::Stopped(_) => Kind::Stopped,
+            Self::CallFails {
+                cannot_follow: true,
+                ..
+            } => Kind::NoEquilibrium,
+            Self::CallFails { .. } => Kind::Library,
+            Self::Stopped(_) | Self::StoppedAtOnce { .. } => Kind::Stopped,
             Self::Point(error) => match &**error {
                 point::Error::Misuse { .. } | point::Error::InitialState { .. } => Kind::Input,
                 point::Error::Failure(failure) => match failure.cause {

@@ -233,7 +233,7 @@ impl std::fmt::Display for Seen {
 
 /// What whoever watches sees in the memory.
 #[derive(Debug)]
-pub struct Watched<'a>(pub(crate) &'a SharedMemory, pub(crate) usize);
+pub struct Watched<'a>(pub &'a SharedMemory, pub usize);
 
 impl Watched<'_> {
     /// Calls under way.

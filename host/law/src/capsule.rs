@@ -24,12 +24,16 @@ pub const FILE_NAME: &str = "failure.toml";
 pub struct Capsule {
     /// Version of this form.
     version: u32,
-    law: LawPart,
+    /// Whose law was called.
+    pub law: LawPart,
+    /// Where it comes from, by key.
     #[serde(rename = "where", default)]
-    origin: IndexMap<String, toml::Value>,
-    outcome: OutcomePart,
+    pub origin: IndexMap<String, toml::Value>,
+    /// What became of the call.
+    pub outcome: OutcomePart,
+    /// Parameters of the law, by id.
     #[serde(default)]
-    parameters: IndexMap<String, f64>,
+    pub parameters: IndexMap<String, f64>,
     call: CallPart,
     start: Values,
     #[serde(default)]
@@ -39,25 +43,38 @@ pub struct Capsule {
     source: Option<Source>,
 }
 
+/// The law of a capsule.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct LawPart {
-    id: String,
-    version: String,
-    hypothesis: String,
-    library: PathBuf,
-    sha256: String,
-    adapter: Option<Adapter>,
-    sidecar: Option<PathBuf>,
-    externals: Option<Externals>,
+pub struct LawPart {
+    /// Id of the law.
+    pub id: String,
+    /// Its version.
+    pub version: String,
+    /// Name of its hypothesis.
+    pub hypothesis: String,
+    /// Its library.
+    pub library: PathBuf,
+    /// SHA-256 of that.
+    pub sha256: String,
+    /// What the library is made for, if not for the contract.
+    pub adapter: Option<Adapter>,
+    /// What describes it.
+    pub sidecar: Option<PathBuf>,
+    /// What becomes of routines that nobody supplies.
+    pub externals: Option<Externals>,
 }
 
+/// What became of a call.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct OutcomePart {
-    status: String,
-    message: String,
-    step_factor: Option<f64>,
+pub struct OutcomePart {
+    /// Name of the outcome.
+    pub status: String,
+    /// The law's words.
+    pub message: String,
+    /// The smaller step that it asks for, as a fraction.
+    pub step_factor: Option<f64>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -216,7 +233,7 @@ impl Capsule {
     }
 
     /// An error about what stands under these keys, or about the last of them that is there.
-    fn error(&self, keys: &[&str], message: impl Into<String>) -> Error {
+    pub fn error(&self, keys: &[&str], message: impl Into<String>) -> Error {
         let Some(source) = &self.source else {
             return text::Error::Usage(message.into()).into();
         };
@@ -236,7 +253,8 @@ impl Capsule {
         Ok(replace(path, self.to_string())?)
     }
 
-    fn hypothesis(&self) -> Option<Hypothesis> {
+    /// The hypothesis of the law.
+    pub fn hypothesis(&self) -> Option<Hypothesis> {
         let mut all = Hypothesis::ALL.into_iter();
         all.find(|h| h.name() == self.law.hypothesis)
     }
@@ -248,7 +266,8 @@ impl Capsule {
 }
 
 impl OutcomePart {
-    fn of(failure: &BatchFailure) -> Self {
+    /// That of a failure.
+    pub fn of(failure: &BatchFailure) -> Self {
         Self {
             status: status(failure.outcome).to_owned(),
             message: failure.message.clone(),
@@ -258,7 +277,7 @@ impl OutcomePart {
 }
 
 /// Name of an outcome in files.
-fn status(outcome: Outcome) -> &'static str {
+pub fn status(outcome: Outcome) -> &'static str {
     match outcome {
         Outcome::Ok => "ok",
         Outcome::Unreliable => "unreliable",
@@ -410,7 +429,7 @@ impl Capsule {
     ///
     /// # Errors
     /// The name that is missing, or too much.
-    fn in_order<'a>(
+    pub fn in_order<'a>(
         &self,
         values: &IndexMap<String, f64>,
         names: impl Iterator<Item = &'a str> + Clone,

@@ -396,7 +396,7 @@ fn receive<T: for<'de> Deserialize<'de>>(socket: &mut impl Read) -> io::Result<T
 
 /// A file in memory.
 #[cfg(target_os = "linux")]
-pub(crate) fn memory_file() -> io::Result<File> {
+pub fn memory_file() -> io::Result<File> {
     use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, memfd_create};
     let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
     let memory = memfd_create("pilum_batch", flags)?;
@@ -406,7 +406,7 @@ pub(crate) fn memory_file() -> io::Result<File> {
 
 /// A file whose name is gone.
 #[cfg(not(target_os = "linux"))]
-pub(crate) fn memory_file() -> io::Result<File> {
+pub fn memory_file() -> io::Result<File> {
     use std::sync::atomic::{AtomicU32, Ordering};
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);

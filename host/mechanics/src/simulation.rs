@@ -26,7 +26,7 @@ use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::problem::{Axis, Material, Problem};
-use crate::settings::{Control, Settings};
+use crate::settings::{Control, Method, Settings};
 use beyond::Beyond;
 use history::History;
 use law::{Moment, Stop, custody};
@@ -235,6 +235,11 @@ impl Simulation {
         let n = nodes.len().max(1) as f64;
         let sum = |c: usize| nodes.iter().map(move |node| self.displacement[2 * node + c]);
         Some([0, 1].map(|c| sum(c).sum::<f64>() / n))
+    }
+
+    /// The method that iterates in the present phase.
+    pub fn method(&self) -> Method {
+        self.settings().method
     }
 
     /// The settings, with the method that suits the laws of the present phase.

@@ -36,7 +36,7 @@ pub struct Checkpoint<'c> {
     /// Warnings so far.
     pub warnings: Cow<'c, [String]>,
     /// The run; `None` if it has come to its end.
-    pub run: Option<State<'c>>,
+    pub run: Option<Cow<'c, State<'c>>>,
 }
 
 impl<'c> Checkpoint<'c> {
@@ -45,13 +45,13 @@ impl<'c> Checkpoint<'c> {
         identity: &'c str,
         results: ResultsState,
         warnings: &'c [String],
-        run: Option<State<'c>>,
+        run: Option<&'c State<'c>>,
     ) -> Self {
         Self {
             identity: identity.into(),
             results,
             warnings: warnings.into(),
-            run,
+            run: run.map(Cow::Borrowed),
         }
     }
 

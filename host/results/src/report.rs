@@ -19,6 +19,8 @@ mod table;
 
 use text::Error;
 use text::write::replace;
+pub use page::STYLE;
+
 use budget::Budget;
 use results::Run;
 use std::path::{Path, PathBuf};

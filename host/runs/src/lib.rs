@@ -1,1 +1,15 @@
+//! Runs: of a case, of a driver, of variants, of studies; with results in folders, checkpoints, and a
+//! watch over what laws do to the process.
 
+mod ending;
+#[expect(unsafe_code, reason = "the program's allocator")]
+#[cfg(unix)]
+pub mod memory;
+pub mod point;
+pub mod run;
+pub mod supervision;
+pub mod trade_off;
+pub mod variants;
+
+pub use ending::ending;
+pub use input::Error;

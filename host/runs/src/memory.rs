@@ -5,7 +5,7 @@
 //! on. So the program's allocator gives back a reserve, says what there is to say, and ends the
 //! process. What is worked on says beforehand how much it will take.
 
-use crate::error::Error;
+use crate::Error;
 use rustix::io::Errno;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::{Path, PathBuf};
@@ -148,7 +148,7 @@ fn end(size: usize) {
     if let Ok(results) = RESULTS.try_lock()
         && let Some(folder) = &*results
     {
-        let _ = crate::output::end_summary(folder, &Error::Usage(message));
+        let _ = results::end_summary(folder, &crate::ending(Some(&Error::usage(message))));
     }
     // Who watches this process knows that no law has ended it.
     crate::supervision::end(CODE);

@@ -7,13 +7,14 @@ use law::adapter::{self, Adapter};
 use law::capsule::{self, Capsule};
 use point::Course;
 use results::figure::Figures;
+use results::wanted::Figure;
 use results::point_figure::{draw_row, drawable};
 use results::point_table::Table;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use text::suggestion;
+use crate::variants::keep;
 use text::write::{Identity, check_own, identity, is_same};
 
 /// What came out of a driver file.
@@ -160,14 +161,14 @@ pub fn run_incremental(
 }
 
 fn run_all(
-    drivers: Vec<Driver>,
+    mut drivers: Vec<Driver>,
     path: &Path,
     variant: Option<&str>,
     csv: Option<&Path>,
     report: &mut dyn FnMut(&PointReport),
 ) -> Result<(), Error> {
     let names: Vec<String> = drivers.iter().filter_map(name).map(str::to_owned).collect();
-    let drivers = chosen(drivers, &names, variant)?;
+    keep(&mut drivers, variant, |driver| name(driver).map(str::to_owned))?;
     check_recording(&drivers)?;
     for driver in &drivers {
         let checked = driver.point().check();
@@ -182,22 +183,6 @@ fn run_all(
 /// Name of the variant.
 fn name(driver: &Driver) -> Option<&str> {
     driver.point().variant()
-}
-
-/// All drivers, or the variant that is wanted.
-fn chosen(
-    mut drivers: Vec<Driver>,
-    names: &[String],
-    variant: Option<&str>,
-) -> Result<Vec<Driver>, Error> {
-    if let Some(wanted) = variant {
-        drivers.retain(|driver| name(driver) == Some(wanted));
-        if drivers.is_empty() {
-            let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
-            return Err(usage(format!("there is no variant `{wanted}`: {known}")));
-        }
-    }
-    Ok(drivers)
 }
 
 /// Only one run of a UMAT can be recorded.
@@ -339,7 +324,8 @@ pub fn write_csv(driver: &Driver, out: impl Write, name: &Path) -> Result<PointR
 
 /// The figures of a driver, still without curves.
 fn empty_figures(driver: &Driver) -> Figures {
-    Figures::new(driver.title(), driver.figures(), drawable(driver.point()))
+    let wanted: Vec<Figure> = driver.figures().iter().map(Figure::from).collect();
+    Figures::new(driver.title(), &wanted, drawable(driver.point()))
 }
 
 /// Why a table ends early.

@@ -2,7 +2,7 @@
 //! program lets itself be carried out by a child, and watches. What the child calls, what it has
 //! handed out and how it means to end stands in memory that both share; a child that is gone
 //! without having said how it ends was ended by a law. Then the same is done once more with laws in
-//! processes of their own ([`crate::plugin::isolate`]), which names the point.
+//! processes of their own ([`law::isolate`]), which names the point.
 //!
 //! The watcher takes the signals; the child and its children are not reached by those of the
 //! terminal, and see a request to stop in the memory. One that does not answer is ended.
@@ -28,7 +28,7 @@ pub use child::{begin_run, case_begun, end, end_run, enter, is_again, stdout, st
 pub use parent::supervise;
 
 #[cfg(target_os = "linux")]
-use crate::plugin::{SharedMemory, calls};
+use law::{SharedMemory, calls};
 
 /// Set to anything, the program does all in one process, for debuggers and profilers.
 pub const ALONE: &str = "PILUM_UNSUPERVISED";

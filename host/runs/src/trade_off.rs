@@ -24,11 +24,11 @@ pub use accuracy::{reach, reach_until};
 pub use sampled::Convergence;
 pub use study::{Measurement, Reference, Row, Study};
 
-use crate::case::{Case, base};
-use crate::error::{Error, Source, suggestion};
-use crate::output::replace;
-use crate::point::Driver;
-use crate::stop::Stop;
+use input::{Case, Driver, is_driver};
+use crate::Error;
+use crate::variants::keep;
+use text::write::replace;
+use law::Stop;
 use std::path::{Path, PathBuf};
 use trial::Scratch;
 
@@ -63,7 +63,7 @@ pub fn run(
 ) -> Result<(), Error> {
     if options.most_increments == 0 {
         let message = "--max-increments is 0, expected at least 1";
-        return Err(Error::Usage(message.to_owned()));
+        return Err(Error::usage(message.to_owned()));
     }
     let path = if path.is_dir() {
         path.join("case.toml")
@@ -73,19 +73,12 @@ pub fn run(
     if is_driver(&path)? {
         if options.interface_stiffness {
             let message = "--interface-stiffness needs a case: a driver has no elements beside it";
-            return Err(Error::Usage(message.to_owned()));
+            return Err(Error::usage(message.to_owned()));
         }
         run_drivers(&path, options, show, say)
     } else {
         run_cases(&path, options, show, say)
     }
-}
-
-/// A driver has a path of segments.
-pub(crate) fn is_driver(path: &Path) -> Result<bool, Error> {
-    let (_, files) = base::read::<toml::Table>(Source::read(path)?)?;
-    let mut tables = files.iter().map(|(_, table)| table);
-    Ok(tables.any(|table| table.contains_key("hypothesis") || table.contains_key("segment")))
 }
 
 fn run_drivers(
@@ -97,17 +90,17 @@ fn run_drivers(
     let mut drivers = Driver::read(path)?;
     let stop = &options.stop;
     for driver in &mut drivers {
-        driver.stop_on(stop);
+        driver.point_mut().stop_on(stop);
     }
     let stem = path.file_stem().unwrap_or_default();
     let stem = stem.to_string_lossy().into_owned();
-    let name = |driver: &Driver| driver.variant().map(str::to_owned);
+    let name = |driver: &Driver| driver.point().variant().map(str::to_owned);
     keep(&mut drivers, options.variant.as_deref(), name)?;
     let folder = options.folder(&stem);
     for driver in &drivers {
-        let name = full_name(&stem, driver.variant());
+        let name = full_name(&stem, driver.point().variant());
         let study = driver_study::study(driver, &name, options.most_increments, stop, say)?;
-        finish(&study, &options.place(&folder, driver.variant()), show)?;
+        finish(&study, &options.place(&folder, driver.point().variant()), show)?;
     }
     Ok(())
 }
@@ -140,23 +133,6 @@ fn run_cases(
     Ok(())
 }
 
-/// Keeps the variant that is asked for.
-fn keep<T>(
-    all: &mut Vec<T>,
-    wanted: Option<&str>,
-    name: impl Fn(&T) -> Option<String>,
-) -> Result<(), Error> {
-    let Some(wanted) = wanted else { return Ok(()) };
-    let names: Vec<String> = all.iter().filter_map(&name).collect();
-    all.retain(|one| name(one).as_deref() == Some(wanted));
-    if all.is_empty() {
-        let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
-        let message = format!("there is no variant `{wanted}`: {known}");
-        return Err(Error::Usage(message));
-    }
-    Ok(())
-}
-
 fn full_name(name: &str, variant: Option<&str>) -> String {
     match variant {
         Some(variant) => format!("{name}, {variant}"),
@@ -181,13 +157,13 @@ impl Options {
 
 /// Writes table, diagram and page, and shows the table.
 fn finish(study: &Study, folder: &Path, show: &mut dyn FnMut(&str)) -> Result<(), Error> {
-    let diagram = study.diagram().map_err(Error::Internal)?;
+    let diagram = study.diagram().map_err(Error::internal)?;
     let page = study.page(&diagram)?;
-    std::fs::create_dir_all(folder).map_err(|source| unwritable(folder, source))?;
+    std::fs::create_dir_all(folder).map_err(|source| text::Error::unwritable(folder, source))?;
     let table = folder.join("trade_off.csv");
     study
         .write_csv(&table)
-        .map_err(|error| unwritable(&table, std::io::Error::other(error)))?;
+        .map_err(|error| text::Error::unwritable(&table, std::io::Error::other(error)))?;
     write(&folder.join("trade_off.svg"), &diagram)?;
     write(&folder.join("trade_off.html"), &page)?;
     show(&study.text());
@@ -196,12 +172,5 @@ fn finish(study: &Study, folder: &Path, show: &mut dyn FnMut(&str)) -> Result<()
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Error> {
-    replace(path, text)
-}
-
-fn unwritable(path: &Path, source: std::io::Error) -> Error {
-    Error::Unwritable {
-        path: path.to_owned(),
-        source,
-    }
+    Ok(replace(path, text)?)
 }

@@ -14,11 +14,12 @@ mod random;
 mod robustness;
 mod specimen;
 
-use crate::child::{self, Ending, Work};
-use crate::error::{Error, suggestion};
-use crate::file;
-use crate::plugin::probe::NO_OUTCOME;
-use crate::plugin::{Library, LoadedLaw, SearchPath, hexadecimal_sha256};
+use law::child::{self, Ending, Work};
+use crate::Error;
+use text::suggestion;
+use text::file;
+use law::probe::NO_OUTCOME;
+use law::{Library, LoadedLaw, SearchPath, hexadecimal_sha256};
 use abi::raw;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -245,15 +246,15 @@ struct Report<'a> {
 /// Checks a library and prints what it found.
 ///
 /// # Errors
-/// [`Error::Usage`] for an unknown check or settings that no law can have, [`Error::Unreadable`],
-/// [`Error::Plugin`] if there is no such law or a check fails or crashes.
+/// [`text::Error::Usage`] for an unknown check or settings that no law can have, [`text::Error::Unreadable`],
+/// [`law::Error::Library`] if there is no such law or a check fails or crashes.
 pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Error> {
     let ids: Vec<&str> = checks().map(|check| check.id).collect();
     for id in &arguments.only {
         let is_inner = arguments.in_process && id == SETTINGS.id;
         if !is_inner && !ids.contains(&id.as_str()) {
             let known = suggestion(id, ids.iter().copied());
-            return Err(Error::Usage(format!("there is no check `{id}`: {known}")));
+            return Err(Error::usage(format!("there is no check `{id}`: {known}")));
         }
     }
     if arguments.list {
@@ -267,7 +268,7 @@ pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Err
         return Ok(());
     }
     // What cannot be read needs no checks, and what it was is what is reported.
-    let bytes = file::read_library(&path).map_err(|source| Error::Unreadable {
+    let bytes = file::read_library(&path).map_err(|source| text::Error::Unreadable {
         path: path.clone(),
         source,
     })?;
@@ -301,7 +302,7 @@ pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Err
     if bad.is_empty() {
         return Ok(());
     }
-    Err(Error::plugin(format!(
+    Err(Error::library(format!(
         "library {} does not keep the contract: {}",
         path.display(),
         bad.join(", ")
@@ -309,7 +310,7 @@ pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Err
 }
 
 fn json(value: &impl Serialize) -> Result<String, Error> {
-    serde_json::to_string_pretty(value).map_err(|error| Error::Internal(error.to_string()))
+    serde_json::to_string_pretty(value).map_err(|error| Error::internal(error.to_string()))
 }
 
 fn list(as_json: bool) -> Result<String, Error> {
@@ -345,9 +346,9 @@ fn library_path(name: &str) -> Result<PathBuf, Error> {
     if looks_like_a_path || path.is_file() {
         return std::path::absolute(path)
             .and_then(|path| std::fs::metadata(&path).map(|_| path))
-            .map_err(|source| Error::Unreadable {
-                path: path.to_owned(),
-                source,
+            .map_err(|source| {
+                let path = path.to_owned();
+                text::Error::Unreadable { path, source }.into()
             });
     }
     let search = SearchPath::new(&[]);
@@ -357,12 +358,13 @@ fn library_path(name: &str) -> Result<PathBuf, Error> {
     named
         .find(|path| path.is_file())
         .or_else(|| installed.get(name).cloned())
-        .ok_or_else(|| Error::Plugin {
-            message: format!("there is no library or law `{name}`"),
-            hint: Some(suggestion(
-                name,
-                installed.keys().map(String::as_str).collect::<Vec<_>>(),
-            )),
+        .ok_or_else(|| {
+            let known = installed.keys().map(String::as_str);
+            let error = law::Error::Library {
+                message: format!("there is no library or law `{name}`"),
+                hint: Some(suggestion(name, known.collect::<Vec<_>>())),
+            };
+            error.into()
         })
 }
 
@@ -379,7 +381,7 @@ static SETTINGS: Check = Check {
 fn refuse_settings(arguments: &Arguments, path: &Path) -> Result<(), Error> {
     let finding = in_child(&SETTINGS, arguments, path, &ScratchFolder::new()?)?;
     match finding.outcome {
-        Outcome::Failed => Err(Error::Usage(finding.details)),
+        Outcome::Failed => Err(Error::usage(finding.details)),
         _ => Ok(()),
     }
 }
@@ -450,7 +452,7 @@ struct Answer {
 
 /// Runs one check here. The answer as JSON.
 fn in_process(arguments: &Arguments, path: PathBuf) -> Result<String, Error> {
-    child::enter().map_err(|error| Error::Internal(error.to_string()))?;
+    child::enter().map_err(|error| Error::internal(error.to_string()))?;
     let subject = Subject {
         path,
         seed: arguments.seed,
@@ -459,7 +461,7 @@ fn in_process(arguments: &Arguments, path: PathBuf) -> Result<String, Error> {
     let check = checks()
         .chain([&SETTINGS])
         .find(|check| arguments.only.iter().any(|id| id == check.id))
-        .ok_or_else(|| Error::Internal("there is no check to run".to_owned()))?;
+        .ok_or_else(|| Error::internal("there is no check to run".to_owned()))?;
     let (outcome, details) = match (check.run)(&subject) {
         Ok(details) => (Outcome::Passed, details),
         Err(Verdict::Skipped(why)) => (Outcome::Skipped, why),
@@ -467,7 +469,7 @@ fn in_process(arguments: &Arguments, path: PathBuf) -> Result<String, Error> {
         Err(Verdict::Failed(why)) => (Outcome::Failed, why),
     };
     serde_json::to_string(&Answer { outcome, details })
-        .map_err(|error| Error::Internal(error.to_string()))
+        .map_err(|error| Error::internal(error.to_string()))
 }
 
 /// Runs one check in a child.
@@ -477,7 +479,7 @@ fn in_child(
     path: &Path,
     scratch: &ScratchFolder,
 ) -> Result<Finding, Error> {
-    let internal = |error: std::io::Error| Error::Internal(error.to_string());
+    let internal = |error: std::io::Error| Error::internal(error.to_string());
     let folder = scratch.inner(check.id).map_err(internal)?;
     let mut own: Vec<OsString> = ["--only", check.id, "--seed", &arguments.seed.to_string()]
         .map(OsString::from)
@@ -569,7 +571,7 @@ impl ScratchFolder {
         let path = std::env::temp_dir().join(name);
         match std::fs::create_dir(&path) {
             Ok(()) => Ok(Self(path)),
-            Err(source) => Err(Error::Unwritable { path, source }),
+            Err(source) => Err(text::Error::unwritable(&path, source).into()),
         }
     }
 

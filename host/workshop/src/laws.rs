@@ -1,8 +1,8 @@
 //! What `pilum laws` prints: the laws found, and a page about one of them, as text or as JSON.
 
-use crate::error::Error;
-use crate::plugin::adapter::conventions;
-use crate::plugin::{
+use crate::Error;
+use law::adapter::conventions;
+use law::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw,
     ParameterDescription, SearchPath,
 };
@@ -36,7 +36,7 @@ impl<'a> Record<'a> {
 fn json(value: &impl Serialize) -> Result<String, Error> {
     serde_json::to_string_pretty(value)
         .map(|text| text + "\n")
-        .map_err(|error| Error::Internal(error.to_string()))
+        .map_err(|error| Error::internal(error.to_string()))
 }
 
 /// One line for every law found, and the conventions of every route by which laws come in; a
@@ -81,7 +81,7 @@ pub fn list_json(search: &SearchPath) -> Result<String, Error> {
 /// Everything about a law, as a JSON object.
 ///
 /// # Errors
-/// [`Error::Internal`] only.
+/// [`text::Error::Internal`] only.
 pub fn page_json(law: &LoadedLaw) -> Result<String, Error> {
     json(&Record::new(law))
 }

@@ -1,1 +1,9 @@
+//! For authors of laws: does a library keep the contract, what is there, a call that failed once more, a
+//! project to begin with.
 
+pub mod check;
+pub mod laws;
+pub mod new_law;
+pub mod replay;
+
+pub use input::Error;

@@ -3,8 +3,8 @@
 //! The templates are files in `new_law/`, complete laws called `my_law`; what they need of the
 //! contract (`abi/`) is carried by the program, so that a project depends on nothing else.
 
-use crate::error::Error;
-use crate::plugin::SearchPath;
+use crate::Error;
+use law::SearchPath;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -58,7 +58,7 @@ macro_rules! template {
 
 macro_rules! contract {
     ($name:literal) => {
-        include_str!(concat!("../../abi/", $name))
+        include_str!(concat!("../../../abi/", $name))
     };
 }
 
@@ -177,13 +177,13 @@ impl NewLaw {
     /// Writes the project. Returns what to say about it.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a name that cannot be used or a folder that exists,
-    /// [`Error::Unwritable`].
+    /// [`text::Error::Usage`] for a name that cannot be used or a folder that exists,
+    /// [`text::Error::Unwritable`].
     pub fn write(&self) -> Result<String, Error> {
         let name = self.name.as_str();
         check_name(name, self.language)?;
         if let Some(library) = SearchPath::new(&[]).installed().get(name) {
-            return Err(Error::Usage(format!(
+            return Err(Error::usage(format!(
                 "there is a law `{name}` already, in {}; ids are public, so choose another",
                 library.display()
             )));
@@ -191,17 +191,17 @@ impl NewLaw {
         let folder = self.out.clone().unwrap_or_else(|| PathBuf::from(name));
         let unwritable = |path: &Path| {
             let path = path.to_owned();
-            move |source| Error::Unwritable { path, source }
+            move |source| text::Error::Unwritable { path, source }
         };
         if let Some(parent) = folder.parent() {
             fs::create_dir_all(parent).map_err(unwritable(parent))?;
         }
         fs::create_dir(&folder).map_err(|error| match error.kind() {
-            std::io::ErrorKind::AlreadyExists => Error::Usage(format!(
+            std::io::ErrorKind::AlreadyExists => Error::usage(format!(
                 "{} exists already; name another folder with --out",
                 folder.display()
             )),
-            _ => unwritable(&folder)(error),
+            _ => unwritable(&folder)(error).into(),
         })?;
         for (path, text) in self.files() {
             let path = folder.join(path);
@@ -283,7 +283,7 @@ impl NewLaw {
 fn check_name(name: &str, language: Language) -> Result<(), Error> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     let refuse = |why: &str| {
-        Err(Error::Usage(format!(
+        Err(Error::usage(format!(
             "`{name}` cannot be the id of a law: {why}"
         )))
     };

@@ -1,14 +1,13 @@
 //! Repeating the call of a capsule: what comes out, how far the increment can be followed, and
 //! whether the tangent is the derivative of the update.
 
-use super::{Capsule, OutcomePart, status};
-use crate::error::Error;
-use crate::plugin::adapter::Foreign;
-use crate::plugin::{
+use crate::Error;
+use law::adapter::Foreign;
+use law::capsule::{Capsule, OutcomePart, status};
+use law::{
     BatchFailure, End, Law, Library, LoadedLaw, Operator, PointCall, Request, SearchPath, Start,
-    Strided,
+    Strided, words,
 };
-use crate::point::words;
 use abi::status::Outcome;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -30,14 +29,15 @@ type Answer = (Vec<f64>, Vec<f64>, Vec<f64>);
 ///
 /// # Errors
 /// The capsule or its law cannot be used; or, after the report, the call fails as before:
-/// [`Error::NoEquilibrium`] if the law cannot follow, [`Error::Plugin`] if it is defective.
+/// [`Error::CallFails`].
 pub fn replay(path: &Path, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
     let capsule = Capsule::read(path)?;
     repeat(&capsule, &find(&capsule)?, say)
 }
 
 /// Repeats the call with this law.
-pub(crate) fn repeat(
+#[doc(hidden)]
+pub fn repeat(
     capsule: &Capsule,
     loaded: &LoadedLaw,
     say: &mut dyn FnMut(&str),
@@ -108,7 +108,7 @@ fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
     let search = SearchPath::new(&[]);
     let part = &capsule.law;
     if !part.library.is_file() {
-        return search.law(&part.id);
+        return Ok(search.law(&part.id)?);
     }
     if let Some(adapter) = part.adapter {
         let foreign = Foreign {
@@ -122,11 +122,11 @@ fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
             externals: part.externals,
             scratch: None,
         };
-        return search.foreign_law(&part.id, &foreign);
+        return Ok(search.foreign_law(&part.id, &foreign)?);
     }
     let library = Library::open(&part.library)?;
     library.law(&part.id).ok_or_else(|| {
-        Error::plugin(format!(
+        Error::library(format!(
             "library {} has no law `{}`",
             part.library.display(),
             part.id
@@ -143,7 +143,7 @@ fn build(capsule: &Capsule, loaded: &LoadedLaw) -> Result<Law, Error> {
     let ids = ids.map(|p| p.id.as_str());
     let parameters = capsule.in_order(&capsule.parameters, ids, &["parameters"], "parameter")?;
     loaded.build(hypothesis, &parameters).map_err(|failure| {
-        Error::plugin(format!(
+        Error::library(format!(
             "law `{}` refuses its parameters: {}",
             capsule.law.id, failure.reason
         ))
@@ -236,18 +236,15 @@ fn outcome(
         say(&format!("outcome   {}", words(&found)));
         say(&format!("recorded  {}", words(&capsule.outcome)));
     }
-    let text = format!(
-        "law `{}` fails: {}",
-        law.description().id,
-        status(failure.outcome)
-    );
-    Err(match failure.outcome {
-        _ if law.breaks_down(failure) => Error::plugin(text),
-        Outcome::CutStep | Outcome::Domain | Outcome::Numeric => Error::NoEquilibrium {
-            message: text,
-            hint: None,
-        },
-        _ => Error::plugin(text),
+    let cannot_follow = !law.breaks_down(failure)
+        && matches!(
+            failure.outcome,
+            Outcome::CutStep | Outcome::Domain | Outcome::Numeric
+        );
+    Err(Error::CallFails {
+        law: law.description().id.clone(),
+        outcome: status(failure.outcome),
+        cannot_follow,
     })
 }
 

@@ -17,7 +17,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 const TEMPLATE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("style.css");
+/// Looks of a page.
+pub const STYLE: &str = include_str!("style.css");
 /// The parts of the script, one after the other in one scope.
 const SCRIPT: [&str; 7] = [
     include_str!("script/basics.js"),

@@ -1,8 +1,8 @@
 //! The child's side: it says where it is and how it ends, and looks whether it is to stop.
 
 use super::{CALLS, FOLDER, FOLDER_WORDS, Page, WATCHER, word};
-use crate::plugin::{SharedMemory, calls};
-use crate::stop::Stop;
+use law::{SharedMemory, calls};
+use law::Stop;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use std::fs::File;
 use std::io::{self, Write};
@@ -143,7 +143,7 @@ impl Write for Handed {
             SKIP.fetch_sub(skipped, Ordering::Relaxed);
             return Ok(skipped as usize);
         }
-        crate::custody::restore().map_err(io::Error::other)?;
+        law::custody::restore().map_err(io::Error::other)?;
         // No line is kept back: a law may end the process at any time.
         let mut out = io::stdout().lock();
         let n = out.write(bytes)?;

@@ -1,7 +1,7 @@
 //! Where processes cannot be watched, the program does all by itself.
 
-use crate::error::Error;
-use crate::stop::Stop;
+use crate::Error;
+use law::Stop;
 use std::io;
 use std::path::Path;
 

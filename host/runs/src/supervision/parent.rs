@@ -2,10 +2,10 @@
 //! what it is.
 
 use super::{Page, SIZE, STOPPING, WATCHER, word};
-use crate::child::{self, Ending};
-use crate::error::Error;
-use crate::plugin::calls::Seen;
-use crate::plugin::{SharedMemory, isolate};
+use law::child::{self, Ending};
+use crate::Error;
+use law::calls::Seen;
+use law::{SharedMemory, isolate};
 use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, WaitOptions, kill_process, set_child_subreaper, wait,
     waitid,
@@ -48,7 +48,7 @@ pub fn supervise(again: bool, mend: &dyn Fn(&Path, &Error)) -> Option<Result<u8,
         Ok(ending) => ending,
         Err(why) => {
             let message = format!("the program cannot start itself: {why}");
-            return Some(Err(Error::Internal(message)));
+            return Some(Err(Error::internal(message)));
         }
     };
     Some(watch.conclude(ending, again, mend))
@@ -164,13 +164,14 @@ impl Watch {
         mend: &dyn Fn(&Path, &Error),
     ) -> Result<u8, Error> {
         if let Some(copied) = self.page.calls().copy() {
-            return Err(self.mended(mend, Error::Plugin {
+            let error = law::Error::Library {
                 message: format!(
                     "{copied}: the law made a copy of the process (fork), which came back from the \
                      call and was ended"
                 ),
                 hint: Some("what stands in the files was written by one process alone".to_owned()),
-            }));
+            };
+            return Err(self.mended(mend, error.into()));
         }
         if let Some(code) = self.ended() {
             return Ok(code);
@@ -187,7 +188,7 @@ impl Watch {
         let is_apart = self.page.get(word::APART) != 0;
         if is_apart {
             let message = format!("the program {what}, and no law was in its process");
-            return Err(self.mended(mend, Error::Internal(message)));
+            return Err(self.mended(mend, Error::internal(message)));
         }
         let trouble = format!("{place}: the process {what}");
         if !again || ending == Ending::Signal(9) {
@@ -196,13 +197,11 @@ impl Watch {
             } else {
                 "with `--isolate` the law is called in a process of its own, and its point is named"
             };
-            return Err(self.mended(
-                mend,
-                Error::Plugin {
-                    message: trouble,
-                    hint: Some(hint.to_owned()),
-                },
-            ));
+            let error = law::Error::Library {
+                message: trouble,
+                hint: Some(hint.to_owned()),
+            };
+            return Err(self.mended(mend, error.into()));
         }
         let _ = writeln!(
             io::stderr(),
@@ -223,21 +222,21 @@ impl Watch {
         }
         if code.is_none() && calls.is_empty() {
             let message = format!("the program {what}, twice, and no law was being called");
-            return Err(self.mended(mend, Error::Internal(message)));
+            return Err(self.mended(mend, Error::internal(message)));
         }
         let since = match (code, ending) {
             (Some(_), _) => "it did not do so in a process of its own".to_owned(),
             (None, Ok(ending)) => format!("the second attempt ended, too: {ending}"),
             (None, Err(why)) => format!("there was no second attempt: {why}"),
         };
-        let error = Error::Plugin {
+        let error = Error::from(law::Error::Library {
             message: format!("{trouble}\n  {since}"),
             hint: Some(
                 "all rows in equilibrium are written; `--isolate`, with `--resume` for a run, goes \
                  on with laws in processes of their own"
                     .to_owned(),
             ),
-        };
+        });
         // The run that it happened in, not one that came after it.
         if !folder.is_empty() {
             mend(Path::new(&folder), &error);
@@ -277,17 +276,8 @@ impl Watch {
 
 /// What is said of a child that did not stop by itself.
 fn stopped(calls: &[Seen]) -> Error {
-    let message = if calls.is_empty() {
-        "stopped at once, as asked".to_owned()
-    } else {
-        format!("{}: stopped at once, as asked", places(calls))
-    };
-    Error::Stopped {
-        message,
-        hint: Some(
-            "a run has all its rows and goes on with --resume; a driver lacks those of the last 0.2 s"
-                .to_owned(),
-        ),
+    Error::StoppedAtOnce {
+        during: (!calls.is_empty()).then(|| places(calls)),
     }
 }
 

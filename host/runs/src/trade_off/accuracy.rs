@@ -9,10 +9,11 @@ use super::pace::in_words;
 use super::sampled::Sampled;
 use super::scheme::Scheme;
 use super::trial::{Scratch, Settings, Trial, trial};
-use crate::case::{Case, Chosen};
-use crate::error::Error;
-use crate::input::ParameterValue;
-use crate::stop::Stop;
+use input::{Case, Kind};
+use input::case::Chosen;
+use crate::Error;
+use input::material::ParameterValue;
+use law::Stop;
 use std::path::Path;
 use std::time::Instant;
 
@@ -190,7 +191,7 @@ impl Search<'_> {
             last = Some((factor, started.elapsed().as_secs_f64()));
             match outcome {
                 Ok(trial) => levels.push((factor, trial)),
-                Err(error @ Error::NoEquilibrium { .. }) => {
+                Err(error) if error.kind() == Kind::NoEquilibrium => {
                     // Finer runs are not compared with coarser ones across a gap.
                     levels.clear();
                     failure = Some(error);
@@ -205,7 +206,7 @@ impl Search<'_> {
             }
         }
         let Some((_, finest)) = levels.last() else {
-            let none = || Error::Internal("no level of increments was tried".to_owned());
+            let none = || Error::internal("no level of increments was tried".to_owned());
             return Err(failure.unwrap_or_else(none));
         };
         let finest = finest.clone();
@@ -249,7 +250,7 @@ impl Search<'_> {
             (self.say)(&format!("{STUDY}: run {}, {}", self.runs, loose.label()));
             let trial = match trial(self.case, &loose, self.scratch, false) {
                 Ok(trial) => trial,
-                Err(Error::NoEquilibrium { .. }) => continue,
+                Err(error) if error.kind() == Kind::NoEquilibrium => continue,
                 Err(error) => return Err(error),
             };
             let change = trial.rows.difference(&found.trial.rows, &found.scale);

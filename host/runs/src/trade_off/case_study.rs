@@ -6,10 +6,12 @@ use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
 use super::study::{Measurement, Reference, Row, Study};
 use super::trial::{COUNTS, SOLVER_CHOICES, Scratch, Settings, Trial, repetitions, trial};
-use crate::case::{Case, Formulation, Integration};
-use crate::error::Error;
-use crate::input::BuiltLaw;
-use crate::model::Model;
+use input::Case;
+use mechanics::problem::{Formulation, Integration};
+use crate::Error;
+use law::BuiltLaw;
+use crate::run::begin;
+use mechanics::equilibrium::Reuse;
 
 /// Factors of the increments.
 const FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
@@ -307,7 +309,7 @@ impl Cases<'_> {
                 }
             }
         }
-        Err(failure.unwrap_or_else(|| Error::Internal("no reference to try".to_owned())))
+        Err(failure.unwrap_or_else(|| Error::internal("no reference to try".to_owned())))
     }
 
     fn at(&mut self, settings: &Settings, increments: f64) -> Result<Trial, Error> {
@@ -412,9 +414,9 @@ impl Cases<'_> {
 
 /// Schemes of the laws that have any, by the law's name in the file.
 pub(super) fn law_schemes(case: &Case, scratch: &Scratch) -> Result<Vec<(String, Scheme)>, Error> {
-    let model = Model::build(case)?;
+    let (_, laws) = begin(case, Reuse::default())?;
     let mut found: Vec<(String, Scheme)> = Vec::new();
-    for ((name, _), built) in &model.laws {
+    for ((name, _), built) in &laws {
         if found.iter().any(|(known, _)| known == name) {
             continue;
         }

@@ -1,7 +1,7 @@
 //! The work–precision diagram: error over cost, both logarithmic, as SVG.
 
 use super::study::{Measurement, Row, Study};
-use crate::output::COLOURS;
+use results::figure::COLOURS;
 use plotters::prelude::*;
 
 /// Size of the diagram in points, and of the legend beside it.

@@ -1,8 +1,10 @@
 //! Finer meshes of the same case.
 
-use crate::case::{Axis, Case, Formulation, PartInput};
-use crate::error::Error;
-use crate::mesh::{Mesh, Quad};
+use input::{Case, grid};
+use mechanics::problem::Formulation;
+use input::case::{Axis, PartInput};
+use crate::Error;
+use mechanics::mesh::{Mesh, Solid};
 use toml::Spanned;
 
 /// Divides columns and rows by a whole number, so that the lines of the given mesh stay. Parts
@@ -11,7 +13,7 @@ use toml::Spanned;
 /// # Errors
 /// Those of building the mesh.
 pub(super) fn divide(case: &mut Case, by: usize) -> Result<(), Error> {
-    let mesh = Mesh::build(&case.source, &case.file)?;
+    let mesh = grid::build(&case.source, &case.file)?;
     let layers = layers(case, &mesh);
     let input = &mut case.file.mesh;
     let origin = input.origin.as_ref().map_or([0.0; 2], |at| *at.get_ref());
@@ -47,7 +49,7 @@ fn layers(case: &Case, mesh: &Mesh) -> [Vec<f64>; 2] {
         if group.formulation != Formulation::ThinLayer {
             continue;
         }
-        for quad in mesh.quads.iter().filter(|quad| quad.group == number) {
+        for quad in mesh.solids.iter().filter(|quad| quad.group == number) {
             let [from, to] = extent(mesh, quad);
             let across = group.normal.as_ref().map_or_else(
                 || usize::from(to[1] - from[1] < to[0] - from[0]),
@@ -60,15 +62,14 @@ fn layers(case: &Case, mesh: &Mesh) -> [Vec<f64>; 2] {
 }
 
 /// Lower left and upper right corner.
-fn extent(mesh: &Mesh, quad: &Quad) -> [[f64; 2]; 2] {
-    [0, 2].map(|corner| mesh.nodes[quad.nodes[corner]])
+fn extent(mesh: &Mesh, quad: &Solid) -> [[f64; 2]; 2] {
+    [0, 2].map(|corner| mesh.nodes[quad.corners()[corner]])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Source;
-    use crate::input::parse;
+    use text::{Source, parse};
     use approx::assert_relative_eq;
 
     /// A layer of 0.1 m between a graded and an even part.

@@ -5,9 +5,9 @@ use super::pace::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Scheme, schemes};
 use super::study::{Measurement, ROWS, Reference, Row, Study};
-use crate::error::Error;
-use crate::point::Driver;
-use crate::stop::Stop;
+use crate::Error;
+use input::Driver;
+use law::Stop;
 
 /// Increments per segment.
 const INCREMENTS: [usize; 10] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
@@ -26,16 +26,16 @@ pub(super) fn study(
     stop: &Stop,
     say: &mut dyn FnMut(&str),
 ) -> Result<Study, Error> {
-    let n_segments = driver.segment_increments().len();
+    let n_segments = driver.point().segment_increments().len();
     // The file's own setting has to run, whatever becomes of the others.
     follow(driver)?;
     let schemes = schemes(
-        driver.law().description(),
-        |id| driver.parameter(id),
+        driver.point().law().description(),
+        |id| driver.point().parameter(id),
         |a, b| {
             let run = |values| {
                 let mut driver = driver.with_parameters(values).ok()?;
-                driver.set_increments(&vec![FEW; n_segments]);
+                driver.point_mut().set_increments(&vec![FEW; n_segments]);
                 follow(&driver).ok().map(|(rows, _)| rows)
             };
             run(a) != run(b)
@@ -58,7 +58,7 @@ pub(super) fn study(
         rows: Vec::new(),
         notes: found.notes,
     };
-    let own = driver.segment_increments();
+    let own = driver.point().segment_increments();
     // What does not depend on the increments is as long as some of them.
     let weight = |increments: &[usize]| 100.0 + increments.iter().sum::<usize>() as f64;
     let mut pace = Pace::new(0.0);
@@ -76,7 +76,7 @@ pub(super) fn study(
         }
         for increments in numbers {
             say(&pace.line(&label(&scheme, &increments)));
-            driver.set_increments(&increments);
+            driver.point_mut().set_increments(&increments);
             let outcome = measure(&driver, &found.rows, &found.scale);
             stop.check("the study")?;
             pace.did(weight(&increments));
@@ -112,7 +112,7 @@ fn find_reference(
     for (driver, scheme) in drivers.iter().filter(|(_, scheme)| scheme.is_finest) {
         let run = |n: usize| {
             let mut driver = driver.with_parameters(&scheme.values)?;
-            driver.set_increments(&vec![n; n_segments]);
+            driver.point_mut().set_increments(&vec![n; n_segments]);
             follow(&driver).map(|(rows, _)| rows)
         };
         match (run(finest / 4), run(finest / 2), run(finest)) {
@@ -131,7 +131,7 @@ fn find_reference(
     });
     let mut candidates = candidates.into_iter();
     let Some((reference, rows, scale)) = candidates.next() else {
-        return Err(failure.unwrap_or_else(|| Error::Internal("no scheme to try".to_owned())));
+        return Err(failure.unwrap_or_else(|| Error::internal("no scheme to try".to_owned())));
     };
     let other = |(other, its_rows, _): (Reference, Sampled, Vec<f64>)| {
         format!(
@@ -189,15 +189,15 @@ pub(super) fn in_one_line(error: &Error) -> String {
 
 /// Tractions or stresses along the path, and the counts.
 fn follow(driver: &Driver) -> Result<(Sampled, Vec<u64>), Error> {
-    let lengths = driver.segment_increments();
-    let n = driver.law().n_components();
-    let names = driver.columns()[n..2 * n].to_vec();
+    let lengths = driver.point().segment_increments();
+    let n = driver.point().law().n_components();
+    let names = driver.point().columns()[n..2 * n].to_vec();
     let mut rows: Vec<Vec<f64>> = Vec::new();
-    let report = driver.run(|row| {
+    let report = driver.point().run(|row| {
         if row.increment > 0 {
             rows.push(row.flux.to_vec());
         }
-        Ok(())
+        Ok::<_, point::Error>(())
     })?;
     let mut rows = rows.into_iter();
     let stretches = lengths.iter().map(|&n| rows.by_ref().take(n).collect());
@@ -212,6 +212,9 @@ fn follow(driver: &Driver) -> Result<(Sampled, Vec<u64>), Error> {
 fn measure(driver: &Driver, reference: &Sampled, scale: &[f64]) -> Result<Measurement, Error> {
     let (rows, counts) = follow(driver)?;
     let errors = rows.differences(reference, scale);
-    let seconds = seconds_of_a_call(|| driver.run(|_| Ok(())).map(|_| ()))?;
+    let seconds = seconds_of_a_call(|| {
+        let run = driver.point().run(|_| Ok::<_, point::Error>(()));
+        run.map(|_| ())
+    })?;
     Ok(Measurement::new(seconds, counts, errors))
 }

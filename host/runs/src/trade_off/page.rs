@@ -1,11 +1,11 @@
 //! A study as a page, in the style of the reports.
 
 use super::study::{Row, Study};
-use crate::error::Error;
+use crate::Error;
 use minijinja::{Environment, Value, context};
 
 const TEMPLATE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("../report/style.css");
+use results::report::STYLE;
 
 impl Study {
     /// The page.
@@ -18,7 +18,7 @@ impl Study {
             .add_template("trade_off.html", TEMPLATE)
             .and_then(|()| environment.get_template("trade_off.html"))
             .and_then(|template| template.render(self.contents(diagram)))
-            .map_err(|error| Error::Internal(format!("page: {error:#}")))
+            .map_err(|error| Error::internal(format!("page: {error:#}")))
     }
 
     fn contents(&self, diagram: &str) -> Value {

@@ -3,8 +3,8 @@
 //! A law whose parameter `scheme` is a choice is tried with every label. Parameters that steer a
 //! scheme have the ids below; one belongs to a scheme if the result changes with it.
 
-use crate::input::ParameterValue;
-use crate::plugin::LawDescription;
+use input::material::ParameterValue;
+use law::LawDescription;
 
 /// Id of the choice.
 const SCHEME: &str = "scheme";
@@ -108,7 +108,7 @@ pub(super) fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plugin::{Bounds, ParameterDescription};
+    use law::{Bounds, ParameterDescription};
 
     fn parameter(id: &str, choices: &[&str]) -> ParameterDescription {
         let any = Bounds {

@@ -10,15 +10,20 @@ use super::pace::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
 use super::trial::{Scratch, Settings, measure};
-use super::{unwritable, write};
-use crate::case::{Case, Formulation, OutputInput, When};
-use crate::error::Error;
-use crate::group::Group;
-use crate::input::{BuiltLaw, ParameterValue};
-use crate::mesh::Joint;
-use crate::model::Model;
-use crate::plugin::{End, Law, Moment, Operator, Start, Strided};
-use crate::stop::Stop;
+use super::write;
+use mechanics::Simulation;
+use mechanics::equilibrium::Reuse;
+use input::Case;
+use mechanics::problem::Formulation;
+use results::wanted::{Output, When};
+use crate::Error;
+use mechanics::group::Group;
+use input::material::ParameterValue;
+use law::BuiltLaw;
+use mechanics::mesh::Joint;
+use crate::run::begin;
+use law::{End, Law, Moment, Operator, Start, Strided};
+use law::Stop;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -38,15 +43,15 @@ pub(super) fn run(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
-    let model = Model::build(case)?;
-    let groups = model.groups.iter().enumerate();
+    let (simulation, _) = begin(case, Reuse::default())?;
+    let groups = simulation.groups().iter().enumerate();
     let interfaces: Vec<(usize, &Group)> = groups
         .filter(|(_, group)| group.formulation == Formulation::ZeroThickness)
         .collect();
     if interfaces.is_empty() {
         let message = "no group has the formulation `zero_thickness`: a thin layer's stiffness \
                        follows from its thickness";
-        return Err(Error::Usage(message.to_owned()));
+        return Err(Error::usage(message.to_owned()));
     }
     if case.file.probes.is_empty() {
         let message = "there are no [probes], so no change of the answer can be measured";
@@ -55,13 +60,13 @@ pub(super) fn run(
     let mut text = String::new();
     let mut rows = Vec::new();
     for (number, group) in interfaces {
-        let interface = Interface::new(&model, number, group)?;
+        let interface = Interface::new(&simulation, number, group)?;
         let scratch = Scratch::new(folder, stop)?;
         let tried = interface.try_all(case, &scratch, say)?;
         text += &interface.table(name, &tried);
         rows.extend(tried.into_iter().map(|t| (group.name.clone(), t)));
     }
-    std::fs::create_dir_all(folder).map_err(|source| unwritable(folder, source))?;
+    std::fs::create_dir_all(folder).map_err(|source| text::Error::unwritable(folder, source))?;
     write(&folder.join("interface_stiffness.csv"), &csv(&rows))?;
     show(&text);
     show(&format!("results in {}", folder.display()));
@@ -102,13 +107,13 @@ struct Answer {
 }
 
 impl<'a> Interface<'a> {
-    fn new(model: &Model, number: usize, group: &'a Group) -> Result<Self, Error> {
-        let mut swaps = model.swaps.iter().flatten();
+    fn new(model: &Simulation, number: usize, group: &'a Group) -> Result<Self, Error> {
+        let mut swaps = model.swaps().iter().flatten();
         let law = swaps
             .rfind(|(swapped, _)| *swapped == number)
             .map_or(&group.law, |(_, law)| law);
         let parameters = stiffness_parameters(&law.built)?;
-        let joints = model.mesh.joints.iter().filter(|j| j.group == number);
+        let joints = model.problem().mesh.joints.iter().filter(|j| j.group == number);
         let mut logarithms = [0.0; 3];
         let mut n = 0.0;
         for joint in joints {
@@ -119,7 +124,7 @@ impl<'a> Interface<'a> {
             }
         }
         if n <= 0.0 {
-            return Err(Error::Usage(format!(
+            return Err(Error::usage(format!(
                 "group `{}` has no solid element beside it whose moduli could be taken",
                 group.name
             )));
@@ -187,9 +192,9 @@ impl<'a> Interface<'a> {
             ..Settings::default()
         };
         let mut case = settings.apply(case)?;
-        case.file.output = OutputInput {
+        case.file.output = Output {
             profile: When::Phases,
-            ..OutputInput::default()
+            ..Output::default()
         };
         let trial = measure(&mut case, scratch, false)?;
         let pressure = largest_pressure(&scratch.folder().join("profile.csv"), &self.group.name)?;
@@ -353,7 +358,7 @@ fn elastic_operator(law: &Law) -> Option<Vec<f64>> {
 fn stiffness_parameters(built: &BuiltLaw) -> Result<[(String, f64, f64); 2], Error> {
     let description = built.law.description();
     let none = || {
-        Error::Usage(format!(
+        Error::usage(format!(
             "law `{}` has no parameters in kPa/m that scale its elastic operator",
             description.id
         ))
@@ -389,21 +394,18 @@ fn stiffness_parameters(built: &BuiltLaw) -> Result<[(String, f64, f64); 2], Err
 }
 
 /// E_oed/h, G/h and h of the element beside a joint on the side where E_oed/h is smaller.
-fn softer_side(model: &Model, joint: &Joint) -> Option<[f64; 3]> {
-    let ends = [0, 1].map(|i| model.mesh.nodes[joint.minus[i]]);
+fn softer_side(model: &Simulation, joint: &Joint) -> Option<[f64; 3]> {
+    let ends = [0, 1].map(|i| model.problem().mesh.nodes[joint.minus[i]]);
     let along_x = (ends[1][0] - ends[0][0]).abs() > (ends[1][1] - ends[0][1]).abs();
     let across = usize::from(along_x);
     let side = |middle: usize| {
-        let quad = model
-            .mesh
-            .quads
-            .iter()
-            .find(|q| q.nodes.contains(&middle))?;
-        let operator = elastic_operator(&model.groups[quad.group].law.built.law)?;
+        let mut solids = model.problem().mesh.solids.iter();
+        let quad = solids.find(|solid| solid.nodes().contains(&middle))?;
+        let operator = elastic_operator(&model.groups()[quad.group].law.built.law)?;
         if operator.len() != 16 {
             return None;
         }
-        let [from, to] = [0, 2].map(|corner| model.mesh.nodes[quad.nodes[corner]][across]);
+        let [from, to] = [0, 2].map(|corner| model.problem().mesh.nodes[quad.corners()[corner]][across]);
         let size = (to - from).abs();
         Some([operator[5 * across] / size, operator[15] / size, size])
     };
@@ -413,12 +415,12 @@ fn softer_side(model: &Model, joint: &Joint) -> Option<[f64; 3]> {
 }
 
 /// Diagonal entries of the solid elements that share a node with an interface.
-fn diagonals_beside(model: &Model, interface: &Group) -> BTreeMap<usize, f64> {
+fn diagonals_beside(model: &Simulation, interface: &Group) -> BTreeMap<usize, f64> {
     let of_interface: Vec<usize> = (0..interface.kinematics.n_elements())
         .flat_map(|e| interface.kinematics.nodes(e).to_vec())
         .collect();
     let mut diagonal = BTreeMap::new();
-    for group in &model.groups {
+    for group in model.groups() {
         let operator = elastic_operator(&group.law.built.law);
         let Some(operator) = operator.filter(|o| o.len() == 16) else {
             continue;
@@ -458,12 +460,12 @@ fn add_diagonals(
 
 /// The largest compression of a group in a profile, kPa.
 fn largest_pressure(path: &Path, group: &str) -> Result<f64, Error> {
-    let broken = |error: csv::Error| Error::Internal(format!("{}: {error}", path.display()));
+    let broken = |error: csv::Error| Error::internal(format!("{}: {error}", path.display()));
     let mut reader = csv::Reader::from_path(path).map_err(broken)?;
     let headers = reader.headers().map_err(broken)?.clone();
     let column = |name: &str| headers.iter().position(|header| header == name);
     let (Some(of), Some(traction)) = (column("group"), column("traction_n")) else {
-        return Err(Error::Internal(format!("{}: columns", path.display())));
+        return Err(Error::internal(format!("{}: columns", path.display())));
     };
     let mut largest = 0.0;
     for row in reader.records() {

@@ -1,7 +1,7 @@
 //! A study as a table: on a terminal, and as comma-separated values.
 
 use super::study::{Row, Study};
-use crate::output::begin;
+use text::write::begin;
 use std::fmt::Write as _;
 use std::path::Path;
 

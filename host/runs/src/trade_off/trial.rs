@@ -4,11 +4,16 @@ use super::clock::cpu_seconds;
 use super::division::divide;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
-use crate::case::{Case, Equations, Formulation, Integration, Method, OutputInput, SolverInput};
-use crate::error::{Error, Place};
-use crate::input::set_parameters;
+use input::Case;
+use mechanics::Settings as Solver;
+use mechanics::problem::{Formulation, Integration};
+use mechanics::settings::{Equations, Method};
+use results::wanted::Output;
+use crate::Error;
+use mechanics::Place;
+use input::material::set_parameters;
 use crate::run::{Observer, run};
-use crate::stop::Stop;
+use law::Stop;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct SolverChoice {
     pub(super) key: &'static str,
     pub(super) value: &'static str,
-    pub(super) set: fn(&mut SolverInput),
+    pub(super) set: fn(&mut Solver),
 }
 
 impl std::fmt::Debug for SolverChoice {
@@ -45,7 +50,7 @@ pub(super) const SOLVER_CHOICES: &[SolverChoice] = &[
     choice("line_search", "false", |s| s.line_search = false),
 ];
 
-const fn choice(key: &'static str, value: &'static str, set: fn(&mut SolverInput)) -> SolverChoice {
+const fn choice(key: &'static str, value: &'static str, set: fn(&mut Solver)) -> SolverChoice {
     SolverChoice { key, value, set }
 }
 
@@ -184,7 +189,7 @@ impl Scratch {
     /// [`Error::Unwritable`].
     pub(super) fn new(within: &Path, stop: &Stop) -> Result<Self, Error> {
         let folder = within.join(".trial");
-        std::fs::create_dir_all(&folder).map_err(|source| Error::Unwritable {
+        std::fs::create_dir_all(&folder).map_err(|source| text::Error::Unwritable {
             path: folder.clone(),
             source,
         })?;
@@ -241,7 +246,7 @@ pub(super) fn trial(
     timed: bool,
 ) -> Result<Trial, Error> {
     let mut case = settings.apply(case)?;
-    case.file.output = OutputInput::default();
+    case.file.output = Output::default();
     measure(&mut case, scratch, timed)
 }
 
@@ -305,7 +310,7 @@ impl Observer for Meter {
 
 /// Probes of a history by phase and increment.
 fn history(path: &Path, phases: &[&str]) -> Result<Sampled, Error> {
-    let broken = |error: csv::Error| Error::Internal(format!("{}: {error}", path.display()));
+    let broken = |error: csv::Error| Error::internal(format!("{}: {error}", path.display()));
     let mut reader = csv::Reader::from_path(path).map_err(broken)?;
     let headers = reader.headers().map_err(broken)?.clone();
     let probes: Vec<usize> = (0..headers.len())
@@ -328,11 +333,11 @@ fn history(path: &Path, phases: &[&str]) -> Result<Sampled, Error> {
 /// `summary.json` of a run.
 pub(super) fn summary(folder: &Path) -> Result<Value, Error> {
     let path = folder.join("summary.json");
-    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+    let text = std::fs::read_to_string(&path).map_err(|source| text::Error::Unreadable {
         path: path.clone(),
         source,
     })?;
-    serde_json::from_str(&text).map_err(|error| Error::Internal(error.to_string()))
+    serde_json::from_str(&text).map_err(|error| Error::internal(error.to_string()))
 }
 
 fn counts(summary: &Value) -> Vec<u64> {

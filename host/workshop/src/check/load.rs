@@ -1,7 +1,7 @@
 //! Can the file be opened, and is it of this contract?
 
 use super::{Check, Family, Found, Subject, Verdict, failed, skipped};
-use crate::plugin::probe;
+use law::probe;
 use object::{Architecture, BinaryFormat, Object, ObjectKind, ObjectSection};
 
 pub(super) const CHECKS: &[Check] = &[

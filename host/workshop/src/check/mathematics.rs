@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::specimen::{Specimen, Step, create_form, hypotheses, is_success};
 use super::{Check, Family, Found, Subject, Verdict, skipped};
-use crate::plugin::probe::{Form, PointEnd, PointStart};
+use law::probe::{Form, PointEnd, PointStart};
 use abi::Hypothesis;
 use abi::raw;
 use nalgebra::{DMatrix, DVector};
@@ -372,7 +372,7 @@ fn hypotheses_agree(subject: &Subject) -> Found {
         let Some((formulation, hypothesis)) = larger else {
             continue;
         };
-        let ids = |f: &crate::plugin::FormulationDescription| -> Vec<String> {
+        let ids = |f: &law::FormulationDescription| -> Vec<String> {
             f.internal_variables.iter().map(|v| v.id.clone()).collect()
         };
         if ids(formulation) != ids(&specimen.formulation) {

@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::specimen::{is_finite, is_success};
 use super::{Check, Family, Found, Subject, failed, skipped};
-use crate::plugin::probe::{CAN_TRAP, Fence, Form, Order};
+use law::probe::{CAN_TRAP, Fence, Form, Order};
 use abi::raw;
 
 pub(super) const CHECKS: &[Check] = &[

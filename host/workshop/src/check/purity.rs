@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::specimen::{Specimen, create_form, first_difference};
 use super::{Check, Family, Found, Subject, Verdict, skipped};
-use crate::plugin::probe::{Form, Order, PointEnd, PointStart};
+use law::probe::{Form, Order, PointEnd, PointStart};
 use abi::raw;
 use std::hint::black_box;
 

@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::specimen::{first_difference, is_finite, is_success};
 use super::{Check, Family, Found, Subject, status_name};
-use crate::plugin::probe::PointStart;
+use law::probe::PointStart;
 use abi::raw;
 use abi::status::Outcome;
 

@@ -2,9 +2,9 @@
 
 use super::random::Random;
 use super::{Found, Subject, Verdict, failed, refusal, skipped};
-use crate::error::suggestion;
-use crate::plugin::probe::{Answer, CreateForm, Form, NO_OUTCOME, PointEnd, PointStart, Probe};
-use crate::plugin::{FormulationDescription, LoadedLaw, ParameterDescription};
+use text::suggestion;
+use law::probe::{Answer, CreateForm, Form, NO_OUTCOME, PointEnd, PointStart, Probe};
+use law::{FormulationDescription, LoadedLaw, ParameterDescription};
 use abi::Hypothesis;
 use abi::raw;
 

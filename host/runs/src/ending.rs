@@ -1,0 +1,32 @@
+//! How a run ended, for its summary.
+
+use input::{Error, Kind};
+use results::Ending;
+
+/// How a run ended, in a word and in its error's own.
+pub fn ending(error: Option<&Error>) -> Ending {
+    let Some(error) = error else {
+        return Ending::done();
+    };
+    let status = match error.kind() {
+        Kind::NoEquilibrium => "no equilibrium",
+        Kind::Library => "plugin trouble",
+        Kind::Stopped => "interrupted",
+        Kind::Input | Kind::Internal => "stopped",
+    };
+    Ending {
+        status,
+        error: Some(error.to_string()),
+    }
+}
+
+/// What of a run concerns the whole process.
+pub(crate) mod process {
+    /// Results are being written into a folder, or no longer.
+    pub(crate) fn writes(folder: Option<&std::path::Path>) {
+        #[cfg(unix)]
+        crate::memory::writes(folder);
+        #[cfg(not(unix))]
+        let _ = folder;
+    }
+}

@@ -1,0 +1,466 @@
+//! One run: from a case to a folder with results.
+
+use crate::Error;
+use crate::ending::{ending, process};
+use input::build::{Laws, Posed};
+use input::{Case, Kind, probes};
+use law::capsule::{self, Capsule};
+use law::{Library, Stop, hexadecimal_sha256};
+use mechanics::equilibrium::{Iteration, Reason, Reuse};
+use mechanics::group::{Group, PointFailure};
+use mechanics::settings::Method;
+use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
+use mechanics::{Place, Simulation, State, Watch};
+use results::{Checkpoint, Fault, Figures, Recorder};
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Progress of a run, for whoever shows it.
+pub trait Observer {
+    /// A phase begins.
+    fn phase(&mut self, name: &str, increments: usize);
+    /// An increment reached equilibrium.
+    fn increment(&mut self, place: &Place, of: usize, iterations: usize);
+    /// An increment is repeated with smaller steps.
+    fn cut_back(&mut self, place: &Place, reason: &str);
+    /// Something the user should know.
+    fn warning(&mut self, message: &str);
+    /// An earlier run is gone on with after this increment; `None`: it had come to its end.
+    fn resumed(&mut self, _from: Option<&Place>) {}
+    /// Who may want the run to stop: after the increment under way, or within it if that takes
+    /// long.
+    fn stop(&self) -> Stop {
+        Stop::never()
+    }
+}
+
+/// How a run begins, and what it keeps to go on from.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// Go on from the checkpoint in the folder, if there is one.
+    pub resume: bool,
+    /// Time between checkpoints; `None`: there are none.
+    pub checkpoints: Option<Duration>,
+}
+
+/// A case's simulation before its first phase, with its laws.
+///
+/// # Errors
+/// Bad input, or trouble with a library.
+pub fn begin(case: &Case, reuse: Reuse) -> Result<(Simulation, Laws), Error> {
+    let Posed { problem, laws } = case.pose()?;
+    let simulation = Simulation::reusing(problem, reuse).map_err(|error| case.place(error))?;
+    Ok((simulation, laws))
+}
+
+/// Checks everything about a case that can be checked without running it.
+///
+/// # Errors
+/// As [`begin`].
+pub fn check(case: &Case) -> Result<(), Error> {
+    let (simulation, _) = begin(case, Reuse::default())?;
+    case.wanted(&simulation)?;
+    Ok(())
+}
+
+/// Runs a case and writes its results into `folder`.
+///
+/// # Errors
+/// Bad input before anything is written; no equilibrium or plugin trouble after the last state
+/// of equilibrium has been written.
+pub fn run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<Figures, Error> {
+    let options = Options::default();
+    let mut reuse = Reuse::default();
+    reuse.is_last_run = true;
+    run_reusing(case, folder, observer, &mut reuse, options)
+}
+
+/// As [`run`], with what earlier runs have factorised, and with checkpoints.
+///
+/// # Errors
+/// As [`run`]; a checkpoint to go on from that is damaged or belongs to another run; stopped as
+/// asked.
+pub fn run_reusing(
+    case: &Case,
+    folder: &Path,
+    observer: &mut dyn Observer,
+    reuse: &mut Reuse,
+    options: Options,
+) -> Result<Figures, Error> {
+    let started = Instant::now();
+    #[cfg(unix)]
+    {
+        reuse.announces = Some(crate::memory::expect);
+    }
+    let (mut simulation, laws) = begin(case, std::mem::take(reuse))?;
+    let wanted = case.wanted(&simulation)?;
+    let about = case.about(&laws);
+    let keeper = Keeper::new(identity(case, &laws), folder, options.checkpoints);
+    let found = if options.resume {
+        keeper.found()?
+    } else {
+        None
+    };
+    let mut warnings = Vec::new();
+    let results = if let Some(checkpoint) = found {
+        let Some(state) = checkpoint.run else {
+            checkpoint.results.check(folder)?;
+            observer.resumed(None);
+            return Ok(checkpoint.results.figures(&wanted));
+        };
+        let phases = &simulation.problem().phases;
+        let place = phases.get(state.phase).map(|phase| Place {
+            phase: phase.name.clone(),
+            increment: state.increment(),
+        });
+        observer.resumed(place.as_ref());
+        warnings = checkpoint.warnings.into_owned();
+        let at = (folder, checkpoint.results);
+        let results = Recorder::resume(at.0, wanted, &about, &simulation, at.1)?;
+        let phase = &simulation.problem().phases[state.phase];
+        observer.phase(&phase.name, phase.increments);
+        simulation.go_to(state.into_owned())?;
+        results
+    } else {
+        let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
+        let mut all: Vec<String> = of_laws.chain(simulation.warnings().to_vec()).collect();
+        all.extend(case.warnings(&simulation));
+        all.iter().for_each(|warning| observer.warning(warning));
+        warnings.extend(all);
+        Recorder::create(folder, wanted, &about, &simulation)?
+    };
+    process::writes(Some(folder));
+    let mut follower = Follower {
+        stop: observer.stop(),
+        observer,
+        results,
+        keeper,
+        warnings,
+        fault: None,
+    };
+    let outcome = simulation.run(&mut follower);
+    let (beyond, unreliable) = (simulation.beyond_theory(), follower.results.unreliable());
+    for warning in beyond.iter().chain(&unreliable) {
+        follower.say(warning);
+    }
+    let outcome = outcome.map_err(|error| explained(case, &simulation, error, &mut follower));
+    let Follower {
+        mut results,
+        keeper,
+        warnings,
+        ..
+    } = follower;
+    let finished = results.finish(
+        simulation.groups(),
+        started.elapsed(),
+        &warnings,
+        &ending(outcome.as_ref().err()),
+    );
+    process::writes(None);
+    *reuse = simulation.into_reuse();
+    let is_done = outcome.is_ok();
+    outcome.and(finished.map_err(Error::from))?;
+    if is_done {
+        keeper.end(&results, &warnings)?;
+    }
+    Ok(results.figures().clone())
+}
+
+/// Whoever follows a simulation into its folder, and shows how it goes.
+struct Follower<'a> {
+    observer: &'a mut dyn Observer,
+    results: Recorder,
+    keeper: Keeper,
+    /// Warnings so far, for the summary.
+    warnings: Vec<String>,
+    stop: Stop,
+    /// Why no more is wanted.
+    fault: Option<Fault>,
+}
+
+impl Follower<'_> {
+    fn say(&mut self, message: &str) {
+        self.warnings.push(message.to_owned());
+        self.observer.warning(message);
+    }
+
+    /// Wants no more after a fault.
+    fn kept(&mut self, outcome: Result<(), impl Into<Fault>>) -> ControlFlow<()> {
+        match outcome {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(fault) => {
+                self.fault.get_or_insert(fault.into());
+                ControlFlow::Break(())
+            }
+        }
+    }
+}
+
+impl Watch for Follower<'_> {
+    fn phase(&mut self, name: &str, increments: usize) {
+        self.observer.phase(name, increments);
+    }
+
+    fn iterations(
+        &mut self,
+        place: &Place,
+        load_factor: f64,
+        iterations: &[Iteration],
+    ) -> ControlFlow<()> {
+        let written = self.results.iterations(place, load_factor, iterations);
+        self.kept(written)
+    }
+
+    fn cut_back(
+        &mut self,
+        place: &Place,
+        load_factor: f64,
+        next: f64,
+        reason: &Reason,
+    ) -> ControlFlow<()> {
+        let reason = reason.to_string();
+        let written = self.results.cut_back(place, load_factor, next, &reason);
+        self.observer.cut_back(place, &reason);
+        self.kept(written)
+    }
+
+    fn looks_at(&self, when: When<'_>, groups: &[Group]) -> Option<Part> {
+        self.results.looks_at(when, groups)
+    }
+
+    fn increment(&mut self, increment: &Increment, state: &Snapshot<'_>) -> ControlFlow<()> {
+        let written = self.results.increment(increment, state);
+        if written.is_ok() {
+            let place = &increment.place;
+            self.observer
+                .increment(place, increment.of, increment.iterations);
+        }
+        self.kept(written)
+    }
+
+    fn step(
+        &mut self,
+        place: &Place,
+        load_factor: f64,
+        iterations: usize,
+        state: &Snapshot<'_>,
+    ) -> ControlFlow<()> {
+        let written = self.results.step(place, load_factor, iterations, state);
+        self.kept(written)
+    }
+
+    fn last_equilibrium(
+        &mut self,
+        place: &Place,
+        load_factor: f64,
+        time: f64,
+        state: &Snapshot<'_>,
+    ) {
+        // What led here matters more than trouble with the state before it.
+        let _ = self
+            .results
+            .last_equilibrium(place, load_factor, time, state);
+    }
+
+    fn phase_ends(&mut self, record: PhaseRecord) {
+        self.results.phase(record);
+    }
+
+    fn warning(&mut self, warning: &Warning) {
+        let message = warning.to_string();
+        if !(warning.is_said_once() && self.warnings.contains(&message)) {
+            self.say(&message);
+        }
+    }
+
+    fn wants_state(&self, stops: bool) -> bool {
+        stops || self.keeper.is_due()
+    }
+
+    fn state(&mut self, state: &State<'_>) -> ControlFlow<()> {
+        let kept = self.keeper.keep(state, &self.results, &self.warnings);
+        self.kept(kept)
+    }
+
+    fn stop(&self) -> Stop {
+        self.stop.clone()
+    }
+}
+
+/// Writes the checkpoints of a run.
+struct Keeper {
+    identity: String,
+    folder: PathBuf,
+    every: Option<Duration>,
+    last: Instant,
+}
+
+impl Keeper {
+    /// Checkpoints in this folder, this long after one another; `None`: there are none.
+    fn new(identity: String, folder: &Path, every: Option<Duration>) -> Self {
+        Self {
+            identity,
+            folder: folder.to_owned(),
+            every,
+            last: Instant::now(),
+        }
+    }
+
+    /// What the folder's checkpoint holds, if there is one.
+    fn found(&self) -> Result<Option<Checkpoint<'static>>, text::Error> {
+        Checkpoint::read(&self.folder, &self.identity)
+    }
+
+    /// Whether it is time for another checkpoint.
+    fn is_due(&self) -> bool {
+        self.every.is_some_and(|every| self.last.elapsed() >= every)
+    }
+
+    fn keep(
+        &mut self,
+        state: &State<'_>,
+        results: &Recorder,
+        warnings: &[String],
+    ) -> Result<(), text::Error> {
+        if self.every.is_some() {
+            let so_far = results.state()?;
+            Checkpoint::new(&self.identity, so_far, warnings, Some(state)).write(&self.folder)?;
+            self.last = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// The last checkpoint: there is nothing left to do.
+    fn end(&self, results: &Recorder, warnings: &[String]) -> Result<(), text::Error> {
+        if self.every.is_some() {
+            let so_far = results.state()?;
+            Checkpoint::new(&self.identity, so_far, warnings, None).write(&self.folder)?;
+        }
+        Ok(())
+    }
+}
+
+/// What must be the same for a run to go on: the program, the case with its variant, the bytes of
+/// its libraries and of their sidecars, and the parameters.
+fn identity(case: &Case, laws: &Laws) -> String {
+    let mut text = format!("pilum {}\n", env!("CARGO_PKG_VERSION"));
+    text += case.variant.as_deref().unwrap_or_default();
+    text += "\n";
+    for ((name, hypothesis), built) in laws {
+        let library = built.law.library();
+        let (sha256, sidecar) = (library.sha256(), library.sidecar_sha256());
+        // What a sidecar says of a library is not part of its bytes.
+        let sidecar = sidecar.unwrap_or_default();
+        let _ = writeln!(text, "{name} {hypothesis} {sha256} {sidecar}");
+        for parameter in &built.parameters {
+            let _ = writeln!(text, "{} {:x}", parameter.id, parameter.value.to_bits());
+        }
+    }
+    let _ = writeln!(text, "{:?}", case.file.chosen);
+    text += case.source.text();
+    hexadecimal_sha256(text.as_bytes())
+}
+
+/// The error of a run with its place in the file, and what the user can do about it.
+fn explained(
+    case: &Case,
+    simulation: &Simulation,
+    error: mechanics::Error,
+    follower: &mut Follower<'_>,
+) -> Error {
+    let kept = keep_capsule(case, simulation, &error, &follower.results);
+    let suspicion = || suspicion(simulation, &error);
+    let hint = match &kept {
+        Ok(kept) => kept.clone().or_else(suspicion),
+        Err(_) => None,
+    };
+    match (error, follower.fault.take(), kept) {
+        (mechanics::Error::Halted, Some(Fault::File(error)), _) => error.into(),
+        (mechanics::Error::Halted, Some(Fault::Overflow { probe, place }), _) => {
+            probes::overflow(case, &probe, &place)
+        }
+        (_, _, Err(error)) => error.into(),
+        (error, _, Ok(_)) => {
+            let error = case.place(error);
+            match hint {
+                Some(hint) if error.kind() != Kind::Input => error.with_hint(&hint),
+                _ => error,
+            }
+        }
+    }
+}
+
+/// Writes the call of a law that failed for good. Returns what the user can do with it.
+fn keep_capsule(
+    case: &Case,
+    simulation: &Simulation,
+    error: &mechanics::Error,
+    results: &Recorder,
+) -> Result<Option<String>, text::Error> {
+    let (place, point): (&Place, &PointFailure) = match error {
+        mechanics::Error::Law { place, failure, .. } => (place, failure),
+        mechanics::Error::NoEquilibrium(none) => match none.failure.failed() {
+            Some(point) => (&none.place, point),
+            None => return Ok(None),
+        },
+        _ => return Ok(None),
+    };
+    let mut groups = simulation.groups().iter();
+    let group = groups.find(|group| group.name == point.group);
+    let number = |n: usize| toml::Value::from(n as i64);
+    let mut origin = vec![("case", case.source.path().display().to_string().into())];
+    origin.extend(case.variant.iter().map(|v| ("variant", v.as_str().into())));
+    origin.extend([
+        ("phase", place.phase.as_str().into()),
+        ("increment", number(place.increment)),
+        ("group", point.group.as_str().into()),
+        ("element", number(point.element)),
+        ("point", number(point.point)),
+        ("position", point.position.to_vec().into()),
+    ]);
+    let capsule = group.and_then(|group| Capsule::of(&group.law.built.law, &point.failure, origin));
+    let Some(capsule) = capsule else {
+        return Ok(None);
+    };
+    let file = results.folder().join(capsule::FILE_NAME);
+    capsule.write(&file).map_err(|error| match error {
+        law::Error::Text(error) => error,
+        other => text::Error::Internal(other.to_string()),
+    })?;
+    Ok(Some(format!(
+        "`pilum replay {}` repeats the call that failed",
+        file.display()
+    )))
+}
+
+/// Where to look if a law of the user's own may have kept the iterations from converging: a
+/// wrong tangent does that.
+fn suspicion(simulation: &Simulation, error: &mechanics::Error) -> Option<String> {
+    let mechanics::Error::NoEquilibrium(none) = error else {
+        return None;
+    };
+    let asks_for_tangents = simulation.method() != Method::InitialStress;
+    let iterates = none.failure.failed().is_none() && !none.failure.iterations.is_empty();
+    let mut libraries: Vec<&Path> = simulation
+        .groups()
+        .iter()
+        .filter(|group| !group.is_linear())
+        .map(|group| group.law.built.law.library())
+        .filter(|library| library.foreign().is_none() && !library.is_beside_program())
+        .map(Library::path)
+        .collect();
+    libraries.sort_unstable();
+    libraries.dedup();
+    let checks = libraries
+        .iter()
+        .map(|library| format!("`pilum check {}`", library.display()));
+    let checks: Vec<String> = checks.collect();
+    (asks_for_tangents && iterates && !checks.is_empty()).then(|| {
+        format!(
+            "{} tells whether a wrong tangent is a cause",
+            checks.join(", ")
+        )
+    })
+}

@@ -1,0 +1,24 @@
+//! Which of several variants are meant: of cases and of drivers alike.
+
+use crate::Error;
+use text::suggestion;
+
+/// Keeps the variant that is asked for; all, if none is.
+///
+/// # Errors
+/// There is no such variant.
+pub fn keep<T>(
+    all: &mut Vec<T>,
+    wanted: Option<&str>,
+    name: impl Fn(&T) -> Option<String>,
+) -> Result<(), Error> {
+    let Some(wanted) = wanted else { return Ok(()) };
+    let names: Vec<String> = all.iter().filter_map(&name).collect();
+    all.retain(|one| name(one).as_deref() == Some(wanted));
+    if all.is_empty() {
+        let known = suggestion(wanted, names.iter().map(String::as_str).collect::<Vec<_>>());
+        let message = format!("there is no variant `{wanted}`: {known}");
+        return Err(Error::usage(message));
+    }
+    Ok(())
+}

@@ -1,0 +1,213 @@
+//! The command line.
+
+use clap::{Parser, Subcommand, ValueEnum};
+use law::vetting;
+use std::path::PathBuf;
+use workshop::new_law::NewLaw;
+
+/// Finite elements for soil-structure interfaces, with constitutive laws as plugins.
+#[derive(Parser)]
+#[command(name = "pilum", version, max_term_width = 100)]
+pub(crate) struct Arguments {
+    /// Open libraries that are not known yet without trying them in a child process first.
+    #[arg(long, global = true)]
+    pub(crate) no_probe: bool,
+    /// Call laws in processes of their own, so that one that crashes ends the increment and not the
+    /// program; a call may take this many seconds.
+    #[arg(
+        long,
+        global = true,
+        value_name = "SECONDS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "10",
+        value_parser = seconds
+    )]
+    pub(crate) isolate: Option<f64>,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Run a case, or all variants of it.
+    Run {
+        /// A case file, or a folder with `case.toml`.
+        case: PathBuf,
+        /// Run only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
+        /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Go on from where an earlier run into the same folder was stopped, or start if none was.
+        #[arg(long)]
+        resume: bool,
+        /// Seconds between checkpoints, from which a run can be resumed; 0: after every increment.
+        #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
+        checkpoint: f64,
+        /// Threads; the results do not depend on it [default: all processors].
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        threads: Option<u16>,
+        /// Write all arguments of one call of the case's UMAT to this file, before and after it.
+        #[arg(long, value_name = "FILE")]
+        record: Option<PathBuf>,
+    },
+    /// Lead one law at one integration point along a path.
+    Point {
+        /// A driver file, or with `--umat` the `test.inp` of an IncrementalDriver.
+        driver: PathBuf,
+        /// Read input of the IncrementalDriver, and run it with this Abaqus user subroutine.
+        #[arg(long, value_name = "LIBRARY", conflicts_with = "variant")]
+        umat: Option<PathBuf>,
+        /// Run only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
+        /// File for the table; standard output if left out.
+        #[arg(long)]
+        csv: Option<PathBuf>,
+        /// Write all arguments of one call of the UMAT to this file, before and after it.
+        #[arg(long, value_name = "FILE")]
+        record: Option<PathBuf>,
+    },
+    /// Write the report of a run, or the comparison of several.
+    Report {
+        /// Results folders.
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+        /// The report's file [default: report.html in the folder, or beside the folders].
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+    /// Measure what accuracy costs: the settings of a case or driver, error against CPU time.
+    TradeOff {
+        /// A case file, a folder with `case.toml`, or a driver file.
+        input: PathBuf,
+        /// Study only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
+        /// Folder for the results [default: `results/trade_off_NAME`].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Divide the mesh of a case by 4 too, not only by 2.
+        #[arg(long)]
+        fine: bool,
+        /// Most increments per segment of a driver.
+        #[arg(long, default_value_t = 1000)]
+        max_increments: usize,
+        /// Instead: what stiffness the interfaces of no thickness should have.
+        #[arg(long)]
+        interface_stiffness: bool,
+    },
+    /// Check whether a library keeps the contract; each check runs in a process of its own.
+    Check(workshop::check::Arguments),
+    /// List the laws found, or show all about one of them.
+    Laws {
+        /// Id of a law.
+        id: Option<String>,
+        /// A folder with law libraries, looked in first; may be repeated.
+        #[arg(long, value_name = "DIR")]
+        law_path: Vec<PathBuf>,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Read what a library is and needs, without executing it.
+    Inspect {
+        /// A library.
+        library: PathBuf,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write the libraries that a case or driver uses, with their SHA-256, to a lock file beside it.
+    Lock {
+        /// A case file, a folder with `case.toml`, or a driver file.
+        input: PathBuf,
+    },
+    /// Repeat the call of a law that failed, from the file that a run left in its results.
+    Replay {
+        /// A `failure.toml`.
+        capsule: PathBuf,
+        /// Write all arguments of the call, that of a UMAT, to this file, before and after it.
+        #[arg(long, value_name = "FILE")]
+        record: Option<PathBuf>,
+        /// Call the law in this process, for a debugger, and not in one of its own.
+        #[arg(long, conflicts_with = "isolate")]
+        in_process: bool,
+    },
+    /// Write a small project for a law that builds and runs.
+    NewLaw(NewLaw),
+    /// Print the JSON Schema of an input file, for editors.
+    Schema {
+        /// Which file.
+        file: File,
+    },
+    /// Print completions for a shell.
+    Completions {
+        /// Which shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page.
+    Man,
+    /// Try a library: what a child process does.
+    #[command(name = vetting::COMMAND, hide = true)]
+    ProbeLibrary { library: PathBuf, sha256: String },
+    /// Call a law for another process.
+    #[command(name = "law-worker", hide = true)]
+    LawWorker,
+}
+
+impl Command {
+    /// Whether it calls laws in its own process, which they may end; and whether that may be done
+    /// once more with laws in processes of their own.
+    pub(crate) fn calls_laws(&self) -> Option<bool> {
+        match self {
+            // What came through a pipe comes only once.
+            Self::Run { case, .. } => Some(case.is_file() || case.is_dir()),
+            Self::Point { driver, csv, .. } => {
+                let goes_into_pipe = csv
+                    .as_ref()
+                    .is_some_and(|csv| csv.exists() && !csv.is_file());
+                Some(driver.is_file() && !goes_into_pipe)
+            }
+            Self::TradeOff { .. } | Self::Laws { .. } | Self::Lock { .. } => Some(false),
+            _ => None,
+        }
+    }
+
+    /// A replay outlives a law that crashes again.
+    pub(crate) fn isolates_anyway(&self) -> Option<f64> {
+        let replays = matches!(self, Self::Replay { in_process, .. } if !in_process);
+        (replays && cfg!(unix)).then_some(10.0)
+    }
+}
+
+/// What a schema is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum File {
+    /// Case files, for `pilum run`.
+    Case,
+    /// Driver files, for `pilum point`.
+    Point,
+}
+
+/// A time in seconds.
+fn not_negative(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number of seconds")?;
+    if (0.0..=1e6).contains(&value) {
+        Ok(value)
+    } else {
+        Err("expected 0 to 1e6 seconds".to_owned())
+    }
+}
+
+/// A time limit in seconds.
+fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number of seconds")?;
+    if value > 0.0 && value <= 1e6 {
+        Ok(value)
+    } else {
+        Err("expected more than 0 and at most 1e6 seconds".to_owned())
+    }
+}

@@ -1,0 +1,277 @@
+//! What each command does: calls of the rooms, and what they say.
+
+mod cases;
+
+use crate::arguments::{Arguments, Command, File};
+use crate::say::{print, printing, say};
+use cases::{run_cases, write_report};
+use clap::CommandFactory;
+use input::schema::{self, FileKind};
+use input::{Case, Error};
+use law::adapter::{self, Adapter};
+use law::{SearchPath, Stop, vetting};
+use runs::run::Options;
+use runs::{supervision, trade_off};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use text::write::refuse_other;
+
+pub(crate) fn execute(command: Command) -> Result<(), Error> {
+    match command {
+        Command::Run {
+            case,
+            variant,
+            out,
+            resume,
+            checkpoint,
+            threads,
+            record,
+        } => {
+            start_threads(threads)?;
+            let options = Options {
+                resume,
+                checkpoints: Some(Duration::from_secs_f64(checkpoint)),
+            };
+            let stop = stop_on_signals()?;
+            recorded(record.as_deref(), || {
+                run_cases(&case, variant.as_deref(), out.as_deref(), options, &stop)
+            })
+        }
+        Command::Point {
+            driver,
+            umat,
+            variant,
+            csv,
+            record,
+        } => {
+            let stop = stop_on_signals()?;
+            recorded(record.as_deref(), || {
+                let (umat, variant) = (umat.as_deref(), variant.as_deref());
+                run_point(&driver, umat, variant, csv.as_deref(), &stop)
+            })
+        }
+        Command::Report { folders, out } => write_report(&folders, out),
+        Command::TradeOff {
+            input,
+            variant,
+            out,
+            fine,
+            max_increments,
+            interface_stiffness,
+        } => {
+            let options = trade_off::Options {
+                variant,
+                out,
+                fine,
+                most_increments: max_increments,
+                interface_stiffness,
+                stop: stop_on_signals()?,
+            };
+            printing(|out| {
+                let mut show = |text: &str| out.line(text);
+                trade_off::run(&input, &options, &mut show, &mut |doing| {
+                    say!("{doing}");
+                })
+            })
+        }
+        Command::Check(arguments) => {
+            printing(|out| workshop::check::run(&arguments, &mut |text| out.text(text)))
+        }
+        Command::Laws { id, law_path, json } => show_laws(id.as_deref(), &law_path, json),
+        Command::NewLaw(project) => print(&project.write()?),
+        Command::Schema { file } => print_schema(file),
+        Command::Completions { shell } => {
+            let mut program = Arguments::command();
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut program, "pilum", &mut script);
+            print(&String::from_utf8_lossy(&script))
+        }
+        Command::Man => manual(&Arguments::command()),
+        Command::Inspect { library, json } => {
+            let inspection = law::inspect::inspect(&library)?;
+            if json {
+                print(&law::inspect::json(&inspection)?)
+            } else {
+                print(&format!("{inspection}\n"))
+            }
+        }
+        Command::Lock { input } => {
+            let lock = input::lock::write(&input)?;
+            print(&format!("lock in {}\n", lock.display()))
+        }
+        Command::Replay {
+            capsule, record, ..
+        } => recorded(record.as_deref(), || {
+            printing(|out| workshop::replay::replay(&capsule, &mut |line| out.line(line)))
+        }),
+        #[cfg(unix)]
+        Command::LawWorker => Ok(law::isolate::work()?),
+        #[cfg(not(unix))]
+        Command::LawWorker => Err(Error::usage("there are no workers here")),
+        Command::ProbeLibrary { library, sha256 } => {
+            Ok(vetting::probe(
+                &library,
+                &sha256,
+                &mut std::io::stdout().lock(),
+            )?)
+        }
+    }
+}
+
+/// Does something while one call of a UMAT is recorded, if a file for it is given, and says whether
+/// it was.
+fn recorded(file: Option<&Path>, action: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
+    let Some(file) = file else {
+        return action();
+    };
+    let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+    let unwritable = |source| text::Error::unwritable(&path, source);
+    refuse_other(&path)?;
+    // The record takes the place of an earlier one when there is one, not before.
+    let mut partial = path.clone().into_os_string();
+    partial.push(".part");
+    let partial = PathBuf::from(partial);
+    std::fs::File::create(&partial)
+        .and_then(|_| std::fs::remove_file(&partial))
+        .map_err(unwritable)?;
+    adapter::record_to(partial.clone());
+    let outcome = action();
+    if partial.is_file() {
+        std::fs::rename(&partial, &path).map_err(unwritable)?;
+        say!("all arguments of one call in {}", file.display());
+    } else if outcome.is_ok() {
+        say!("no call was recorded: none moved a point");
+    }
+    outcome
+}
+
+/// Refuses to record where it is not plain which law is meant.
+fn check_recording(cases: &[Case]) -> Result<(), Error> {
+    if adapter::is_recorded_to().is_none() {
+        return Ok(());
+    }
+    let [case] = cases else {
+        let message = "--record is for one run: name one with --variant";
+        return Err(Error::usage(message.to_owned()));
+    };
+    let mut umats = Vec::new();
+    for (name, law) in &case.file.laws {
+        let foreign = law.get_ref().foreign(&case.source)?;
+        if foreign.is_some_and(|foreign| foreign.adapter == Adapter::Umat) {
+            umats.push(name.get_ref().as_str());
+        }
+    }
+    let message = match umats.as_slice() {
+        [_] => return Ok(()),
+        [] => format!(
+            "--record: no law of {} is a UMAT",
+            case.source.path().display()
+        ),
+        several => format!(
+            "--record: {} are UMATs; give the key `record` to the one that is meant",
+            several.join(", ")
+        ),
+    };
+    Err(Error::usage(message))
+}
+
+/// Who asks the work to stop: the process that watches this one; where none does, Ctrl-C and its
+/// like, and a second one ends the program at once.
+fn stop_on_signals() -> Result<Stop, Error> {
+    if let Some(stop) = supervision::stop() {
+        return Ok(stop);
+    }
+    let asked = Arc::new(AtomicBool::new(false));
+    let stop = Stop::flag(Arc::clone(&asked));
+    let ask = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        say!("{}", supervision::STOPPING);
+    };
+    ctrlc::set_handler(ask).map_err(|error| match error {
+        ctrlc::Error::System(why) => cannot_start("a thread for Ctrl-C", &why),
+        error => Error::internal(error.to_string()),
+    })?;
+    Ok(stop)
+}
+
+/// Starts the threads that a run works with; as many as there are processors, if it is not said.
+fn start_threads(n: Option<u16>) -> Result<(), Error> {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(n.map_or(0, usize::from));
+    threads
+        .build_global()
+        .map_err(|why| cannot_start("the threads of the run", &why))
+}
+
+/// What starting a thread takes is memory, above all.
+pub(crate) fn cannot_start(what: &str, why: &impl std::fmt::Display) -> Error {
+    #[cfg(unix)]
+    let message = runs::memory::cannot_start(what, why);
+    #[cfg(not(unix))]
+    let message = format!("not enough memory to start {what}: {why}");
+    Error::usage(message)
+}
+
+/// Tables go to standard output or files, what came out of each driver to the error stream.
+fn run_point(
+    driver: &Path,
+    umat: Option<&Path>,
+    variant: Option<&str>,
+    csv: Option<&Path>,
+    stop: &Stop,
+) -> Result<(), Error> {
+    let report = |report: &runs::point::PointReport| say!("{report}");
+    match umat {
+        Some(umat) => runs::point::run_incremental(driver, umat, csv, stop, report),
+        None if driver.extension().is_some_and(|ending| ending == "inp") => {
+            Err(Error::usage(format!(
+                "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
+                driver.display()
+            )))
+        }
+        None => runs::point::run_file_until(driver, variant, csv, stop, report),
+    }
+}
+
+fn show_laws(id: Option<&str>, folders: &[PathBuf], json: bool) -> Result<(), Error> {
+    if let Some(missing) = folders.iter().find(|folder| !folder.is_dir()) {
+        let message = format!("--law-path: there is no folder {}", missing.display());
+        return Err(Error::usage(message));
+    }
+    let search = SearchPath::new(folders);
+    let text = match (id, json) {
+        (None, false) => workshop::laws::list(&search),
+        (None, true) => workshop::laws::list_json(&search)?,
+        (Some(id), false) => workshop::laws::page(&search.law(id)?),
+        (Some(id), true) => workshop::laws::page_json(&search.law(id)?)?,
+    };
+    print(&text)
+}
+
+fn print_schema(file: File) -> Result<(), Error> {
+    let text = serde_json::to_string_pretty(&schema::of(match file {
+        File::Case => FileKind::Case,
+        File::Point => FileKind::Point,
+    }))
+        .map_err(|error| Error::internal(error.to_string()))?;
+    print(&format!("{text}\n"))
+}
+
+/// The program's manual page, that of each command behind it.
+fn manual(program: &clap::Command) -> Result<(), Error> {
+    let mut page = Vec::new();
+    let mut written = clap_mangen::Man::new(program.clone()).render(&mut page);
+    let shown = |command: &&clap::Command| !command.is_hide_set();
+    for command in program.get_subcommands().filter(shown) {
+        // A command's name lives as long as the program.
+        let name: &'static str = format!("pilum-{}", command.get_name()).leak();
+        let command = command.clone().name(name);
+        let section = clap_mangen::Man::new(command);
+        written = written.and_then(|()| section.render(&mut page));
+    }
+    written.map_err(|error| Error::internal(error.to_string()))?;
+    print(&String::from_utf8_lossy(&page))
+}

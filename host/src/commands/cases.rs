@@ -1,0 +1,153 @@
+//! `pilum run`: a case, or all variants of one, with a report of each and their comparison.
+
+use super::check_recording;
+use crate::progress::Progress;
+use crate::say::{self, say};
+use input::{Case, Error};
+use law::Stop;
+use mechanics::equilibrium::Reuse;
+use results::{Figures, remove_comparison, report};
+use runs::run::{Observer as _, Options, check, run_reusing};
+use runs::{supervision, trade_off, variants};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Runs a case, or all variants of one, and writes the report of each, and their comparison. A
+/// variant that fails does not stop the others; the last failure is the outcome.
+pub(super) fn run_cases(
+    path: &Path,
+    variant: Option<&str>,
+    out: Option<&Path>,
+    options: Options,
+    stop: &Stop,
+) -> Result<(), Error> {
+    let mut cases = Case::load(path)?;
+    variants::keep(&mut cases, variant, |case| case.variant.clone())?;
+    check_recording(&cases)?;
+    // All variants are checked before the first one runs.
+    if cases.len() > 1 {
+        cases.iter().try_for_each(check)?;
+    }
+    let together = match (out, cases.first()) {
+        (Some(out), _) => out.to_owned(),
+        (None, case) => Path::new("results").join(case.map(Case::name).unwrap_or_default()),
+    };
+    if let [case, _, ..] = cases.as_slice() {
+        let figures = case.file.figures.iter();
+        let figures: Vec<&str> = figures.map(|f| f.name.get_ref().as_str()).collect();
+        remove_comparison(&together, &figures)?;
+    }
+    let mut outcome = Ok(());
+    let mut reports = Ok(());
+    let mut drawn = Vec::new();
+    let mut folders = Vec::new();
+    // Variants on one mesh share the factors of its linear part.
+    let mut reuse = Reuse::default();
+    for (number, case) in (1..).zip(&cases) {
+        reuse.is_last_run = number == cases.len();
+        let folder = match (out, &case.variant) {
+            (None, _) => case.default_folder(),
+            (Some(out), Some(name)) if variant.is_none() => out.join(name),
+            (Some(out), _) => out.to_owned(),
+        };
+        if let Some(name) = &case.variant {
+            say!("variant {name}");
+        }
+        let mut progress = Progress::new(number, &folder, stop);
+        let options = Options {
+            resume: options.resume || supervision::was_begun(number),
+            ..options
+        };
+        let run = run_accurately(case, &folder, &mut progress, &mut reuse, options);
+        progress.finish();
+        supervision::end_run();
+        let has_results = progress.has_begun;
+        match run {
+            Ok(figures) => {
+                let _ = writeln!(supervision::stdout(), "results in {}", folder.display());
+                drawn.extend(case.variant.clone().map(|variant| (variant, figures)));
+            }
+            Err(error) => keep_last(&mut outcome, error),
+        }
+        let is_stopped = outcome.as_ref().is_err_and(Error::is_stop);
+        if has_results {
+            if let Err(error) = write_report(std::slice::from_ref(&folder), None) {
+                keep_last(&mut reports, error);
+            }
+            folders.push(folder);
+        }
+        if is_stopped {
+            break;
+        }
+    }
+    if drawn.len() > 1
+        && let Err(error) = Figures::draw_overlaid(&together, &drawn)
+    {
+        keep_last(&mut reports, error.into());
+    }
+    if folders.len() > 1
+        && let Err(error) = write_report(&folders, Some(together))
+    {
+        keep_last(&mut reports, error);
+    }
+    match (outcome, reports) {
+        // What became of the run matters more than what became of its report.
+        (Err(run), Err(report)) => {
+            say::error(report);
+            Err(run)
+        }
+        (outcome, reports) => outcome.and(reports),
+    }
+}
+
+/// Runs a case; where it asks for an accuracy, with settings that reach it.
+fn run_accurately(
+    case: &Case,
+    folder: &Path,
+    progress: &mut Progress,
+    reuse: &mut Reuse,
+    options: Options,
+) -> Result<Figures, Error> {
+    let studied =
+        trade_off::reach_until(case, folder, &progress.stop, &mut |doing| say!("{doing}"))?;
+    let case = studied.as_ref().unwrap_or(case);
+    if let Some(chosen) = &case.file.chosen {
+        let increments: Vec<String> = chosen
+            .increments
+            .iter()
+            .map(|(phase, n)| format!("{phase} {n}"))
+            .collect();
+        let settings = format!(
+            "error {:.1e} estimated, {:.1e} asked for; increments {}, force tolerance {:e} {}",
+            chosen.reached,
+            chosen.asked,
+            increments.join(", "),
+            chosen.force_tolerance,
+            chosen.parameters.join(" ")
+        );
+        if chosen.is_reached {
+            progress.say(&format!("accuracy: {}", settings.trim_end()));
+        } else {
+            progress.warning(&format!(
+                "the accuracy is not reached: {}",
+                settings.trim_end()
+            ));
+        }
+    }
+    run_reusing(case, folder, progress, reuse, options)
+}
+
+/// Keeps the last failure for the caller to report, and reports the one before it.
+fn keep_last(outcome: &mut Result<(), Error>, error: Error) {
+    if let Err(earlier) = std::mem::replace(outcome, Err(error)) {
+        say::error(earlier);
+    }
+}
+
+/// Writes the report of a run, or the comparison of several.
+pub(super) fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
+    let out = out.unwrap_or_else(|| report::default_path(folders));
+    let written = report::write(folders, &out)?;
+    let _ = writeln!(supervision::stdout(), "report in {}", written.display());
+    Ok(())
+}

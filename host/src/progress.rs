@@ -1,0 +1,109 @@
+//! How a run goes, for whoever waits for it.
+
+use crate::say::say;
+use indicatif::{ProgressBar, ProgressStyle};
+use law::Stop;
+use mechanics::Place;
+use runs::run::Observer;
+use runs::supervision;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+/// A bar on a terminal, plain lines elsewhere; both on the error stream.
+pub(crate) struct Progress {
+    /// Number of the case, from 1, and where its results go.
+    place: (usize, PathBuf),
+    pub(crate) stop: Stop,
+    bar: Option<ProgressBar>,
+    cut_backs: usize,
+    /// A phase has begun, so there is a folder with results.
+    pub(crate) has_begun: bool,
+}
+
+impl Progress {
+    pub(crate) fn new(number: usize, folder: &Path, stop: &Stop) -> Self {
+        Self {
+            place: (number, folder.to_owned()),
+            stop: stop.clone(),
+            bar: None,
+            cut_backs: 0,
+            has_begun: false,
+        }
+    }
+
+    pub(crate) fn say(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(line),
+            None => say!("{line}"),
+        }
+    }
+
+    pub(crate) fn finish(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish();
+        }
+    }
+}
+
+impl Observer for Progress {
+    fn phase(&mut self, name: &str, increments: usize) {
+        self.finish();
+        self.cut_backs = 0;
+        self.has_begun = true;
+        supervision::case_begun(self.place.0, &self.place.1);
+        if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new(increments as u64);
+            let template = "{prefix:16} {bar:32} {pos}/{len}  {msg}  {eta} left";
+            if let Ok(style) = ProgressStyle::with_template(template) {
+                bar.set_style(style);
+            }
+            bar.set_prefix(name.to_owned());
+            bar.tick();
+            self.bar = Some(bar);
+        } else {
+            say!("phase {name}: {increments} increments");
+        }
+    }
+
+    fn increment(&mut self, place: &Place, of: usize, iterations: usize) {
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position(place.increment as u64);
+                bar.set_message(format!(
+                    "{iterations} iterations, {} cut-backs",
+                    self.cut_backs
+                ));
+            }
+            None => say!(
+                "phase {}: increment {}/{of}, {iterations} iterations",
+                place.phase,
+                place.increment
+            ),
+        }
+    }
+
+    fn cut_back(&mut self, place: &Place, reason: &str) {
+        self.cut_backs += 1;
+        if self.cut_backs <= 10 {
+            self.say(&format!("{place}: step cut back: {reason}"));
+        } else if self.cut_backs == 11 {
+            self.say("further cut-backs are only in log.jsonl");
+        }
+    }
+
+    fn warning(&mut self, message: &str) {
+        self.say(&format!("warning: {message}"));
+    }
+
+    fn resumed(&mut self, from: Option<&Place>) {
+        self.has_begun = true;
+        match from {
+            Some(place) => self.say(&format!("resumed after {place}")),
+            None => self.say("done already"),
+        }
+    }
+
+    fn stop(&self) -> Stop {
+        self.stop.clone()
+    }
+}
