@@ -34,8 +34,9 @@
 //! # }
 //! ```
 //!
-//! In the order in which data flows: [`path`](Segment), `driver`, `course` (rows), `walk` (increments
-//! in steps), `search` (the equilibrium of a step).
+//! Inside, in the order in which data flows: `path` and `driver` say what is followed, `course` hands
+//! out rows, `walk` carries the point over an increment in steps, `search` finds the equilibrium of a
+//! step.
 
 mod anchor;
 mod course;

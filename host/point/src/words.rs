@@ -285,3 +285,121 @@ impl Moved {
         (word, list(&self.given), list(&self.returned))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use abi::Hypothesis;
+    use law::BatchFailure;
+
+    const PLACE: Place = Place::Increment {
+        segment: 2,
+        increment: 3,
+        of: 4,
+        row: 13,
+    };
+
+    fn failure(cause: Cause) -> Failure {
+        Failure {
+            variant: Some("b".to_owned()),
+            place: PLACE,
+            law: "joint".to_owned(),
+            library: "libjoint.so".into(),
+            hypothesis: Hypothesis::Interface2d,
+            cause,
+            warnings: vec![Warning::Note("a note".to_owned())],
+            advice: None,
+        }
+    }
+
+    fn refusal(outcome: Outcome) -> BatchFailure {
+        BatchFailure {
+            point: 0,
+            outcome,
+            message: "its words".to_owned(),
+            factor: None,
+            call: None,
+        }
+    }
+
+    fn unmet(criterion: Criterion) -> Cause {
+        Cause::NoEquilibrium(NoEquilibrium {
+            reached: 0.5,
+            unmet: Some(Unmet {
+                criterion,
+                found: 70.0,
+                goal: 72.0,
+                residual: -2.0,
+                tolerance: 4.5e-8,
+            }),
+            refusal: Some(Box::new(refusal(Outcome::CutStep))),
+        })
+    }
+
+    #[test]
+    fn a_flux_beyond_strength_is_said_with_all_that_is_known() {
+        let component = "t";
+        let at_end = 75.0;
+        let failure = failure(unmet(Criterion::Flux { component, at_end }));
+        assert_eq!(
+            failure.to_string(),
+            "variant b, segment 2, increment 3 of 4 (13 of the file): no equilibrium: traction `t` \
+             is 7.000000000e1 kPa at best, 7.200000000e1 kPa is asked for (residual -2.00e0, \
+             tolerance 4.5e-8)\n  reached: 0.500000 of the increment, at whose end traction `t` is \
+             to be 7.500000000e1 kPa\n  law `joint`: its words\n  warning: a note"
+        );
+        let own = "a traction beyond strength has no equilibrium; control the jump of `t` instead";
+        assert_eq!(failure.hint().unwrap(), own);
+        let error = Error::Failure(Box::new(failure)).with_hint("more");
+        assert_eq!(error.hint().unwrap(), format!("{own}; more"));
+        assert!(error.failed_call().is_some());
+    }
+
+    #[test]
+    fn restrictions_and_springs_have_no_goal_of_their_own_at_the_end() {
+        let restricted = failure(unmet(Criterion::Restriction(2)));
+        let text = restricted.to_string();
+        assert!(text.contains("restriction 2 cannot be met: residual -2.00e0 kPa"));
+        assert!(text.contains("reached: 0.500000 of the increment\n"));
+        assert_eq!(restricted.hint(), None);
+        let sprung = failure(unmet(Criterion::Stiffness { component: "n" }));
+        assert!(!sprung.to_string().contains("at whose end"));
+        assert!(sprung.hint().unwrap().contains("the jump of `n`"));
+    }
+
+    #[test]
+    fn libraries_at_fault_are_named() {
+        let begins = "variant b, segment 2, increment 3 of 4 (13 of the file): law `joint` of \
+                      library libjoint.so ";
+        for (cause, says) in [
+            (
+                Cause::Law(refusal(Outcome::Internal)),
+                "broke down: its words",
+            ),
+            (
+                Cause::LawInSmallSteps(refusal(Outcome::Numeric)),
+                "fails, however small the step: its words",
+            ),
+        ] {
+            assert_eq!(failure(cause).to_string(), format!("{begins}{says}"));
+        }
+        let mut start = failure(Cause::InitialState(refusal(Outcome::Internal)));
+        start.place = Place::Start;
+        assert_eq!(
+            start.to_string(),
+            "law `joint` of library libjoint.so: the initial state failed (Internal): its words"
+        );
+    }
+
+    #[test]
+    fn a_stop_is_no_failed_call() {
+        let failure = failure(Cause::Stopped);
+        assert!(
+            failure
+                .to_string()
+                .ends_with("(13 of the file): stopped as asked; the rows before it are written")
+        );
+        let error = Error::Failure(Box::new(failure));
+        assert!(error.failed_call().is_none() && error.hint().is_none());
+    }
+}
