@@ -6,15 +6,24 @@
 use algebra::{LinearSolver, mesh_lines};
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use host::assembly::{Places, System};
-use host::case::{Axis, Case, SolverInput};
-use host::error::{Place, Source};
-use host::group::Group;
-use host::input::parse;
-use host::model::Model;
-use host::plugin::Operator;
-use host::run::{Observer, run};
-use host::solver::{Costs, LinearDomain, Loads, Matrix, Newton};
+use mechanics::assembly::Places;
+use mechanics::assembly::System;
+use input::case::Axis;
+use input::Case;
+use mechanics::Settings;
+use mechanics::Place;
+use text::Source;
+use mechanics::group::Group;
+use text::parse;
+use mechanics::Model;
+use law::Operator;
+use runs::run::Observer;
+use runs::run::run;
+use mechanics::equilibrium::Costs;
+use mechanics::equilibrium::LinearDomain;
+use mechanics::equilibrium::Loads;
+use mechanics::equilibrium::Matrix;
+use mechanics::equilibrium::Newton;
 use std::path::Path;
 
 fn main() {

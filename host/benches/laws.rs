@@ -7,7 +7,7 @@ mod scenario;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use host::plugin::Operator;
+use law::Operator;
 use scenario::{NAMES, Scenario};
 
 const BATCHES: [usize; 4] = [1, 8, 64, 512];

@@ -12,7 +12,7 @@
 
 mod scenario;
 
-use host::plugin::Operator;
+use law::Operator;
 use rustix::time::{ClockId, clock_gettime};
 use scenario::{NAMES, Scenario};
 

@@ -8,9 +8,14 @@ use crate::compilers::{library, repository};
 use crate::guides::commands;
 use crate::program::{pilum, shell};
 use abi::Hypothesis;
-use host::error::Source;
-use host::plugin::{End, Law, Operator, SearchPath, Start, Strided};
-use host::point::Driver;
+use text::Source;
+use law::End;
+use law::Law;
+use law::Operator;
+use law::SearchPath;
+use law::Start;
+use law::Strided;
+use input::Driver;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -202,7 +207,7 @@ fn tangents_agree(laws: &[&str], folder: &Path) {
                     state: &state,
                     time: 0.0,
                     time_increment: 1.0,
-                    moment: host::plugin::Moment::default(),
+                    moment: law::Moment::default(),
                     sites: &[],
                 };
                 let to = End {
@@ -319,7 +324,7 @@ fn an_exception_is_a_defect_of_the_law() {
             state: &[0.0],
             time: 0.0,
             time_increment: 1.0,
-            moment: host::plugin::Moment::default(),
+            moment: law::Moment::default(),
             sites: &[],
         };
         let to = End {

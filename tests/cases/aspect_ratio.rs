@@ -5,10 +5,12 @@
 //! Asserts   ultimate shear stress, monotony, plateaus; the zero-thickness element against a closed
 //!           form; the layer with mean strains against the law at one point; the causes one by one
 
-use host::case::{Case, CaseFile, Integration};
-use host::error::Source;
-use host::point::Driver;
-use host::run::run;
+use input::Case;
+use input::case::CaseFile;
+use mechanics::problem::Integration;
+use text::Source;
+use input::Driver;
+use runs::run::run;
 use std::path::Path;
 use tempfile::TempDir;
 use tests::case::{Silent, column};
@@ -81,7 +83,7 @@ fn increments(file: &mut CaseFile, n: usize) {
 fn parameter(file: &mut CaseFile, name: &str, value: f64) {
     let law = file.laws.get_mut("mepi").unwrap().get_mut();
     let parameter = law.parameters.get_mut(name).unwrap();
-    *parameter.get_mut() = host::input::ParameterValue::Number(value);
+    *parameter.get_mut() = input::material::ParameterValue::Number(value);
 }
 
 fn last(values: &[f64]) -> f64 {

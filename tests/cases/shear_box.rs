@@ -5,8 +5,8 @@
 //! Asserts   friction against equations (10), (11); contraction; ultimate and residual friction;
 //!           order of curves; normal stress against the stiffness that holds it; figures
 
-use host::error::Error;
-use host::point::run_file_variants;
+use input::Error;
+use runs::point::run_file_variants;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::column;
@@ -309,10 +309,10 @@ fn figures_stand_beside_the_table() {
 
 #[test]
 fn a_driver_with_variants_needs_a_file_or_the_name_of_one() {
-    let no_report = |_: &host::point::PointReport| panic!("nothing should have run");
+    let no_report = |_: &runs::point::PointReport| panic!("nothing should have run");
     let file = driver("silica.toml");
     let error = run_file_variants(&file, None, None, no_report).unwrap_err();
-    assert!(matches!(error, Error::Usage(_)));
+    assert!(matches!(error, Error::Text(text::Error::Usage(_))));
     let words = error.to_string();
     assert!(words.contains("--csv") && words.contains("--variant") && words.contains("test_2"));
     let error = run_file_variants(&file, Some("test_4"), None, no_report).unwrap_err();
@@ -340,7 +340,7 @@ fn figures_of_columns_that_there_are_not_are_refused() {
     ] {
         std::fs::write(&file, text.replace(from, to)).unwrap();
         let error = run_file_variants(&file, None, Some(&csv), |_| {}).unwrap_err();
-        assert!(matches!(error, Error::Input(_)));
+        assert!(matches!(error, Error::Text(text::Error::Input(_))));
         assert!(error.to_string().contains(words), "{error}");
     }
 }

@@ -1,7 +1,7 @@
 //! Variants of the cases in `cases/`, each run once for all tests.
 
-use host::case::Case;
-use host::error::Error;
+use input::Case;
+use input::Error;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::{Arc, LazyLock, Mutex, OnceLock};
@@ -59,7 +59,7 @@ impl Run {
         let folder = TempDir::new().unwrap();
         let file = |name| folder.path().join(name);
         let mut observer = Silent::default();
-        let outcome = host::run::run(case, folder.path(), &mut observer).map(|_| observer);
+        let outcome = runs::run::run(case, folder.path(), &mut observer).map(|_| observer);
         let summary = std::fs::read_to_string(file("summary.json")).unwrap();
         let points = file("points.csv");
         Self {

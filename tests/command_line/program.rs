@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use tempfile::TempDir;
 
-/// Exit codes, `host::error::Error::exit_code`.
+/// Exit codes, `input::Error::exit_code`.
 pub(crate) const DONE: i32 = 0;
 pub(crate) const BAD_INPUT: i32 = 1;
 pub(crate) const NO_EQUILIBRIUM: i32 = 2;

@@ -14,7 +14,7 @@ fn shipped(law: &str) -> PathBuf {
 }
 
 fn sha256(library: &Path) -> String {
-    host::plugin::hexadecimal_sha256(&std::fs::read(library).unwrap())
+    law::hexadecimal_sha256(&std::fs::read(library).unwrap())
 }
 
 /// The case with a SHA-256 beside its soil's law.

@@ -7,7 +7,7 @@
 use crate::matrix::{Family, Verdict};
 use crate::point::{Point, law, reason};
 use abi::Hypothesis;
-use host::plugin::Operator;
+use law::Operator;
 
 /// A law with parameters that make sense, and a flux to start from.
 struct Sound {

@@ -3,7 +3,14 @@
 use crate::matrix::Verdict;
 use abi::Hypothesis;
 use abi::status::Outcome;
-use host::plugin::{BatchFailure, End, Law, LoadedLaw, Operator, SearchPath, Start, Strided};
+use law::BatchFailure;
+use law::End;
+use law::Law;
+use law::LoadedLaw;
+use law::Operator;
+use law::SearchPath;
+use law::Start;
+use law::Strided;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
@@ -93,7 +100,7 @@ impl Point {
             state: &self.state,
             time: 0.0,
             time_increment: 1.0,
-            moment: host::plugin::Moment::default(),
+            moment: law::Moment::default(),
             sites: &[],
         };
         let success = self.law.integrate(

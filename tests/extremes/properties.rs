@@ -8,7 +8,7 @@ use crate::mohr_coulomb::{self, Parameters, Pyramid};
 use crate::point::{Point, Response, law};
 use crate::quadrature::{Truth, call, calls, distance, resolved};
 use abi::Hypothesis;
-use host::plugin::Operator;
+use law::Operator;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -22,8 +22,9 @@ use crate::mepi_paths::{FONTAINEBLEAU, SILICA, TABLE_4, extremes};
 use crate::mepi_step::{Constants, Mepi};
 use crate::point::{Point, law, reason};
 use abi::Hypothesis;
-use host::error::{Error, Source};
-use host::point::Driver;
+use input::Error;
+use text::Source;
+use input::Driver;
 
 /// ξ, σ_n, τ at a slip.
 pub(crate) type Shear = [f64; 3];
@@ -180,7 +181,7 @@ fn drive(
     let mut ends = [[0.0; 3]; 2];
     for (end, n) in ends.iter_mut().zip(increments) {
         driver.set_increments(&[n]);
-        let keep = |row: &host::point::Row<'_>| {
+        let keep = |row: &point::Row<'_>| {
             *end = [row.internal[0], -row.flux[0], row.flux[1]];
             Ok(())
         };

@@ -6,7 +6,7 @@ use crate::mepi_paths::{FONTAINEBLEAU, TABLE_4};
 use crate::mohr_coulomb::{self, Parameters, Pyramid};
 use crate::point::{Point, law};
 use abi::Hypothesis;
-use host::plugin::Operator;
+use law::Operator;
 use std::process::Command;
 
 const CALLS: u32 = 1_000_000;

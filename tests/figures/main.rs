@@ -7,10 +7,10 @@
 //! ```
 #![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
 
-use host::case::Case;
-use host::error::Error;
-use host::output::Figures;
-use host::point::run_file_variants;
+use input::Case;
+use input::Kind;
+use results::Figures;
+use runs::point::run_file_variants;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -161,9 +161,9 @@ fn draw(input: &str) -> TempDir {
     for case in Case::load(&path).unwrap() {
         let variant = case.variant.clone().unwrap_or_default();
         let folder = place.path().join(&variant);
-        match host::run::run(&case, &folder, &mut Silent::default()) {
+        match runs::run::run(&case, &folder, &mut Silent::default()) {
             Ok(figures) => drawn.push((variant, figures)),
-            Err(Error::NoEquilibrium { .. }) => (),
+            Err(error) if error.kind() == Kind::NoEquilibrium => (),
             Err(error) => panic!("{input}, {variant}: {error}"),
         }
     }

@@ -8,9 +8,10 @@
 //!             from `summary.json`
 
 use crate::setup::Results as _;
-use host::case::Case;
-use host::run::{Options, run_reusing};
-use host::solver::Reuse;
+use input::Case;
+use runs::run::Options;
+use runs::run::run_reusing;
+use mechanics::equilibrium::Reuse;
 use serde_json::Value;
 use std::path::Path;
 use tests::case::{Silent, table};

@@ -10,7 +10,7 @@
 use crate::footing::{FRICTION, Footing, push, text};
 use crate::setup::{Results, assert_close, fail, run};
 use crate::thick_cylinder;
-use host::error::Error;
+use input::Kind;
 use tests::case::table;
 
 #[test]
@@ -59,7 +59,7 @@ fn a_pressure_beyond_the_limit_ends_in_no_equilibrium() {
     let load = "increments = 8\npressure = [{ line = \"inner\", value = 80.0 }]";
     let failed = fail(&thick_cylinder::text(law, 8, "reduced", load, ""));
     assert!(
-        matches!(failed.error, Error::NoEquilibrium { .. }),
+        failed.error.kind() == Kind::NoEquilibrium,
         "{}",
         failed.error
     );

@@ -12,7 +12,7 @@
 
 use crate::footing::{self, Footing};
 use crate::setup::fail;
-use host::error::Error;
+use input::Kind;
 use std::f64::consts::PI;
 use tests::case::{column, run_text};
 
@@ -35,7 +35,7 @@ fn outcome<const N: usize>(text: &str, probes: [&str; N]) -> Result<[f64; N], St
             let history = folder.path().join("history.csv");
             Ok(probes.map(|probe| *column(&history, probe).last().expect("an increment")))
         }
-        Err(Error::NoEquilibrium { message, .. }) => Err(message),
+        Err(error) if error.kind() == Kind::NoEquilibrium => Err(error.to_string()),
         Err(error) => panic!("{error}\n{text}"),
     }
 }

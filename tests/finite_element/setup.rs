@@ -1,6 +1,6 @@
 //! Runs of case texts in temporary folders, and what the tests read from their results.
 
-use host::error::Error;
+use input::Error;
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;

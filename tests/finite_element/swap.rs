@@ -24,12 +24,17 @@
 
 use crate::setup::{Finished, Results, assert_close, elastic, run};
 use crate::sliding_block::{self, Kind, PRESS, coulomb, hold_top, slide};
-use host::case::{Case, CaseFile};
-use host::error::{Error, Place, Source};
-use host::input::parse;
-use host::run::{Observer, Options, run_reusing};
-use host::solver::Reuse;
-use host::stop::Stop;
+use input::Case;
+use input::case::CaseFile;
+use input::Error;
+use mechanics::Place;
+use text::Source;
+use text::parse;
+use runs::run::Observer;
+use runs::run::Options;
+use runs::run::run_reusing;
+use mechanics::equilibrium::Reuse;
+use law::Stop;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -282,7 +287,7 @@ fn a_run_stopped_after_a_swap_goes_on_to_the_same_bits() {
     // Within the phase of the swap.
     let outcome = run_until(&text, stopped.path(), 2);
     assert!(
-        matches!(outcome, Err(Error::Interrupted { .. })),
+        outcome.as_ref().is_err_and(Error::is_stop),
         "{outcome:?}"
     );
     run_until(&text, stopped.path(), 100).unwrap();

@@ -18,7 +18,7 @@
 //!             the chamber within a stated part
 
 use crate::setup::{Results, assert_close, elastic, fail, run};
-use host::error::Error;
+use input::Error;
 use std::path::Path;
 use tests::tolerance::EQUILIBRIUM;
 
@@ -75,7 +75,7 @@ corner = {{ line = "corner", quantity = "displacement_y" }}
 
 /// The text that an input error points at.
 fn place<'a>(error: &Error, text: &'a str) -> &'a str {
-    let Error::Input(input) = error else {
+    let Error::Text(text::Error::Input(input)) = error else {
         panic!("not an input error: {error}")
     };
     assert_eq!(error.exit_code(), 1);

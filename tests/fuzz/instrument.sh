@@ -3,7 +3,8 @@
 # reports to libFuzzer which edges it takes and what it compares. With SANITIZE=address
 # AddressSanitizer watches its memory too; sanitizers are not stable yet, whence RUSTC_BOOTSTRAP.
 case " $* " in
-*" --crate-name abi "* | *" --crate-name host "* | *" --crate-name algebra "* | *" --crate-name fuzz "*)
+*" --crate-name abi "* | *" --crate-name bridges "* | *" --crate-name text "* | *" --crate-name algebra "* | *" --crate-name law "* | *" --crate-name mechanics "* | \
+  *" --crate-name point "* | *" --crate-name results "* | *" --crate-name input "* | *" --crate-name workshop "* | *" --crate-name fuzz "*)
   if [ -n "${SANITIZE:-}" ]; then
     export RUSTC_BOOTSTRAP=1
     set -- "$@" -Z sanitizer="$SANITIZE"

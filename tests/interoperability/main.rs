@@ -104,10 +104,10 @@ impl BondedPile {
             format!("base = {base}\n{changes}\n{SOLVER}[output]\npoints = \"phases\"\n"),
         )
         .unwrap();
-        let cases = host::case::Case::load(&file).unwrap();
-        let is_m200 = |case: &&host::case::Case| case.variant.as_deref() == Some("m200");
+        let cases = input::Case::load(&file).unwrap();
+        let is_m200 = |case: &&input::Case| case.variant.as_deref() == Some("m200");
         let case = cases.iter().find(is_m200).unwrap();
-        host::run::run(case, folder.path(), &mut tests::case::Silent::default()).unwrap();
+        runs::run::run(case, folder.path(), &mut tests::case::Silent::default()).unwrap();
         let history = tests::case::table(&folder.path().join("history.csv"));
         let points = tests::case::table(&folder.path().join("points.csv"));
         let columns = ["x", "y", "stress_11", "stress_22", "stress_33", "stress_12"];

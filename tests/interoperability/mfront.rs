@@ -2,10 +2,13 @@
 //! machine has, and those inside OpenGeoSys.
 
 use crate::{BondedPile, OPENGEOSYS, assert_close, installed, is_there, library};
-use host::error::Source;
-use host::plugin::adapter::{Adapter, Foreign};
-use host::plugin::{Bounds, Library};
-use host::point::{Driver, PointReport};
+use text::Source;
+use law::adapter::Adapter;
+use law::adapter::Foreign;
+use law::Bounds;
+use law::Library;
+use input::Driver;
+use runs::point::PointReport;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

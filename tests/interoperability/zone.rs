@@ -3,8 +3,8 @@
 
 use crate::mfront::{driver, rows};
 use crate::{assert_close, beside, last_line};
-use host::error::Source;
-use host::point::Driver;
+use text::Source;
+use input::Driver;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::Command;
@@ -172,8 +172,8 @@ opening = {{ group = "zone", quantity = "jump_n" }}
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("case.toml");
     std::fs::write(&file, case).unwrap();
-    let case = &host::case::Case::load(&file).unwrap()[0];
-    host::run::run(case, folder.path(), &mut tests::case::Silent::default()).unwrap();
+    let case = &input::Case::load(&file).unwrap()[0];
+    runs::run::run(case, folder.path(), &mut tests::case::Silent::default()).unwrap();
     let rows = tests::case::table(&folder.path().join("history.csv"));
     let end = rows.last().unwrap();
     let number = |name: &str| end[name].parse::<f64>().unwrap();

@@ -1,7 +1,9 @@
 //! Running a driver given as a text, and reading its rows by column.
 
-use host::error::{Error, Source};
-use host::point::{Driver, PointReport};
+use input::Error;
+use text::Source;
+use input::Driver;
+use runs::point::PointReport;
 use std::path::Path;
 
 /// What a driver gave: rows as far as it came, and how it ended.

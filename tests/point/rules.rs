@@ -8,7 +8,7 @@
 use crate::driver::{attempt, csv, follow};
 use crate::mepi::PARAMETERS;
 use approx::assert_relative_eq;
-use host::point::run_file;
+use runs::point::run_file;
 use std::fs;
 use std::path::PathBuf;
 

@@ -2,7 +2,7 @@
 //! pushed back. Reactions balance the loads, what is prescribed is met, nothing runs away in silence.
 
 use crate::seeds::{End, hold};
-use host::error::Error;
+use input::{Error, Kind};
 use proptest::prelude::*;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -296,7 +296,7 @@ impl Model {
     fn check(&self, result: &Result<Silent, Error>, folder: &Path) -> Result<End, String> {
         let end = match result {
             Ok(_) => End::Done,
-            Err(error @ Error::NoEquilibrium { .. })
+            Err(error) if error.kind() == Kind::NoEquilibrium
                 if error.to_string().contains("no equilibrium") =>
             {
                 End::Stopped

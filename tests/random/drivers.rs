@@ -1,8 +1,8 @@
 //! Drivers: controls are met in every row, or the row is not there.
 
 use crate::seeds::{End, hold};
-use host::error::Source;
-use host::point::Driver;
+use text::Source;
+use input::Driver;
 use proptest::prelude::*;
 use std::fmt::Write as _;
 

@@ -1,8 +1,8 @@
 //! Folders in which something is missing or broken: a note in the page or an error, no panic.
 
 use crate::folders::{folders, page_of};
-use host::error::Error;
-use host::report::write;
+use input::Error;
+use results::report::write;
 use std::path::Path;
 use tempfile::TempDir;
 

@@ -1,7 +1,7 @@
 //! A small case with everything a report shows, run once for all tests.
 
-use host::error::Error;
-use host::report;
+use input::{Error, Kind};
+use results::report;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use tempfile::TempDir;
@@ -147,7 +147,7 @@ pub(crate) fn folders() -> &'static Folders {
         )]);
         let outcome = reported(&overloaded, &folders.overloaded);
         assert!(
-            matches!(outcome, Err(Error::NoEquilibrium { .. })),
+            outcome.is_err_and(|error| error.kind() == Kind::NoEquilibrium),
             "{outcome:?}"
         );
         let all = [&folders.layer, &folders.joint, &folders.overloaded].map(Clone::clone);

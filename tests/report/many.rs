@@ -3,7 +3,7 @@
 
 use crate::browser::selftest;
 use crate::folders::{folders, page_of};
-use host::report::write;
+use results::report::write;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

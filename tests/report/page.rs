@@ -1,8 +1,9 @@
 //! What stands in the page.
 
 use crate::folders::{CASE, edited, folders, page_of};
-use host::error::Error;
-use host::report::{default_path, write};
+use input::Error;
+use results::report::default_path;
+use results::report::write;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tests::case::run_text;

@@ -1,9 +1,13 @@
 //! Running a case and reading its results.
 
-use host::case::{Case, CaseFile};
-use host::error::{Error, Place, Source};
-use host::input::parse;
-use host::run::{Observer, run};
+use input::Case;
+use input::case::CaseFile;
+use input::Error;
+use mechanics::Place;
+use text::Source;
+use text::parse;
+use runs::run::Observer;
+use runs::run::run;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -9,7 +9,8 @@
 //! Costs differ from run to run and are never compared.
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
-use host::trade_off::{Options, run};
+use runs::trade_off::Options;
+use runs::trade_off::run;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -46,7 +47,7 @@ fn study(input: &Path, interface_stiffness: bool) -> (TempDir, String) {
         fine: true,
         most_increments: 1000,
         interface_stiffness,
-        stop: host::stop::Stop::never(),
+        stop: law::Stop::never(),
     };
     let mut said = String::new();
     run(input, &options, &mut |text| said += text, &mut |_| ()).unwrap();

@@ -188,7 +188,7 @@ pub(crate) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
 ///
 /// # Errors
 /// [`text::Error::Input`] at the place that does not fit.
-pub(crate) fn sidecar(source: &Source) -> Result<LawDescription, Error> {
+pub fn sidecar(source: &Source) -> Result<LawDescription, Error> {
     Ok(sidecar::Sidecar::of(source)?.law)
 }
 
@@ -196,7 +196,7 @@ pub(crate) fn sidecar(source: &Source) -> Result<LawDescription, Error> {
 ///
 /// # Errors
 /// It has none that can be read.
-pub(crate) fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
+pub fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
     mfront::describe(bytes)
 }
 

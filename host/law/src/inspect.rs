@@ -94,7 +94,7 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
 }
 
 /// As [`inspect`], with the bytes of the file.
-pub(crate) fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<Inspection, Error> {
+pub fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<Inspection, Error> {
     let no_library =
         |why: &dyn fmt::Display| Error::library(format!("{} is no library: {why}", path.display()));
     let file = File::parse(bytes).map_err(|why| no_library(&why))?;
@@ -271,7 +271,7 @@ fn architecture(architecture: Architecture) -> String {
 }
 
 /// Laws in the manifest section; `None` without one.
-pub(crate) fn manifest<'data>(
+pub fn manifest<'data>(
     file: &File<'data, impl ReadRef<'data>>,
 ) -> Option<Vec<ManifestEntry>> {
     let section = file

@@ -1,8 +1,8 @@
 //! Case files: keys, bases, variants; meshes; laws, loads, probes and figures of small ones.
 
 use crate::{shown, source};
-use host::fuzzing;
-use host::run::check;
+use crate::ways_in;
+use runs::run::check;
 
 /// Larger meshes are read alone: building one that may be asked for takes a second.
 const MOST_ELEMENTS: usize = 400;

@@ -7,7 +7,7 @@
 
 use abi::raw::{Law, Parameter, Plugin, Variable};
 use abi::version::{FORMULATION_SIZE_1_0, LAW_SIZE_1_0, PARAMETER_SIZE_1_0, VARIABLE_SIZE_1_0};
-use host::fuzzing;
+use crate::ways_in;
 use std::ffi::c_void;
 use std::mem::size_of;
 use std::ptr::with_exposed_provenance;

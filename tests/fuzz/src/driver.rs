@@ -1,7 +1,7 @@
 //! Driver files, and short paths of them with the laws of this repository.
 
 use crate::{shown, source};
-use host::fuzzing;
+use crate::ways_in;
 
 /// Longer paths are read alone.
 const MOST_INCREMENTS: usize = 20;

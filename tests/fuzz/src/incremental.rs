@@ -1,8 +1,8 @@
 //! The three files of an IncrementalDriver, with a line of three dashes between them.
 
 use crate::shown;
-use host::error::Source;
-use host::fuzzing;
+use text::Source;
+use crate::ways_in;
 
 /// Parameters and internal variables that the files are read for.
 const N: usize = 2;

@@ -9,9 +9,11 @@ mod description;
 mod driver;
 mod incremental;
 mod library;
+mod ways_in;
 
-use host::error::{Error, Source};
-use host::fuzzing;
+use input::{Error, Kind};
+use text::Source;
+use crate::ways_in;
 use std::sync::OnceLock;
 
 /// What a target does with its bytes.
@@ -60,7 +62,7 @@ fn shown<T>(outcome: Result<T, Error>) -> Option<T> {
         Ok(value) => Some(value),
         Err(error) => {
             assert!(
-                !matches!(error, Error::Internal(_)),
+                error.kind() != Kind::Internal,
                 "an internal error: {error}"
             );
             let message = format!("{:?}", miette::Report::new(error));
@@ -102,7 +104,7 @@ fn capsule(data: &[u8]) {
     );
     shown(fuzzing::replay(
         &capsule,
-        &host::plugin::SearchPath::new(&[]),
+        &law::SearchPath::new(&[]),
     ));
 }
 

@@ -2,12 +2,12 @@
 //! them runs.
 
 use crate::shown;
-use host::fuzzing;
+use crate::ways_in;
 
 pub(super) fn read(data: &[u8]) {
     if let Some(inspection) = shown(fuzzing::inspection(data)) {
         assert!(!inspection.to_string().is_empty(), "nothing to say");
-        shown(host::inspect::json(&inspection));
+        shown(law::inspect::json(&inspection));
     }
     fuzzing::manifest(data);
     // Why it has none is a text.

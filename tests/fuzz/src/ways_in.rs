@@ -1,0 +1,114 @@
+//! What reads files and libraries of others, by their contents: the ways in of `tests/fuzz`.
+
+use input::case::PartInput;
+use input::{Case, Driver, Error, grid};
+use law::capsule::Capsule;
+use law::inspect::{Inspection, inspect_bytes};
+use law::{LawDescription, Pins, SearchPath, adapter};
+use mechanics::Mesh;
+use std::path::Path;
+use text::Source;
+use workshop::replay::repeat;
+
+pub use law::describe_memory;
+
+/// A case file with all its variants.
+///
+/// # Errors
+/// Those of [`Case::load`].
+pub fn case(source: Source) -> Result<Vec<Case>, Error> {
+    Case::of(source)
+}
+
+/// Number of elements that a case asks for.
+pub fn elements(case: &Case) -> usize {
+    let of = |parts: &[toml::Spanned<PartInput>]| {
+        let parts = parts.iter().map(|part| part.get_ref().n);
+        parts.fold(0, usize::saturating_add)
+    };
+    let mesh = &case.file.mesh;
+    of(mesh.columns.get_ref()).saturating_mul(of(mesh.rows.get_ref()))
+}
+
+/// The mesh of a case.
+///
+/// # Errors
+/// Those of [`grid::build`].
+pub fn mesh(case: &Case) -> Result<Mesh, Error> {
+    grid::build(&case.source, &case.file)
+}
+
+/// A driver file with all its variants.
+///
+/// # Errors
+/// Those of [`Driver::read`].
+pub fn drivers(source: Source) -> Result<Vec<Driver>, Error> {
+    Driver::variants(source, false)
+}
+
+/// Input of the IncrementalDriver: number of increments of its test; material and initial state
+/// of as many parameters and variables.
+///
+/// # Errors
+/// Those of [`Driver::read_incremental`].
+pub fn incremental(files: [&Source; 3], n: usize) -> Result<usize, Error> {
+    Driver::parse_incremental(files, n)
+}
+
+/// A lock file: the number of laws in it.
+///
+/// # Errors
+/// As when the case beside it is read.
+pub fn lock(source: &Source) -> Result<usize, Error> {
+    Ok(Pins::of_lock(source)?)
+}
+
+/// A capsule.
+///
+/// # Errors
+/// Those of [`Capsule::read`].
+pub fn capsule(source: Source) -> Result<Capsule, Error> {
+    Ok(Capsule::of_source(source)?)
+}
+
+/// Repeats the call of a capsule with the law of this name, wherever the capsule's library is.
+/// Returns what is said.
+///
+/// # Errors
+/// As when a capsule is replayed.
+pub fn replay(capsule: &Capsule, search: &SearchPath) -> Result<String, Error> {
+    let law = search.law(capsule.law_id())?;
+    let mut said = String::new();
+    repeat(capsule, &law, &mut |line| said.push_str(line)).map(|()| said)
+}
+
+/// The sidecar of a UMAT.
+///
+/// # Errors
+/// At the place that does not fit.
+pub fn sidecar(source: &Source) -> Result<LawDescription, Error> {
+    Ok(adapter::sidecar(source)?)
+}
+
+/// What `pilum inspect` says of a library with these bytes.
+///
+/// # Errors
+/// It is no library.
+pub fn inspection(bytes: &[u8]) -> Result<Inspection, Error> {
+    Ok(inspect_bytes(Path::new("library"), bytes)?)
+}
+
+/// Laws in the manifest of a library, where the search path looks for them.
+pub fn manifest(bytes: &[u8]) -> Option<usize> {
+    let cache = object::ReadCache::new(std::io::Cursor::new(bytes));
+    let file = object::File::parse(&cache).ok()?;
+    law::inspect::manifest(&file).map(|laws| laws.len())
+}
+
+/// The behaviours of a library with MFront's generic interface.
+///
+/// # Errors
+/// It has none.
+pub fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
+    adapter::behaviours(bytes)
+}
