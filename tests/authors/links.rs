@@ -30,16 +30,21 @@ fn prose(page: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
+/// The anchor of a heading, if no other is called like it.
+pub(crate) fn anchor(heading: &str) -> String {
+    let heading = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = |c: &char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
+    let anchor: String = heading.chars().filter(kept).collect();
+    anchor.replace(' ', "-")
+}
+
 /// Anchors of a page's headings, as hosts of repositories make them.
 fn anchors(page: &str) -> Vec<String> {
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     prose(page)
         .filter(|(_, line)| line.starts_with('#'))
         .map(|(_, line)| {
-            let heading = line.trim_start_matches('#').trim().to_lowercase();
-            let kept = |c: &char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
-            let anchor: String = heading.chars().filter(kept).collect();
-            let anchor = anchor.replace(' ', "-");
+            let anchor = anchor(line);
             let before = seen.entry(anchor.clone()).or_default();
             *before += 1;
             match *before {

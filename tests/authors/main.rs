@@ -13,6 +13,7 @@ mod names;
 mod on_request;
 mod pages;
 mod program;
+mod reference;
 mod schema;
 mod supply_chain;
 mod validator;
