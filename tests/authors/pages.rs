@@ -294,6 +294,12 @@ fn how_to_pages_are_followed() {
     }
 }
 
+/// Columns of tables are those that a run writes.
+#[test]
+fn files_of_results_are_those_described() {
+    assert!(follow("reference/results.md") >= 8);
+}
+
 /// A page says at its top what it is for and for whom.
 #[test]
 fn every_page_says_what_it_is_for() {
