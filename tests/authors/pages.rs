@@ -10,14 +10,16 @@
 //!   shown. A command ends with exit code 0, or with the one that `$ echo $?` shows next.
 //! - A `text` block is neither run nor compared.
 //!
-//! A page whose first lines contain `<!-- needs: gfortran -->` is passed over where that program is missing.
+//! Remarks at the top of a page: `<!-- needs: gfortran -->`, it is passed over where that program is
+//! missing; `<!-- files of: tutorial.md -->`, the files of that page are there from the start.
 
 use crate::compilers::repository;
 use crate::program::{pilum, shell};
 use crate::validator::Validator;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 
@@ -242,17 +244,17 @@ fn validator(kind: &str) -> Validator {
     Validator::new(serde_json::from_str(&outcome.stdout).unwrap())
 }
 
-/// What a page says that it needs.
-fn needs(page: &str) -> impl Iterator<Item = &str> {
-    page.lines()
-        .take(3)
-        .filter_map(|line| line.strip_prefix("<!-- needs: ")?.strip_suffix(" -->"))
+/// What the remarks at the top of a page name.
+fn remarks<'a>(page: &'a str, kind: &str) -> impl Iterator<Item = &'a str> {
+    let prefix = format!("<!-- {kind}: ");
+    let lines = page.lines().take_while(|line| line.starts_with("<!--"));
+    lines.filter_map(move |line| line.strip_prefix(&prefix)?.strip_suffix(" -->"))
 }
 
 /// Follows a page of `host/docs`; how many commands were typed.
 fn follow(name: &str) -> usize {
     let text = fs::read_to_string(repository("host/docs").join(name)).unwrap();
-    for program in needs(&text) {
+    for program in remarks(&text, "needs") {
         if tests::needs::output(Command::new(program).arg("--version")).is_none() {
             return 0;
         }
@@ -264,6 +266,12 @@ fn follow(name: &str) -> usize {
         point: validator("point"),
         commands: 0,
     };
+    for other in remarks(&text, "files of") {
+        let other = fs::read_to_string(repository("host/docs").join(other)).unwrap();
+        for block in blocks(&other).iter().filter(|block| block.language == "toml") {
+            session.follow(block);
+        }
+    }
     for block in blocks(&text) {
         session.follow(&block);
     }
@@ -281,17 +289,38 @@ fn the_tutorial_of_a_law_is_followed() {
     assert!(follow("tutorial-law.md") >= 6);
 }
 
-#[test]
-fn how_to_pages_are_followed() {
-    let folder = repository("host/docs/how-to");
-    let entries = fs::read_dir(folder).unwrap();
-    let mut pages: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
-    pages.sort();
-    assert!(pages.len() >= 10, "{pages:?}");
-    for page in pages {
-        let name = page.file_name().unwrap().to_str().unwrap();
-        follow(&format!("how-to/{name}"));
-    }
+/// One test for each how-to page, so that a failure names it.
+macro_rules! how_to {
+    ($($test:ident: $page:literal,)*) => {
+        $(#[test]
+        fn $test() {
+            follow(concat!("how-to/", $page, ".md"));
+        })*
+
+        #[test]
+        fn every_how_to_page_is_followed() {
+            let entries = fs::read_dir(repository("host/docs/how-to")).unwrap();
+            let pages = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+            let pages: BTreeSet<String> = pages.collect();
+            let followed: BTreeSet<String> = [$(concat!($page, ".md").to_owned()),*].into();
+            assert_eq!(pages, followed);
+        }
+    };
+}
+
+how_to! {
+    how_to_swap_a_law: "swap-a-law",
+    how_to_make_a_mesh: "mesh",
+    how_to_resume: "resume",
+    how_to_compare_variants: "compare-variants",
+    how_to_use_a_umat: "use-a-umat",
+    how_to_use_an_mfront_behaviour: "use-an-mfront-behaviour",
+    how_to_choose_an_integration: "which-integration",
+    how_to_converge: "why-does-it-not-converge",
+    how_to_read_results: "read-results",
+    how_to_choose_an_accuracy: "choose-accuracy",
+    how_to_get_forces: "forces",
+    how_to_debug_a_law: "debug-a-law",
 }
 
 /// Columns of tables are those that a run writes.
