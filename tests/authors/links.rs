@@ -83,7 +83,9 @@ fn every_link_leads_somewhere() {
                 let is_there = match (to.exists(), anchor) {
                     (exists, "") => exists,
                     (exists, anchor) => {
-                        exists && anchors(&fs::read_to_string(&to).unwrap()).contains(&anchor.to_owned())
+                        exists
+                            && anchors(&fs::read_to_string(&to).unwrap())
+                                .contains(&anchor.to_owned())
                     }
                 };
                 if !is_there {
@@ -99,6 +101,12 @@ fn every_link_leads_somewhere() {
 #[test]
 fn anchors_are_those_of_the_host() {
     let page = "# The paper's figures\n```\n# none\n```\n## A law in C, C++ or Fortran\n## A\n## A\n## `x_y`: E–F\n";
-    let wanted = ["the-papers-figures", "a-law-in-c-c-or-fortran", "a", "a-1", "x_y-ef"];
+    let wanted = [
+        "the-papers-figures",
+        "a-law-in-c-c-or-fortran",
+        "a",
+        "a-1",
+        "x_y-ef",
+    ];
     assert_eq!(anchors(page), wanted);
 }

@@ -107,7 +107,9 @@ fn fits(shown: &str, printed: &str) -> bool {
         let within = (1.001 * unit).max(if unit > 0.0 { 1e-9 * value.abs() } else { 0.0 });
         return (value - other).abs() <= within && fits(&shown[n..], &printed[m..]);
     }
-    printed.strip_prefix(first).is_some_and(|rest| fits(&shown[first.len_utf8()..], rest))
+    printed
+        .strip_prefix(first)
+        .is_some_and(|rest| fits(&shown[first.len_utf8()..], rest))
 }
 
 /// Whether lines are what a page shows.
@@ -179,16 +181,27 @@ impl Session<'_> {
         let table: toml::Table = toml::from_str(text).unwrap_or_else(|why| panic!("{at}: {why}"));
         let mut value = serde_json::to_value(table).unwrap();
         let table = value.as_object_mut().unwrap();
-        table.entry("base").or_insert_with(|| Value::from("other.toml"));
+        table
+            .entry("base")
+            .or_insert_with(|| Value::from("other.toml"));
         let (cases, points) = (self.case.errors(&value), self.point.errors(&value));
         let follows = cases.is_empty() || points.is_empty();
-        assert!(follows, "{at}: as a case {cases:#?}, as a driver {points:#?}");
+        assert!(
+            follows,
+            "{at}: as a case {cases:#?}, as a driver {points:#?}"
+        );
     }
 
     /// Replaces the lines of a file that a `diff` block shows.
     fn change(&self, at: &str, text: &str) {
-        let name = text.lines().next().and_then(|line| line.strip_prefix("--- "));
-        let path = self.folder.path().join(name.unwrap_or_else(|| panic!("{at}: of which file?")));
+        let name = text
+            .lines()
+            .next()
+            .and_then(|line| line.strip_prefix("--- "));
+        let path = self
+            .folder
+            .path()
+            .join(name.unwrap_or_else(|| panic!("{at}: of which file?")));
         let (mut old, mut new) = (String::new(), String::new());
         for line in text.lines().skip(1) {
             let (mark, line) = line.split_at(line.len().min(1));
@@ -200,7 +213,11 @@ impl Session<'_> {
             }
         }
         let whole = fs::read_to_string(&path).unwrap();
-        assert_eq!(whole.matches(&old).count(), 1, "{at}: these lines, once, in\n{whole}");
+        assert_eq!(
+            whole.matches(&old).count(),
+            1,
+            "{at}: these lines, once, in\n{whole}"
+        );
         fs::write(path, whole.replacen(&old, &new, 1)).unwrap();
     }
 
@@ -268,7 +285,10 @@ fn follow(name: &str) -> usize {
     };
     for other in remarks(&text, "files of") {
         let other = fs::read_to_string(repository("host/docs").join(other)).unwrap();
-        for block in blocks(&other).iter().filter(|block| block.language == "toml") {
+        for block in blocks(&other)
+            .iter()
+            .filter(|block| block.language == "toml")
+        {
             session.follow(block);
         }
     }
@@ -338,8 +358,15 @@ fn every_page_says_what_it_is_for() {
         let text = fs::read_to_string(&path).unwrap();
         let first = text.lines().find(|line| !line.starts_with("<!--")).unwrap();
         assert!(first.starts_with("# "), "{}: {first}", path.display());
-        let says = text.lines().take(8).any(|line| line.starts_with("*For ") && line.ends_with('*'));
-        assert!(says, "{}: a line `*For … .*` below its title", path.display());
+        let says = text
+            .lines()
+            .take(8)
+            .any(|line| line.starts_with("*For ") && line.ends_with('*'));
+        assert!(
+            says,
+            "{}: a line `*For … .*` below its title",
+            path.display()
+        );
     }
 }
 
@@ -391,7 +418,9 @@ fn mistakes_of_a_page_are_found() {
     };
     follow("```console\n$ printf 'a 1.25\\nb\\n'; false\na 1.3\n…\n$ echo $?\n1\n```\n");
     follow("```toml\n[solver]\nmethod = \"newton\"\n```\n");
-    follow("```toml\n# a.toml\nx = 1\n```\n```diff\n--- a.toml\n-x = 1\n+x = 2\n```\n```console\n$ tail -n 1 a.toml\nx = 2\n```\n");
+    follow(
+        "```toml\n# a.toml\nx = 1\n```\n```diff\n--- a.toml\n-x = 1\n+x = 2\n```\n```console\n$ tail -n 1 a.toml\nx = 2\n```\n",
+    );
     for text in [
         "```console\n$ echo 1.25\n1.35\n```\n",
         "```console\n$ echo a\nb\n```\n",
@@ -415,6 +444,9 @@ fn the_map_names_every_page() {
     for page in pages {
         let page: &Path = page.strip_prefix(&host).unwrap();
         let name = page.to_str().unwrap().to_owned();
-        assert!(map.contains(&format!("({name})")), "host/README.md does not name {name}");
+        assert!(
+            map.contains(&format!("({name})")),
+            "host/README.md does not name {name}"
+        );
     }
 }

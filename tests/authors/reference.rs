@@ -58,7 +58,10 @@ impl Schema {
 
     /// Definitions that have keys, each of which wants a table.
     fn tables(&self) -> impl Iterator<Item = &String> {
-        let with_keys = self.definitions.iter().filter(|(_, value)| !value["properties"].is_null());
+        let with_keys = self
+            .definitions
+            .iter()
+            .filter(|(_, value)| !value["properties"].is_null());
         with_keys.map(|(name, _)| name)
     }
 
@@ -83,7 +86,10 @@ impl Schema {
             }
             let definition = &self.definitions[name];
             if let Some(labels) = definition["enum"].as_array() {
-                let labels: Vec<_> = labels.iter().map(|l| format!("`\"{}\"`", l.as_str().unwrap())).collect();
+                let labels: Vec<_> = labels
+                    .iter()
+                    .map(|l| format!("`\"{}\"`", l.as_str().unwrap()))
+                    .collect();
                 return labels.join(", ");
             }
             if let Some(kinds) = definition["anyOf"].as_array() {
@@ -92,7 +98,11 @@ impl Schema {
                 kinds.retain(|kind| kind != "whole number");
                 return kinds.join(" or ");
             }
-            let labels: Vec<_> = self.labels(value).into_iter().map(|(l, _)| format!("`\"{l}\"`")).collect();
+            let labels: Vec<_> = self
+                .labels(value)
+                .into_iter()
+                .map(|(l, _)| format!("`\"{l}\"`"))
+                .collect();
             assert!(!labels.is_empty(), "{name} is of no known kind");
             return labels.join(", ");
         }
@@ -120,7 +130,10 @@ impl Schema {
                     _ => format!("array: {of}"),
                 }
             }
-            Some("object") => format!("by name: {}", self.kind(&value["additionalProperties"], places)),
+            Some("object") => format!(
+                "by name: {}",
+                self.kind(&value["additionalProperties"], places)
+            ),
             other => panic!("{other:?} in {value}"),
         }
     }
@@ -140,8 +153,11 @@ impl Schema {
                 "y" if keys.contains_key("z") => Some("z"),
                 _ => None,
             };
-            let other = other.map(|other| format!(", `{other}`")).unwrap_or_default();
-            let is_required = required.is_some_and(|names| names.contains(&Value::from(key.as_str())));
+            let other = other
+                .map(|other| format!(", `{other}`"))
+                .unwrap_or_default();
+            let is_required =
+                required.is_some_and(|names| names.contains(&Value::from(key.as_str())));
             let default = match value.get("default") {
                 _ if is_required => "**required**".to_owned(),
                 None | Some(Value::Null | Value::Object(_) | Value::Array(_)) => String::new(),
@@ -149,7 +165,12 @@ impl Schema {
                 Some(value) => format!("`{value}`"),
             };
             let kind = self.kind(value, places);
-            writeln!(table, "| `{key}`{other} | {kind} | {default} | {} |", text(value)).unwrap();
+            writeln!(
+                table,
+                "| `{key}`{other} | {kind} | {default} | {} |",
+                text(value)
+            )
+            .unwrap();
             for (label, meaning) in self.labels(value) {
                 writeln!(choices, "| `{key} = \"{label}\"` | {meaning} |").unwrap();
             }
@@ -162,12 +183,16 @@ impl Schema {
 }
 
 fn same(a: Option<&Value>, b: Option<&Value>) -> bool {
-    a.zip(b).is_some_and(|(a, b)| a["description"] == b["description"])
+    a.zip(b)
+        .is_some_and(|(a, b)| a["description"] == b["description"])
 }
 
 /// The description of a key or a choice.
 fn text(value: &Value) -> String {
-    value["description"].as_str().unwrap_or_default().replace('\n', " ")
+    value["description"]
+        .as_str()
+        .unwrap_or_default()
+        .replace('\n', " ")
 }
 
 // --- pages --------------------------------------------------------------------------------------
@@ -250,7 +275,10 @@ fn keys_are_those_of_the_schemas() {
         for table in schema.tables() {
             assert!(places.contains_key(table), "{name} has no keys of {table}");
         }
-        bless(&page(name), &filled(&text, "keys", |of| schema.table(of, &places)));
+        bless(
+            &page(name),
+            &filled(&text, "keys", |of| schema.table(of, &places)),
+        );
     }
 }
 
@@ -273,7 +301,10 @@ fn keys(value: &toml::Value, found: &mut BTreeSet<String>) {
 fn every_key_has_an_example() {
     for (schema, name) in schemas() {
         let text = fs::read_to_string(page(name)).unwrap();
-        let examples: Vec<Block> = blocks(&text).into_iter().filter(|b| b.language == "toml").collect();
+        let examples: Vec<Block> = blocks(&text)
+            .into_iter()
+            .filter(|b| b.language == "toml")
+            .collect();
         let marks = marks(&text, "keys");
         for (number, (line, table)) in marks.iter().enumerate() {
             let end = marks.get(number + 1).map_or(usize::MAX, |(line, _)| *line);
@@ -289,7 +320,10 @@ fn every_key_has_an_example() {
                 // Another name for x or y.
                 .filter(|key| !(["r", "z"].contains(&key.as_str()) && known.contains_key("x")))
                 .collect();
-            assert!(missing.is_empty(), "{name}: no example of {missing:?} of {table}");
+            assert!(
+                missing.is_empty(),
+                "{name}: no example of {missing:?} of {table}"
+            );
         }
     }
 }
@@ -297,12 +331,19 @@ fn every_key_has_an_example() {
 /// Each example is a file of its own, based on `example.toml` of its page if it has no name.
 #[test]
 fn every_example_runs() {
-    let runs = [(&["run"][..], "case.md"), (&["point", "--csv", "out.csv"], "driver.md")];
+    let runs = [
+        (&["run"][..], "case.md"),
+        (&["point", "--csv", "out.csv"], "driver.md"),
+    ];
     for (command, name) in runs {
         let place = TempDir::new().unwrap();
         let text = fs::read_to_string(page(name)).unwrap();
         let mut ran = 0;
-        for (number, block) in blocks(&text).iter().filter(|b| b.language == "toml").enumerate() {
+        for (number, block) in blocks(&text)
+            .iter()
+            .filter(|b| b.language == "toml")
+            .enumerate()
+        {
             // One that has a name is a whole file.
             let name_of = block.text.lines().next().unwrap().strip_prefix("# ");
             let (file, based) = match name_of.filter(|name| name.ends_with(".toml")) {
@@ -332,7 +373,13 @@ fn every_example_runs() {
 /// The commands that `pilum help` lists.
 fn commands() -> Vec<String> {
     let help = printed(&["--help"]);
-    let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let list = help
+        .split("Commands:\n")
+        .nth(1)
+        .unwrap()
+        .split("\n\n")
+        .next()
+        .unwrap();
     list.lines()
         .filter_map(|line| line.strip_prefix("  "))
         .filter(|line| !line.starts_with(' '))
@@ -346,7 +393,10 @@ fn commands() -> Vec<String> {
 fn commands_are_those_of_the_program() {
     let path = page("commands.md");
     let text = fs::read_to_string(&path).unwrap();
-    let listed: Vec<_> = marks(&text, "help").into_iter().map(|(_, name)| name).collect();
+    let listed: Vec<_> = marks(&text, "help")
+        .into_iter()
+        .map(|(_, name)| name)
+        .collect();
     let mut wanted = vec!["pilum".to_owned()];
     wanted.extend(commands());
     assert_eq!(listed, wanted, "commands of {}", path.display());
