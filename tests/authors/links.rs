@@ -14,7 +14,7 @@ pub(crate) fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
             if name != "target" && name != "results" && !name.starts_with('.') {
                 pages(&path, found);
             }
-        } else if name.ends_with(".md") {
+        } else if path.extension().is_some_and(|suffix| suffix == "md") {
             found.push(path);
         }
     }

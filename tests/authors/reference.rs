@@ -345,9 +345,12 @@ fn every_example_runs() {
             .enumerate()
         {
             // One that has a name is a whole file.
-            let name_of = block.text.lines().next().unwrap().strip_prefix("# ");
-            let (file, based) = match name_of.filter(|name| name.ends_with(".toml")) {
-                Some(name) => (name.to_owned(), ""),
+            let first = block.text.lines().next().unwrap();
+            let name_of = first
+                .strip_prefix("# ")
+                .and_then(|name| name.strip_suffix(".toml"));
+            let (file, based) = match name_of {
+                Some(name) => (format!("{name}.toml"), ""),
                 None if block.text.contains("base = ") => (format!("{number}.toml"), ""),
                 None => (format!("{number}.toml"), "base = \"example.toml\"\n"),
             };
