@@ -356,17 +356,14 @@ fn every_page_says_what_it_is_for() {
     crate::links::pages(&repository("host/docs"), &mut pages);
     for path in pages {
         let text = fs::read_to_string(&path).unwrap();
-        let first = text.lines().find(|line| !line.starts_with("<!--")).unwrap();
-        assert!(first.starts_with("# "), "{}: {first}", path.display());
-        let says = text
-            .lines()
-            .take(8)
-            .any(|line| line.starts_with("*For ") && line.ends_with('*'));
-        assert!(
-            says,
-            "{}: a line `*For … .*` below its title",
-            path.display()
-        );
+        let lines = text.lines().filter(|line| !line.starts_with("<!--"));
+        let top = lines.take(10).collect::<Vec<_>>().join("\n");
+        let mut paragraphs = top.split("\n\n");
+        let title = paragraphs.next().unwrap();
+        assert!(title.starts_with("# "), "{}: {title}", path.display());
+        let purpose = paragraphs.next().unwrap();
+        let says = purpose.starts_with("*For ") && purpose.ends_with('*');
+        assert!(says, "{}: no `*For … .*` below its title", path.display());
     }
 }
 
