@@ -143,7 +143,7 @@ impl Schema {
         let definition = &self.definitions[name];
         let keys = definition["properties"].as_object().unwrap();
         let required = definition["required"].as_array();
-        let mut table = "| key | takes | left out | |\n|---|---|---|---|\n".to_owned();
+        let mut table = "| key | takes | if left out | |\n|---|---|---|---|\n".to_owned();
         let mut choices = String::new();
         for (key, value) in keys {
             // In axisymmetry, another name for the same.
