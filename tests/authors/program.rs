@@ -61,6 +61,8 @@ fn prepared(mut command: Command, place: &Path) -> Command {
         .env("PATH", path)
         .env("PILUM_LAW_PATH", deps())
         .env("NO_COLOR", "1")
+        // Help is broken at this width.
+        .env("COLUMNS", "100")
         // A project builds where it says, and without a network.
         .env("CARGO_NET_OFFLINE", "true")
         .env_remove("CARGO_TARGET_DIR")
