@@ -14,6 +14,7 @@ mod on_request;
 mod pages;
 mod program;
 mod reference;
+mod rooms;
 mod schema;
 mod supply_chain;
 mod validator;

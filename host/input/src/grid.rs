@@ -25,7 +25,8 @@ pub fn build(source: &Source, file: &CaseFile) -> Result<Mesh, Error> {
     let input = &file.mesh;
     let (x, y) = grids(source, file)?;
     let groups = element_groups(source, file, &x, &y)?;
-    let mut mesh = quads(&x, &y, &groups);
+    let n_columns = x.len() - 1;
+    let mut mesh = Mesh::grid(&x, &y, |column, row| groups[row * n_columns + column]);
     for (name, line) in &input.lines {
         let found = find_line(&mesh, [&x, &y], line.get_ref()).map_err(|why| {
             let message = format!("line `{}`: {why}", name.get_ref());
@@ -347,46 +348,6 @@ fn grid_line(grid: &[f64], at: f64, tolerance: f64) -> Result<usize, String> {
             grid[nearest]
         ))
     }
-}
-
-/// The quads of a grid. Nodes are numbered row by row, mid-sides included.
-fn quads(x: &[f64], y: &[f64], groups: &[usize]) -> Mesh {
-    let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
-    let with_middles = |grid: &[f64]| -> Vec<f64> {
-        let pairs = grid
-            .windows(2)
-            .flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
-        pairs.chain([grid[grid.len() - 1]]).collect()
-    };
-    let (fine_x, fine_y) = (with_middles(x), with_middles(y));
-    let mut number = vec![usize::MAX; fine_x.len() * fine_y.len()];
-    let mut mesh = Mesh::default();
-    for (j, &y) in fine_y.iter().enumerate() {
-        for (i, &x) in fine_x.iter().enumerate() {
-            if i % 2 == 0 || j % 2 == 0 {
-                number[j * fine_x.len() + i] = mesh.nodes.len();
-                mesh.nodes.push([x, y]);
-            }
-        }
-    }
-    for row in 0..n_rows {
-        for column in 0..n_columns {
-            let at = |i: usize, j: usize| number[(2 * row + j) * fine_x.len() + 2 * column + i];
-            let nodes = [
-                at(0, 0),
-                at(2, 0),
-                at(2, 2),
-                at(0, 2),
-                at(1, 0),
-                at(2, 1),
-                at(1, 2),
-                at(0, 1),
-            ];
-            let group = groups[row * n_columns + column];
-            mesh.solids.push(Solid::quad(nodes, group));
-        }
-    }
-    mesh
 }
 
 /// Edges (or the node) of the mesh on a line.

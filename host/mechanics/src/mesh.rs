@@ -122,6 +122,40 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Quads between the lines of a grid, row by row from the smallest coordinates. `group` gives the
+    /// group of each by its column and row. Both lists rise, m.
+    pub fn grid(x: &[f64], y: &[f64], group: impl Fn(usize, usize) -> usize) -> Self {
+        let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
+        let with_middles = |grid: &[f64]| -> Vec<f64> {
+            let pairs = grid
+                .windows(2)
+                .flat_map(|w| [w[0], f64::midpoint(w[0], w[1])]);
+            pairs.chain([grid[grid.len() - 1]]).collect()
+        };
+        let (fine_x, fine_y) = (with_middles(x), with_middles(y));
+        // Nodes are numbered row by row, mid-sides included.
+        let mut number = vec![usize::MAX; fine_x.len() * fine_y.len()];
+        let mut mesh = Self::default();
+        for (j, &y) in fine_y.iter().enumerate() {
+            for (i, &x) in fine_x.iter().enumerate() {
+                if i % 2 == 0 || j % 2 == 0 {
+                    number[j * fine_x.len() + i] = mesh.nodes.len();
+                    mesh.nodes.push([x, y]);
+                }
+            }
+        }
+        for row in 0..n_rows {
+            for column in 0..n_columns {
+                let at = |i: usize, j: usize| number[(2 * row + j) * fine_x.len() + 2 * column + i];
+                let corners = [at(0, 0), at(2, 0), at(2, 2), at(0, 2)];
+                let [a, b, c, d] = corners;
+                let nodes = [a, b, c, d, at(1, 0), at(2, 1), at(1, 2), at(0, 1)];
+                mesh.solids.push(Solid::quad(nodes, group(column, row)));
+            }
+        }
+        mesh
+    }
+
     /// The longer side of the rectangle that holds the mesh, in m.
     pub fn longer_side(&self) -> f64 {
         let extent = |c: usize| {
