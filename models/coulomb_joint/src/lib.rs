@@ -181,6 +181,6 @@ fn open(state: State) -> InterfaceResponse<State> {
 }
 
 abi::export_laws!(interface CoulombJoint);
-abi::export_foreign!(interface CoulombJoint,
+bridges::export!(interface CoulombJoint,
     properties: [NormalStiffness ShearStiffness Cohesion FrictionAngle DilatancyAngle],
     parameters: [TensileStrength]);

@@ -218,6 +218,6 @@ fn check(p: &Parameters) -> Result<(), Refusal> {
 }
 
 abi::export_laws!(continuum MohrCoulomb);
-abi::export_foreign!(continuum MohrCoulomb,
+bridges::export!(continuum MohrCoulomb,
     properties: [YoungModulus PoissonRatio Cohesion FrictionAngle DilatancyAngle],
     parameters: [TensileStrength Scheme Substeps SchemeTolerance]);

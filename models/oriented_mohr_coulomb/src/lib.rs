@@ -203,6 +203,6 @@ fn check(p: &Parameters) -> Result<(), Refusal> {
 }
 
 abi::export_laws!(continuum OrientedMohrCoulomb);
-abi::export_foreign!(continuum OrientedMohrCoulomb in PlaneStrain Axisymmetrical,
+bridges::export!(continuum OrientedMohrCoulomb in PlaneStrain Axisymmetrical,
     properties: [YoungModulus PoissonRatio Cohesion FrictionAngle DilatancyAngle],
     parameters: [TensileStrength]);
