@@ -70,7 +70,7 @@ const EXPORTS: File = ("exports.map", contract!("include/exports.map"));
 const CONTRACT: File = ("CONTRACT.md", contract!("README.md"));
 
 /// The contract's crate without its optional features, and the one that exports laws to other programs.
-const CRATES: [File; 19] = [
+const CRATES: [File; 21] = [
     (ABI_MANIFEST, template!("rust/abi.toml.txt")),
     ("abi/README.md", contract!("README.md")),
     ("abi/src/lib.rs", contract!("src/lib.rs")),
@@ -81,8 +81,10 @@ const CRATES: [File; 19] = [
         "abi/src/export/adapter.rs",
         contract!("src/export/adapter.rs"),
     ),
+    ("abi/src/friction.rs", contract!("src/friction.rs")),
     ("abi/src/law.rs", contract!("src/law.rs")),
     ("abi/src/raw.rs", contract!("src/raw.rs")),
+    ("abi/src/reclosure.rs", contract!("src/reclosure.rs")),
     ("abi/src/status.rs", contract!("src/status.rs")),
     ("abi/src/substepping.rs", contract!("src/substepping.rs")),
     ("abi/src/version.rs", contract!("src/version.rs")),

@@ -1,5 +1,6 @@
 #![doc = include_str!("../LAW.md")]
 #![forbid(unsafe_code)]
+#![expect(non_snake_case, reason = "the letters of the paper: K_n is k_n σ_ni^N")]
 
 mod bounds;
 mod contact;

@@ -252,21 +252,21 @@ fn stops_at_the_published_peak_and_waits_for_the_new_friction() {
             highest = highest.max(walker.tau());
             let xi = walker.state.plastic_slip;
             if before > 0.0 && xi == before {
-                assert_eq!(xi, p.u_tp);
-                assert!(walker.tau() <= p.mu_p * sigma * (1.0 + 1e-12));
+                assert_eq!(xi, p.softening.u_tp);
+                assert!(walker.tau() <= p.common.mu_p * sigma * (1.0 + 1e-12));
                 waited += 1;
-            } else if xi != p.u_tp {
+            } else if xi != p.softening.u_tp {
                 let expected = truth.mu(xi) * walker.sigma();
                 assert_relative_eq!(walker.tau(), expected, max_relative = 1e-12);
             }
         }
-        let jump = p.mu_p - truth.mu(p.u_tp);
+        let jump = p.common.mu_p - truth.mu(p.softening.u_tp);
         let expected = jump * sigma / truth.k_t() / 2.5e-7;
         assert!(
             (f64::from(waited) - expected).abs() < 2.0,
             "{waited}, {expected}"
         );
-        assert!(highest > 0.999 * p.mu_p * sigma, "{highest}");
+        assert!(highest > 0.999 * p.common.mu_p * sigma, "{highest}");
     }
 }
 
