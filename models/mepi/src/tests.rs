@@ -123,6 +123,31 @@ fn softening(p: mepi_softening::Parameters) -> MepiSoftening {
     MepiSoftening::new(p).unwrap()
 }
 
+/// Parameters over many decades.
+fn random_parameters(random: &mut Random) -> (Common, SofteningParameters) {
+    let mu_p = random.between(0.05, 1.5);
+    let common = Common {
+        k_n: random.decades(1.0, 1e12),
+        k_t: random.decades(1.0, 1e12),
+        n: random.unit(),
+        mu_0: mu_p * (random.unit() - 0.3).max(0.0),
+        mu_p,
+        mu_c0: mu_p * random.unit(),
+        a: random.decades(1e-6, 1e3),
+        c_0: random.decades(1e-6, 1e3),
+        t: random.decades(1e-4, 1e-1),
+        p_0: if random.unit() < 0.5 { 1.0 } else { 100.0 },
+        sigma_ni: f64::NAN,
+    };
+    let softening = SofteningParameters {
+        mu_r: mu_p * random.unit(),
+        a_0: random.decades(1e-2, 1e3),
+        u_tp: random.decades(1e-6, 1e-1),
+        peak: f64::from(u8::from(random.unit() < 0.5)),
+    };
+    (common, softening)
+}
+
 /// One integration point on a path. Compression and contraction positive here, as in the paper.
 #[derive(Clone)]
 struct Walker<'a, L> {

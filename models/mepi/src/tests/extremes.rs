@@ -10,27 +10,10 @@ fn stays_admissible_on_random_walks() {
     let mut random = Random(3);
     let (mut updates, mut cuts) = (0_u32, 0_u32);
     for _ in 0..3000 {
-        let mu_p = random.between(0.05, 1.5);
+        let (common, beyond) = random_parameters(&mut random);
         let p = mepi_softening::Parameters {
-            common: Common {
-                k_n: random.decades(1.0, 1e12),
-                k_t: random.decades(1.0, 1e12),
-                n: random.unit(),
-                mu_0: mu_p * (random.unit() - 0.3).max(0.0),
-                mu_p,
-                mu_c0: mu_p * random.unit(),
-                a: random.decades(1e-6, 1e3),
-                c_0: random.decades(1e-6, 1e3),
-                t: random.decades(1e-4, 1e-1),
-                p_0: 1.0,
-                sigma_ni: f64::NAN,
-            },
-            softening: SofteningParameters {
-                mu_r: mu_p * random.unit(),
-                a_0: random.decades(1e-2, 1e3),
-                u_tp: random.decades(1e-6, 1e-1),
-                peak: f64::from(u8::from(random.unit() < 0.5)),
-            },
+            common,
+            softening: beyond,
             scheme: IMPLICIT,
         };
         let law = softening(p);

@@ -8,26 +8,7 @@ use abi::substepping::Scheme;
 
 /// An interface with parameters over many decades, and `σ_ni`.
 fn random_interface(random: &mut Random) -> (Interface, f64) {
-    let mu_p = random.between(0.05, 1.5);
-    let common = Common {
-        k_n: random.decades(1.0, 1e12),
-        k_t: random.decades(1.0, 1e12),
-        n: random.unit(),
-        mu_0: mu_p * (random.unit() - 0.3).max(0.0),
-        mu_p,
-        mu_c0: mu_p * random.unit(),
-        a: random.decades(1e-6, 1e3),
-        c_0: random.decades(1e-6, 1e3),
-        t: random.decades(1e-4, 1e-1),
-        p_0: if random.unit() < 0.5 { 1.0 } else { 100.0 },
-        sigma_ni: f64::NAN,
-    };
-    let softening = SofteningParameters {
-        mu_r: mu_p * random.unit(),
-        a_0: random.decades(1e-2, 1e3),
-        u_tp: random.decades(1e-6, 1e-1),
-        peak: f64::from(u8::from(random.unit() < 0.5)),
-    };
+    let (common, softening) = random_parameters(random);
     let softening = (random.unit() < 0.6).then_some(softening);
     let sigma_ni = random.decades(1e-6, 1e6);
     (
