@@ -270,16 +270,16 @@ fn derivative(constants: &Constants, end: &Sample, sign: f64) -> Result<Matrix, 
     // Eq. (B).
     let friction = end.mu_slope * end.sigma;
     let coupling = K_n * end.contraction_slope;
-    let h = -end.residual_slope;
-    if h <= 1e-13 * (K_t + friction.abs() + end.mu * coupling.abs()) {
+    let H = -end.residual_slope;
+    if H <= 1e-13 * (K_t + friction.abs() + end.mu * coupling.abs()) {
         return Err(Failure::CutStep {
             factor: 0.5,
             reason: "the response turns back at the end of the increment",
         });
     }
     Ok([
-        [(K_t + friction) / h, -sign * coupling / h],
-        [sign * end.mu * K_t / h, (friction - end.mu * coupling) / h],
+        [(K_t + friction) / H, -sign * coupling / H],
+        [sign * end.mu * K_t / H, (friction - end.mu * coupling) / H],
     ])
 }
 

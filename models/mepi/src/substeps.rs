@@ -2,7 +2,6 @@
 //!
 //! | symbol | here | |
 //! |---|---|---|
-//! | H | `hardness` | |
 //! | `[Δu_n]`, `[Δu_t]` | `contraction`, `slip` of [`Path`] | over the whole increment |
 
 use crate::contact::Matrix;
@@ -39,7 +38,7 @@ struct Rates {
     sign: f64,
     mu: Jet,
     beta: f64,
-    hardness: f64,
+    H: f64,
 }
 
 impl Path<'_> {
@@ -120,8 +119,8 @@ impl Path<'_> {
         let mu = self.friction(at.xi);
         let beta = self.constants.hardening.contraction_rate(mu, at.xi).value;
         // Eq. (C).
-        let hardness = K_t + mu.slope * at.sigma - mu.value * K_n * beta;
-        if hardness <= 0.0 {
+        let H = K_t + mu.slope * at.sigma - mu.value * K_n * beta;
+        if H <= 0.0 {
             return Err(Failure::Domain(
                 "the rate equations have no solution here; `scheme = \"implicit\"` jumps across",
             ));
@@ -132,7 +131,7 @@ impl Path<'_> {
             sign: 1.0_f64.copysign(driving),
             mu,
             beta,
-            hardness,
+            H,
         })
     }
 
@@ -140,7 +139,7 @@ impl Path<'_> {
     fn euler(&self, at: &Sliding, rates: &Rates, fraction: f64) -> Sliding {
         let Constants { K_n, K_t, .. } = *self.constants;
         let towards = rates.sign * K_t * self.slip - rates.mu.value * K_n * self.contraction;
-        let d_lambda = (fraction * towards / rates.hardness).max(0.0);
+        let d_lambda = (fraction * towards / rates.H).max(0.0);
         self.elastic(at, fraction)
             .flowed(self.constants, rates, d_lambda)
     }
@@ -214,18 +213,13 @@ impl Path<'_> {
     /// They have no solution there.
     pub(crate) fn continuum_tangent(&self, end: &Sliding) -> Result<Matrix, Failure> {
         let Constants { K_n, K_t, .. } = *self.constants;
-        let Rates {
-            sign,
-            mu,
-            beta,
-            hardness,
-        } = self.rates(end)?;
+        let Rates { sign, mu, beta, H } = self.rates(end)?;
         let towards = sign * K_t * self.slip - mu.value * K_n * self.contraction;
         if towards <= 0.0 {
             return Ok([[1.0, 0.0], [0.0, 1.0]]);
         }
         // dλ = (sign dτ* − μ dσ*)/H.
-        let [by_sigma, by_tau] = [-mu.value / hardness, sign / hardness];
+        let [by_sigma, by_tau] = [-mu.value / H, sign / H];
         Ok([
             [1.0 - K_n * beta * by_sigma, -K_n * beta * by_tau],
             [-sign * K_t * by_sigma, 1.0 - sign * K_t * by_tau],
@@ -240,7 +234,7 @@ impl Path<'_> {
             if outside <= 1e-14 * at.tau.abs() {
                 break;
             }
-            at = at.flowed(self.constants, &rates, outside / rates.hardness);
+            at = at.flowed(self.constants, &rates, outside / rates.H);
         }
         Ok(at)
     }
