@@ -142,10 +142,11 @@ impl InternalVariables for () {
 }
 
 /// Declares the parameters of a law: a struct of numbers whose doc comments, units and bounds are
-/// also what the host checks and prints.
+/// also what the host checks and prints. A table may include another, whose parameters then stand in
+/// its place.
 ///
 /// ```
-/// use abi::Parameter;
+/// use abi::{Parameter, Parameters as _};
 /// abi::parameters! {
 ///     /// Parameters of a spring.
 ///     pub struct Spring {
@@ -155,28 +156,101 @@ impl InternalVariables for () {
 ///         strength: Parameter::new(c"F", c"kN").at_least(0.0).optional(),
 ///     }
 /// }
+/// abi::parameters! {
+///     /// Parameters of a spring with a dashpot.
+///     pub struct Damped {
+///         ..spring: Spring,
+///         /// Viscosity.
+///         viscosity: Parameter::new(c"c", c"kN s/m").at_least(0.0),
+///     }
+/// }
+/// assert_eq!(Damped::TABLE.len(), 3);
+/// let damped = Damped::read(&[1.0, 2.0, 3.0]);
+/// assert_eq!((damped.spring.strength, damped.viscosity), (2.0, 3.0));
 /// ```
 #[macro_export]
 macro_rules! parameters {
-    ($(#[$meta:meta])* pub struct $name:ident {
-        $( $(#[doc = $doc:literal])+ $field:ident : $spec:expr ),* $(,)?
-    }) => {
+    ($(#[$meta:meta])* pub struct $name:ident { $($items:tt)* }) => {
+        $crate::parameters!(@sorted [$(#[$meta])* $name] [] $($items)*);
+    };
+    (@sorted $struct:tt [$($items:tt)*]
+        ..$inner:ident : $table:ident $(, $($rest:tt)*)?) => {
+        $crate::parameters!(@sorted $struct [$($items)* { table $inner $table }] $($($rest)*)?);
+    };
+    (@sorted $struct:tt [$($items:tt)*]
+        $(#[doc = $doc:literal])+ $field:ident : $spec:expr $(, $($rest:tt)*)?) => {
+        $crate::parameters!(@sorted $struct
+            [$($items)* { number $field [$spec] [$($doc)+] }] $($($rest)*)?);
+    };
+    (@sorted [$(#[$meta:meta])* $name:ident] [$({
+        $( table $inner:ident $table:ident )?
+        $( number $field:ident [$spec:expr] [$($doc:literal)+] )?
+    })*]) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug)]
-        pub struct $name { $( $(#[doc = $doc])+ pub $field: f64, )* }
+        pub struct $name { $(
+            $(
+                #[doc = concat!("[`", stringify!($table), "`].")]
+                pub $inner: $table,
+            )?
+            $( $(#[doc = $doc])+ pub $field: f64, )?
+        )* }
         impl $crate::Parameters for $name {
-            const TABLE: &'static [$crate::Parameter] = &[ $(
-                $spec.called(
-                    $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
-                    $crate::descriptor::c_str(concat!($($doc),+, "\0")),
-                ),
-            )* ];
+            const TABLE: &'static [$crate::Parameter] = {
+                const PARTS: &[&[$crate::Parameter]] = &[ $(
+                    $( <$table as $crate::Parameters>::TABLE, )?
+                    $( &[$spec.called(
+                        $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
+                        $crate::descriptor::c_str(concat!($($doc),+, "\0")),
+                    )], )?
+                )* ];
+                &$crate::descriptor::joined::<{ $crate::descriptor::total(PARTS) }>(PARTS)
+            };
             fn read(values: &[f64]) -> Self {
-                let mut values = values.iter().copied();
-                Self { $( $field: values.next().unwrap_or(f64::NAN), )* }
+                let mut rest = values;
+                Self { $(
+                    $( $inner: $crate::descriptor::read_table(&mut rest), )?
+                    $( $field: rest.split_off_first().copied().unwrap_or(f64::NAN), )?
+                )* }
             }
         }
     };
+}
+
+/// Number of parameters in all of these tables.
+#[doc(hidden)]
+pub const fn total(tables: &[&[Parameter]]) -> usize {
+    let (mut n, mut i) = (0, 0);
+    while i < tables.len() {
+        n += tables[i].len();
+        i += 1;
+    }
+    n
+}
+
+/// The parameters of all of these tables, one after the other.
+#[doc(hidden)]
+pub const fn joined<const N: usize>(tables: &[&[Parameter]]) -> [Parameter; N] {
+    let mut all = [Parameter::new(c"", c""); N];
+    let (mut n, mut i) = (0, 0);
+    while i < tables.len() {
+        let mut j = 0;
+        while j < tables[i].len() {
+            all[n] = tables[i][j];
+            n += 1;
+            j += 1;
+        }
+        i += 1;
+    }
+    all
+}
+
+/// The values of one table among others, which are taken off `rest`.
+#[doc(hidden)]
+pub fn read_table<T: Parameters>(rest: &mut &[f64]) -> T {
+    let (own, after) = rest.split_at(T::TABLE.len().min(rest.len()));
+    *rest = after;
+    T::read(own)
 }
 
 /// Declares the internal variables of a law: a struct of numbers whose doc comments and units

@@ -130,6 +130,18 @@ pub struct InterfaceResponse<S> {
     pub unreliable: Option<&'static str>,
 }
 
+impl<S> InterfaceResponse<S> {
+    /// Faces that do not touch: no traction, no stiffness.
+    pub const fn open(state: S) -> Self {
+        Self {
+            traction: [0.0; 2],
+            state,
+            tangent: [[0.0; 2]; 2],
+            unreliable: None,
+        }
+    }
+}
+
 /// A law for solids. Immutable once built; `update` is a pure function of its arguments.
 pub trait ContinuumLaw: Sized + Send + Sync + 'static {
     /// What the law is called.

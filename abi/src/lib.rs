@@ -1,11 +1,14 @@
 #![doc = include_str!("../README.md")]
 
+pub mod access;
 pub mod descriptor;
 pub mod export;
+pub mod friction;
 pub mod law;
 #[cfg(feature = "abi_stable")]
 pub mod layout;
 pub mod raw;
+pub mod reclosure;
 pub mod status;
 pub mod substepping;
 pub mod version;

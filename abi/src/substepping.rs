@@ -1,10 +1,28 @@
 //! For authors of laws that integrate rate equations: the choice of a scheme, and steps whose size
 //! follows from an estimate of their error. A law need not use it.
 
+use crate::descriptor::Parameter;
 use crate::law::{Failure, Refusal};
 
-/// How a law integrates its rate equations over an increment. The parameters that it is made from
-/// are called `scheme`, `substeps` and `scheme_tolerance`.
+crate::parameters! {
+    /// The parameters that a [`Scheme`] is made from: a law includes them behind its own.
+    pub struct SchemeParameters {
+        /// How the flow is integrated.
+        scheme: Parameter::new(c"scheme", c"-")
+            .one_of(crate::choices!(c"implicit", c"explicit", c"error_controlled"))
+            .default(0.0),
+        /// Number of steps of the explicit scheme in an increment, whole.
+        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e6).default(10.0),
+        /// Relative error that a step of the error-controlled scheme may have.
+        scheme_tolerance: Parameter::new(c"ε_s", c"-")
+            .above(0.0)
+            .below(1.0)
+            .usual(1e-10, 1e-2)
+            .default(1e-6),
+    }
+}
+
+/// How a law integrates its rate equations over an increment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scheme {
     /// The end of the increment satisfies the equations.
@@ -22,12 +40,16 @@ pub enum Scheme {
 }
 
 impl Scheme {
-    /// The scheme from the values of its three parameters; `scheme` is the number of a label of
-    /// `choices!(c"implicit", c"explicit", c"error_controlled")`.
+    /// The scheme that the parameters ask for.
     ///
     /// # Errors
-    /// `substeps` is not a whole number.
-    pub fn new(scheme: f64, substeps: f64, tolerance: f64) -> Result<Self, Refusal> {
+    /// `substeps` is not a whole number, and the scheme needs it.
+    pub fn new(parameters: SchemeParameters) -> Result<Self, Refusal> {
+        let SchemeParameters {
+            scheme,
+            substeps,
+            scheme_tolerance: tolerance,
+        } = parameters;
         if scheme < 0.5 {
             return Ok(Self::Implicit);
         }
@@ -108,6 +130,7 @@ pub fn error_controlled<S: Copy>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::descriptor::Parameters;
 
     /// Modified Euler on y' = −5 y, y(0) = 1.
     fn decay(tolerance: f64) -> Result<f64, Failure> {
@@ -159,16 +182,12 @@ mod tests {
 
     #[test]
     fn reads_the_three_parameters() {
-        assert_eq!(Scheme::new(0.0, 2.5, 1e-3), Ok(Scheme::Implicit));
-        assert_eq!(
-            Scheme::new(1.0, 7.0, 1e-3),
-            Ok(Scheme::Explicit { substeps: 7 })
-        );
         let tolerance = 1e-3;
-        assert_eq!(
-            Scheme::new(2.0, 2.5, tolerance),
-            Ok(Scheme::ErrorControlled { tolerance })
-        );
-        assert!(Scheme::new(1.0, 2.5, 1e-3).unwrap_err().parameter == "substeps");
+        let of =
+            |scheme, substeps| Scheme::new(SchemeParameters::read(&[scheme, substeps, tolerance]));
+        assert_eq!(of(0.0, 2.5), Ok(Scheme::Implicit));
+        assert_eq!(of(1.0, 7.0), Ok(Scheme::Explicit { substeps: 7 }));
+        assert_eq!(of(2.0, 2.5), Ok(Scheme::ErrorControlled { tolerance }));
+        assert!(of(1.0, 2.5).unwrap_err().parameter == "substeps");
     }
 }

@@ -136,16 +136,19 @@ fn a_project_in_rust_carries_the_whole_contract() {
     let place = TempDir::new().unwrap();
     let written = pilum(place.path(), &["new-law", "slider", "--language", "rust"]);
     assert_eq!(written.code, Some(0), "{}", written.stderr);
-    let (mut carried, mut ours) = (BTreeSet::new(), BTreeSet::new());
-    below(&place.path().join("slider/abi/src"), "", &mut carried);
-    below(&repository("abi/src"), "", &mut ours);
-    // The optional feature, and the crate's own tests.
-    ours.retain(|name| name != "layout.rs" && name != "export/tests.rs");
-    assert_eq!(carried, ours);
-    for name in carried {
-        let copy = fs::read_to_string(place.path().join("slider/abi/src").join(&name)).unwrap();
-        let original = fs::read_to_string(repository("abi/src").join(&name)).unwrap();
-        assert_eq!(copy, original, "{name}");
+    for folder in ["abi/src", "abi/bridges/src"] {
+        let (theirs, ours) = (place.path().join("slider").join(folder), repository(folder));
+        let (mut carried, mut here) = (BTreeSet::new(), BTreeSet::new());
+        below(&theirs, "", &mut carried);
+        below(&ours, "", &mut here);
+        // The optional feature, and the crate's own tests.
+        here.retain(|name| name != "layout.rs" && name != "export/tests.rs");
+        assert_eq!(carried, here);
+        for name in carried {
+            let copy = fs::read_to_string(theirs.join(&name)).unwrap();
+            let original = fs::read_to_string(ours.join(&name)).unwrap();
+            assert_eq!(copy, original, "{name}");
+        }
     }
 }
 

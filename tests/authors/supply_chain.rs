@@ -8,14 +8,19 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Where `unsafe` may stand, and what for. A folder has the name of the file it belongs to.
-const UNSAFE: [(&str, &str); 7] = [
+const UNSAFE: [(&str, &str); 9] = [
     ("abi/src/raw.rs", "types of C functions"),
+    (
+        "abi/src/access.rs",
+        "points, messages and texts in memory of the host",
+    ),
     (
         "abi/src/export.rs",
         "the entry of a library, written by a macro",
     ),
+    ("abi/src/export", "tests of that entry"),
     (
-        "abi/src/export",
+        "abi/bridges/src",
         "the same law as UMAT, for MFront, for CalculiX",
     ),
     (

@@ -1,5 +1,5 @@
 // A cohesive zone in the shape that MFront's generic interface prescribes, written by hand after its specification
-// (abi/interoperability.md says why): nothing is shared with the export in abi/src/export/mfront.rs.
+// (abi/interoperability.md says why): nothing is shared with the export in abi/bridges/src/mfront.rs.
 //
 // Mode by mode, w = (<u_n>^2 + u_t^2)^(1/2), W its largest value so far: with damage d = W_f (W - W_0)/(W (W_f - W_0))
 // between W_0 and W_f, t = (1 - d) K u; a closed zone carries t_n = K_n u_n. Forces depend on totals only.

@@ -5,10 +5,14 @@
     reason = "values pass unchanged; the macros declare what crates export"
 )]
 
+use super::adapter::assert_solid;
 use super::*;
-use crate::law::{InterfaceResponse, Refusal};
-use crate::{Variable, describe};
+use crate::law::{InterfaceLaw, InterfacePoint, InterfaceResponse, Refusal};
+use crate::raw::{View, ViewMut};
+use crate::version::BATCH_SIZE_1_0;
+use crate::{InternalVariables, Parameter, Variable, describe};
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
 /// Counts what each thread allocates.

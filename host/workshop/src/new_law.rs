@@ -69,32 +69,44 @@ const MODULE: File = ("include/pilum_law.f90", contract!("include/pilum_law.f90"
 const EXPORTS: File = ("exports.map", contract!("include/exports.map"));
 const CONTRACT: File = ("CONTRACT.md", contract!("README.md"));
 
-/// The contract's crate without its optional features.
-const CRATE: [File; 14] = [
-    ("abi/Cargo.toml", template!("rust/abi.toml.txt")),
+/// The contract's crate without its optional features, and the one that exports laws to other programs.
+const CRATES: [File; 21] = [
+    (ABI_MANIFEST, template!("rust/abi.toml.txt")),
     ("abi/README.md", contract!("README.md")),
     ("abi/src/lib.rs", contract!("src/lib.rs")),
+    ("abi/src/access.rs", contract!("src/access.rs")),
     ("abi/src/descriptor.rs", contract!("src/descriptor.rs")),
     ("abi/src/export.rs", contract!("src/export.rs")),
     (
-        "abi/src/export/calculix.rs",
-        contract!("src/export/calculix.rs"),
+        "abi/src/export/adapter.rs",
+        contract!("src/export/adapter.rs"),
     ),
-    (
-        "abi/src/export/foreign.rs",
-        contract!("src/export/foreign.rs"),
-    ),
-    (
-        "abi/src/export/mfront.rs",
-        contract!("src/export/mfront.rs"),
-    ),
-    ("abi/src/export/umat.rs", contract!("src/export/umat.rs")),
+    ("abi/src/friction.rs", contract!("src/friction.rs")),
     ("abi/src/law.rs", contract!("src/law.rs")),
     ("abi/src/raw.rs", contract!("src/raw.rs")),
+    ("abi/src/reclosure.rs", contract!("src/reclosure.rs")),
     ("abi/src/status.rs", contract!("src/status.rs")),
     ("abi/src/substepping.rs", contract!("src/substepping.rs")),
     ("abi/src/version.rs", contract!("src/version.rs")),
+    (BRIDGES_MANIFEST, template!("rust/bridges.toml.txt")),
+    (
+        "abi/bridges/src/calculix.rs",
+        contract!("bridges/src/calculix.rs"),
+    ),
+    ("abi/bridges/src/laws.rs", contract!("bridges/src/laws.rs")),
+    ("abi/bridges/src/lib.rs", contract!("bridges/src/lib.rs")),
+    (
+        "abi/bridges/src/mfront.rs",
+        contract!("bridges/src/mfront.rs"),
+    ),
+    (
+        "abi/bridges/src/point.rs",
+        contract!("bridges/src/point.rs"),
+    ),
+    ("abi/bridges/src/umat.rs", contract!("bridges/src/umat.rs")),
 ];
+const ABI_MANIFEST: &str = "abi/Cargo.toml";
+const BRIDGES_MANIFEST: &str = "abi/bridges/Cargo.toml";
 
 impl Language {
     /// Name in words.
@@ -126,7 +138,7 @@ impl Language {
         match self {
             Self::Rust => {
                 let mut files = vec![("Cargo.toml", template!("rust/Cargo.toml.txt"))];
-                files.extend(CRATE);
+                files.extend(CRATES);
                 files
             }
             Self::C => vec![
@@ -240,7 +252,7 @@ impl NewLaw {
         let fill = |(path, text): File| {
             let is_contract = path.starts_with("include/")
                 || path == CONTRACT.0
-                || (path.starts_with("abi/") && path != CRATE[0].0);
+                || (path.starts_with("abi/") && ![ABI_MANIFEST, BRIDGES_MANIFEST].contains(&path));
             let text = if is_contract {
                 text.to_owned()
             } else {
@@ -293,7 +305,7 @@ fn check_name(name: &str, language: Language) -> Result<(), Error> {
     if name.len() > LONGEST_NAME {
         return refuse("more than 60 characters");
     }
-    if language == Language::Rust && (KEYWORDS.contains(&name) || CRATES.contains(&name)) {
+    if language == Language::Rust && (KEYWORDS.contains(&name) || TAKEN.contains(&name)) {
         return refuse("Rust uses this name itself");
     }
     Ok(())
@@ -311,4 +323,12 @@ const KEYWORDS: [&str; 50] = [
 ];
 
 /// Crates that a law's crate would get in the way of.
-const CRATES: [&str; 6] = ["abi", "alloc", "core", "proc_macro", "std", "test"];
+const TAKEN: [&str; 7] = [
+    "abi",
+    "alloc",
+    "bridges",
+    "core",
+    "proc_macro",
+    "std",
+    "test",
+];

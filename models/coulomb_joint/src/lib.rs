@@ -5,6 +5,8 @@ mod return_mapping;
 #[cfg(test)]
 mod tests;
 
+use abi::friction::tan;
+use abi::reclosure::InContact;
 use abi::{
     Description, Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Parameter, Refusal,
     Tangent, Variable,
@@ -113,7 +115,7 @@ impl InterfaceLaw for CoulombJoint {
         let state = point.state;
         let mut end = match self.contact(point) {
             Ok(contact) => self.carry(state, &contact),
-            Err(gap) => open(State {
+            Err(gap) => InterfaceResponse::open(State {
                 gap,
                 broken: 1.0,
                 ..state
@@ -131,27 +133,17 @@ impl CoulombJoint {
     /// The part of the increment in contact, or the gap at its end if there is none.
     #[inline]
     fn contact(&self, point: &InterfacePoint<State>) -> Result<Contact, f64> {
-        let [opening, slip] = point.jump_increment;
         let gap = point.state.gap;
         if gap > 0.0 {
-            if gap + opening >= 0.0 {
-                return Err(gap + opening);
-            }
-            // Contact re-forms on the way; the path within the increment is straight.
-            let fraction = 1.0 + gap / opening;
             return Ok(Contact {
                 traction: [0.0; 2],
-                opening: gap + opening,
-                slip: slip * fraction,
-                slip_by_jump: [-slip * gap / (opening * opening), fraction],
+                part: InContact::after_closure(gap, point.jump_increment)?,
                 strength: self.broken,
             });
         }
         Ok(Contact {
             traction: point.traction,
-            opening,
-            slip,
-            slip_by_jump: [0.0, 1.0],
+            part: InContact::throughout(point.jump_increment),
             strength: if point.state.broken > 0.5 {
                 self.broken
             } else {
@@ -161,26 +153,7 @@ impl CoulombJoint {
     }
 }
 
-/// Tangent of an angle in degrees, without cancellation near 90°.
-fn tan(degrees: f64) -> f64 {
-    if degrees > 45.0 {
-        (90.0 - degrees).to_radians().tan().recip()
-    } else {
-        degrees.to_radians().tan()
-    }
-}
-
-/// No traction, no stiffness.
-fn open(state: State) -> InterfaceResponse<State> {
-    InterfaceResponse {
-        traction: [0.0; 2],
-        state,
-        tangent: [[0.0; 2]; 2],
-        unreliable: None,
-    }
-}
-
 abi::export_laws!(interface CoulombJoint);
-abi::export_foreign!(interface CoulombJoint,
+bridges::export!(interface CoulombJoint,
     properties: [NormalStiffness ShearStiffness Cohesion FrictionAngle DilatancyAngle],
     parameters: [TensileStrength]);

@@ -1,7 +1,8 @@
 //! Elastic trial, return to the friction line, opening. Tension and opening positive throughout.
 
-use crate::{CoulombJoint, State, open};
+use crate::{CoulombJoint, State};
 use abi::InterfaceResponse;
+use abi::reclosure::InContact;
 
 /// Strength of a joint, intact or broken.
 #[derive(Clone, Copy, Debug)]
@@ -22,10 +23,7 @@ pub(crate) struct Contact {
     /// Traction at the start.
     pub(crate) traction: [f64; 2],
     /// Relative displacement.
-    pub(crate) opening: f64,
-    pub(crate) slip: f64,
-    /// ∂slip/∂⟦u⟧: slip before the contact re-forms does not act.
-    pub(crate) slip_by_jump: [f64; 2],
+    pub(crate) part: InContact,
     pub(crate) strength: Strength,
 }
 
@@ -41,8 +39,8 @@ impl CoulombJoint {
             tan_psi,
         } = contact.strength;
         // Eq. (1).
-        let normal = contact.traction[0] + k_n * contact.opening;
-        let shear = contact.traction[1] + k_t * contact.slip;
+        let normal = contact.traction[0] + k_n * contact.part.opening;
+        let shear = contact.traction[1] + k_t * contact.part.slip;
         let closed = State { gap: 0.0, ..state };
         // Eq. (2).
         let excess = shear.abs() + normal * tan_phi - cohesion;
@@ -57,7 +55,7 @@ impl CoulombJoint {
         // Eq. (3).
         let returned = normal - k_n * tan_psi * d_lambda;
         if returned > tensile || cohesion - returned * tan_phi < 0.0 {
-            return open(self.lose_contact(state, contact));
+            return InterfaceResponse::open(self.lose_contact(state, contact));
         }
         let sign = 1.0_f64.copysign(shear);
         let traction = [returned, sign * (cohesion - returned * tan_phi)];
@@ -83,7 +81,7 @@ impl CoulombJoint {
         let d_lambda = self.slip_before_opening(contact);
         let dilation = tan_psi * d_lambda;
         // From the position of contact without stress.
-        let gap = contact.traction[0] / self.normal_stiffness + contact.opening - dilation;
+        let gap = contact.traction[0] / self.normal_stiffness + contact.part.opening - dilation;
         State {
             gap: gap.max(0.0),
             broken: 1.0,
@@ -102,7 +100,7 @@ impl CoulombJoint {
             tan_psi,
         } = contact.strength;
         let [normal, shear] = contact.traction;
-        let (normal_rate, shear_rate) = (k_n * contact.opening, k_t * contact.slip);
+        let (normal_rate, shear_rate) = (k_n * contact.part.opening, k_t * contact.part.slip);
         let opens_elastically = if normal < tensile && normal_rate > 0.0 {
             (tensile - normal) / normal_rate
         } else {
@@ -148,7 +146,7 @@ fn response(
     [[a, b], [c, d]]: [[f64; 2]; 2],
     contact: &Contact,
 ) -> InterfaceResponse<State> {
-    let [by_normal, by_tangential] = contact.slip_by_jump;
+    let [by_normal, by_tangential] = contact.part.slip_by_jump;
     InterfaceResponse {
         traction,
         state,

@@ -80,4 +80,4 @@ impl ContinuumLaw for Elastic {
 }
 
 abi::export_laws!(continuum Elastic);
-abi::export_foreign!(continuum Elastic, properties: [YoungModulus PoissonRatio], parameters: []);
+bridges::export!(continuum Elastic, properties: [YoungModulus PoissonRatio], parameters: []);

@@ -22,8 +22,8 @@ impl Increment<'_> {
     /// Bounds between two samples of a leg.
     pub(crate) fn bounds(&self, leg: &Leg, from: &Sample, to: &Sample) -> Bounds {
         let Constants {
-            normal_stiffness: k_n,
-            shear_stiffness: k_t,
+            K_n,
+            K_t,
             ref hardening,
             ..
         } = *self.constants;
@@ -34,10 +34,9 @@ impl Increment<'_> {
         let (mu_low, mu_high) = (from.mu.min(to.mu), from.mu.max(to.mu));
         let (slope_low, slope_high) = match (leg.branch, &hardening.softening) {
             (Branch::Softening, Some(softening)) => {
-                let (sech_from, tanh_from) =
-                    sech_tanh(softening.rate * (xi_from - softening.start));
-                let (sech_to, tanh_to) = sech_tanh(softening.rate * (xi_to - softening.start));
-                let scale = (softening.residual - softening.peak) * softening.rate;
+                let (sech_from, tanh_from) = sech_tanh(softening.rate * (xi_from - softening.u_tp));
+                let (sech_to, tanh_to) = sech_tanh(softening.rate * (xi_to - softening.u_tp));
+                let scale = (softening.mu_r - softening.mu_pk) * softening.rate;
                 let one = scale * sech_to * tanh_from;
                 let other = scale * (sech_from * tanh_to).min(0.5);
                 (one.min(other), one.max(other))
@@ -46,25 +45,25 @@ impl Increment<'_> {
         };
 
         // β before and after the characteristic state, and w = β + Δλ β'.
-        let characteristic = hardening.characteristic;
-        let (sech_from, tanh_to, sech_to) = if mu_high > characteristic {
+        let mu_c0 = hardening.mu_c0;
+        let (sech_from, tanh_to, sech_to) = if mu_high > mu_c0 {
             let (sech_to, tanh_to) = hardening.stabilisation(xi_to);
             (hardening.stabilisation(xi_from).0, tanh_to, sech_to)
         } else {
             (1.0, 1.0, 1.0)
         };
-        let (before, after) = (mu_low < characteristic, mu_high > characteristic);
-        let beyond_low = (mu_low - characteristic).max(0.0);
-        let beyond_high = (mu_high - characteristic).max(0.0);
+        let (before, after) = (mu_low < mu_c0, mu_high > mu_c0);
+        let beyond_low = (mu_low - mu_c0).max(0.0);
+        let beyond_high = (mu_high - mu_c0).max(0.0);
         let beta_high = if before {
-            characteristic - mu_low
+            mu_c0 - mu_low
         } else {
             -beyond_low * sech_to
         };
         let beta_low = if after {
             -beyond_high * sech_from
         } else {
-            characteristic - mu_high
+            mu_c0 - mu_high
         };
         let mut rate_high = f64::NEG_INFINITY;
         if before {
@@ -73,7 +72,7 @@ impl Increment<'_> {
             } else {
                 travel_from
             };
-            rate_high = characteristic - mu_low - travel * slope_low;
+            rate_high = mu_c0 - mu_low - travel * slope_low;
         }
         if after || !before {
             let hardening_part = if slope_low < 0.0 {
@@ -94,8 +93,8 @@ impl Increment<'_> {
             + (travel_from * beta_high).max(travel_to * beta_high))
         .min(from.contraction + (to.d_lambda - from.d_lambda) * rate_high.max(0.0));
         let contraction_low = leg.contraction + (travel_from * beta_low).min(travel_to * beta_low);
-        let sigma_low = self.sigma - k_n * contraction_high;
-        let sigma_high = self.sigma - k_n * contraction_low;
+        let sigma_low = self.sigma - K_n * contraction_high;
+        let sigma_high = self.sigma - K_n * contraction_low;
 
         let friction_part = [
             slope_low * sigma_low,
@@ -110,8 +109,8 @@ impl Increment<'_> {
         Bounds {
             contraction_high,
             sigma_high,
-            residual_low: self.tau - k_t * to.d_lambda - mobilised,
-            residual_slope: k_n * coupling - k_t - friction_part,
+            residual_low: self.tau - K_t * to.d_lambda - mobilised,
+            residual_slope: K_n * coupling - K_t - friction_part,
         }
     }
 }

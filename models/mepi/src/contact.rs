@@ -4,6 +4,7 @@ use crate::first_root::last_that;
 use crate::interface::{Constants, Interface, State};
 use crate::return_mapping::{Flow, Increment, Sample};
 use crate::substeps::{Path, Sliding};
+use abi::reclosure::InContact;
 use abi::substepping::Scheme;
 use abi::{Failure, InterfacePoint, InterfaceResponse, Tangent};
 
@@ -18,8 +19,21 @@ struct Contact {
     /// Relative displacement: contraction and slip.
     contraction: f64,
     slip: f64,
-    /// ∂slip by ∂`[u_n]` and ∂`[u_t]`: slip before the contact re-forms does not act.
+    /// ∂slip/∂⟦u⟧.
     slip_by_jump: [f64; 2],
+}
+
+impl Contact {
+    /// From these stresses on.
+    fn of(sigma: f64, tau: f64, part: InContact) -> Self {
+        Self {
+            sigma,
+            tau,
+            contraction: -part.opening,
+            slip: part.slip,
+            slip_by_jump: part.slip_by_jump,
+        }
+    }
 }
 
 /// Carries a point over an increment.
@@ -38,14 +52,11 @@ pub(crate) fn update(
     let constants = law.constants(state.sigma_ni);
     let mut end = match contact(&constants, point) {
         Ok(contact) => close_or_slide(&constants, law.scheme, state, &contact, tangent)?,
-        Err(gap) => open(State { gap, ..state }),
+        Err(gap) => InterfaceResponse::open(State { gap, ..state }),
     };
     if tangent == Tangent::Elastic {
         // Eq. (6).
-        end.tangent = [
-            [constants.normal_stiffness, 0.0],
-            [0.0, constants.shear_stiffness],
-        ];
+        end.tangent = [[constants.K_n, 0.0], [0.0, constants.K_t]];
     }
     Ok(end)
 }
@@ -53,46 +64,20 @@ pub(crate) fn update(
 /// The part of the increment in contact, or the gap at its end if there is none.
 #[inline]
 fn contact(constants: &Constants, point: &InterfacePoint<State>) -> Result<Contact, f64> {
-    let [opening, slip] = point.jump_increment;
     let sigma = -point.traction[0];
     let gap = point.state.gap;
     if gap <= 0.0 {
         // A tension carried in enters the trial like any stress outside the surface; what is left
         // of it at the end of the increment becomes a gap.
-        let left = -sigma / constants.normal_stiffness + opening;
+        let left = -sigma / constants.K_n + point.jump_increment[0];
         if sigma < 0.0 && left >= 0.0 {
             return Err(left);
         }
-        return Ok(Contact {
-            sigma,
-            tau: point.traction[1],
-            contraction: -opening,
-            slip,
-            slip_by_jump: [0.0, 1.0],
-        });
+        let part = InContact::throughout(point.jump_increment);
+        return Ok(Contact::of(sigma, point.traction[1], part));
     }
-    if gap + opening >= 0.0 {
-        return Err(gap + opening);
-    }
-    // Contact re-forms on the way; the path within the increment is straight.
-    let fraction = 1.0 + gap / opening;
-    Ok(Contact {
-        sigma: 0.0,
-        tau: 0.0,
-        contraction: -(gap + opening),
-        slip: slip * fraction,
-        slip_by_jump: [-slip * gap / (opening * opening), fraction],
-    })
-}
-
-/// No traction, no stiffness.
-fn open(state: State) -> InterfaceResponse<State> {
-    InterfaceResponse {
-        traction: [0.0; 2],
-        state,
-        tangent: [[0.0; 2]; 2],
-        unreliable: None,
-    }
+    let part = InContact::after_closure(gap, point.jump_increment)?;
+    Ok(Contact::of(0.0, 0.0, part))
 }
 
 #[inline]
@@ -103,12 +88,12 @@ fn close_or_slide(
     contact: &Contact,
     tangent: Tangent,
 ) -> Result<InterfaceResponse<State>, Failure> {
-    let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
+    let Constants { K_n, K_t, .. } = *constants;
     let hardening = &constants.hardening;
     let xi = state.plastic_slip;
     // Elastic trial, Eq. (6).
-    let sigma_trial = contact.sigma + k_n * contact.contraction;
-    let tau_trial = contact.tau + k_t * contact.slip;
+    let sigma_trial = contact.sigma + K_n * contact.contraction;
+    let tau_trial = contact.tau + K_t * contact.slip;
     if !(sigma_trial - tau_trial).is_finite() {
         return Err(Failure::Numeric("the elastic predictor overflows"));
     }
@@ -156,9 +141,9 @@ fn close_or_slide(
         Flow::StopsAtPeak(end) => {
             let mut state = slid(state, end.d_lambda, end.contraction);
             if let Some(softening) = hardening.softening {
-                state.plastic_slip = softening.start;
+                state.plastic_slip = softening.u_tp;
             }
-            let tau = sign * (increment.tau - k_t * end.d_lambda);
+            let tau = sign * (increment.tau - K_t * end.d_lambda);
             Ok(response(
                 constants,
                 contact,
@@ -167,7 +152,7 @@ fn close_or_slide(
                 elastic,
             ))
         }
-        Flow::LosesContact { exhausted } => Ok(open(lose_contact(
+        Flow::LosesContact { exhausted } => Ok(InterfaceResponse::open(lose_contact(
             constants, state, contact, &increment, exhausted,
         ))),
     }
@@ -248,17 +233,17 @@ fn lose_contact(
     increment: &Increment<'_>,
     exhausted: Option<f64>,
 ) -> State {
-    let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
+    let Constants { K_n, K_t, .. } = *constants;
     // At the fraction s of the increment, τ = 0 and σ_n = 0 with the slip λ that makes τ vanish.
-    let lambda = |s: f64| (contact.tau + s * k_t * contact.slip).abs() / k_t;
+    let lambda = |s: f64| (contact.tau + s * K_t * contact.slip).abs() / K_t;
     let sigma = |s: f64| {
-        contact.sigma + s * k_n * contact.contraction - k_n * increment.contraction(lambda(s))
+        contact.sigma + s * K_n * contact.contraction - K_n * increment.contraction(lambda(s))
     };
     let d_lambda = if contact.contraction < 0.0 && sigma(1.0) < 0.0 {
         if sigma(0.0) >= 0.0 {
             lambda(last_that(|s| sigma(s) >= 0.0, 0.0, 1.0))
         } else {
-            let left = |x: f64| contact.sigma - k_n * increment.contraction(x);
+            let left = |x: f64| contact.sigma - K_n * increment.contraction(x);
             last_that(|x| left(x) >= 0.0, 0.0, lambda(0.0))
         }
     } else {
@@ -268,7 +253,7 @@ fn lose_contact(
     let contraction = increment.contraction(d_lambda);
     // Where contact was lost the faces would touch again.
     let gap = if contact.contraction < 0.0 {
-        (contraction - increment.sigma / k_n).max(0.0)
+        (contraction - increment.sigma / K_n).max(0.0)
     } else {
         0.0
     };
@@ -281,20 +266,20 @@ fn lose_contact(
 /// ∂(`σ_n`, τ)/∂(σ*, τ*) on the yield surface.
 #[inline]
 fn derivative(constants: &Constants, end: &Sample, sign: f64) -> Result<Matrix, Failure> {
-    let (k_n, k_t) = (constants.normal_stiffness, constants.shear_stiffness);
+    let Constants { K_n, K_t, .. } = *constants;
     // Eq. (B).
     let friction = end.mu_slope * end.sigma;
-    let coupling = k_n * end.contraction_slope;
-    let h = -end.residual_slope;
-    if h <= 1e-13 * (k_t + friction.abs() + end.mu * coupling.abs()) {
+    let coupling = K_n * end.contraction_slope;
+    let H = -end.residual_slope;
+    if H <= 1e-13 * (K_t + friction.abs() + end.mu * coupling.abs()) {
         return Err(Failure::CutStep {
             factor: 0.5,
             reason: "the response turns back at the end of the increment",
         });
     }
     Ok([
-        [(k_t + friction) / h, -sign * coupling / h],
-        [sign * end.mu * k_t / h, (friction - end.mu * coupling) / h],
+        [(K_t + friction) / H, -sign * coupling / H],
+        [sign * end.mu * K_t / H, (friction - end.mu * coupling) / H],
     ])
 }
 
@@ -307,15 +292,15 @@ fn response(
     state: State,
     by_trial: Matrix,
 ) -> InterfaceResponse<State> {
-    let k_n = constants.normal_stiffness;
-    let [by_normal, by_tangential] = contact.slip_by_jump.map(|d| d * constants.shear_stiffness);
+    let K_n = constants.K_n;
+    let [by_normal, by_tangential] = contact.slip_by_jump.map(|d| d * constants.K_t);
     let [[a, b], [c, d]] = by_trial;
     InterfaceResponse {
         traction: [-sigma, tau],
         state,
         tangent: [
-            [a * k_n - b * by_normal, -b * by_tangential],
-            [d * by_normal - c * k_n, d * by_tangential],
+            [a * K_n - b * by_normal, -b * by_tangential],
+            [d * by_normal - c * K_n, d * by_tangential],
         ],
         unreliable: None,
     }

@@ -1,7 +1,9 @@
 //! Friction μ and contraction rate β = `μ_c` − μ of one point as functions of the plastic slip ξ,
 //! with their derivatives: Eq. (10), (11), (16), (17).
 //!
-//! | symbol | here | |
+//! Letters are those of the paper. Products of them that have none:
+//!
+//! | product | here | |
 //! |---|---|---|
 //! | A (σ_ni/p_0) t | `slip_scale` | slip at which half of the rise of Eq. (10) is done |
 //! | C_0 (σ_ni/p_0) / t | `stabilisation_rate` | rate of Eq. (17) |
@@ -26,29 +28,26 @@ pub(crate) enum Branch {
 /// Constants of Eq. (11) at one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Softening {
-    /// Plastic slip `u_tp` where Eq. (11) takes over.
-    pub(crate) start: f64,
-    /// Friction from which Eq. (11) starts.
-    pub(crate) peak: f64,
-    /// Residual friction `μ_r`.
-    pub(crate) residual: f64,
+    /// Plastic slip where Eq. (11) takes over.
+    pub(crate) u_tp: f64,
+    /// Friction from which it starts, and the residual one.
+    pub(crate) mu_pk: f64,
+    pub(crate) mu_r: f64,
     /// `A_0` / t.
     pub(crate) rate: f64,
-    /// μ jumps to `peak` at `start`.
+    /// μ jumps to `μ_pk` at `u_tp`.
     pub(crate) jumps: bool,
 }
 
 /// Constants of the friction and the flow at one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hardening {
-    /// `μ_0`.
-    pub(crate) initial: f64,
-    /// `μ_p` − `μ_0`.
-    pub(crate) rise: f64,
+    /// Friction at the end of the elastic range, at failure, at the characteristic state.
+    pub(crate) mu_0: f64,
+    pub(crate) mu_p: f64,
+    pub(crate) mu_c0: f64,
     /// A (`σ_ni/p_0`) t.
     pub(crate) slip_scale: f64,
-    /// `μ_c0`.
-    pub(crate) characteristic: f64,
     /// `C_0` (`σ_ni/p_0`) / t.
     pub(crate) stabilisation_rate: f64,
     /// Eq. (11), if the law has it.
@@ -59,7 +58,7 @@ impl Hardening {
     /// The expression of μ that holds from ξ on.
     pub(crate) fn branch(&self, xi: f64) -> Branch {
         match self.softening {
-            Some(softening) if xi >= softening.start => Branch::Softening,
+            Some(softening) if xi >= softening.u_tp => Branch::Softening,
             _ => Branch::Hardening,
         }
     }
@@ -69,18 +68,19 @@ impl Hardening {
     pub(crate) fn friction(&self, branch: Branch, xi: f64) -> Jet {
         if let (Branch::Softening, Some(softening)) = (branch, &self.softening) {
             // Eq. (11).
-            let (sech, tanh) = sech_tanh(softening.rate * (xi - softening.start));
-            let drop = (softening.peak - softening.residual) * sech;
+            let (sech, tanh) = sech_tanh(softening.rate * (xi - softening.u_tp));
+            let drop = (softening.mu_pk - softening.mu_r) * sech;
             Jet {
-                value: softening.residual + drop,
+                value: softening.mu_r + drop,
                 slope: -drop * softening.rate * tanh,
             }
         } else {
             // Eq. (10).
             let inverse = (self.slip_scale + xi).recip();
+            let rise = self.mu_p - self.mu_0;
             Jet {
-                value: self.initial + self.rise * (xi * inverse),
-                slope: self.rise * (self.slip_scale * inverse) * inverse,
+                value: self.mu_0 + rise * (xi * inverse),
+                slope: rise * (self.slip_scale * inverse) * inverse,
             }
         }
     }
@@ -88,7 +88,7 @@ impl Hardening {
     /// β(ξ) = `μ_c` − μ: contraction positive, dilation negative.
     #[inline]
     pub(crate) fn contraction_rate(&self, friction: Jet, xi: f64) -> Jet {
-        let beyond = friction.value - self.characteristic;
+        let beyond = friction.value - self.mu_c0;
         if beyond < 0.0 {
             // Before the characteristic state μ_c = μ_c0.
             Jet {

@@ -2,7 +2,7 @@
 
 use crate::hardening::{Hardening, Softening};
 use abi::substepping::Scheme;
-use abi::{Failure, Refusal, Variable};
+use abi::{Failure, Parameter, Refusal, Variable};
 
 abi::internal_variables! {
     /// Internal variables of both laws.
@@ -18,38 +18,63 @@ abi::internal_variables! {
     }
 }
 
-/// The parameters that both laws have, under the paper's names.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Common {
-    pub(crate) k_n: f64,
-    pub(crate) k_t: f64,
-    pub(crate) n: f64,
-    pub(crate) mu_0: f64,
-    pub(crate) mu_p: f64,
-    pub(crate) mu_c0: f64,
-    pub(crate) a: f64,
-    pub(crate) c_0: f64,
-    pub(crate) t: f64,
-    pub(crate) p_0: f64,
-    pub(crate) sigma_ni: f64,
+abi::parameters! {
+    /// The parameters that both laws have, in the letters of the paper.
+    pub struct Common {
+        /// Normal stiffness at a normal stress of 1 kPa.
+        k_n: Parameter::new(c"k_n", c"kPa^(1-N)/m").above(0.0).usual(1e2, 1e9),
+        /// Shear stiffness at a normal stress of 1 kPa.
+        k_t: Parameter::new(c"k_t", c"kPa^(1-N)/m").above(0.0).usual(1e2, 1e9),
+        /// Exponent of the normal stress in the stiffnesses.
+        n: Parameter::new(c"N", c"-").at_least(0.0).at_most(2.0).usual(0.0, 1.0),
+        /// Friction coefficient at the end of the elastic range.
+        mu_0: Parameter::new(c"μ_0", c"-").at_least(0.0).usual(0.0, 1.0),
+        /// Friction coefficient at failure.
+        mu_p: Parameter::new(c"μ_p", c"-").above(0.0).usual(0.1, 1.5),
+        /// Friction coefficient at the characteristic state, where contraction turns to dilation.
+        mu_c0: Parameter::new(c"μ_c0", c"-").at_least(0.0).usual(0.1, 1.5),
+        /// Slip that hardening takes; larger is softer.
+        a: Parameter::new(c"A", c"-").above(0.0).usual(1e-5, 1e-1),
+        /// Rate at which dilation dies out.
+        c_0: Parameter::new(c"C_0", c"-").at_least(0.0).usual(1e-3, 1e2),
+        /// Thickness of the interface, its internal length.
+        t: Parameter::new(c"t", c"m").above(0.0).usual(1e-5, 1e-1),
+        /// Reference pressure.
+        p_0: Parameter::new(c"p_0", c"kPa").above(0.0).usual(1.0, 1e3).default(1.0),
+        /// Initial normal stress, compression positive; taken from the initial state if left out.
+        sigma_ni: Parameter::new(c"σ_ni", c"kPa").above(0.0).usual(1e-1, 1e5).optional(),
+    }
 }
 
-/// The parameters of Eq. (11).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Peak {
-    pub(crate) mu_r: f64,
-    pub(crate) a_0: f64,
-    pub(crate) u_tp: f64,
-    pub(crate) published: bool,
+abi::parameters! {
+    /// The parameters of Eq. (11).
+    pub struct SofteningParameters {
+        /// Residual friction coefficient.
+        mu_r: Parameter::new(c"μ_r", c"-").at_least(0.0).usual(0.1, 1.5),
+        /// Rate of softening.
+        a_0: Parameter::new(c"A_0", c"-").at_least(0.0).usual(1.0, 20.0),
+        /// Plastic slip at the peak.
+        u_tp: Parameter::new(c"u_tp", c"m").at_least(0.0).usual(1e-5, 1e-1),
+        /// How softening starts: from the friction reached at the peak, or at μ_p with a jump.
+        peak: Parameter::new(c"peak", c"-")
+            .one_of(abi::choices!(c"continuous", c"published"))
+            .default(0.0),
+    }
+}
+
+impl SofteningParameters {
+    /// (11) starts at `μ_p`, as printed.
+    pub(crate) fn is_published(&self) -> bool {
+        self.peak > 0.5
+    }
 }
 
 /// The constants of a point, all of them fixed by `σ_ni`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Constants {
-    /// `K_n`.
-    pub(crate) normal_stiffness: f64,
-    /// `K_t`.
-    pub(crate) shear_stiffness: f64,
+    /// `K_n`, `K_t`, Eq. (7).
+    pub(crate) K_n: f64,
+    pub(crate) K_t: f64,
     /// μ and β.
     pub(crate) hardening: Hardening,
     /// As long as Eq. (10) holds, the scalar equation has one root at most.
@@ -60,7 +85,7 @@ pub(crate) struct Constants {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Interface {
     common: Common,
-    peak: Option<Peak>,
+    softening: Option<SofteningParameters>,
     one_root: bool,
     /// Constants of the points whose `σ_ni` is the parameter.
     given: Option<Constants>,
@@ -72,7 +97,11 @@ pub(crate) const STABILISATION_BOUND: f64 = 0.2512;
 
 impl Interface {
     /// Checks how the parameters go together.
-    pub(crate) fn new(common: Common, peak: Option<Peak>, scheme: Scheme) -> Result<Self, Refusal> {
+    pub(crate) fn new(
+        common: Common,
+        softening: Option<SofteningParameters>,
+        scheme: Scheme,
+    ) -> Result<Self, Refusal> {
         let Common {
             mu_0, mu_p, mu_c0, ..
         } = common;
@@ -81,7 +110,7 @@ impl Interface {
                 return Err(Refusal::new(id, format!("{value} is above mu_p = {mu_p}")));
             }
         }
-        if let Some(Peak { mu_r, .. }) = peak
+        if let Some(SofteningParameters { mu_r, .. }) = softening
             && mu_r > mu_p
         {
             return Err(Refusal::new(
@@ -89,7 +118,7 @@ impl Interface {
                 format!("{mu_r} is above mu_p = {mu_p}"),
             ));
         }
-        if scheme != Scheme::Implicit && peak.is_some_and(|peak| peak.published) {
+        if scheme != Scheme::Implicit && softening.is_some_and(|p| p.is_published()) {
             let reason = "only `implicit` follows the jump of `peak = \"published\"`";
             return Err(Refusal::new("scheme", reason));
         }
@@ -97,7 +126,7 @@ impl Interface {
         let coupling = (0.25 * mu_c0 * mu_c0).max(STABILISATION_BOUND * mu_p * (mu_p - mu_c0));
         let mut law = Self {
             common,
-            peak,
+            softening,
             one_root: common.k_n * coupling < common.k_t,
             given: None,
             scheme,
@@ -139,41 +168,46 @@ impl Interface {
     }
 
     fn computed_constants(&self, sigma_ni: f64) -> Constants {
-        let common = &self.common;
+        let Common {
+            k_n,
+            k_t,
+            n,
+            mu_0,
+            mu_p,
+            mu_c0,
+            a,
+            c_0,
+            t,
+            p_0,
+            ..
+        } = self.common;
         // Eq. (7).
-        let power = if common.n > 0.0 {
-            sigma_ni.powf(common.n)
-        } else {
-            1.0
-        };
-        let ratio = sigma_ni / common.p_0;
-        let mut hardening = Hardening {
-            initial: common.mu_0,
-            rise: common.mu_p - common.mu_0,
-            slip_scale: common.a * ratio * common.t,
-            characteristic: common.mu_c0,
-            stabilisation_rate: common.c_0 * ratio / common.t,
-            softening: None,
-        };
-        if let Some(peak) = self.peak {
-            let reached = peak.u_tp / (hardening.slip_scale + peak.u_tp);
-            hardening.softening = Some(Softening {
-                start: peak.u_tp,
-                peak: if peak.published {
-                    common.mu_p
-                } else {
-                    // Eq. (10) at u_tp.
-                    hardening.initial + hardening.rise * reached
-                },
-                residual: peak.mu_r,
-                rate: peak.a_0 / common.t,
-                jumps: peak.published,
-            });
-        }
+        let power = if n > 0.0 { sigma_ni.powf(n) } else { 1.0 };
+        let ratio = sigma_ni / p_0;
+        let slip_scale = a * ratio * t;
+        let softening = self.softening.map(|p| Softening {
+            u_tp: p.u_tp,
+            mu_pk: if p.is_published() {
+                mu_p
+            } else {
+                // Eq. (10) at u_tp.
+                mu_0 + (mu_p - mu_0) * (p.u_tp / (slip_scale + p.u_tp))
+            },
+            mu_r: p.mu_r,
+            rate: p.a_0 / t,
+            jumps: p.is_published(),
+        });
         Constants {
-            normal_stiffness: common.k_n * power,
-            shear_stiffness: common.k_t * power,
-            hardening,
+            K_n: k_n * power,
+            K_t: k_t * power,
+            hardening: Hardening {
+                mu_0,
+                mu_p,
+                slip_scale,
+                mu_c0,
+                stabilisation_rate: c_0 * ratio / t,
+                softening,
+            },
             one_root: self.one_root,
         }
     }

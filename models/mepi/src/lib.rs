@@ -1,5 +1,6 @@
 #![doc = include_str!("../LAW.md")]
 #![forbid(unsafe_code)]
+#![expect(non_snake_case, reason = "the letters of the paper: K_n is k_n σ_ni^N")]
 
 mod bounds;
 mod contact;
@@ -18,9 +19,9 @@ pub use mepi::Mepi;
 pub use mepi_softening::MepiSoftening;
 
 abi::export_laws!(interface Mepi, interface MepiSoftening);
-abi::export_foreign!(interface Mepi,
+bridges::export!(interface Mepi,
     properties: [KN KT N Mu0 MuP MuC0 A C0 T],
     parameters: [P0 SigmaNi Scheme Substeps SchemeTolerance]);
-abi::export_foreign!(interface MepiSoftening,
+bridges::export!(interface MepiSoftening,
     properties: [KN KT N Mu0 MuP MuC0 A C0 T MuR A0 UTp],
     parameters: [P0 SigmaNi Peak Scheme Substeps SchemeTolerance]);

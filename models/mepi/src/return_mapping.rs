@@ -79,7 +79,7 @@ impl Increment<'_> {
     /// Δλ at the peak, if it lies ahead.
     pub(crate) fn distance_to_peak(&self) -> Option<f64> {
         let softening = self.constants.hardening.softening?;
-        (self.xi < softening.start).then_some(softening.start - self.xi)
+        (self.xi < softening.u_tp).then_some(softening.u_tp - self.xi)
     }
 
     /// The leg beyond the peak, which the first leg reached at this sample.
@@ -96,8 +96,8 @@ impl Increment<'_> {
     #[inline]
     pub(crate) fn sample(&self, leg: &Leg, d_lambda: f64) -> Sample {
         let Constants {
-            normal_stiffness: k_n,
-            shear_stiffness: k_t,
+            K_n,
+            K_t,
             ref hardening,
             ..
         } = *self.constants;
@@ -109,9 +109,9 @@ impl Increment<'_> {
         let contraction = leg.contraction + travel * beta.value;
         let contraction_slope = beta.value + travel * beta.slope;
         // Eq. (6), and Eq. (A) with its derivative.
-        let sigma = self.sigma - k_n * contraction;
-        let residual = self.tau - k_t * d_lambda - mu.value * sigma;
-        let residual_slope = k_n * mu.value * contraction_slope - k_t - mu.slope * sigma;
+        let sigma = self.sigma - K_n * contraction;
+        let residual = self.tau - K_t * d_lambda - mu.value * sigma;
+        let residual_slope = K_n * mu.value * contraction_slope - K_t - mu.slope * sigma;
         Sample {
             d_lambda,
             mu: mu.value,
@@ -142,7 +142,7 @@ impl Increment<'_> {
     pub(crate) fn flow(&self) -> Result<Flow, Failure> {
         let leg = self.first_leg();
         // Beyond this slip τ would change sign.
-        let limit = self.tau / self.constants.shear_stiffness;
+        let limit = self.tau / self.constants.K_t;
         let end = self.distance_to_peak().map_or(limit, |p| p.min(limit));
         let candidate = self.newton(&leg, self.first_guess(&leg), end);
         match candidate {
@@ -153,19 +153,20 @@ impl Increment<'_> {
 
     /// Δλ with `σ_n` frozen at its trial value: exact under constant normal stress.
     fn first_guess(&self, leg: &Leg) -> f64 {
-        let k_t = self.constants.shear_stiffness;
+        let K_t = self.constants.K_t;
         let hardening = &self.constants.hardening;
         let excess = self.tau - self.mu * self.sigma;
         if leg.branch == Branch::Softening {
-            return excess / k_t;
+            return excess / K_t;
         }
         // Eq. (10) in |τ*| − K_t Δλ − μ σ* = 0 gives K_t Δλ² − q Δλ − r = 0.
+        let rise = hardening.mu_p - hardening.mu_0;
         let scale = hardening.slip_scale + self.xi;
-        let q = self.tau - k_t * scale - (hardening.initial + hardening.rise) * self.sigma;
+        let q = self.tau - K_t * scale - (hardening.mu_0 + rise) * self.sigma;
         let r = scale * excess;
-        let root = (q * q + 4.0 * k_t * r).sqrt();
+        let root = (q * q + 4.0 * K_t * r).sqrt();
         if q > 0.0 {
-            (q + root) / (2.0 * k_t)
+            (q + root) / (2.0 * K_t)
         } else {
             2.0 * r / (root - q)
         }
@@ -178,7 +179,7 @@ impl Increment<'_> {
             d_lambda: from.d_lambda + step,
             mu: from.mu + step * from.mu_slope,
             contraction,
-            sigma: self.sigma - self.constants.normal_stiffness * contraction,
+            sigma: self.sigma - self.constants.K_n * contraction,
             residual: from.residual + step * from.residual_slope,
             ..*from
         }
@@ -211,26 +212,23 @@ impl Increment<'_> {
     #[inline]
     fn is_first_root(&self, leg: &Leg, root: &Sample) -> bool {
         let Constants {
-            normal_stiffness: k_n,
-            shear_stiffness: k_t,
+            K_n,
+            K_t,
             ref hardening,
             one_root,
         } = *self.constants;
-        let characteristic = hardening.characteristic;
+        let mu_c0 = hardening.mu_c0;
         let (low, high) = (self.mu.min(root.mu), self.mu.max(root.mu));
-        let (contracts, dilates) = (
-            (characteristic - low).max(0.0),
-            (high - characteristic).max(0.0),
-        );
+        let (contracts, dilates) = ((mu_c0 - low).max(0.0), (high - mu_c0).max(0.0));
         if self.keeps_contact(root.d_lambda * contracts) {
             match (leg.branch, &hardening.softening) {
                 (Branch::Softening, Some(softening)) => {
                     // |dμ/dξ| is largest where sech z tanh z is, at 1/2.
-                    let slope = 0.5 * softening.rate * (softening.peak - softening.residual).abs();
+                    let slope = 0.5 * softening.rate * (softening.mu_pk - softening.mu_r).abs();
                     let travel = root.d_lambda;
-                    let sigma = self.sigma.abs() + k_n * travel * contracts.max(dilates);
+                    let sigma = self.sigma.abs() + K_n * travel * contracts.max(dilates);
                     let rate = contracts.max(STABILISATION_BOUND * dilates) + travel * slope;
-                    if slope * sigma + k_n * high * rate < k_t {
+                    if slope * sigma + K_n * high * rate < K_t {
                         return true;
                     }
                 }
@@ -245,6 +243,6 @@ impl Increment<'_> {
     /// A plastic contraction that leaves the faces in contact at the highest normal stress of the
     /// increment; if it does not, contact is lost for certain.
     pub(crate) fn keeps_contact(&self, contraction: f64) -> bool {
-        self.highest >= self.constants.normal_stiffness * contraction
+        self.highest >= self.constants.K_n * contraction
     }
 }

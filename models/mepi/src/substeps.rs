@@ -2,7 +2,6 @@
 //!
 //! | symbol | here | |
 //! |---|---|---|
-//! | H | `hardness` | |
 //! | `[Δu_n]`, `[Δu_t]` | `contraction`, `slip` of [`Path`] | over the whole increment |
 
 use crate::contact::Matrix;
@@ -39,7 +38,7 @@ struct Rates {
     sign: f64,
     mu: Jet,
     beta: f64,
-    hardness: f64,
+    H: f64,
 }
 
 impl Path<'_> {
@@ -101,8 +100,8 @@ impl Path<'_> {
     /// Eq. (6) without flow.
     fn elastic(&self, from: &Sliding, fraction: f64) -> Sliding {
         Sliding {
-            sigma: from.sigma + fraction * self.constants.normal_stiffness * self.contraction,
-            tau: from.tau + fraction * self.constants.shear_stiffness * self.slip,
+            sigma: from.sigma + fraction * self.constants.K_n * self.contraction,
+            tau: from.tau + fraction * self.constants.K_t * self.slip,
             done: from.done + fraction,
             ..*from
         }
@@ -116,15 +115,12 @@ impl Path<'_> {
     /// # Errors
     /// H ≤ 0: softening or dilatancy is steeper than the elastic springs.
     fn rates(&self, at: &Sliding) -> Result<Rates, Failure> {
-        let (k_n, k_t) = (
-            self.constants.normal_stiffness,
-            self.constants.shear_stiffness,
-        );
+        let Constants { K_n, K_t, .. } = *self.constants;
         let mu = self.friction(at.xi);
         let beta = self.constants.hardening.contraction_rate(mu, at.xi).value;
         // Eq. (C).
-        let hardness = k_t + mu.slope * at.sigma - mu.value * k_n * beta;
-        if hardness <= 0.0 {
+        let H = K_t + mu.slope * at.sigma - mu.value * K_n * beta;
+        if H <= 0.0 {
             return Err(Failure::Domain(
                 "the rate equations have no solution here; `scheme = \"implicit\"` jumps across",
             ));
@@ -135,18 +131,15 @@ impl Path<'_> {
             sign: 1.0_f64.copysign(driving),
             mu,
             beta,
-            hardness,
+            H,
         })
     }
 
     /// Eq. (D): a step forward with these rates.
     fn euler(&self, at: &Sliding, rates: &Rates, fraction: f64) -> Sliding {
-        let (k_n, k_t) = (
-            self.constants.normal_stiffness,
-            self.constants.shear_stiffness,
-        );
-        let towards = rates.sign * k_t * self.slip - rates.mu.value * k_n * self.contraction;
-        let d_lambda = (fraction * towards / rates.hardness).max(0.0);
+        let Constants { K_n, K_t, .. } = *self.constants;
+        let towards = rates.sign * K_t * self.slip - rates.mu.value * K_n * self.contraction;
+        let d_lambda = (fraction * towards / rates.H).max(0.0);
         self.elastic(at, fraction)
             .flowed(self.constants, rates, d_lambda)
     }
@@ -219,25 +212,17 @@ impl Path<'_> {
     /// # Errors
     /// They have no solution there.
     pub(crate) fn continuum_tangent(&self, end: &Sliding) -> Result<Matrix, Failure> {
-        let (k_n, k_t) = (
-            self.constants.normal_stiffness,
-            self.constants.shear_stiffness,
-        );
-        let Rates {
-            sign,
-            mu,
-            beta,
-            hardness,
-        } = self.rates(end)?;
-        let towards = sign * k_t * self.slip - mu.value * k_n * self.contraction;
+        let Constants { K_n, K_t, .. } = *self.constants;
+        let Rates { sign, mu, beta, H } = self.rates(end)?;
+        let towards = sign * K_t * self.slip - mu.value * K_n * self.contraction;
         if towards <= 0.0 {
             return Ok([[1.0, 0.0], [0.0, 1.0]]);
         }
         // dλ = (sign dτ* − μ dσ*)/H.
-        let [by_sigma, by_tau] = [-mu.value / hardness, sign / hardness];
+        let [by_sigma, by_tau] = [-mu.value / H, sign / H];
         Ok([
-            [1.0 - k_n * beta * by_sigma, -k_n * beta * by_tau],
-            [-sign * k_t * by_sigma, 1.0 - sign * k_t * by_tau],
+            [1.0 - K_n * beta * by_sigma, -K_n * beta * by_tau],
+            [-sign * K_t * by_sigma, 1.0 - sign * K_t * by_tau],
         ])
     }
 
@@ -249,7 +234,7 @@ impl Path<'_> {
             if outside <= 1e-14 * at.tau.abs() {
                 break;
             }
-            at = at.flowed(self.constants, &rates, outside / rates.hardness);
+            at = at.flowed(self.constants, &rates, outside / rates.H);
         }
         Ok(at)
     }
@@ -265,8 +250,8 @@ impl Sliding {
     /// After plastic flow, Eq. (6) and (14).
     fn flowed(self, constants: &Constants, rates: &Rates, d_lambda: f64) -> Self {
         Self {
-            sigma: self.sigma - constants.normal_stiffness * rates.beta * d_lambda,
-            tau: self.tau - rates.sign * constants.shear_stiffness * d_lambda,
+            sigma: self.sigma - constants.K_n * rates.beta * d_lambda,
+            tau: self.tau - rates.sign * constants.K_t * d_lambda,
             xi: self.xi + d_lambda,
             contraction: self.contraction + rates.beta * d_lambda,
             ..self

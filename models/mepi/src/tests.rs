@@ -12,12 +12,14 @@ mod schemes;
 mod tangent;
 mod truth;
 
+use crate::interface::{Common, SofteningParameters};
 use crate::{Mepi, MepiSoftening, State, mepi, mepi_softening};
+use abi::substepping::SchemeParameters;
 use abi::{Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Tangent};
 use truth::Truth;
 
 /// Table IV with the reference pressure that makes it dilate.
-const TABLE_4: mepi::Parameters = mepi::Parameters {
+const TABLE_4: Common = Common {
     k_n: 0.86e5,
     k_t: 0.37e5,
     n: 0.55,
@@ -29,13 +31,10 @@ const TABLE_4: mepi::Parameters = mepi::Parameters {
     t: 2e-3,
     p_0: 100.0,
     sigma_ni: f64::NAN,
-    scheme: 0.0,
-    substeps: 10.0,
-    scheme_tolerance: 1e-6,
 };
 
 /// Table II, thickness for L/t = 25.
-const TABLE_2: mepi::Parameters = mepi::Parameters {
+const TABLE_2: Common = Common {
     k_n: 1e6,
     k_t: 0.5e6,
     n: 0.0,
@@ -47,6 +46,10 @@ const TABLE_2: mepi::Parameters = mepi::Parameters {
     t: 4e-4,
     p_0: 100.0,
     sigma_ni: 100.0,
+};
+
+/// What the scheme's parameters are by default.
+const IMPLICIT: SchemeParameters = SchemeParameters {
     scheme: 0.0,
     substeps: 10.0,
     scheme_tolerance: 1e-6,
@@ -54,58 +57,95 @@ const TABLE_2: mepi::Parameters = mepi::Parameters {
 
 /// Table I, Fontainebleau sand, loose.
 const FONTAINEBLEAU: mepi_softening::Parameters = mepi_softening::Parameters {
-    k_n: 0.86e5,
-    k_t: 0.37e5,
-    n: 0.55,
-    mu_0: 0.0,
-    mu_p: 0.78,
-    mu_c0: 0.67,
-    a: 0.000_45,
-    c_0: 0.05,
-    t: 2e-3,
-    p_0: 1.0,
-    sigma_ni: f64::NAN,
-    mu_r: 0.7,
-    a_0: 4.0,
-    u_tp: 1.4e-3,
-    peak: 0.0,
-    scheme: 0.0,
-    substeps: 10.0,
-    scheme_tolerance: 1e-6,
+    common: Common {
+        k_n: 0.86e5,
+        k_t: 0.37e5,
+        n: 0.55,
+        mu_0: 0.0,
+        mu_p: 0.78,
+        mu_c0: 0.67,
+        a: 0.000_45,
+        c_0: 0.05,
+        t: 2e-3,
+        p_0: 1.0,
+        sigma_ni: f64::NAN,
+    },
+    softening: SofteningParameters {
+        mu_r: 0.7,
+        a_0: 4.0,
+        u_tp: 1.4e-3,
+        peak: 0.0,
+    },
+    scheme: IMPLICIT,
 };
 
 /// Table I, silica sand, dense.
 const SILICA: mepi_softening::Parameters = mepi_softening::Parameters {
-    k_n: 6e6,
-    k_t: 1e6,
-    n: 0.0,
-    mu_0: 0.0,
-    mu_p: 0.81,
-    mu_c0: 0.49,
-    a: 0.000_06,
-    c_0: 0.05,
-    t: 6e-3,
-    p_0: 1.0,
-    sigma_ni: f64::NAN,
-    mu_r: 0.6,
-    a_0: 12.0,
-    u_tp: 4.3e-4,
-    peak: 0.0,
-    scheme: 0.0,
-    substeps: 10.0,
-    scheme_tolerance: 1e-6,
+    common: Common {
+        k_n: 6e6,
+        k_t: 1e6,
+        n: 0.0,
+        mu_0: 0.0,
+        mu_p: 0.81,
+        mu_c0: 0.49,
+        a: 0.000_06,
+        c_0: 0.05,
+        t: 6e-3,
+        p_0: 1.0,
+        sigma_ni: f64::NAN,
+    },
+    softening: SofteningParameters {
+        mu_r: 0.6,
+        a_0: 12.0,
+        u_tp: 4.3e-4,
+        peak: 0.0,
+    },
+    scheme: IMPLICIT,
 };
 
 fn published(p: mepi_softening::Parameters) -> mepi_softening::Parameters {
-    mepi_softening::Parameters { peak: 1.0, ..p }
+    let softening = SofteningParameters {
+        peak: 1.0,
+        ..p.softening
+    };
+    mepi_softening::Parameters { softening, ..p }
 }
 
-fn mepi(p: mepi::Parameters) -> Mepi {
-    Mepi::new(p).unwrap()
+fn mepi(common: Common) -> Mepi {
+    mepi_by(IMPLICIT, common)
+}
+
+fn mepi_by(scheme: SchemeParameters, common: Common) -> Mepi {
+    Mepi::new(mepi::Parameters { common, scheme }).unwrap()
 }
 
 fn softening(p: mepi_softening::Parameters) -> MepiSoftening {
     MepiSoftening::new(p).unwrap()
+}
+
+/// Parameters over many decades.
+fn random_parameters(random: &mut Random) -> (Common, SofteningParameters) {
+    let mu_p = random.between(0.05, 1.5);
+    let common = Common {
+        k_n: random.decades(1.0, 1e12),
+        k_t: random.decades(1.0, 1e12),
+        n: random.unit(),
+        mu_0: mu_p * (random.unit() - 0.3).max(0.0),
+        mu_p,
+        mu_c0: mu_p * random.unit(),
+        a: random.decades(1e-6, 1e3),
+        c_0: random.decades(1e-6, 1e3),
+        t: random.decades(1e-4, 1e-1),
+        p_0: if random.unit() < 0.5 { 1.0 } else { 100.0 },
+        sigma_ni: f64::NAN,
+    };
+    let softening = SofteningParameters {
+        mu_r: mu_p * random.unit(),
+        a_0: random.decades(1e-2, 1e3),
+        u_tp: random.decades(1e-6, 1e-1),
+        peak: f64::from(u8::from(random.unit() < 0.5)),
+    };
+    (common, softening)
 }
 
 /// One integration point on a path. Compression and contraction positive here, as in the paper.

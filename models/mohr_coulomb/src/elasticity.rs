@@ -8,10 +8,10 @@ use nalgebra::{Matrix3, Vector3};
 /// Isotropic elastic constants.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Elasticity {
-    pub(crate) young_modulus: f64,
-    pub(crate) poisson_ratio: f64,
+    pub(crate) E: f64,
+    pub(crate) nu: f64,
     pub(crate) lambda: f64,
-    pub(crate) shear_modulus: f64,
+    pub(crate) G: f64,
     /// 1/(2G).
     shear_compliance: f64,
     /// 1/(3λ + 2G).
@@ -19,14 +19,14 @@ pub(crate) struct Elasticity {
 }
 
 impl Elasticity {
-    pub(crate) fn new(e: f64, nu: f64) -> Self {
+    pub(crate) fn new(E: f64, nu: f64) -> Self {
         Self {
-            young_modulus: e,
-            poisson_ratio: nu,
-            lambda: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
-            shear_modulus: e / (2.0 * (1.0 + nu)),
-            shear_compliance: (1.0 + nu) / e,
-            bulk_compliance: (1.0 - 2.0 * nu) / e,
+            E,
+            nu,
+            lambda: E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
+            G: E / (2.0 * (1.0 + nu)),
+            shear_compliance: (1.0 + nu) / E,
+            bulk_compliance: (1.0 - 2.0 * nu) / E,
         }
     }
 
@@ -37,14 +37,14 @@ impl Elasticity {
         stress: &[f64; N],
         strain_increment: &[f64; N],
     ) -> [f64; N] {
-        let (lambda, g) = (self.lambda, self.shear_modulus);
+        let Self { lambda, G, .. } = *self;
         let volumetric = strain_increment[0] + strain_increment[1] + strain_increment[2];
         std::array::from_fn(|i| {
             stress[i]
                 + if i < 3 {
-                    lambda * volumetric + 2.0 * g * strain_increment[i]
+                    lambda * volumetric + 2.0 * G * strain_increment[i]
                 } else {
-                    g * strain_increment[i]
+                    G * strain_increment[i]
                 }
         })
     }
@@ -56,18 +56,17 @@ impl Elasticity {
         for i in 0..N {
             if i < 3 {
                 d[i][..3].fill(self.lambda);
-                d[i][i] += 2.0 * self.shear_modulus;
+                d[i][i] += 2.0 * self.G;
             } else {
-                d[i][i] = self.shear_modulus;
+                d[i][i] = self.G;
             }
         }
         d
     }
 
-    /// The operator between principal strains and principal stresses.
+    /// D of Eq. (12), between principal strains and principal stresses.
     pub(crate) fn principal_operator(&self) -> Matrix3<f64> {
-        Matrix3::from_element(self.lambda)
-            + Matrix3::from_diagonal_element(2.0 * self.shear_modulus)
+        Matrix3::from_element(self.lambda) + Matrix3::from_diagonal_element(2.0 * self.G)
     }
 
     /// Equivalent shear strain and volumetric strain that belong to principal stresses, Eq. (13).

@@ -1,5 +1,6 @@
 #![doc = include_str!("../LAW.md")]
 #![forbid(unsafe_code)]
+#![expect(non_snake_case, reason = "the letters of LAW.md: G is not g, M not m")]
 
 mod elasticity;
 mod return_mapping;
@@ -9,7 +10,8 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-use abi::substepping::Scheme;
+use abi::friction::Strength;
+use abi::substepping::{Scheme, SchemeParameters};
 use abi::{
     ContinuumLaw, Description, Failure, Parameter, Refusal, SolidPoint, SolidResponse, Tangent,
     Variable,
@@ -35,18 +37,7 @@ abi::parameters! {
         dilatancy_angle: Parameter::new(c"ψ", c"deg").at_least(0.0).below(90.0).usual(0.0, 30.0),
         /// Bound on the largest principal stress, at most c cot φ; none if left out.
         tensile_strength: Parameter::new(c"R_t", c"kPa").at_least(0.0).optional(),
-        /// How the flow is integrated.
-        scheme: Parameter::new(c"scheme", c"-")
-            .one_of(abi::choices!(c"implicit", c"explicit", c"error_controlled"))
-            .default(0.0),
-        /// Number of steps of the explicit scheme in an increment, whole.
-        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e6).default(10.0),
-        /// Relative error that a step of the error-controlled scheme may have.
-        scheme_tolerance: Parameter::new(c"ε_s", c"-")
-            .above(0.0)
-            .below(1.0)
-            .usual(1e-10, 1e-2)
-            .default(1e-6),
+        ..scheme: SchemeParameters,
     }
 }
 
@@ -80,21 +71,19 @@ impl ContinuumLaw for MohrCoulomb {
     type State = State;
 
     fn new(p: Parameters) -> Result<Self, Refusal> {
-        check(&p)?;
+        let strength = Strength {
+            cohesion: p.cohesion,
+            friction_angle: p.friction_angle,
+            dilatancy_angle: p.dilatancy_angle,
+            tensile_strength: p.tensile_strength,
+            apex: surface::apex(p.cohesion, p.friction_angle),
+        };
+        strength.check()?;
         let elasticity = Elasticity::new(p.young_modulus, p.poisson_ratio);
-        let apex = surface::apex(p.cohesion, p.friction_angle);
-        // At c cot φ the cut-off touches the apex and changes nothing.
-        let below_apex = |t: &f64| *t < apex * (1.0 - APEX_ROUNDING);
         Ok(Self {
             elasticity,
-            pyramid: Pyramid::new(
-                &elasticity,
-                p.cohesion,
-                p.friction_angle,
-                p.dilatancy_angle,
-                Some(p.tensile_strength).filter(below_apex),
-            ),
-            scheme: Scheme::new(p.scheme, p.substeps, p.scheme_tolerance)?,
+            pyramid: Pyramid::new(&elasticity, &strength),
+            scheme: Scheme::new(p.scheme)?,
         })
     }
 
@@ -136,7 +125,7 @@ impl ContinuumLaw for MohrCoulomb {
             }
         };
         // Eqs. (2) and (3), (10), (11).
-        let g = self.elasticity.shear_modulus;
+        let Elasticity { G, .. } = self.elasticity;
         if N == 4 {
             let circle = MohrCircle::of(&trial);
             let (largest, smallest) = circle.extremes();
@@ -149,9 +138,9 @@ impl ContinuumLaw for MohrCoulomb {
             let principal = circle.principal();
             let end = self.pyramid.return_stress(&principal.stress);
             let consistent = || {
-                let moduli = self.pyramid.in_plane_moduli(end.zone, principal.pair);
-                let spin = end.spin(&principal.stress, principal.pair);
-                resized(principal.tangent(moduli, g * spin).map(resized))
+                let M = self.pyramid.in_plane_M(end.zone, principal.pair);
+                let kappa = end.kappa(&principal.stress, principal.pair);
+                resized(principal.tangent(M, G * kappa).map(resized))
             };
             let stress = resized(principal.compose(&end.stress));
             Ok(plastic(
@@ -175,10 +164,10 @@ impl ContinuumLaw for MohrCoulomb {
             }
             let end = self.pyramid.return_stress(s);
             let consistent = || {
-                let shear = Pair::ALL.map(|pair| g * end.spin(s, pair));
+                let shear = Pair::ALL.map(|pair| G * end.kappa(s, pair));
                 resized(
                     principal
-                        .tangent(self.pyramid.moduli(end.zone), shear)
+                        .tangent(self.pyramid.M(end.zone), shear)
                         .map(resized),
                 )
             };
@@ -194,30 +183,7 @@ fn resized<T: Copy, const M: usize, const N: usize>(values: [T; M]) -> [T; N] {
     std::array::from_fn(|i| values[i])
 }
 
-/// Relative rounding of c cot φ.
-const APEX_ROUNDING: f64 = 1e-12;
-
-/// What the bounds of single parameters cannot say.
-fn check(p: &Parameters) -> Result<(), Refusal> {
-    let (c, phi, psi) = (p.cohesion, p.friction_angle, p.dilatancy_angle);
-    if psi > phi {
-        let reason = format!("{psi} deg exceeds the friction angle of {phi} deg");
-        return Err(Refusal::new("dilatancy_angle", reason));
-    }
-    let apex = surface::apex(c, phi);
-    if phi <= 0.0 && c <= 0.0 {
-        let reason = "0 kPa with a friction angle of 0 deg leaves no strength";
-        return Err(Refusal::new("cohesion", reason));
-    }
-    if p.tensile_strength > apex * (1.0 + APEX_ROUNDING) {
-        let t = p.tensile_strength;
-        let reason = format!("{t} kPa exceeds c cot φ = {apex} kPa, the apex of the pyramid");
-        return Err(Refusal::new("tensile_strength", reason));
-    }
-    Ok(())
-}
-
 abi::export_laws!(continuum MohrCoulomb);
-abi::export_foreign!(continuum MohrCoulomb,
+bridges::export!(continuum MohrCoulomb,
     properties: [YoungModulus PoissonRatio Cohesion FrictionAngle DilatancyAngle],
     parameters: [TensileStrength Scheme Substeps SchemeTolerance]);

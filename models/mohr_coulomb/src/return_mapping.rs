@@ -1,9 +1,7 @@
 //! Return mapping to the Mohr–Coulomb pyramid and its tension cut-off, in principal stresses.
 //!
-//! | symbol | here | |
-//! |---|---|---|
-//! | `s₁ ≥ s₂ ≥ s₃` | `s` | trial principal stresses, tension positive |
-//! | `Δ` | `d` | G times the plastic multiplier, kPa |
+//! Letters are those of `LAW.md`; here `s` is the trial stress s\*, largest principal value first, and
+//! `delta` is Δ, kPa.
 
 use crate::spectral::Pair;
 use crate::surface::{CutOff, Pyramid};
@@ -45,10 +43,10 @@ pub(crate) struct Returned {
 }
 
 impl Returned {
-    /// `(s_i − s_j)/(s_i* − s_j*)` of a pair: what the return leaves of a shear increment between
+    /// `κ_ij = (s_i − s_j)/(s_i* − s_j*)` of a pair: what the return leaves of a shear increment between
     /// the two principal axes, Eq. (11).
     #[inline]
-    pub(crate) fn spin(&self, trial: &Vector3<f64>, pair: Pair) -> f64 {
+    pub(crate) fn kappa(&self, trial: &Vector3<f64>, pair: Pair) -> f64 {
         let [x, y] = self.gaps;
         // Where two trial values coincide the return leaves both alone or merges both.
         let (gap, merged) = match pair {
@@ -73,14 +71,14 @@ impl Pyramid {
         let Some(cut) = &self.cut_off else {
             return self.to_pyramid(s);
         };
-        if s[0] > cut.strength {
+        if s[0] > cut.R_t {
             let end = self.to_cut_off(s, cut);
-            if self.yield_function(end.stress[0], end.stress[2]) <= 0.0 {
+            if self.f(end.stress[0], end.stress[2]) <= 0.0 {
                 return end;
             }
         }
         let end = self.to_pyramid(s);
-        if end.stress[0] <= cut.strength {
+        if end.stress[0] <= cut.R_t {
             end
         } else {
             self.to_intersection(s, cut)
@@ -91,15 +89,15 @@ impl Pyramid {
     #[inline]
     fn to_pyramid(&self, s: &Vector3<f64>) -> Returned {
         // Eq. (5).
-        let d = self.yield_function(s[0], s[2]) / self.face.hardness;
-        let x = s[0] - s[1] - 2.0 * d * self.psi.upper;
-        let y = s[1] - s[2] - 2.0 * d * self.psi.lower;
+        let delta = self.f(s[0], s[2]) / self.face.h;
+        let x = s[0] - s[1] - 2.0 * delta * self.psi.a;
+        let y = s[1] - s[2] - 2.0 * delta * self.psi.b;
         if x >= 0.0 && y >= 0.0 {
-            let s3 = s[2] - d * self.face.relief[2];
+            let s3 = s[2] - delta * self.face.g[2];
             if self.gap_above(s3) >= 0.0 {
                 let s1 = self.s1_above(s3);
                 // Held in order: s₂ has the rounding of the trial stress.
-                let s2 = (s[1] - d * self.face.relief[1]).min(s1).max(s3);
+                let s2 = (s[1] - delta * self.face.g[1]).min(s1).max(s3);
                 return Returned {
                     zone: Zone::Face,
                     stress: Vector3::new(s1, s2, s3),
@@ -110,8 +108,8 @@ impl Pyramid {
         // Eq. (6).
         if x < 0.0 {
             let mean = 0.5 * (s[0] + s[1]);
-            let d = self.yield_function(mean, s[2]) / self.edge_12.hardness;
-            let s3 = s[2] - d * self.edge_12.relief[2];
+            let delta = self.f(mean, s[2]) / self.edge_12.h;
+            let s3 = s[2] - delta * self.edge_12.g[2];
             let gap = self.gap_above(s3);
             if gap >= 0.0 {
                 let s1 = self.s1_above(s3);
@@ -124,8 +122,8 @@ impl Pyramid {
         }
         if y < 0.0 {
             let mean = 0.5 * (s[1] + s[2]);
-            let d = self.yield_function(s[0], mean) / self.edge_23.hardness;
-            let s3 = mean - d * self.edge_23.relief[2];
+            let delta = self.f(s[0], mean) / self.edge_23.h;
+            let s3 = mean - delta * self.edge_23.g[2];
             let gap = self.gap_above(s3);
             if gap >= 0.0 {
                 return Returned {
@@ -146,34 +144,34 @@ impl Pyramid {
     /// Tension plane, edge and corner, Eq. (8), for s₁\* above the tensile strength.
     #[inline]
     fn to_cut_off(&self, s: &Vector3<f64>, cut: &CutOff) -> Returned {
-        let (t, nu) = (cut.strength, self.poisson_ratio);
-        let relief = (s[0] - t) * nu / (1.0 - nu);
-        let s2 = s[1] - relief;
-        if s2 <= t {
+        let (R_t, nu) = (cut.R_t, self.nu);
+        let fall = (s[0] - R_t) * nu / (1.0 - nu);
+        let s2 = s[1] - fall;
+        if s2 <= R_t {
             return Returned {
                 zone: Zone::TensionPlane,
-                stress: Vector3::new(t, s2, s[2] - relief),
-                gaps: [t - s2, s[1] - s[2]],
+                stress: Vector3::new(R_t, s2, s[2] - fall),
+                gaps: [R_t - s2, s[1] - s[2]],
             };
         }
-        let s3 = s[2] - nu * ((s[0] - t) + (s[1] - t));
-        let (zone, s3) = if s3 <= t {
+        let s3 = s[2] - nu * ((s[0] - R_t) + (s[1] - R_t));
+        let (zone, s3) = if s3 <= R_t {
             (Zone::TensionEdge, s3)
         } else {
-            (Zone::TensionCorner, t)
+            (Zone::TensionCorner, R_t)
         };
         Returned {
             zone,
-            stress: Vector3::new(t, t, s3),
-            gaps: [0.0, t - s3],
+            stress: Vector3::new(R_t, R_t, s3),
+            gaps: [0.0, R_t - s3],
         }
     }
 
     /// Where the pyramid meets the cut-off, Eq. (9).
     #[inline]
     fn to_intersection(&self, s: &Vector3<f64>, cut: &CutOff) -> Returned {
-        let (s1, s3) = (cut.strength, cut.s3);
-        let s2 = s[1] - self.poisson_ratio * ((s[0] - s1) + (s[2] - s3));
+        let (s1, s3) = (cut.R_t, cut.t_3);
+        let s2 = s[1] - self.nu * ((s[0] - s1) + (s[2] - s3));
         let (zone, s2) = if s2 >= s1 {
             (Zone::Vertex12, s1)
         } else if s2 <= s3 {

@@ -2,6 +2,7 @@
 //!
 //! Stresses are tensors here, in the plane and in space alike.
 
+use crate::elasticity::Elasticity;
 use crate::return_mapping::Zone;
 use crate::spectral::{Pair, Spatial, jacobi};
 use crate::{MohrCoulomb, State};
@@ -209,10 +210,10 @@ impl MohrCoulomb {
             Zone::Apex | Zone::TensionCorner => true,
             Zone::Face | Zone::TensionPlane | Zone::FaceAndTension => false,
         };
-        let g = self.elasticity.shear_modulus;
-        let shear = Pair::ALL.map(|pair| if merged(pair) { 0.0 } else { g });
+        let Elasticity { G, .. } = self.elasticity;
+        let shear = Pair::ALL.map(|pair| if merged(pair) { 0.0 } else { G });
         let all: [f64; 6] = components(stress);
-        let tangent = Spatial::of(&all).tangent(self.pyramid.moduli(zone), shear);
+        let tangent = Spatial::of(&all).tangent(self.pyramid.M(zone), shear);
         std::array::from_fn(|i| std::array::from_fn(|j| tangent[i][j]))
     }
 }

@@ -14,6 +14,7 @@ mod zones;
 use crate::return_mapping::{Returned, Zone};
 use crate::surface::Pyramid;
 use crate::{MohrCoulomb, Parameters, State};
+use abi::substepping::SchemeParameters;
 use abi::{ContinuumLaw as _, SolidPoint, SolidResponse, Tangent};
 use nalgebra::{Matrix3, Vector3};
 
@@ -27,18 +28,12 @@ fn handy(tensile_strength: Option<f64>) -> Parameters {
         friction_angle: 30.0,
         dilatancy_angle: 0.0,
         tensile_strength: tensile_strength.unwrap_or(f64::NAN),
-        ..IMPLICIT
+        scheme: IMPLICIT,
     }
 }
 
-/// The defaults of the scheme; everything else is left out.
-const IMPLICIT: Parameters = Parameters {
-    young_modulus: f64::NAN,
-    poisson_ratio: f64::NAN,
-    cohesion: f64::NAN,
-    friction_angle: f64::NAN,
-    dilatancy_angle: f64::NAN,
-    tensile_strength: f64::NAN,
+/// What the scheme's parameters are by default.
+const IMPLICIT: SchemeParameters = SchemeParameters {
     scheme: 0.0,
     substeps: 10.0,
     scheme_tolerance: 1e-6,
@@ -191,7 +186,7 @@ impl Random {
             friction_angle,
             dilatancy_angle: friction_angle * self.one_of(&[0.0, 0.0, 0.4, 1.0]),
             tensile_strength: share * apex.min(3.0) * scale,
-            ..IMPLICIT
+            scheme: IMPLICIT,
         }
     }
 }

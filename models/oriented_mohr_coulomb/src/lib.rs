@@ -5,6 +5,7 @@ mod return_mapping;
 #[cfg(test)]
 mod tests;
 
+use abi::friction::Strength;
 use abi::{
     ContinuumLaw, Description, Failure, Hypothesis, Parameter, Refusal, SolidPoint, SolidResponse,
     Tangent, Variable,
@@ -68,26 +69,23 @@ impl ContinuumLaw for OrientedMohrCoulomb {
     type State = State;
 
     fn new(p: Parameters) -> Result<Self, Refusal> {
-        check(&p)?;
+        let strength = Strength {
+            cohesion: p.cohesion,
+            friction_angle: p.friction_angle,
+            dilatancy_angle: p.dilatancy_angle,
+            tensile_strength: p.tensile_strength,
+            apex: return_mapping::apex(p.cohesion, p.friction_angle),
+        };
+        strength.check()?;
         let (e, nu) = (p.young_modulus, p.poisson_ratio);
         let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
         let shear_modulus = e / (2.0 * (1.0 + nu));
         let oedometric = lambda + 2.0 * shear_modulus;
-        let apex = return_mapping::apex(p.cohesion, p.friction_angle);
-        // At c cot φ the cut-off touches the apex and changes nothing.
-        let below_apex = |t: &f64| *t < apex * (1.0 - APEX_ROUNDING);
         Ok(Self {
             lambda,
             shear_modulus,
             oedometric,
-            facet: Facet::new(
-                oedometric,
-                shear_modulus,
-                p.cohesion,
-                p.friction_angle,
-                p.dilatancy_angle,
-                Some(p.tensile_strength).filter(below_apex),
-            ),
+            facet: Facet::new(oedometric, shear_modulus, &strength),
         })
     }
 
@@ -180,29 +178,7 @@ impl OrientedMohrCoulomb {
     }
 }
 
-/// Relative rounding of c cot φ.
-const APEX_ROUNDING: f64 = 1e-12;
-
-/// What the bounds of single parameters cannot say.
-fn check(p: &Parameters) -> Result<(), Refusal> {
-    let (c, phi, psi) = (p.cohesion, p.friction_angle, p.dilatancy_angle);
-    if psi > phi {
-        let reason = format!("{psi} deg exceeds the friction angle of {phi} deg");
-        return Err(Refusal::new("dilatancy_angle", reason));
-    }
-    if phi <= 0.0 && c <= 0.0 {
-        let reason = "0 kPa with a friction angle of 0 deg leaves no strength";
-        return Err(Refusal::new("cohesion", reason));
-    }
-    let (t, apex) = (p.tensile_strength, return_mapping::apex(c, phi));
-    if t > apex * (1.0 + APEX_ROUNDING) {
-        let reason = format!("{t} kPa exceeds c cot φ = {apex} kPa, the apex of the surface");
-        return Err(Refusal::new("tensile_strength", reason));
-    }
-    Ok(())
-}
-
 abi::export_laws!(continuum OrientedMohrCoulomb);
-abi::export_foreign!(continuum OrientedMohrCoulomb in PlaneStrain Axisymmetrical,
+bridges::export!(continuum OrientedMohrCoulomb in PlaneStrain Axisymmetrical,
     properties: [YoungModulus PoissonRatio Cohesion FrictionAngle DilatancyAngle],
     parameters: [TensileStrength]);

@@ -6,6 +6,8 @@
 //! | `M`, `G` | `oedometric`, `shear_modulus` | moduli of the facet, kPa |
 //! | `H` | `hardness` | G + M tan φ tan ψ, kPa |
 
+use abi::friction::{Strength, tan};
+
 /// Where a trial stress returns to. Each inadmissible trial stress has exactly one zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Zone {
@@ -47,15 +49,6 @@ pub(crate) struct Facet {
     cut_off: Option<CutOff>,
 }
 
-/// Tangent of an angle in degrees, without cancellation near 90°.
-fn tan(degrees: f64) -> f64 {
-    if degrees > 45.0 {
-        (90.0 - degrees).to_radians().tan().recip()
-    } else {
-        degrees.to_radians().tan()
-    }
-}
-
 /// c cot φ; infinite for φ = 0.
 pub(crate) fn apex(cohesion: f64, friction_angle: f64) -> f64 {
     let tan_phi = tan(friction_angle);
@@ -67,16 +60,11 @@ pub(crate) fn apex(cohesion: f64, friction_angle: f64) -> f64 {
 }
 
 impl Facet {
-    /// The surface for angles in degrees. `tensile_strength` below c cot φ cuts the apex off.
-    pub(crate) fn new(
-        oedometric: f64,
-        shear_modulus: f64,
-        cohesion: f64,
-        friction_angle: f64,
-        dilatancy_angle: f64,
-        tensile_strength: Option<f64>,
-    ) -> Self {
-        let (tan_phi, tan_psi) = (tan(friction_angle), tan(dilatancy_angle));
+    /// The surface of this strength.
+    pub(crate) fn new(oedometric: f64, shear_modulus: f64, strength: &Strength) -> Self {
+        let cohesion = strength.cohesion;
+        let tan_phi = tan(strength.friction_angle);
+        let tan_psi = tan(strength.dilatancy_angle);
         Self {
             cohesion,
             tan_phi,
@@ -84,8 +72,8 @@ impl Facet {
             oedometric,
             shear_modulus,
             hardness: shear_modulus + oedometric * tan_phi * tan_psi,
-            apex: apex(cohesion, friction_angle),
-            cut_off: tensile_strength.map(|normal| CutOff {
+            apex: strength.apex,
+            cut_off: strength.cut_off().map(|normal| CutOff {
                 normal,
                 shear: cohesion - normal * tan_phi,
             }),

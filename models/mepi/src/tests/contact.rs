@@ -87,7 +87,7 @@ fn losing_contact_relieves_the_shear_stress_by_slip() {
 fn dilation_keeps_a_point_in_contact_that_opens_slowly() {
     // Constant normal stress in a dilating interface: the trial stress of a large increment is
     // tensile, the solution is not.
-    let p = mepi::Parameters {
+    let p = Common {
         mu_0: 0.6,
         c_0: 0.0,
         ..TABLE_4
@@ -102,7 +102,7 @@ fn dilation_keeps_a_point_in_contact_that_opens_slowly() {
 #[test]
 fn contraction_at_constant_volume_uses_up_the_normal_stress() {
     // Slow hardening: never beyond the characteristic state before σ_n is gone.
-    let p = mepi::Parameters {
+    let p = Common {
         a: 10.0,
         mu_0: 0.0,
         ..TABLE_4
@@ -146,7 +146,7 @@ fn contraction_at_constant_volume_uses_up_the_normal_stress() {
 #[test]
 fn an_increment_that_exhausts_contact_ends_there_however_far_it_goes() {
     // The slip of the second increment would reach the dilating range; contact is lost before.
-    let p = mepi::Parameters {
+    let p = Common {
         a: 1.0,
         mu_0: 0.0,
         ..TABLE_4
@@ -162,7 +162,7 @@ fn an_increment_that_exhausts_contact_ends_there_however_far_it_goes() {
 
 #[test]
 fn a_tension_carried_in_is_released_as_a_gap() {
-    let law = mepi(mepi::Parameters {
+    let law = mepi(Common {
         sigma_ni: 100.0,
         ..TABLE_4
     });
@@ -175,7 +175,7 @@ fn a_tension_carried_in_is_released_as_a_gap() {
 
 #[test]
 fn a_tension_carried_in_enters_the_trial_as_it_stands() {
-    let law = mepi(mepi::Parameters {
+    let law = mepi(Common {
         sigma_ni: 100.0,
         ..TABLE_4
     });
@@ -205,23 +205,32 @@ fn starts_only_from_compression_unless_the_initial_stress_is_given() {
 
 #[test]
 fn refuses_parameters_that_do_not_go_together() {
-    let refused = |p| Mepi::new(p).unwrap_err().parameter;
+    let refused = |common| {
+        let p = mepi::Parameters {
+            common,
+            scheme: IMPLICIT,
+        };
+        Mepi::new(p).unwrap_err().parameter
+    };
     assert_eq!(
-        refused(mepi::Parameters {
+        refused(Common {
             mu_0: 0.8,
             ..TABLE_4
         }),
         "mu_0"
     );
     assert_eq!(
-        refused(mepi::Parameters {
+        refused(Common {
             mu_c0: 0.8,
             ..TABLE_4
         }),
         "mu_c0"
     );
     let residual = mepi_softening::Parameters {
-        mu_r: 0.9,
+        softening: SofteningParameters {
+            mu_r: 0.9,
+            ..SILICA.softening
+        },
         ..SILICA
     };
     assert_eq!(MepiSoftening::new(residual).unwrap_err().parameter, "mu_r");

@@ -10,24 +10,11 @@ fn stays_admissible_on_random_walks() {
     let mut random = Random(3);
     let (mut updates, mut cuts) = (0_u32, 0_u32);
     for _ in 0..3000 {
-        let mu_p = random.between(0.05, 1.5);
+        let (common, beyond) = random_parameters(&mut random);
         let p = mepi_softening::Parameters {
-            k_n: random.decades(1.0, 1e12),
-            k_t: random.decades(1.0, 1e12),
-            n: random.unit(),
-            mu_0: mu_p * (random.unit() - 0.3).max(0.0),
-            mu_p,
-            mu_c0: mu_p * random.unit(),
-            a: random.decades(1e-6, 1e3),
-            c_0: random.decades(1e-6, 1e3),
-            t: random.decades(1e-4, 1e-1),
-            p_0: 1.0,
-            sigma_ni: f64::NAN,
-            mu_r: mu_p * random.unit(),
-            a_0: random.decades(1e-2, 1e3),
-            u_tp: random.decades(1e-6, 1e-1),
-            peak: f64::from(u8::from(random.unit() < 0.5)),
-            ..FONTAINEBLEAU
+            common,
+            softening: beyond,
+            scheme: IMPLICIT,
         };
         let law = softening(p);
         let sigma_ni = random.decades(1e-6, 1e6);
@@ -61,8 +48,8 @@ fn stays_admissible_on_random_walks() {
                 assert_eq!([sigma, tau], [0.0; 2]);
             }
             // F ≤ 0; at the jump the surface is the one above.
-            let mu = if state.plastic_slip == p.u_tp && p.peak > 0.5 {
-                p.mu_p
+            let mu = if state.plastic_slip == p.softening.u_tp && p.softening.is_published() {
+                p.common.mu_p
             } else {
                 truth.mu(state.plastic_slip)
             };
@@ -70,7 +57,9 @@ fn stays_admissible_on_random_walks() {
             let before = walker.dissipation;
             walker.step(du);
             // With the stress at the end, an increment across the jump may count too little.
-            let jumped = p.peak > 0.5 && start.plastic_slip < p.u_tp && state.plastic_slip > p.u_tp;
+            let jumped = p.softening.is_published()
+                && start.plastic_slip < p.softening.u_tp
+                && state.plastic_slip > p.softening.u_tp;
             let spent = walker.dissipation - before;
             assert!(
                 jumped || spent >= -1e-13 * sigma * state.plastic_slip,
@@ -87,17 +76,27 @@ fn scales_with_stress_and_length() {
     // σ, p_0 by s and u, t, u_tp by l leave the equations as they are.
     for p in [FONTAINEBLEAU, published(SILICA)] {
         for (s, l) in [(1e-8, 1.0), (1e4, 1e-3), (1e4, 1e6)] {
+            let c = p.common;
             let scaled = mepi_softening::Parameters {
-                k_n: p.k_n * (100.0_f64 * s).powf(-p.n) * s / l,
-                k_t: p.k_t * (100.0_f64 * s).powf(-p.n) * s / l,
-                t: p.t * l,
-                p_0: p.p_0 * s,
-                u_tp: p.u_tp * l,
+                common: Common {
+                    k_n: c.k_n * (100.0_f64 * s).powf(-c.n) * s / l,
+                    k_t: c.k_t * (100.0_f64 * s).powf(-c.n) * s / l,
+                    t: c.t * l,
+                    p_0: c.p_0 * s,
+                    ..c
+                },
+                softening: SofteningParameters {
+                    u_tp: p.softening.u_tp * l,
+                    ..p.softening
+                },
                 ..p
             };
             let plain = mepi_softening::Parameters {
-                k_n: p.k_n * 100.0_f64.powf(-p.n),
-                k_t: p.k_t * 100.0_f64.powf(-p.n),
+                common: Common {
+                    k_n: c.k_n * 100.0_f64.powf(-c.n),
+                    k_t: c.k_t * 100.0_f64.powf(-c.n),
+                    ..c
+                },
                 ..p
             };
             let (one, other) = (softening(plain), softening(scaled));

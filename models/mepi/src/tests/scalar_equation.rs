@@ -2,36 +2,17 @@
 
 use super::*;
 use crate::hardening::sech_tanh;
-use crate::interface::{Common, Interface, Peak};
+use crate::interface::{Constants, Interface};
 use crate::return_mapping::{Flow, Increment, Sample};
 use abi::substepping::Scheme;
 
 /// An interface with parameters over many decades, and `σ_ni`.
 fn random_interface(random: &mut Random) -> (Interface, f64) {
-    let mu_p = random.between(0.05, 1.5);
-    let common = Common {
-        k_n: random.decades(1.0, 1e12),
-        k_t: random.decades(1.0, 1e12),
-        n: random.unit(),
-        mu_0: mu_p * (random.unit() - 0.3).max(0.0),
-        mu_p,
-        mu_c0: mu_p * random.unit(),
-        a: random.decades(1e-6, 1e3),
-        c_0: random.decades(1e-6, 1e3),
-        t: random.decades(1e-4, 1e-1),
-        p_0: if random.unit() < 0.5 { 1.0 } else { 100.0 },
-        sigma_ni: f64::NAN,
-    };
-    let peak = Peak {
-        mu_r: mu_p * random.unit(),
-        a_0: random.decades(1e-2, 1e3),
-        u_tp: random.decades(1e-6, 1e-1),
-        published: random.unit() < 0.5,
-    };
-    let peak = (random.unit() < 0.6).then_some(peak);
+    let (common, softening) = random_parameters(random);
+    let softening = (random.unit() < 0.6).then_some(softening);
     let sigma_ni = random.decades(1e-6, 1e6);
     (
-        Interface::new(common, peak, Scheme::Implicit).unwrap(),
+        Interface::new(common, softening, Scheme::Implicit).unwrap(),
         sigma_ni,
     )
 }
@@ -58,11 +39,11 @@ fn the_bound_used_for_uniqueness_holds() {
 
 /// What g cannot be told from zero by: errors of its terms, of μ and β, and of ξ.
 fn round_off(increment: &Increment<'_>, at: &Sample) -> f64 {
-    let k_n = increment.constants.normal_stiffness;
+    let Constants { K_n, .. } = *increment.constants;
     let hardening = &increment.constants.hardening;
     // Eq. (11) adds numbers of the size of μ_r.
-    let mu = at.mu.max(hardening.softening.map_or(0.0, |s| s.residual));
-    let normal = increment.sigma.abs() + k_n * at.d_lambda * (mu + hardening.characteristic);
+    let mu = at.mu.max(hardening.softening.map_or(0.0, |s| s.mu_r));
+    let normal = increment.sigma.abs() + K_n * at.d_lambda * (mu + hardening.mu_c0);
     let resolution = (at.d_lambda + increment.xi) * at.residual_slope.abs();
     4.0 * f64::EPSILON * (increment.tau + mu * normal + resolution)
 }
@@ -71,7 +52,7 @@ fn round_off(increment: &Increment<'_>, at: &Sample) -> f64 {
 /// tension is found before the flow's end.
 fn nothing_before(increment: &Increment<'_>, end: f64) -> bool {
     let leg = increment.first_leg();
-    let k_n = increment.constants.normal_stiffness;
+    let Constants { K_n, .. } = *increment.constants;
     let last = increment.distance_to_peak().map_or(end, |p| p.min(end));
     (1..1000).all(|i| {
         let fraction = f64::from(i) / 1000.0;
@@ -85,7 +66,7 @@ fn nothing_before(increment: &Increment<'_>, end: f64) -> bool {
                 let sample = increment.sample(&leg, x);
                 let noise = round_off(increment, &sample);
                 sample.residual > -noise
-                    && increment.highest - k_n * sample.contraction >= -1e-12 * increment.highest
+                    && increment.highest - K_n * sample.contraction >= -1e-12 * increment.highest
             })
     })
 }
@@ -142,7 +123,7 @@ fn finds_the_first_root_to_machine_precision() {
             }
             Ok(Flow::LosesContact { exhausted }) => {
                 counted[2] += 1;
-                let end = exhausted.unwrap_or(increment.tau / constants.shear_stiffness);
+                let end = exhausted.unwrap_or(increment.tau / constants.K_t);
                 assert!(nothing_before(&increment, end), "{increment:?} {end:?}");
             }
             Err(failure) => {

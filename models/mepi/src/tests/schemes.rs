@@ -6,28 +6,32 @@ use super::*;
 const EXPLICIT: f64 = 1.0;
 const ERROR_CONTROLLED: f64 = 2.0;
 
-fn explicit(substeps: f64) -> Mepi {
-    mepi(mepi::Parameters {
+fn in_steps(substeps: f64) -> SchemeParameters {
+    SchemeParameters {
         scheme: EXPLICIT,
         substeps,
-        ..TABLE_4
-    })
+        ..IMPLICIT
+    }
 }
 
-fn controlled(scheme_tolerance: f64) -> Mepi {
-    mepi(mepi::Parameters {
+fn within(scheme_tolerance: f64) -> SchemeParameters {
+    SchemeParameters {
         scheme: ERROR_CONTROLLED,
         scheme_tolerance,
-        ..TABLE_4
-    })
+        ..IMPLICIT
+    }
 }
 
-fn softening_controlled(p: mepi_softening::Parameters, scheme_tolerance: f64) -> MepiSoftening {
-    softening(mepi_softening::Parameters {
-        scheme: ERROR_CONTROLLED,
-        scheme_tolerance,
-        ..p
-    })
+fn explicit(substeps: f64) -> Mepi {
+    mepi_by(in_steps(substeps), TABLE_4)
+}
+
+fn controlled(tolerance: f64) -> Mepi {
+    mepi_by(within(tolerance), TABLE_4)
+}
+
+fn softening_by(scheme: SchemeParameters, p: mepi_softening::Parameters) -> MepiSoftening {
+    softening(mepi_softening::Parameters { scheme, ..p })
 }
 
 /// Slip at constant volume, and the largest relative error of `σ_n`, τ and ξ against quadrature.
@@ -62,11 +66,7 @@ fn the_error_of_explicit_steps_falls_as_one_over_their_number() {
     for p in [FONTAINEBLEAU, SILICA] {
         let truth = Truth::softening(p, 100.0);
         let errors = [2000.0, 4000.0, 8000.0].map(|substeps| {
-            let law = softening(mepi_softening::Parameters {
-                scheme: EXPLICIT,
-                substeps,
-                ..p
-            });
+            let law = softening_by(in_steps(substeps), p);
             error_at_constant_volume(&law, &truth, 1e-3, 1)
         });
         for pair in errors.windows(2) {
@@ -94,7 +94,7 @@ fn error_control_meets_its_tolerance_in_one_increment() {
         assert!(error < 10.0 * tolerance, "{error:e} at {tolerance:e}");
         for p in [FONTAINEBLEAU, SILICA] {
             let truth = Truth::softening(p, 100.0);
-            let law = softening_controlled(p, tolerance);
+            let law = softening_by(within(tolerance), p);
             let error = error_at_constant_volume(&law, &truth, 3e-3, 1);
             assert!(error < 10.0 * tolerance, "{error:e} at {tolerance:e}");
         }
@@ -218,7 +218,7 @@ fn an_initial_stress_outside_the_surface_is_returned_to_it() {
 #[test]
 fn the_published_jump_takes_the_implicit_scheme() {
     let refused = MepiSoftening::new(mepi_softening::Parameters {
-        scheme: EXPLICIT,
+        scheme: in_steps(10.0),
         ..published(FONTAINEBLEAU)
     });
     assert_eq!(refused.unwrap_err().parameter, "scheme");
@@ -230,7 +230,7 @@ fn stands_random_states() {
     let mut random = Random(11);
     for k in 0..400 {
         let mu_p = random.between(0.05, 1.5);
-        let p = mepi_softening::Parameters {
+        let common = Common {
             k_n: random.decades(1e2, 1e9),
             k_t: random.decades(1e2, 1e9),
             mu_0: mu_p * (random.unit() - 0.3).max(0.0),
@@ -238,14 +238,22 @@ fn stands_random_states() {
             mu_c0: mu_p * random.unit(),
             a: random.decades(1e-5, 1.0),
             c_0: random.decades(1e-3, 1e2),
+            ..FONTAINEBLEAU.common
+        };
+        let peak = SofteningParameters {
             mu_r: mu_p * random.unit(),
-            scheme: if k % 2 == 0 {
-                EXPLICIT
-            } else {
-                ERROR_CONTROLLED
-            },
-            scheme_tolerance: 1e-4,
-            ..FONTAINEBLEAU
+            ..FONTAINEBLEAU.softening
+        };
+        let controls = k % 2 == 1;
+        let scheme = if controls {
+            within(1e-4)
+        } else {
+            in_steps(10.0)
+        };
+        let p = mepi_softening::Parameters {
+            common,
+            softening: peak,
+            scheme,
         };
         let law = softening(p);
         let truth = Truth::softening(p, 100.0);
@@ -262,7 +270,7 @@ fn stands_random_states() {
             let numbers = end.traction.iter().chain(end.tangent.as_flattened());
             assert!(numbers.copied().all(f64::is_finite), "{p:?} {end:?}");
             assert!(end.traction[0] <= 0.0, "{p:?} {end:?}");
-            if p.scheme == ERROR_CONTROLLED {
+            if controls {
                 let strength = -end.traction[0] * truth.mu(end.state.plastic_slip);
                 assert!(
                     end.traction[1].abs() <= strength * (1.0 + 1e-9) + 1e-12,
@@ -279,16 +287,21 @@ fn stands_random_states() {
 #[test]
 fn an_increment_far_longer_than_the_hardening_is_followed() {
     let t = 5e-7;
-    let p = mepi_softening::Parameters {
-        k_n: FONTAINEBLEAU.k_n * FONTAINEBLEAU.t / t,
-        k_t: FONTAINEBLEAU.k_t * FONTAINEBLEAU.t / t,
+    let sand = FONTAINEBLEAU.common;
+    let common = Common {
+        k_n: sand.k_n * sand.t / t,
+        k_t: sand.k_t * sand.t / t,
         t,
         sigma_ni: 100.0,
+        ..sand
+    };
+    let p = mepi_softening::Parameters {
+        common,
         ..FONTAINEBLEAU
     };
     let truth = Truth::softening(p, 100.0);
     for u_t in [1e-6, 1e-4, 1e-3] {
-        let error = error_at_constant_volume(&softening_controlled(p, 1e-6), &truth, u_t, 1);
+        let error = error_at_constant_volume(&softening_by(within(1e-6), p), &truth, u_t, 1);
         assert!(error < 1e-5, "{error:e} at {u_t:e}");
     }
 }

@@ -150,10 +150,15 @@ fn agrees_with_differences_with_softening() {
         for p in [base, published(base)] {
             let truth = Truth::softening(p, 100.0);
             let k = [truth.k_n(), truth.k_t()];
-            let slips = [0.1 * p.u_tp, 0.7 * p.u_tp, p.u_tp, 3.0 * p.u_tp];
-            let counted = compare(&softening(p), k, &slips, p.u_tp);
+            let slips = [
+                0.1 * p.softening.u_tp,
+                0.7 * p.softening.u_tp,
+                p.softening.u_tp,
+                3.0 * p.softening.u_tp,
+            ];
+            let counted = compare(&softening(p), k, &slips, p.softening.u_tp);
             assert!(counted[..3].iter().all(|&n| n > 500), "{counted:?}");
-            if p.peak > 0.5 {
+            if p.softening.is_published() {
                 assert!(counted[Zone::Peak as usize] > 10, "{counted:?}");
             }
         }

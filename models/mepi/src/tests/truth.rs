@@ -1,41 +1,28 @@
 //! What the laws must give, from the equations of the paper by quadrature and bisection.
 
-use super::{FONTAINEBLEAU, mepi, mepi_softening};
+use super::{Common, SofteningParameters, mepi_softening};
 
 /// Eq. (10), (11), (16), (17) and their integrals, for a point with this initial normal stress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Truth {
-    pub(super) p: mepi_softening::Parameters,
-    softens: bool,
+    p: Common,
+    softening: Option<SofteningParameters>,
     pub(super) sigma_ni: f64,
 }
 
 impl Truth {
     pub(super) fn softening(p: mepi_softening::Parameters, sigma_ni: f64) -> Self {
         Self {
-            p,
-            softens: true,
+            p: p.common,
+            softening: Some(p.softening),
             sigma_ni,
         }
     }
 
-    pub(super) fn hardening(p: mepi::Parameters, sigma_ni: f64) -> Self {
-        let p = mepi_softening::Parameters {
-            k_n: p.k_n,
-            k_t: p.k_t,
-            n: p.n,
-            mu_0: p.mu_0,
-            mu_p: p.mu_p,
-            mu_c0: p.mu_c0,
-            a: p.a,
-            c_0: p.c_0,
-            t: p.t,
-            p_0: p.p_0,
-            ..FONTAINEBLEAU
-        };
+    pub(super) fn hardening(p: Common, sigma_ni: f64) -> Self {
         Self {
             p,
-            softens: false,
+            softening: None,
             sigma_ni,
         }
     }
@@ -52,15 +39,16 @@ impl Truth {
         let p = &self.p;
         let hardening =
             |xi: f64| p.mu_0 + (p.mu_p - p.mu_0) * xi / (p.a * self.sigma_ni / p.p_0 * p.t + xi);
-        if self.softens && xi > p.u_tp {
-            let peak = if p.peak > 0.5 {
-                p.mu_p
-            } else {
-                hardening(p.u_tp)
-            };
-            p.mu_r + (peak - p.mu_r) / (p.a_0 / p.t * (xi - p.u_tp)).cosh()
-        } else {
-            hardening(xi)
+        match self.softening {
+            Some(q) if xi > q.u_tp => {
+                let peak = if q.peak > 0.5 {
+                    p.mu_p
+                } else {
+                    hardening(q.u_tp)
+                };
+                q.mu_r + (peak - q.mu_r) / (q.a_0 / p.t * (xi - q.u_tp)).cosh()
+            }
+            _ => hardening(xi),
         }
     }
 
@@ -81,10 +69,10 @@ impl Truth {
         let scale = self.p.a * self.sigma_ni / self.p.p_0 * self.p.t;
         let transformed = |y: f64| f(scale * y.exp_m1()) * scale * y.exp();
         let end = (xi / scale).ln_1p();
-        let peak = (self.p.u_tp / scale).ln_1p();
         let characteristic = (self.p.mu_c0 - self.p.mu_0) / (self.p.mu_p - self.p.mu_c0);
         let mut kinks = vec![0.0, end];
-        if self.softens {
+        if let Some(SofteningParameters { u_tp, .. }) = self.softening {
+            let peak = (u_tp / scale).ln_1p();
             // Just beyond, where the published μ has jumped.
             kinks.extend([peak * (1.0 - 1e-15), peak * (1.0 + 1e-15)]);
         }

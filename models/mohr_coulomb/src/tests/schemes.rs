@@ -1,8 +1,10 @@
 //! The schemes against each other: order, tolerance, and what they leave alone.
 
-use super::{IMPLICIT, Random, distance, excess, law, rested, size};
+use super::{IMPLICIT, Random, distance, excess, from_trial, law, rested, size};
+use crate::spectral::Spatial;
 use crate::{MohrCoulomb, Parameters, State};
-use abi::{ContinuumLaw as _, SolidPoint, Tangent};
+use abi::substepping::SchemeParameters;
+use abi::{ContinuumLaw as _, Failure, SolidPoint, Tangent};
 
 /// Sand of the comparison with other programs.
 const SAND: Parameters = Parameters {
@@ -11,21 +13,36 @@ const SAND: Parameters = Parameters {
     cohesion: 1.0,
     friction_angle: 36.5,
     dilatancy_angle: 12.0,
-    ..IMPLICIT
+    tensile_strength: f64::NAN,
+    scheme: IMPLICIT,
 };
+
+fn in_steps(substeps: f64) -> SchemeParameters {
+    SchemeParameters {
+        scheme: 1.0,
+        substeps,
+        ..IMPLICIT
+    }
+}
+
+fn within(scheme_tolerance: f64) -> SchemeParameters {
+    SchemeParameters {
+        scheme: 2.0,
+        scheme_tolerance,
+        ..IMPLICIT
+    }
+}
 
 fn explicit(substeps: f64) -> MohrCoulomb {
     law(Parameters {
-        scheme: 1.0,
-        substeps,
+        scheme: in_steps(substeps),
         ..SAND
     })
 }
 
-fn controlled(scheme_tolerance: f64) -> MohrCoulomb {
+fn controlled(tolerance: f64) -> MohrCoulomb {
     law(Parameters {
-        scheme: 2.0,
-        scheme_tolerance,
+        scheme: within(tolerance),
         ..SAND
     })
 }
@@ -165,34 +182,71 @@ fn the_tangent_is_the_continuum_one() {
     }
 }
 
-/// Every scheme ends near the surface or says why not, and its numbers are finite.
+/// Every scheme ends near the surface with finite numbers. The explicit one has no reason to refuse. The
+/// other may, where two principal stresses are equal where the flow starts or ends: there the axes turn
+/// at a rate without bound, `G γ/(s_i − s_j)`, and the error of a step does not fall with its square, nor
+/// has a relative error a meaning at an apex without stress. Where the three stay apart, about
+/// `√(‖σ''‖/(2 ‖σ‖ ε_s))` steps suffice, far below the 10 000 that it has. So that success is no matter
+/// of chance, states are drawn until a hundred have had to succeed, fifty by each scheme at least.
 #[test]
 fn stands_random_states() {
     let mut random = Random(5);
-    for k in 0..400 {
-        let angles = [0.0, 10.0, 36.5, 60.0];
+    let angles = [0.0, 10.0, 36.5, 60.0];
+    // By the explicit scheme, under control, and those of the latter that may be refused.
+    let (mut explicit, mut apart, mut equal) = (0, 0, [0, 0]);
+    for k in 0.. {
+        if explicit >= 50 && apart >= 50 {
+            break;
+        }
         let scale = 10_f64.powf(random.between(-1.0, 3.0));
+        let controls = k % 2 == 1;
         let p = Parameters {
-            scheme: if k % 2 == 0 { 1.0 } else { 2.0 },
-            scheme_tolerance: 1e-4,
+            scheme: if controls {
+                within(1e-4)
+            } else {
+                in_steps(10.0)
+            },
             ..random.parameters(&angles, scale)
         };
         let stress = super::turned::<6>(random.principal(scale), random.angles());
         let increment: [f64; 6] =
             std::array::from_fn(|_| random.between(-3.0, 3.0) * scale / p.young_modulus);
-        let law = law(p);
-        if let Ok(end) = law.update(&rested(stress, increment), Tangent::Consistent) {
-            assert!(
-                end.stress
-                    .iter()
-                    .chain(end.tangent.as_flattened())
-                    .all(|v| v.is_finite())
-            );
-            if p.scheme > 1.5 {
-                assert!(excess(&p, &end.stress) < 1e-12, "{p:?}");
+        let start = rested(stress, increment);
+        let implicit = law(Parameters {
+            scheme: IMPLICIT,
+            ..p
+        });
+        let first = from_trial(&implicit, stress);
+        let last = implicit.update(&start, Tangent::None).unwrap();
+        let may_refuse = controls && (are_equal(&first.stress) || are_equal(&last.stress));
+        let end = match law(p).update(&start, Tangent::Consistent) {
+            Ok(end) => end,
+            Err(Failure::CutStep { factor, .. }) => {
+                assert!(may_refuse, "{k}: {p:?} {start:?}");
+                assert!((0.0..1.0).contains(&factor), "{factor}");
+                equal[0] += 1;
+                continue;
             }
+            Err(other) => panic!("{other:?}"),
+        };
+        let numbers = end.stress.iter().chain(end.tangent.as_flattened());
+        assert!(numbers.copied().all(f64::is_finite), "{p:?}");
+        if controls {
+            assert!(excess(&p, &end.stress) < 1e-12, "{p:?}");
+        }
+        match (controls, may_refuse) {
+            (false, _) => explicit += 1,
+            (true, false) => apart += 1,
+            (true, true) => equal[1] += 1,
         }
     }
+    println!("{explicit} explicit, {apart} apart, with equal ones refused and not: {equal:?}");
+}
+
+/// Whether two principal stresses are equal up to rounding.
+fn are_equal(stress: &[f64; 6]) -> bool {
+    let s = Spatial::of(stress).stress;
+    (s[0] - s[1]).min(s[1] - s[2]) <= 1e-9 * s.amax()
 }
 
 /// What lies outside at the start is no error of a step: however small the steps, it would stay.

@@ -119,7 +119,7 @@ fn survives_a_long_path_of_huge_increments() {
                 friction_angle,
                 dilatancy_angle: 0.0,
                 tensile_strength: f64::NAN,
-                ..super::IMPLICIT
+                scheme: super::IMPLICIT,
             };
             let law = law(p);
             let mut point = rested([0.0; 4], [0.0; 4]);
@@ -146,7 +146,7 @@ fn tresca_stands_any_predictor() {
         friction_angle: 0.0,
         dilatancy_angle: 0.0,
         tensile_strength: f64::NAN,
-        ..super::IMPLICIT
+        scheme: super::IMPLICIT,
     };
     let law = law(p);
     for _ in 0..10_000 {

@@ -12,19 +12,19 @@
 //!
 //! Gradients and fluxes are Kelvin–Mandel vectors there: shear strain γ/√2, shear stress √2 τ.
 
-use super::Exported;
-use super::foreign::{Laws, MOST_PARAMETERS, Point, has_default, tell};
-use super::umat::row;
-use crate::descriptor::{Hypothesis, Parameters};
-use crate::law::Tangent;
-use crate::raw::{self, PILUM_T_LINEAR, PILUM_T_LOCAL_AXES};
+use crate::laws::{Laws, MOST_PARAMETERS, has_default, tell};
+use crate::point::{Carried, Point};
+use crate::umat::row;
+use abi::export::Exported;
+use abi::raw::{self, PILUM_T_LINEAR, PILUM_T_LOCAL_AXES};
+use abi::{Hypothesis, Parameters, Tangent};
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ffi::{CStr, c_char, c_int};
 use std::fmt;
 use std::ptr::null;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Exports a law as a behaviour of MFront's generic interface; see [`export_foreign!`](crate::export_foreign).
+/// Exports a law as a behaviour of MFront's generic interface; see [`export!`](crate::export).
 #[macro_export]
 macro_rules! export_mfront {
     (continuum $law:ident $(, $($names:tt)+)?) => {
@@ -32,19 +32,19 @@ macro_rules! export_mfront {
             $(, $($names)+)?);
     };
     (continuum $law:ident in $($hypothesis:ident)+ $(, $($names:tt)+)?) => {
-        $crate::export_mfront!(@behaviour $law, $crate::export::Continuum<$law>,
+        $crate::export_mfront!(@behaviour $law, $crate::abi::export::Continuum<$law>,
             [Strain Stress StandardStrainBased], [$($hypothesis)+]);
-        $( $crate::export_mfront!(@bounds $law, $crate::export::Continuum<$law>, $($names)+); )?
+        $( $crate::export_mfront!(@bounds $law, $crate::abi::export::Continuum<$law>, $($names)+); )?
     };
     (interface $law:ident $(, $($names:tt)+)?) => {
-        $crate::export_mfront!(@behaviour $law, $crate::export::Interface<$law>,
+        $crate::export_mfront!(@behaviour $law, $crate::abi::export::Interface<$law>,
             [OpeningDisplacement CohesiveForce CohesiveZone], [PlaneStrain Axisymmetrical]);
-        $( $crate::export_mfront!(@bounds $law, $crate::export::Interface<$law>, $($names)+); )?
+        $( $crate::export_mfront!(@bounds $law, $crate::abi::export::Interface<$law>, $($names)+); )?
     };
     (@bounds $law:ident, $exported:ty,
         properties: [$($property:ident)*], parameters: [$($setting:ident)*]) => {
         const _: () = {
-            use $crate::export::mfront as m;
+            use $crate::mfront as m;
             type Law = $exported;
             const {
                 assert!(
@@ -83,11 +83,11 @@ macro_rules! export_mfront {
     (@behaviour $law:ident, $exported:ty, [$gradient:ident $flux:ident $kind:ident],
         [$($hypothesis:ident)+]) => {
         const _: () = {
-            use $crate::export::mfront as m;
+            use $crate::mfront as m;
             type Law = $exported;
 
-            static LAWS: $crate::export::foreign::Laws<Law> =
-                $crate::export::foreign::Laws::new();
+            static LAWS: $crate::laws::Laws<Law> =
+                $crate::laws::Laws::new();
             static SETTINGS: m::Settings = m::Settings::of::<Law>();
 
             $crate::export_mfront!(@numbers $law u16 [
@@ -150,11 +150,11 @@ macro_rules! export_mfront {
             pub extern "C" fn policy(_: ::std::ffi::c_int) {}
 
             $( const _: () = {
-                const HYPOTHESIS: $crate::Hypothesis =
+                const HYPOTHESIS: $crate::abi::Hypothesis =
                     m::Kind::$kind.hypothesis(m::Modelling::$hypothesis);
                 const {
                     assert!(
-                        $crate::export::foreign::offers::<Law>(HYPOTHESIS),
+                        $crate::laws::offers::<Law>(HYPOTHESIS),
                         "the law does not offer the hypothesis"
                     );
                 }
@@ -173,11 +173,11 @@ macro_rules! export_mfront {
     (@texts $law:ident [$($suffix:literal = $text:expr,)+]) => { $( const _: () = {
         #[unsafe(export_name = concat!(stringify!($law), $suffix))]
         pub static DATUM: m::Texts<1> =
-            m::Texts::new([$crate::descriptor::c_str(concat!($text, "\0"))]);
+            m::Texts::new([$crate::abi::descriptor::c_str(concat!($text, "\0"))]);
     }; )+ };
     (@words $law:ident [$($suffix:literal = $($word:ident)+,)+]) => { $( const _: () = {
         const WORDS: &[&::std::ffi::CStr] =
-            &[$($crate::descriptor::c_str(concat!(stringify!($word), "\0"))),+];
+            &[$($crate::abi::descriptor::c_str(concat!(stringify!($word), "\0"))),+];
         #[unsafe(export_name = concat!(stringify!($law), $suffix))]
         pub static DATUM: m::Texts<{ WORDS.len() }> = m::Texts::of(WORDS);
     }; )+ };
@@ -604,7 +604,7 @@ impl Request {
 ///
 /// # Safety
 /// `data` is null or as MFront's interface says.
-pub unsafe fn integrate<L: Exported>(
+pub unsafe fn integrate<L: Carried>(
     laws: &Laws<L>,
     settings: &Settings,
     hypothesis: Hypothesis,
@@ -643,7 +643,7 @@ pub unsafe fn integrate<L: Exported>(
 ///
 /// # Safety
 /// As [`integrate`].
-unsafe fn carry<L: Exported>(
+unsafe fn carry<L: Carried>(
     laws: &Laws<L>,
     settings: &Settings,
     hypothesis: Hypothesis,
@@ -749,7 +749,7 @@ unsafe fn carry<L: Exported>(
 /// tangents, and with the elastic one a full Newton iteration may cycle for ever. A point inside
 /// the surface stays elastic under the small strain along its deviatoric stress that tells the
 /// two apart.
-fn loading<L: Exported>(
+fn loading<L: Carried>(
     laws: &Laws<L>,
     given: &[f64],
     point: &Point,

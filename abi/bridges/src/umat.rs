@@ -12,10 +12,10 @@
 //! fraction of the increment that the law believes it can follow: a caller that ignores `PNEWDT`, or
 //! passes none, must not take the stress of the start for that of the end.
 
-use super::foreign::{Answer, Laws, Point, complain, offers};
-use super::{Continuum, Exported};
-use crate::descriptor::{Hypothesis, InternalVariables};
-use crate::law::{ContinuumLaw, Tangent};
+use crate::laws::{Laws, complain, offers};
+use crate::point::{Answer, Point};
+use abi::export::{Continuum, Exported};
+use abi::{ContinuumLaw, Hypothesis, InternalVariables, Tangent};
 use std::ffi::c_int;
 
 /// Exports a law for solids as the user material of the library: `umat_` (as Fortran names it),
@@ -24,8 +24,8 @@ use std::ffi::c_int;
 macro_rules! export_umat {
     ($law:ty) => {
         const _: () = {
-            static LAWS: $crate::export::foreign::Laws<$crate::export::Continuum<$law>> =
-                $crate::export::foreign::Laws::new();
+            static LAWS: $crate::laws::Laws<$crate::abi::export::Continuum<$law>> =
+                $crate::laws::Laws::new();
     $crate::export_umat!(@abaqus "umat_");
     $crate::export_umat!(@abaqus "umat");
     $crate::export_umat!(@abaqus "UMAT");
@@ -34,10 +34,10 @@ macro_rules! export_umat {
     };
     (@abaqus $symbol:literal) => {
         const _: () = {
-            /// See `abi::export::umat`.
+            /// See `bridges::umat`.
             ///
             /// # Safety
-            /// The pointers are those of Abaqus' `UMAT`, or null where `abi::export::umat` admits it.
+            /// The pointers are those of Abaqus' `UMAT`, or null where `bridges::umat` admits it.
             #[unsafe(export_name = $symbol)]
             pub unsafe extern "C" fn entry(
                 stress: *mut f64,
@@ -69,7 +69,7 @@ macro_rules! export_umat {
                 _: *const f64,
                 pnewdt: *mut f64,
             ) {
-                let call = $crate::export::umat::Call {
+                let call = $crate::umat::Call {
                     stress,
                     statev,
                     ddsdde,
@@ -85,13 +85,13 @@ macro_rules! export_umat {
                     pnewdt,
                 };
                 // SAFETY: passed on to the caller.
-                unsafe { $crate::export::umat::answer(&LAWS, &call) }
+                unsafe { $crate::umat::answer(&LAWS, &call) }
             }
         };
     };
     (@calculix $symbol:literal) => {
         const _: () = {
-            /// See `abi::export::calculix`.
+            /// See `bridges::calculix`.
             ///
             /// # Safety
             /// The pointers are those of CalculiX' material routine.
@@ -127,7 +127,7 @@ macro_rules! export_umat {
                 _: *const f64,
                 pnewdt: *mut f64,
             ) {
-                let call = $crate::export::calculix::Call {
+                let call = $crate::calculix::Call {
                     iel,
                     iint,
                     kode,
@@ -149,7 +149,7 @@ macro_rules! export_umat {
                     pnewdt,
                 };
                 // SAFETY: passed on to the caller.
-                unsafe { $crate::export::calculix::answer(&LAWS, &call) }
+                unsafe { $crate::calculix::answer(&LAWS, &call) }
             }
         };
     };
@@ -178,7 +178,7 @@ pub struct Call {
 ///
 /// # Safety
 /// `p` is null or valid.
-pub(super) unsafe fn or<T: Copy>(p: *const T, other: T) -> T {
+pub(crate) unsafe fn or<T: Copy>(p: *const T, other: T) -> T {
     // SAFETY: passed on to the caller.
     unsafe { p.as_ref() }.copied().unwrap_or(other)
 }
@@ -187,7 +187,7 @@ pub(super) unsafe fn or<T: Copy>(p: *const T, other: T) -> T {
 ///
 /// # Safety
 /// `p` is null or valid for `n` values, at most 6.
-pub(super) unsafe fn row(p: *const f64, n: usize) -> [f64; 6] {
+pub(crate) unsafe fn row(p: *const f64, n: usize) -> [f64; 6] {
     let mut values = [0.0; 6];
     if !p.is_null() {
         // SAFETY: passed on to the caller.

@@ -1,17 +1,17 @@
 //! The entry of CalculiX' own material routines, which it looks up in a library for a material
 //! named `@LIBRARY_CALCULIX`. (A material named `@ABAQUS_LIBRARY_UMAT` is called as in
-//! [`umat`](super::umat).)
+//! [`umat`](crate::umat).)
 //!
 //! Always three dimensions. Strains are tensor components, internal variables stand in an array of
 //! the whole model, and the tangent is symmetric: of an unsymmetric one CalculiX gets the
 //! symmetric part, as its own interface to Abaqus' routines makes it. That slows the iteration of
 //! laws with non-associated flow and does not change the stress.
 
-use super::Continuum;
-use super::foreign::{Laws, Point, complain, offers};
-use super::umat::{or, row};
-use crate::descriptor::{Hypothesis, InternalVariables};
-use crate::law::{ContinuumLaw, Tangent};
+use crate::laws::{Laws, complain, offers};
+use crate::point::Point;
+use crate::umat::{or, row};
+use abi::export::Continuum;
+use abi::{ContinuumLaw, Hypothesis, InternalVariables, Tangent};
 use std::ffi::c_int;
 
 /// The arguments of CalculiX' material routine that a law needs; none is null.

@@ -1,0 +1,292 @@
+//! The two traits of [`law`](crate::law) as one, which is what the boundary calls.
+
+use crate::access::Access;
+use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameters, Variable};
+use crate::law::{
+    ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, SolidPoint, SolidResponse, Tangent,
+};
+use crate::raw::{self, Formulation};
+use std::marker::PhantomData;
+
+mod sealed {
+    /// Keeps [`Exported`](super::Exported) to this file: its formulations are pointers.
+    pub trait Sealed {}
+    impl<L> Sealed for super::Continuum<L> {}
+    impl<L> Sealed for super::Interface<L> {}
+}
+
+/// What the boundary needs of a law, whichever trait its author chose.
+pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
+    /// What the law is called.
+    const DESCRIPTION: Description;
+    /// Parameters.
+    type Parameters: Parameters;
+    /// Formulations.
+    const FORMULATIONS: &'static [Formulation];
+    /// Internal variables, the same in all formulations.
+    const STATE: &'static [Variable];
+    /// Fixes the parameters.
+    ///
+    /// # Errors
+    /// The message, starting with the parameter's id and a colon.
+    fn new(parameters: Self::Parameters) -> Result<Self, String>;
+    /// Initial internal variables of point `i`.
+    ///
+    /// # Errors
+    /// Why the law cannot start there.
+    fn init<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        i: usize,
+    ) -> Result<(), Failure>;
+    /// Carries point `i` over the increment.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    fn update<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        i: usize,
+        tangent: Tangent,
+    ) -> Result<Option<&'static str>, Failure>;
+}
+
+/// Adapter for laws of solids.
+#[derive(Debug)]
+pub struct Continuum<L>(L);
+
+/// Adapter for laws of interfaces.
+#[derive(Debug)]
+pub struct Interface<L>(L);
+
+struct ContinuumFormulations<L>(PhantomData<L>);
+
+impl<L: ContinuumLaw> ContinuumFormulations<L> {
+    const FLAGS: u32 = flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC)
+        | flag(L::LINEAR, raw::PILUM_T_LINEAR)
+        | flag(L::LOCAL_AXES, raw::PILUM_T_LOCAL_AXES);
+    const TABLE: [Formulation; 3] = {
+        assert_solid(L::HYPOTHESES);
+        let state = <L::State as InternalVariables>::TABLE;
+        let mut table = [Formulation::new(L::HYPOTHESES[0], Self::FLAGS, state); 3];
+        let mut i = 1;
+        while i < L::HYPOTHESES.len() {
+            table[i] = Formulation::new(L::HYPOTHESES[i], Self::FLAGS, state);
+            i += 1;
+        }
+        table
+    };
+}
+
+/// Refuses hypotheses whose points a law for solids cannot read: what it is called with has four
+/// or six components.
+///
+/// # Panics
+/// At compile time, where a law is exported.
+pub(super) const fn assert_solid(hypotheses: &[Hypothesis]) {
+    assert!(!hypotheses.is_empty(), "`HYPOTHESES` is empty");
+    assert!(
+        hypotheses.len() <= 3,
+        "`HYPOTHESES` has more than three entries"
+    );
+    let mut i = 0;
+    while i < hypotheses.len() {
+        assert!(
+            !matches!(hypotheses[i], Hypothesis::Interface2d),
+            "`HYPOTHESES` of a `ContinuumLaw` holds an interface: implement `InterfaceLaw`"
+        );
+        i += 1;
+    }
+}
+
+const fn flag(set: bool, bit: u32) -> u32 {
+    if set { bit } else { 0 }
+}
+
+impl<L: ContinuumLaw> Exported for Continuum<L> {
+    const DESCRIPTION: Description = L::DESCRIPTION;
+    type Parameters = L::Parameters;
+    const FORMULATIONS: &'static [Formulation] = ContinuumFormulations::<L>::TABLE
+        .split_at(L::HYPOTHESES.len())
+        .0;
+    const STATE: &'static [Variable] = <L::State as InternalVariables>::TABLE;
+
+    fn new(parameters: L::Parameters) -> Result<Self, String> {
+        L::new(parameters)
+            .map(Self)
+            .map_err(|refusal| refusal.to_string())
+    }
+
+    fn init<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        i: usize,
+    ) -> Result<(), Failure> {
+        let state = if access.n_components == 6 {
+            self.0.initial_state::<6>(&access.flux0(i)?)?
+        } else {
+            self.0.initial_state::<4>(&access.flux0(i)?)?
+        };
+        access.put_state(i, &state);
+        Ok(())
+    }
+
+    #[inline]
+    fn update<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        i: usize,
+        tangent: Tangent,
+    ) -> Result<Option<&'static str>, Failure> {
+        if access.n_components == 6 {
+            update_solid::<L, 6, PACKED>(&self.0, access, i, tangent)
+        } else {
+            update_solid::<L, 4, PACKED>(&self.0, access, i, tangent)
+        }
+    }
+}
+
+#[inline]
+fn update_solid<L: ContinuumLaw, const N: usize, const PACKED: bool>(
+    law: &L,
+    access: &Access<'_, PACKED>,
+    i: usize,
+    tangent: Tangent,
+) -> Result<Option<&'static str>, Failure> {
+    let start = access.start::<N, L::State>(i)?;
+    let point = SolidPoint {
+        strain: start.gradient,
+        strain_increment: start.gradient_increment,
+        stress: start.flux,
+        state: start.state,
+        time: access.batch.time,
+        time_increment: access.batch.time_increment,
+    };
+    let SolidResponse {
+        stress,
+        state,
+        tangent: operator,
+        unreliable,
+    } = law.update::<N>(&point, tangent)?;
+    access.put(
+        i,
+        &stress,
+        &state,
+        (tangent != Tangent::None).then_some(&operator),
+    )?;
+    Ok(unreliable)
+}
+
+impl<L> Continuum<L> {
+    /// The law itself.
+    pub const fn law(&self) -> &L {
+        &self.0
+    }
+}
+
+impl<L> Interface<L> {
+    /// The law itself.
+    pub const fn law(&self) -> &L {
+        &self.0
+    }
+}
+
+impl<L: InterfaceLaw> Interface<L> {
+    const FLAGS: u32 =
+        flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC) | flag(L::LINEAR, raw::PILUM_T_LINEAR);
+    const TABLE: [Formulation; 1] = [Formulation::new(
+        Hypothesis::Interface2d,
+        Self::FLAGS,
+        <L::State as InternalVariables>::TABLE,
+    )];
+}
+
+impl<L: InterfaceLaw> Exported for Interface<L> {
+    const DESCRIPTION: Description = L::DESCRIPTION;
+    type Parameters = L::Parameters;
+    const FORMULATIONS: &'static [Formulation] = &Self::TABLE;
+    const STATE: &'static [Variable] = <L::State as InternalVariables>::TABLE;
+
+    fn new(parameters: L::Parameters) -> Result<Self, String> {
+        L::new(parameters)
+            .map(Self)
+            .map_err(|refusal| refusal.to_string())
+    }
+
+    fn init<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        i: usize,
+    ) -> Result<(), Failure> {
+        let state = self.0.initial_state(&access.flux0(i)?)?;
+        access.put_state(i, &state);
+        Ok(())
+    }
+
+    #[inline]
+    fn update<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        i: usize,
+        tangent: Tangent,
+    ) -> Result<Option<&'static str>, Failure> {
+        let start = access.start(i)?;
+        let point = InterfacePoint {
+            jump: start.gradient,
+            jump_increment: start.gradient_increment,
+            traction: start.flux,
+            state: start.state,
+            time: access.batch.time,
+            time_increment: access.batch.time_increment,
+        };
+        let end = self.0.update(&point, tangent)?;
+        access.put(
+            i,
+            &end.traction,
+            &end.state,
+            (tangent != Tangent::None).then_some(&end.tangent),
+        )?;
+        Ok(end.unreliable)
+    }
+}
+
+/// What a law for solids may not declare stops the compiler; the same law with a solid's
+/// hypothesis compiles.
+///
+/// ```compile_fail
+/// use abi::{ContinuumLaw, Description, Failure, Hypothesis, Refusal};
+/// use abi::{SolidPoint, SolidResponse, Tangent};
+/// abi::parameters! { pub struct Nothing {} }
+/// struct Astray;
+/// impl ContinuumLaw for Astray {
+///     const DESCRIPTION: Description =
+///         abi::describe! { id: "astray", name: "", doc: "", references: "" };
+///     const HYPOTHESES: &'static [Hypothesis] = &[Hypothesis::Interface2d];
+///     type Parameters = Nothing;
+///     type State = ();
+///     fn new(_: Nothing) -> Result<Self, Refusal> { Ok(Self) }
+///     fn update<const N: usize>(&self, _: &SolidPoint<N, ()>, _: Tangent)
+///         -> Result<SolidResponse<N, ()>, Failure> { Err(Failure::Domain("")) }
+/// }
+/// const _: abi::raw::Law = abi::export::law::<abi::export::Continuum<Astray>>();
+/// ```
+///
+/// ```
+/// use abi::{ContinuumLaw, Description, Failure, Hypothesis, Refusal};
+/// use abi::{SolidPoint, SolidResponse, Tangent};
+/// abi::parameters! { pub struct Nothing {} }
+/// struct Astray;
+/// impl ContinuumLaw for Astray {
+///     const DESCRIPTION: Description =
+///         abi::describe! { id: "astray", name: "", doc: "", references: "" };
+///     const HYPOTHESES: &'static [Hypothesis] = &[Hypothesis::PlaneStrain];
+///     type Parameters = Nothing;
+///     type State = ();
+///     fn new(_: Nothing) -> Result<Self, Refusal> { Ok(Self) }
+///     fn update<const N: usize>(&self, _: &SolidPoint<N, ()>, _: Tangent)
+///         -> Result<SolidResponse<N, ()>, Failure> { Err(Failure::Domain("")) }
+/// }
+/// const _: abi::raw::Law = abi::export::law::<abi::export::Continuum<Astray>>();
+/// ```
+#[cfg(doctest)]
+struct HypothesesOfSolids;
