@@ -19,6 +19,8 @@ mod kernels;
 mod solution;
 mod supernodes;
 
+pub(crate) use analysis::work;
+
 use crate::{Pattern, Singular, dense};
 use analysis::Analysis;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -78,6 +80,11 @@ impl Multifrontal {
     /// Bytes that a factorisation takes, by the analysis.
     pub fn bytes(&self) -> u64 {
         self.analysis.bytes()
+    }
+
+    /// Floating-point operations of a factorisation, by the analysis.
+    pub fn operations(&self) -> f64 {
+        self.analysis.operations()
     }
 
     /// Kept equations, in the order of the Schur complement.

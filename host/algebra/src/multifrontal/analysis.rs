@@ -90,6 +90,16 @@ impl Analysis {
         Ok(analysis)
     }
 
+    /// Floating-point operations of a factorisation.
+    pub(super) fn operations(&self) -> f64 {
+        let of_roots = self.roots.iter().map(|&root| self.fronts[root].work);
+        let share = match self.kind {
+            Kind::Symmetric => 0.5,
+            Kind::Unsymmetric => 1.0,
+        };
+        share * of_roots.sum::<f64>()
+    }
+
     /// Memory that a factorisation takes: factors, the Schur complement, and the updates that wait
     /// for their parents, one branch after the other.
     pub(super) fn bytes(&self) -> u64 {

@@ -1,18 +1,16 @@
 //! The order of elimination, and the supernodes that it makes.
 
-use crate::{Pattern, Singular, dissection};
+use crate::order::{self, Order};
+use crate::{Pattern, Singular};
 use faer::Side;
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
-
-/// Unknowns from which on nested dissection is used: as much work as after minimum degree at 10⁴
-/// unknowns, a fifth less at 6·10⁵.
-const WORTH_DISSECTING: usize = 5_000;
+use faer::sparse::linalg::{SupernodalThreshold, amd};
 
 /// The order of elimination and the supernodes of part of the equations.
 pub(super) struct Supernodes {
@@ -52,20 +50,18 @@ impl Supernodes {
             supernodal_flop_ratio_threshold: SupernodalThreshold(f64::NEG_INFINITY),
             ..Default::default()
         };
-        // Chains of unknowns between kept ones: minimum degree would not see those.
-        let lines = lines.filter(|_| n >= WORTH_DISSECTING || n < pattern.n());
-        let (mut forward, mut inverse) = (Vec::new(), vec![0; n]);
-        if let Some(lines) = lines {
-            let of_eliminated = eliminated.iter().map(|&equation| lines[equation as usize]);
-            forward = dissection::order(&of_eliminated.collect::<Vec<_>>());
-            for (at, &unknown) in (0..).zip(&forward) {
-                inverse[unknown as usize] = at;
+        let chosen = order::choose(pattern, eliminated, lines, || minimum_degree(matrix))?;
+        let (forward, mut inverse);
+        let ordering = match chosen {
+            Order::MinimumDegree => SymmetricOrdering::Amd,
+            Order::Given(order) => {
+                inverse = vec![0; n];
+                for (at, &unknown) in (0..).zip(&order) {
+                    inverse[unknown as usize] = at;
+                }
+                forward = order;
+                SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n))
             }
-        }
-        let ordering = if lines.is_some() {
-            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n))
-        } else {
-            SymmetricOrdering::Amd
         };
         let symbolic: SymbolicCholesky<u32> =
             factorize_symbolic_cholesky(matrix, Side::Lower, ordering, settings)
@@ -89,4 +85,21 @@ impl Supernodes {
                 .collect(),
         })
     }
+}
+
+/// Approximate minimum degree (Amestoy, Davis & Duff 1996).
+fn minimum_degree(matrix: SymbolicSparseColMatRef<'_, u32>) -> Result<Vec<u32>, Singular> {
+    let n = matrix.nrows();
+    let entries = matrix.row_idx().len();
+    let (mut forward, mut inverse) = (vec![0; n], vec![0; n]);
+    let mut memory = MemBuffer::new(amd::order_scratch::<u32>(n, entries));
+    amd::order(
+        &mut forward,
+        &mut inverse,
+        matrix,
+        amd::Control::default(),
+        MemStack::new(&mut memory),
+    )
+    .map_err(|_| Singular)?;
+    Ok(forward)
 }
