@@ -1,10 +1,10 @@
-//! 8-node quads: solids, and thin layers in their own axes.
+//! Elements of the plane with any number of nodes: solids, and thin layers in their own axes.
 #![expect(
     clippy::inline_always,
     reason = "only what is inlined is compiled for the processor's own vector instructions"
 )]
 
-use super::shape::{gauss, quad_shape};
+use super::shape::{Functions, Reference};
 use super::{Axes, Kinematics, depth};
 use crate::case::Analysis;
 use pulp::{Arch, Simd, WithSimd};
@@ -12,27 +12,29 @@ use rayon::prelude::*;
 
 /// Elements that one thread takes at a time.
 const PIECE: usize = 256;
+/// Most integration points of an element.
+const MOST_POINTS: usize = 9;
 
-/// 8-node quads of one group.
+/// Elements of N nodes of one group.
 #[derive(Debug)]
-pub struct Quad8 {
-    nodes: Vec<[usize; 8]>,
+pub struct Solid<const N: usize> {
+    nodes: Vec<[usize; N]>,
     axes: Vec<Axes>,
     lengths: Vec<f64>,
     points_per_element: usize,
-    points: Vec<Point>,
+    points: Vec<Point<N>>,
 }
 
 /// An integration point. With displacement components u₁, u₂ along the element's axes:
 /// ε₁₁ = Σ a u₁, ε₂₂ = Σ b u₂, γ₁₂ = Σ (b u₁ + a u₂), ε₃₃ = Σ h u_r.
 #[derive(Clone, Debug)]
-struct Point {
+struct Point<const N: usize> {
     /// ∂N/∂x₁.
-    a: [f64; 8],
+    a: [f64; N],
     /// ∂N/∂x₂.
-    b: [f64; 8],
+    b: [f64; N],
     /// N/r; zero in plane strain.
-    h: [f64; 8],
+    h: [f64; N],
     weight: f64,
     position: [f64; 2],
 }
@@ -44,40 +46,48 @@ pub struct BadShape {
     pub element: usize,
 }
 
-impl Quad8 {
-    /// Elements with `rule.0` × `rule.1` Gauss points along their first and second direction
-    /// (from node 1 to node 2, from node 1 to node 4), in the given axes.
+/// An integration point of the reference element.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RulePoint {
+    pub(super) at: [f64; 2],
+    /// Its weight is the product.
+    pub(super) weights: [f64; 2],
+}
+
+impl<const N: usize> Solid<N> {
+    /// Elements with the integration points of a rule, in the given axes. `rule` gives the points
+    /// of an element, of all as many.
     ///
     /// # Errors
     /// An element whose Jacobian is not positive.
-    pub fn new(
+    pub(super) fn of_reference(
+        reference: &Reference<N>,
         analysis: Analysis,
         coordinates: &[[f64; 2]],
-        nodes: Vec<[usize; 8]>,
+        nodes: Vec<[usize; N]>,
         axes: Vec<Axes>,
-        rule: impl Fn(usize) -> (usize, usize),
+        rule: impl Fn(usize) -> Vec<RulePoint>,
     ) -> Result<Self, BadShape> {
         let mut points = Vec::new();
         let mut points_per_element = 0;
+        let mut lengths = Vec::with_capacity(nodes.len());
         for (element, nodes) in nodes.iter().enumerate() {
-            let corners = nodes.map(|n| coordinates[n]);
-            let (n_xi, n_eta) = rule(element);
-            points_per_element = n_xi * n_eta;
-            let ((xi, w_xi), (eta, w_eta)) = (gauss(n_xi), gauss(n_eta));
-            for (eta, w_eta) in eta.iter().zip(w_eta) {
-                for (xi, w_xi) in xi.iter().zip(w_xi) {
-                    let point = Point::new(analysis, &corners, &axes[element], *xi, *eta)
-                        .ok_or(BadShape { element })?;
-                    points.push(Point {
-                        weight: point.weight * w_xi * w_eta,
-                        ..point
-                    });
-                }
+            let places = nodes.map(|n| coordinates[n]);
+            let rule = rule(element);
+            points_per_element = rule.len();
+            for RulePoint { at, weights } in rule {
+                let shape = (reference.shape)(at);
+                let point = Point::new(analysis, &places, &axes[element], shape)
+                    .ok_or(BadShape { element })?;
+                points.push(Point {
+                    weight: point.weight * weights[0] * weights[1],
+                    ..point
+                });
             }
+            lengths.push((reference.area)(&places).sqrt());
         }
-        let lengths = nodes.iter().map(|nodes| area(nodes, coordinates).sqrt());
         Ok(Self {
-            lengths: lengths.collect(),
+            lengths,
             nodes,
             axes,
             points_per_element,
@@ -86,28 +96,20 @@ impl Quad8 {
     }
 
     /// Points of an element.
-    fn points_of(&self, element: usize) -> &[Point] {
+    fn points_of(&self, element: usize) -> &[Point<N>] {
         &self.points[element * self.points_per_element..][..self.points_per_element]
     }
 }
 
-/// Area between the corners.
-fn area(nodes: &[usize; 8], coordinates: &[[f64; 2]]) -> f64 {
-    let [a, b, c, d] = [0, 1, 2, 3].map(|i| coordinates[nodes[i]]);
-    0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1])).abs()
-}
-
-impl Point {
+impl<const N: usize> Point<N> {
     /// `None` if the Jacobian is not positive.
     fn new(
         analysis: Analysis,
-        corners: &[[f64; 2]; 8],
+        places: &[[f64; 2]; N],
         axes: &Axes,
-        xi: f64,
-        eta: f64,
+        (n, [d_xi, d_eta]): Functions<N>,
     ) -> Option<Self> {
-        let (n, [d_xi, d_eta]) = quad_shape(xi, eta);
-        let sum = |f: &[f64; 8], c: usize| -> f64 { (0..8).map(|i| f[i] * corners[i][c]).sum() };
+        let sum = |f: &[f64; N], c: usize| -> f64 { (0..N).map(|i| f[i] * places[i][c]).sum() };
         let position = [sum(&n, 0), sum(&n, 1)];
         // J = ∂(x, y)/∂(ξ, η)
         let (x_xi, y_xi, x_eta, y_eta) =
@@ -140,7 +142,7 @@ impl Point {
     }
 }
 
-impl Kinematics for Quad8 {
+impl<const N: usize> Kinematics for Solid<N> {
     fn n_elements(&self) -> usize {
         self.nodes.len()
     }
@@ -205,7 +207,7 @@ impl Kinematics for Quad8 {
             })
         };
         // Elements share nodes: their forces are added in one order, whoever computed them.
-        let mut add = |number: usize, of_piece: Vec<[[f64; 2]; 8]>| {
+        let mut add = |number: usize, of_piece: Vec<[[f64; 2]; N]>| {
             for (nodes, forces) in self.nodes[number * PIECE..].iter().zip(of_piece) {
                 for (node, f) in nodes.iter().zip(forces) {
                     force[2 * node] += f[0];
@@ -237,14 +239,14 @@ impl Kinematics for Quad8 {
 }
 
 /// Strains of consecutive elements, compiled for the processor's own vector instructions.
-struct Gradients<'a> {
-    elements: &'a Quad8,
+struct Gradients<'a, const N: usize> {
+    elements: &'a Solid<N>,
     first: usize,
     displacement: &'a [f64],
     out: &'a mut [f64],
 }
 
-impl WithSimd for Gradients<'_> {
+impl<const N: usize> WithSimd for Gradients<'_, N> {
     type Output = ();
 
     #[inline(always)]
@@ -258,14 +260,14 @@ impl WithSimd for Gradients<'_> {
 }
 
 /// Nodal forces of consecutive elements, likewise.
-struct Forces<'a> {
-    elements: &'a Quad8,
+struct Forces<'a, const N: usize> {
+    elements: &'a Solid<N>,
     first: usize,
     flux: &'a [f64],
 }
 
-impl WithSimd for Forces<'_> {
-    type Output = Vec<[[f64; 2]; 8]>;
+impl<const N: usize> WithSimd for Forces<'_, N> {
+    type Output = Vec<[[f64; 2]; N]>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
@@ -279,14 +281,14 @@ impl WithSimd for Forces<'_> {
 }
 
 /// Stiffness of one element, likewise.
-struct Stiffness<'a> {
-    elements: &'a Quad8,
+struct Stiffness<'a, const N: usize> {
+    elements: &'a Solid<N>,
     element: usize,
     tangent: &'a [f64],
     out: &'a mut [f64],
 }
 
-impl WithSimd for Stiffness<'_> {
+impl<const N: usize> WithSimd for Stiffness<'_, N> {
     type Output = ();
 
     #[inline(always)]
@@ -296,22 +298,29 @@ impl WithSimd for Stiffness<'_> {
     }
 }
 
-/// Σ u v, in pairs.
+/// Σ u v: the second half of the products is added to the first, until one is left.
 #[inline(always)]
-fn dot(u: &[f64; 8], v: &[f64; 8]) -> f64 {
-    let p: [f64; 8] = std::array::from_fn(|i| u[i] * v[i]);
-    let q: [f64; 4] = std::array::from_fn(|i| p[i] + p[i + 4]);
-    (q[0] + q[2]) + (q[1] + q[3])
+fn dot<const N: usize>(u: &[f64; N], v: &[f64; N]) -> f64 {
+    let mut p: [f64; N] = std::array::from_fn(|i| u[i] * v[i]);
+    let mut n = N;
+    while n > 1 {
+        let half = n.div_ceil(2);
+        for i in 0..n - half {
+            p[i] += p[i + half];
+        }
+        n = half;
+    }
+    p[0]
 }
 
 /// The arithmetic of one element, inlined into what is compiled for the processor.
-impl Quad8 {
+impl<const N: usize> Solid<N> {
     #[inline(always)]
     fn element_gradients(&self, element: usize, displacement: &[f64], strains: &mut [f64]) {
         let (nodes, axes) = (&self.nodes[element], &self.axes[element]);
-        let u_r: [f64; 8] = std::array::from_fn(|i| displacement[2 * nodes[i]]);
-        let u_z: [f64; 8] = std::array::from_fn(|i| displacement[2 * nodes[i] + 1]);
-        let turned = |axis: [f64; 2]| -> [f64; 8] {
+        let u_r: [f64; N] = std::array::from_fn(|i| displacement[2 * nodes[i]]);
+        let u_z: [f64; N] = std::array::from_fn(|i| displacement[2 * nodes[i] + 1]);
+        let turned = |axis: [f64; 2]| -> [f64; N] {
             std::array::from_fn(|i| axis[0] * u_r[i] + axis[1] * u_z[i])
         };
         let (u_1, u_2) = (turned(axes.along), turned(axes.across));
@@ -329,12 +338,12 @@ impl Quad8 {
 
     /// Nodal forces in global axes.
     #[inline(always)]
-    fn element_forces(&self, element: usize, flux: &[f64]) -> [[f64; 2]; 8] {
+    fn element_forces(&self, element: usize, flux: &[f64]) -> [[f64; 2]; N] {
         let axes = &self.axes[element];
-        let (mut f_1, mut f_2, mut f_r) = ([0.0; 8], [0.0; 8], [0.0; 8]);
+        let (mut f_1, mut f_2, mut f_r) = ([0.0; N], [0.0; N], [0.0; N]);
         for (point, s) in self.points_of(element).iter().zip(flux.chunks_exact(4)) {
             let s: [f64; 4] = std::array::from_fn(|c| point.weight * s[c]);
-            for i in 0..8 {
+            for i in 0..N {
                 f_1[i] += point.a[i] * s[0] + point.b[i] * s[3];
                 f_2[i] += point.b[i] * s[1] + point.a[i] * s[3];
                 f_r[i] += point.h[i] * s[2];
@@ -357,46 +366,46 @@ impl Quad8 {
         let radial = [axes.along[0], axes.across[0]];
         let points = self.points_of(element);
         // D B w of every point: by component, for u₁ and u₂.
-        let mut db = [[[[0.0; 8]; 4]; 2]; 9];
+        let mut db = [[[[0.0; N]; 4]; 2]; MOST_POINTS];
         for ((point, d), db) in points.iter().zip(tangent.chunks_exact(16)).zip(&mut db) {
             let (w, [on_1, on_2]) = (point.weight, db);
             for c in 0..4 {
                 let d: [f64; 4] = std::array::from_fn(|e| w * d[4 * c + e]);
                 let hoop = [d[2] * radial[0], d[2] * radial[1]];
-                for j in 0..8 {
+                for j in 0..N {
                     on_1[c][j] = d[0] * point.a[j] + hoop[0] * point.h[j] + d[3] * point.b[j];
                     on_2[c][j] = d[1] * point.b[j] + hoop[1] * point.h[j] + d[3] * point.a[j];
                 }
             }
         }
-        for i in 0..8 {
+        for i in 0..N {
             // Rows of u₁ and u₂ of node i.
-            let mut k = [[[0.0; 8]; 2]; 2];
+            let mut k = [[[0.0; N]; 2]; 2];
             for (point, db) in points.iter().zip(&db) {
                 let (a, b) = (point.a[i], point.b[i]);
                 let h = [point.h[i] * radial[0], point.h[i] * radial[1]];
                 for (column, d) in db.iter().enumerate() {
-                    for j in 0..8 {
+                    for j in 0..N {
                         k[0][column][j] += a * d[0][j] + h[0] * d[2][j] + b * d[3][j];
                         k[1][column][j] += b * d[1][j] + h[1] * d[2][j] + a * d[3][j];
                     }
                 }
             }
-            let rows = &mut out[32 * i..32 * (i + 1)];
+            let rows = &mut out[4 * N * i..4 * N * (i + 1)];
             if *axes == Axes::GLOBAL {
-                for j in 0..8 {
+                for j in 0..N {
                     for c in 0..2 {
                         rows[2 * j + c] = k[0][c][j];
-                        rows[16 + 2 * j + c] = k[1][c][j];
+                        rows[2 * N + 2 * j + c] = k[1][c][j];
                     }
                 }
             } else {
                 // Rᵀ k R, with the axes as rows of R.
                 let r = [axes.along, axes.across];
-                for j in 0..8 {
+                for j in 0..N {
                     for c in 0..2 {
                         for e in 0..2 {
-                            rows[16 * c + 2 * j + e] = (0..2)
+                            rows[2 * N * c + 2 * j + e] = (0..2)
                                 .map(|p| r[p][c] * (k[p][0][j] * r[0][e] + k[p][1][j] * r[1][e]))
                                 .sum();
                         }
