@@ -87,9 +87,9 @@ impl<const N: usize> Solid<N> {
             lengths.push((reference.area)(&places).sqrt());
         }
         Ok(Self {
-            lengths,
             nodes,
             axes,
+            lengths,
             points_per_element,
             points,
         })
