@@ -20,7 +20,7 @@ use graph::Compressed;
 /// Unknowns from which on nested dissection is used: as much work as after minimum degree at 10⁴
 /// unknowns, a fifth less at 6·10⁵.
 const WORTH_DISSECTING: usize = 5_000;
-/// Another order than the usual one has to do with this share of its operations: orders that are
+/// An order that replaces mesh lines has to do with this share of their operations: orders that are
 /// about as good do not take turns as a mesh changes.
 const CLEARLY_LESS: f64 = 0.8;
 
@@ -71,7 +71,8 @@ pub(crate) fn choose(
         .filter(|&vertex| !compressed.is_kept[vertex as usize])
         .collect();
     let dissected = dissection::order(&compressed.graph, &free);
-    if counts::operations(&compressed, &dissected) > CLEARLY_LESS * of_usual {
+    let allowed = if lines.is_some() { CLEARLY_LESS } else { 1.0 } * of_usual;
+    if counts::operations(&compressed, &dissected) > allowed {
         return Ok(Order::Given(usual));
     }
     let mut number = vec![0; pattern.n()];

@@ -2,6 +2,7 @@
 
 use super::graph::Graph;
 use super::separator::{SEPARATOR, Separated, refine};
+use std::cmp::Reverse;
 
 /// The side of every vertex: 0, 1, or [`SEPARATOR`]. No edge leads from side 0 to side 1.
 ///
@@ -35,32 +36,42 @@ pub(super) fn bisect(graph: &Graph) -> Vec<u8> {
     best.map_or_else(Vec::new, |best| best.sides)
 }
 
-/// Heights of the vertices of a connected graph where it is not known where they lie: differences
-/// of the distances, in edges, from two vertices that are far from each other, those from two
-/// others, and what lies between these two directions.
+/// Heights of the vertices of a connected graph where it is not known where they lie: from their
+/// distances, in edges, from four vertices that are far from each other. In a rectangle these are
+/// its corners, and what is nearer to two of them than to the others lies on one side of its middle.
 pub(super) fn heights_by_distance(graph: &Graph) -> Vec<Vec<i32>> {
+    // Of all that are as far, one with few neighbours, in a corner of the mesh.
     let farthest = |distances: &[i32]| {
-        let all = distances
-            .iter()
-            .zip(0..)
-            .max_by_key(|&(&distance, _)| distance);
-        all.map_or(0, |(_, vertex)| vertex)
+        let all = (0..graph.n())
+            .max_by_key(|&vertex| (distances[vertex], Reverse(graph.neighbours(vertex).len())));
+        all.unwrap_or(0)
     };
-    let from = |vertex: usize| distances(graph, vertex);
-    let a = from(farthest(&from(0)));
-    let b = from(farthest(&a));
-    let combined = |p: &[i32], q: &[i32], combine: fn(i32, i32) -> i32| -> Vec<i32> {
-        p.iter().zip(q).map(|(&p, &q)| combine(p, q)).collect()
+    let mut nearest = distances(graph, 0);
+    let mut from: Vec<Vec<i32>> = Vec::new();
+    for corner in 0..4 {
+        let own = distances(graph, farthest(&nearest));
+        if corner == 0 {
+            nearest.clone_from(&own);
+        }
+        for (nearest, own) in nearest.iter_mut().zip(&own) {
+            *nearest = (*nearest).min(*own);
+        }
+        from.push(own);
+    }
+    let combined = |signs: [i32; 4]| -> Vec<i32> {
+        let height = |vertex: usize| {
+            (0..4)
+                .map(|corner| signs[corner] * from[corner][vertex])
+                .sum()
+        };
+        (0..graph.n()).map(height).collect()
     };
-    let c = from(farthest(&combined(&a, &b, i32::min)));
-    let d = from(farthest(&c));
-    let along = combined(&a, &b, |p, q| p - q);
-    let across = combined(&c, &d, |p, q| p - q);
     vec![
-        combined(&along, &across, |p, q| p + q),
-        combined(&along, &across, |p, q| p - q),
-        along,
-        across,
+        combined([1, 1, -1, -1]),
+        combined([1, -1, 1, -1]),
+        combined([1, -1, -1, 1]),
+        combined([1, -1, 0, 0]),
+        combined([0, 0, 1, -1]),
     ]
 }
 
