@@ -3,13 +3,20 @@
 //!
 //! It knows matrices and right sides, neither elements nor materials. Kernels are `faer`'s.
 
+#[cfg(test)]
+extern crate self as algebra;
+#[cfg(test)]
+#[path = "../tests/meshes/mod.rs"]
+#[expect(dead_code, reason = "tests of the whole crate use the rest")]
+mod meshes;
+
 mod dense;
-mod dissection;
 mod linear;
 mod multifrontal;
+mod order;
 mod pattern;
 
-pub use dissection::mesh_lines;
 pub use linear::{Block, LinearSolver, Singular};
 pub use multifrontal::{Gathered, Kind, Multifrontal};
+pub use order::mesh_lines;
 pub use pattern::Pattern;

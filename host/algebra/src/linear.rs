@@ -145,6 +145,11 @@ impl LinearSolver {
         self.multifrontal.bytes()
     }
 
+    /// Floating-point operations of a factorisation, by the analysis; the block's not among them.
+    pub fn operations(&self) -> f64 {
+        self.multifrontal.operations()
+    }
+
     /// Factorises the matrix with these values, the block as it is.
     ///
     /// # Errors

@@ -1,4 +1,33 @@
-//! Shape functions of the 8-node quad and the 3-node line, and Gauss rules.
+//! Reference elements: shape functions of the 8-node quad, the 6-node triangle and the 3-node line,
+//! and Gauss rules.
+
+/// Shape functions at a point, and their derivatives by ξ and η.
+pub(super) type Functions<const N: usize> = ([f64; N], [[f64; N]; 2]);
+
+/// An element of N nodes in its own coordinates (ξ, η).
+#[derive(Debug)]
+pub(super) struct Reference<const N: usize> {
+    /// Shape functions at (ξ, η).
+    pub(super) shape: fn([f64; 2]) -> Functions<N>,
+    /// Area between the corners of an element whose nodes lie here.
+    pub(super) area: fn(&[[f64; 2]; N]) -> f64,
+}
+
+/// The 8-node quad, ξ and η from −1 to 1.
+pub(super) const QUAD8: Reference<8> = Reference {
+    shape: |[xi, eta]| quad_shape(xi, eta),
+    area: |&[a, b, c, d, ..]| {
+        0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1])).abs()
+    },
+};
+
+/// The 6-node triangle with corners (0, 0), (1, 0), (0, 1).
+pub(super) const TRI6: Reference<6> = Reference {
+    shape: |[xi, eta]| triangle_shape(xi, eta),
+    area: |&[a, b, c, ..]| {
+        0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs()
+    },
+};
 
 /// Points and weights of the Gauss rule with `n` points on (−1, 1); exact to degree 2n − 1.
 ///
@@ -21,8 +50,73 @@ pub fn gauss(n: usize) -> (&'static [f64], &'static [f64]) {
     }
 }
 
+/// Points and weights of the Gauss rule with `n` points on the triangle with corners (0, 0), (1, 0),
+/// (0, 1): exact to degree 2 with 3 points, 4 with 6 (Strang & Fix 1973) and 5 with 7 (Radon 1948).
+///
+/// # Panics
+/// If `n` is not 3, 6 or 7.
+#[expect(clippy::panic, reason = "`n` comes from this program's own tables")]
+pub(super) fn gauss_triangle(n: usize) -> &'static [([f64; 2], f64)] {
+    const P: f64 = 0.445_948_490_915_964_9;
+    const Q: f64 = 0.091_576_213_509_770_74;
+    const W_P: f64 = 0.111_690_794_839_005_74;
+    const W_Q: f64 = 0.054_975_871_827_660_935;
+    // (6 ± √15)/21 and (155 ± √15)/2400.
+    const R: f64 = 0.470_142_064_105_115_1;
+    const S: f64 = 0.101_286_507_323_456_34;
+    const W_R: f64 = 0.066_197_076_394_253_1;
+    const W_S: f64 = 0.062_969_590_272_413_58;
+    const THREE: [([f64; 2], f64); 3] = [
+        ([1.0 / 6.0, 1.0 / 6.0], 1.0 / 6.0),
+        ([2.0 / 3.0, 1.0 / 6.0], 1.0 / 6.0),
+        ([1.0 / 6.0, 2.0 / 3.0], 1.0 / 6.0),
+    ];
+    const SIX: [([f64; 2], f64); 6] = [
+        ([P, P], W_P),
+        ([1.0 - 2.0 * P, P], W_P),
+        ([P, 1.0 - 2.0 * P], W_P),
+        ([Q, Q], W_Q),
+        ([1.0 - 2.0 * Q, Q], W_Q),
+        ([Q, 1.0 - 2.0 * Q], W_Q),
+    ];
+    const SEVEN: [([f64; 2], f64); 7] = [
+        ([1.0 / 3.0, 1.0 / 3.0], 9.0 / 80.0),
+        ([R, R], W_R),
+        ([1.0 - 2.0 * R, R], W_R),
+        ([R, 1.0 - 2.0 * R], W_R),
+        ([S, S], W_S),
+        ([1.0 - 2.0 * S, S], W_S),
+        ([S, 1.0 - 2.0 * S], W_S),
+    ];
+    match n {
+        3 => &THREE,
+        6 => &SIX,
+        7 => &SEVEN,
+        _ => panic!("there is no Gauss rule with {n} points on a triangle here"),
+    }
+}
+
+/// Shape functions of the 6-node triangle at (ξ, η), and their derivatives by ξ and η.
+fn triangle_shape(xi: f64, eta: f64) -> Functions<6> {
+    // Area coordinates, and their derivatives.
+    let l = [1.0 - xi - eta, xi, eta];
+    let d = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]];
+    let next = |i: usize| (i + 1) % 3;
+    let n = std::array::from_fn(|i| match i {
+        0..3 => l[i] * (2.0 * l[i] - 1.0),
+        _ => 4.0 * l[i - 3] * l[next(i - 3)],
+    });
+    let derivative = |d: [f64; 3]| {
+        std::array::from_fn(|i| match i {
+            0..3 => (4.0 * l[i] - 1.0) * d[i],
+            _ => 4.0 * (d[i - 3] * l[next(i - 3)] + l[i - 3] * d[next(i - 3)]),
+        })
+    };
+    (n, d.map(derivative))
+}
+
 /// Shape functions of the 8-node quad at (ξ, η), and their derivatives by ξ and η.
-pub(super) fn quad_shape(xi: f64, eta: f64) -> ([f64; 8], [[f64; 8]; 2]) {
+fn quad_shape(xi: f64, eta: f64) -> Functions<8> {
     const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let mut n = [0.0; 8];
     let mut d = [[0.0; 8]; 2];
@@ -58,40 +152,75 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    #[test]
-    fn shape_functions_sum_to_one_and_are_one_at_their_node() {
-        let (n, d) = quad_shape(0.3, -0.7);
+    const QUAD_NODES: [[f64; 2]; 8] = [
+        [-1.0, -1.0],
+        [1.0, -1.0],
+        [1.0, 1.0],
+        [-1.0, 1.0],
+        [0.0, -1.0],
+        [1.0, 0.0],
+        [0.0, 1.0],
+        [-1.0, 0.0],
+    ];
+    const TRIANGLE_NODES: [[f64; 2]; 6] = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [0.0, 1.0],
+        [0.5, 0.0],
+        [0.5, 0.5],
+        [0.0, 0.5],
+    ];
+
+    fn check_shape<const N: usize>(reference: &Reference<N>, nodes: [[f64; 2]; N], at: [f64; 2]) {
+        let (n, d) = (reference.shape)(at);
         assert_relative_eq!(n.iter().sum::<f64>(), 1.0, epsilon = 1e-15);
         for derivative in d {
             assert_relative_eq!(derivative.iter().sum::<f64>(), 0.0, epsilon = 1e-15);
         }
-        let nodes = [
-            (-1.0, -1.0),
-            (1.0, -1.0),
-            (1.0, 1.0),
-            (-1.0, 1.0),
-            (0.0, -1.0),
-            (1.0, 0.0),
-            (0.0, 1.0),
-            (-1.0, 0.0),
-        ];
-        for (i, (xi, eta)) in nodes.into_iter().enumerate() {
-            let (n, _) = quad_shape(xi, eta);
-            for j in 0..8 {
-                assert_relative_eq!(n[j], f64::from(u8::from(i == j)), epsilon = 1e-15);
+        for (i, node) in nodes.into_iter().enumerate() {
+            let (n, _) = (reference.shape)(node);
+            for (j, n) in n.into_iter().enumerate() {
+                assert_relative_eq!(n, f64::from(u8::from(i == j)), epsilon = 1e-15);
+            }
+        }
+        let h = 1e-6;
+        for axis in 0..2 {
+            let moved = |by: f64| {
+                let mut there = at;
+                there[axis] += by;
+                (reference.shape)(there).0
+            };
+            let (ahead, behind) = (moved(h), moved(-h));
+            for i in 0..N {
+                let difference = (ahead[i] - behind[i]) / (2.0 * h);
+                assert_relative_eq!(d[axis][i], difference, epsilon = 1e-9);
             }
         }
     }
 
     #[test]
-    fn derivatives_agree_with_differences() {
-        let h = 1e-6;
-        let (_, d) = quad_shape(0.3, -0.7);
-        let (east, west) = (quad_shape(0.3 + h, -0.7).0, quad_shape(0.3 - h, -0.7).0);
-        let (north, south) = (quad_shape(0.3, -0.7 + h).0, quad_shape(0.3, -0.7 - h).0);
-        for i in 0..8 {
-            assert_relative_eq!(d[0][i], (east[i] - west[i]) / (2.0 * h), epsilon = 1e-9);
-            assert_relative_eq!(d[1][i], (north[i] - south[i]) / (2.0 * h), epsilon = 1e-9);
+    fn shape_functions_sum_to_one_and_derivatives_agree_with_differences() {
+        check_shape(&QUAD8, QUAD_NODES, [0.3, -0.7]);
+        check_shape(&TRI6, TRIANGLE_NODES, [0.3, 0.15]);
+    }
+
+    #[test]
+    fn triangle_rules_are_exact_to_their_degree() {
+        let factorial = |n: i32| (1..=n).map(f64::from).product::<f64>();
+        for (n, degree) in [(3, 2), (6, 4), (7, 5)] {
+            let error = |p: i32, q: i32| {
+                let rule = gauss_triangle(n).iter();
+                let sum: f64 = rule.map(|([x, y], w)| w * x.powi(p) * y.powi(q)).sum();
+                // ∫ ξ^p η^q = p! q! / (p + q + 2)!
+                (sum - factorial(p) * factorial(q) / factorial(p + q + 2)).abs()
+            };
+            for p in 0..=degree {
+                for q in 0..=degree - p {
+                    assert!(error(p, q) < 1e-16, "{n}: {p} {q}");
+                }
+            }
+            let beyond = (0..=degree + 1).map(|p| error(p, degree + 1 - p));
+            assert!(beyond.fold(0.0, f64::max) > 1e-5, "{n}: no more than that");
         }
     }
 

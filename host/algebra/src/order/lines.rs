@@ -4,6 +4,8 @@
 //! unknowns on the line are eliminated after those on both sides, which do not touch each other
 //! (George 1973). What is cut where only bears on speed: any order gives a right factorisation.
 
+use std::cmp::Ordering;
+
 /// Sets within so few mesh lines each way are not cut any more.
 const SMALLEST: u32 = 4;
 
@@ -26,16 +28,31 @@ pub fn mesh_lines(positions: &[[f64; 2]]) -> Vec<[u32; 2]> {
     lines
 }
 
+/// Whether the lines are those of a grid, most crossings of which are nodes: of 8-node quads three
+/// quarters are. Nodes that lie anyhow have lines of their own, which separate nothing.
+pub(super) fn are_a_grid(lines: &[[u32; 2]]) -> bool {
+    let number = |axis: usize| {
+        let last = lines.iter().map(|line| line[axis]).max().unwrap_or(0);
+        let mut is_met = vec![false; last as usize + 1];
+        for line in lines {
+            is_met[line[axis] as usize] = true;
+        }
+        is_met.into_iter().filter(|&is_met| is_met).count()
+    };
+    // Unknowns come in twos; half of the crossings may be empty.
+    number(0).saturating_mul(number(1)) <= lines.len()
+}
+
 /// An order of elimination of unknowns that lie on these mesh lines.
-pub(crate) fn order(lines: &[[u32; 2]]) -> Vec<u32> {
-    let mut all: Vec<u32> = (0..lines.len() as u32).collect();
+pub(super) fn order(lines: &[[u32; 2]]) -> Vec<u32> {
+    let all: Vec<u32> = (0..lines.len() as u32).collect();
     let mut order = Vec::with_capacity(all.len());
-    dissect(lines, &mut all, &mut order);
+    dissect(lines, &all, &mut order);
     order
 }
 
 /// Appends a set to the order: one side, the other side, and what separates them.
-fn dissect(lines: &[[u32; 2]], set: &mut [u32], order: &mut Vec<u32>) {
+fn dissect(lines: &[[u32; 2]], set: &[u32], order: &mut Vec<u32>) {
     let Some([(low, high), (low_y, high_y)]) = extents(lines, set) else {
         return;
     };
@@ -49,25 +66,29 @@ fn dissect(lines: &[[u32; 2]], set: &mut [u32], order: &mut Vec<u32>) {
         return;
     }
     let line = |unknown: u32| lines[unknown as usize][axis];
-    let half = set.len() / 2;
-    let (_, &mut middle, _) =
-        set.select_nth_unstable_by_key(half, |&unknown| (line(unknown), unknown));
+    let mut all: Vec<u32> = set.iter().map(|&unknown| line(unknown)).collect();
+    let half = all.len() / 2;
+    let (_, &mut middle, _) = all.select_nth_unstable(half);
     // An even line, so that no element reaches across it.
-    let cut = (line(middle) / 2 * 2).clamp(low + 1, high - 1);
-    set.sort_unstable_by_key(|&unknown| (line(unknown).cmp(&cut) as i8, unknown));
-    let before = set.partition_point(|&unknown| line(unknown) < cut);
-    let on = set[before..].partition_point(|&unknown| line(unknown) == cut);
-    let (below, rest) = set.split_at_mut(before);
-    let (separator, above) = rest.split_at_mut(on);
+    let cut = (middle / 2 * 2).clamp(low + 1, high - 1);
+    let part = |wanted: Ordering| -> Vec<u32> {
+        let of_set = set.iter().copied();
+        of_set
+            .filter(|&unknown| line(unknown).cmp(&cut) == wanted)
+            .collect()
+    };
+    let below = part(Ordering::Less);
+    let separator = part(Ordering::Equal);
+    let above = part(Ordering::Greater);
     // A line without unknowns separates nothing.
     if below.is_empty() || above.is_empty() {
-        order.extend_from_slice(below);
-        order.extend_from_slice(above);
+        order.extend(below);
+        order.extend(above);
     } else {
-        dissect(lines, below, order);
-        dissect(lines, above, order);
+        dissect(lines, &below, order);
+        dissect(lines, &above, order);
     }
-    order.extend_from_slice(separator);
+    order.extend(separator);
 }
 
 /// Least and greatest line, by axis.

@@ -1,0 +1,308 @@
+//! What follows from a pattern alone: the order of elimination, the fronts, and where every entry
+//! of a matrix goes.
+
+use super::Kind;
+use super::supernodes::Supernodes;
+use crate::{Pattern, Singular};
+use std::ops::Range;
+
+/// The order of elimination and the shape of everything that follows from it.
+#[derive(Debug)]
+pub(super) struct Analysis {
+    pub(super) kind: Kind,
+    /// Equations that are eliminated, in this order.
+    pub(super) order: Vec<u32>,
+    /// Equations that are kept.
+    pub(super) kept: Vec<u32>,
+    pub(super) fronts: Vec<Shape>,
+    /// Rows below the pivot block of all fronts: positions in `order`, then, counted on, in `kept`.
+    pub(super) rows: Vec<u32>,
+    /// Where each of them stands in the parent's front; without a parent, in `kept`.
+    pub(super) relative: Vec<u32>,
+    /// Entries of the matrix by front: their places in the pattern, and where they go.
+    pub(super) sources: Vec<u32>,
+    pub(super) targets: Vec<u32>,
+    /// Entries between kept equations; targets in the column-major Schur complement.
+    pub(super) kept_entries: Vec<Entry>,
+    pub(super) roots: Vec<usize>,
+}
+
+/// Where an entry between kept equations goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry {
+    pub(super) source: u32,
+    pub(super) target: u32,
+}
+
+/// A supernode with the rows it touches.
+#[derive(Debug)]
+pub(super) struct Shape {
+    /// Positions of its pivots.
+    pub(super) pivots: Range<usize>,
+    /// Within `rows`.
+    pub(super) rows: Range<usize>,
+    /// Within `sources` and `targets`.
+    pub(super) entries: Range<usize>,
+    pub(super) children: Vec<usize>,
+    /// Floating-point operations of it and its descendants.
+    pub(super) work: f64,
+}
+
+impl Analysis {
+    pub(super) fn new(
+        pattern: &Pattern,
+        kind: Kind,
+        kept: &[bool],
+        lines: Option<&[[u32; 2]]>,
+    ) -> Result<Self, Singular> {
+        let eliminated: Vec<u32> = (0..kept.len() as u32)
+            .filter(|&equation| !kept[equation as usize])
+            .collect();
+        let kept: Vec<u32> = (0..kept.len() as u32)
+            .filter(|&equation| kept[equation as usize])
+            .collect();
+        let mut analysis = Self {
+            kind,
+            order: Vec::new(),
+            kept,
+            fronts: Vec::new(),
+            rows: Vec::new(),
+            relative: Vec::new(),
+            sources: Vec::new(),
+            targets: Vec::new(),
+            kept_entries: Vec::new(),
+            roots: Vec::new(),
+        };
+        // Where every equation stands: eliminated ones first, kept ones after them.
+        let mut position = vec![0_u32; eliminated.len() + analysis.kept.len()];
+        for (at, &equation) in (eliminated.len() as u32..).zip(&analysis.kept) {
+            position[equation as usize] = at;
+        }
+        if !eliminated.is_empty() {
+            let supernodes = Supernodes::new(pattern, &eliminated, lines)?;
+            analysis.order = supernodes.order;
+            for (at, &equation) in (0..).zip(&analysis.order) {
+                position[equation as usize] = at;
+            }
+            analysis.add_fronts(pattern, &position, &supernodes.starts, &supernodes.rows);
+        }
+        analysis.add_kept_entries(pattern, &position);
+        Ok(analysis)
+    }
+
+    /// Floating-point operations of a factorisation.
+    pub(super) fn operations(&self) -> f64 {
+        let of_roots = self.roots.iter().map(|&root| self.fronts[root].work);
+        let share = match self.kind {
+            Kind::Symmetric => 0.5,
+            Kind::Unsymmetric => 1.0,
+        };
+        share * of_roots.sum::<f64>()
+    }
+
+    /// Memory that a factorisation takes: factors, the Schur complement, and the updates that wait
+    /// for their parents, one branch after the other.
+    pub(super) fn bytes(&self) -> u64 {
+        let square = |n: usize| (n * n) as u64;
+        let mut factors = 0;
+        let mut peaks: Vec<u64> = Vec::with_capacity(self.fronts.len());
+        // Children come before their parents.
+        for shape in &self.fronts {
+            let (k, m) = (shape.pivots.len(), shape.rows.len());
+            factors += match self.kind {
+                Kind::Symmetric => square(k) + (k * m) as u64,
+                Kind::Unsymmetric => square(k) + 2 * (k * m) as u64,
+            };
+            let (mut waiting, mut peak) = (0, 0);
+            for &child in &shape.children {
+                peak = peak.max(waiting + peaks[child]);
+                waiting += square(self.fronts[child].rows.len());
+            }
+            peaks.push(peak.max(waiting + square(m)));
+        }
+        let peak = self.roots.iter().map(|&root| peaks[root]).max();
+        let words = factors + peak.unwrap_or(0) + square(self.kept.len());
+        words * size_of::<f64>() as u64
+    }
+
+    fn add_fronts(
+        &mut self,
+        pattern: &Pattern,
+        position: &[u32],
+        starts: &[usize],
+        eliminated_rows: &[Vec<u32>],
+    ) {
+        let n_eliminated = self.order.len();
+        let n_fronts = eliminated_rows.len();
+        let mut front_of = vec![0_u32; n_eliminated];
+        for front in 0..n_fronts {
+            front_of[starts[front]..starts[front + 1]].fill(front as u32);
+        }
+        let mut children = vec![Vec::new(); n_fronts];
+        let mut parent = vec![None; n_fronts];
+        for (front, rows) in eliminated_rows.iter().enumerate() {
+            match rows.first() {
+                Some(&row) => {
+                    let above = front_of[row as usize] as usize;
+                    children[above].push(front);
+                    parent[front] = Some(above);
+                }
+                None => self.roots.push(front),
+            }
+        }
+        // Kept equations that a front touches: its own, and those of its children.
+        let mut touched_by = vec![u32::MAX; self.kept.len()];
+        for front in 0..n_fronts {
+            let pivots = starts[front]..starts[front + 1];
+            let mut touched = Vec::new();
+            let mut touch = |row: u32, touched: &mut Vec<u32>| {
+                let mark = &mut touched_by[row as usize - n_eliminated];
+                if *mark != front as u32 {
+                    *mark = front as u32;
+                    touched.push(row);
+                }
+            };
+            for &child in &children[front] {
+                for &row in &self.rows[self.fronts_rows(child)] {
+                    if row as usize >= n_eliminated {
+                        touch(row, &mut touched);
+                    }
+                }
+            }
+            for &equation in &self.order[pivots.clone()] {
+                for &row in pattern.column(equation as usize) {
+                    let row = position[row as usize];
+                    if row as usize >= n_eliminated {
+                        touch(row, &mut touched);
+                    }
+                }
+            }
+            touched.sort_unstable();
+            let start = self.rows.len();
+            self.rows.extend_from_slice(&eliminated_rows[front]);
+            self.rows.extend(touched);
+            let rows = start..self.rows.len();
+            let (k, m) = (pivots.len() as f64, rows.len() as f64);
+            let own = work(k, m);
+            let below: f64 = children[front]
+                .iter()
+                .map(|&child: &usize| self.fronts[child].work)
+                .sum();
+            self.fronts.push(Shape {
+                pivots,
+                rows,
+                entries: 0..0,
+                children: std::mem::take(&mut children[front]),
+                work: own + below,
+            });
+        }
+        self.place_rows(&parent);
+        self.place_entries(pattern, position);
+    }
+
+    fn fronts_rows(&self, front: usize) -> Range<usize> {
+        self.fronts[front].rows.clone()
+    }
+
+    /// Where the rows of every front stand in its parent's.
+    fn place_rows(&mut self, parent: &[Option<usize>]) {
+        let n_eliminated = self.order.len();
+        self.relative = vec![0; self.rows.len()];
+        let mut place = vec![0_u32; n_eliminated + self.kept.len()];
+        for front in 0..self.fronts.len() {
+            let Shape {
+                pivots,
+                rows,
+                children,
+                ..
+            } = &self.fronts[front];
+            self.place_front(pivots.clone(), rows.clone(), &mut place);
+            for &child in children {
+                let of_child = self.fronts_rows(child);
+                for at in of_child {
+                    self.relative[at] = place[self.rows[at] as usize];
+                }
+            }
+        }
+        for (front, parent) in parent.iter().enumerate() {
+            if parent.is_none() {
+                for at in self.fronts_rows(front) {
+                    self.relative[at] = self.rows[at] - n_eliminated as u32;
+                }
+            }
+        }
+    }
+
+    /// Numbers the rows of one front.
+    fn place_front(&self, pivots: Range<usize>, rows: Range<usize>, place: &mut [u32]) {
+        let k = pivots.len() as u32;
+        for (at, pivot) in (0..).zip(pivots) {
+            place[pivot] = at;
+        }
+        for (at, &row) in (k..).zip(&self.rows[rows]) {
+            place[row as usize] = at;
+        }
+    }
+
+    /// Where the entries of the matrix go: each to the front that eliminates its row or its
+    /// column first.
+    fn place_entries(&mut self, pattern: &Pattern, position: &[u32]) {
+        // Rows of the matrix, for entries above the diagonal: the transposed pattern is the same.
+        let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
+        let mut place = vec![0_u32; position.len()];
+        let (mut sources, mut targets) = (Vec::new(), Vec::new());
+        for front in 0..self.fronts.len() {
+            let Shape { pivots, rows, .. } = &self.fronts[front];
+            let (pivots, rows) = (pivots.clone(), rows.clone());
+            let (k, n) = (pivots.len(), pivots.len() + rows.len());
+            self.place_front(pivots.clone(), rows, &mut place);
+            let start = targets.len();
+            for (column, pivot) in pivots.clone().enumerate() {
+                let equation = self.order[pivot] as usize;
+                for at in pattern.places(equation) {
+                    let row = position[pattern.rows[at] as usize] as usize;
+                    let lower = self.kind == Kind::Unsymmetric || row >= pivot;
+                    if row >= pivots.start && lower {
+                        let target = column * n + place[row] as usize;
+                        sources.push(at as u32);
+                        targets.push(target as u32);
+                    }
+                    // The entry across the diagonal, in the row of this pivot.
+                    if let Some(transposed) = &transposed
+                        && row >= pivots.end
+                    {
+                        let target = n * k + (place[row] as usize - k) * k + column;
+                        sources.push(transposed[at]);
+                        targets.push(target as u32);
+                    }
+                }
+            }
+            self.fronts[front].entries = start..targets.len();
+        }
+        (self.sources, self.targets) = (sources, targets);
+    }
+
+    fn add_kept_entries(&mut self, pattern: &Pattern, position: &[u32]) {
+        let (n_eliminated, n) = (self.order.len(), self.kept.len());
+        for (column, &equation) in self.kept.iter().enumerate() {
+            for at in pattern.places(equation as usize) {
+                let row = position[pattern.rows[at] as usize] as usize;
+                if row >= n_eliminated {
+                    let row = row - n_eliminated;
+                    if self.kind == Kind::Unsymmetric || row >= column {
+                        self.kept_entries.push(Entry {
+                            source: at as u32,
+                            target: (column * n + row) as u32,
+                        });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Floating-point operations that eliminate k pivots with m rows below them, as L U; of a symmetric
+/// matrix half of them are done.
+pub(crate) fn work(k: f64, m: f64) -> f64 {
+    2.0 / 3.0 * k * k * k + 2.0 * k * k * m + 2.0 * k * m * m
+}

@@ -1,0 +1,417 @@
+//! Elements of the plane with any number of nodes: solids, and thin layers in their own axes.
+#![expect(
+    clippy::inline_always,
+    reason = "only what is inlined is compiled for the processor's own vector instructions"
+)]
+
+use super::shape::{Functions, Reference};
+use super::{Axes, Kinematics, depth};
+use crate::problem::Analysis;
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+/// Elements that one thread takes at a time.
+const PIECE: usize = 256;
+/// Most integration points of an element.
+const MOST_POINTS: usize = 9;
+
+/// Elements of N nodes of one group.
+#[derive(Debug)]
+pub struct Solid<const N: usize> {
+    nodes: Vec<[usize; N]>,
+    axes: Vec<Axes>,
+    lengths: Vec<f64>,
+    points_per_element: usize,
+    points: Vec<Point<N>>,
+}
+
+/// An integration point. With displacement components u₁, u₂ along the element's axes:
+/// ε₁₁ = Σ a u₁, ε₂₂ = Σ b u₂, γ₁₂ = Σ (b u₁ + a u₂), ε₃₃ = Σ h u_r.
+#[derive(Clone, Debug)]
+struct Point<const N: usize> {
+    /// ∂N/∂x₁.
+    a: [f64; N],
+    /// ∂N/∂x₂.
+    b: [f64; N],
+    /// N/r; zero in plane strain.
+    h: [f64; N],
+    weight: f64,
+    position: [f64; 2],
+}
+
+/// An element that is turned inside out or has no area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BadShape {
+    /// Number of the element within the group.
+    pub element: usize,
+}
+
+/// An integration point of the reference element.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RulePoint {
+    pub(super) at: [f64; 2],
+    /// Its weight is the product.
+    pub(super) weights: [f64; 2],
+}
+
+impl<const N: usize> Solid<N> {
+    /// Elements with the integration points of a rule, in the given axes. `rule` gives the points
+    /// of an element, of all as many.
+    ///
+    /// # Errors
+    /// An element whose Jacobian is not positive.
+    pub(super) fn of_reference(
+        reference: &Reference<N>,
+        analysis: Analysis,
+        coordinates: &[[f64; 2]],
+        nodes: Vec<[usize; N]>,
+        axes: Vec<Axes>,
+        rule: impl Fn(usize) -> Vec<RulePoint>,
+    ) -> Result<Self, BadShape> {
+        let mut points = Vec::new();
+        let mut points_per_element = 0;
+        let mut lengths = Vec::with_capacity(nodes.len());
+        for (element, nodes) in nodes.iter().enumerate() {
+            let places = nodes.map(|n| coordinates[n]);
+            let rule = rule(element);
+            points_per_element = rule.len();
+            for RulePoint { at, weights } in rule {
+                let shape = (reference.shape)(at);
+                let point = Point::new(analysis, &places, &axes[element], shape)
+                    .ok_or(BadShape { element })?;
+                points.push(Point {
+                    weight: point.weight * weights[0] * weights[1],
+                    ..point
+                });
+            }
+            lengths.push((reference.area)(&places).sqrt());
+        }
+        Ok(Self {
+            nodes,
+            axes,
+            lengths,
+            points_per_element,
+            points,
+        })
+    }
+
+    /// Points of an element.
+    fn points_of(&self, element: usize) -> &[Point<N>] {
+        &self.points[element * self.points_per_element..][..self.points_per_element]
+    }
+}
+
+impl<const N: usize> Point<N> {
+    /// `None` if the Jacobian is not positive.
+    fn new(
+        analysis: Analysis,
+        places: &[[f64; 2]; N],
+        axes: &Axes,
+        (n, [d_xi, d_eta]): Functions<N>,
+    ) -> Option<Self> {
+        let sum = |f: &[f64; N], c: usize| -> f64 { (0..N).map(|i| f[i] * places[i][c]).sum() };
+        let position = [sum(&n, 0), sum(&n, 1)];
+        // J = ∂(x, y)/∂(ξ, η)
+        let (x_xi, y_xi, x_eta, y_eta) =
+            (sum(&d_xi, 0), sum(&d_xi, 1), sum(&d_eta, 0), sum(&d_eta, 1));
+        let determinant = x_xi * y_eta - y_xi * x_eta;
+        if determinant.is_nan() || determinant <= 0.0 {
+            return None;
+        }
+        let gradient = |i: usize| {
+            [
+                (y_eta * d_xi[i] - y_xi * d_eta[i]) / determinant,
+                (x_xi * d_eta[i] - x_eta * d_xi[i]) / determinant,
+            ]
+        };
+        let along = |v: [f64; 2], i: usize| {
+            let g = gradient(i);
+            v[0] * g[0] + v[1] * g[1]
+        };
+        let hoop = |i: usize| match analysis {
+            Analysis::Axisymmetric => n[i] / position[0],
+            Analysis::PlaneStrain => 0.0,
+        };
+        Some(Self {
+            a: std::array::from_fn(|i| along(axes.along, i)),
+            b: std::array::from_fn(|i| along(axes.across, i)),
+            h: std::array::from_fn(hoop),
+            weight: determinant * depth(analysis, position[0]),
+            position,
+        })
+    }
+}
+
+impl<const N: usize> Kinematics for Solid<N> {
+    fn n_elements(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn points_per_element(&self) -> usize {
+        self.points_per_element
+    }
+
+    fn n_components(&self) -> usize {
+        4
+    }
+
+    fn nodes(&self, element: usize) -> &[usize] {
+        &self.nodes[element]
+    }
+
+    fn position(&self, point: usize) -> [f64; 2] {
+        self.points[point].position
+    }
+
+    fn weight(&self, point: usize) -> f64 {
+        self.points[point].weight
+    }
+
+    fn length(&self, element: usize) -> f64 {
+        self.lengths[element]
+    }
+
+    fn axes(&self, element: usize) -> Axes {
+        self.axes[element]
+    }
+
+    fn add_gradients(&self, displacement: &[f64], out: &mut [f64]) {
+        let per_element = 4 * self.points_per_element;
+        let piece = |(number, out): (usize, &mut [f64])| {
+            let elements = self;
+            let first = number * PIECE;
+            Arch::new().dispatch(Gradients {
+                elements,
+                first,
+                displacement,
+                out,
+            });
+        };
+        if self.nodes.len() > PIECE {
+            let pieces = out.par_chunks_mut(PIECE * per_element).enumerate();
+            pieces.for_each(piece);
+        } else {
+            piece((0, out));
+        }
+    }
+
+    fn add_forces(&self, flux: &[f64], force: &mut [f64]) {
+        let per_element = 4 * self.points_per_element;
+        let forces_of = |(number, flux): (usize, &[f64])| {
+            let elements = self;
+            let first = number * PIECE;
+            Arch::new().dispatch(Forces {
+                elements,
+                first,
+                flux,
+            })
+        };
+        // Elements share nodes: their forces are added in one order, whoever computed them.
+        let mut add = |number: usize, of_piece: Vec<[[f64; 2]; N]>| {
+            for (nodes, forces) in self.nodes[number * PIECE..].iter().zip(of_piece) {
+                for (node, f) in nodes.iter().zip(forces) {
+                    force[2 * node] += f[0];
+                    force[2 * node + 1] += f[1];
+                }
+            }
+        };
+        if self.nodes.len() > PIECE {
+            let pieces = flux.par_chunks(PIECE * per_element).enumerate();
+            let forces: Vec<_> = pieces.map(forces_of).collect();
+            forces
+                .into_iter()
+                .enumerate()
+                .for_each(|(number, of_piece)| add(number, of_piece));
+        } else {
+            add(0, forces_of((0, flux)));
+        }
+    }
+
+    fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
+        let elements = self;
+        Arch::new().dispatch(Stiffness {
+            elements,
+            element,
+            tangent,
+            out,
+        });
+    }
+}
+
+/// Strains of consecutive elements, compiled for the processor's own vector instructions.
+struct Gradients<'a, const N: usize> {
+    elements: &'a Solid<N>,
+    first: usize,
+    displacement: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl<const N: usize> WithSimd for Gradients<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let per_element = 4 * self.elements.points_per_element;
+        for (element, out) in (self.first..).zip(self.out.chunks_exact_mut(per_element)) {
+            self.elements
+                .element_gradients(element, self.displacement, out);
+        }
+    }
+}
+
+/// Nodal forces of consecutive elements, likewise.
+struct Forces<'a, const N: usize> {
+    elements: &'a Solid<N>,
+    first: usize,
+    flux: &'a [f64],
+}
+
+impl<const N: usize> WithSimd for Forces<'_, N> {
+    type Output = Vec<[[f64; 2]; N]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let fluxes = self.flux.chunks_exact(4 * self.elements.points_per_element);
+        let mut forces = Vec::with_capacity(fluxes.len());
+        for (element, flux) in (self.first..).zip(fluxes) {
+            forces.push(self.elements.element_forces(element, flux));
+        }
+        forces
+    }
+}
+
+/// Stiffness of one element, likewise.
+struct Stiffness<'a, const N: usize> {
+    elements: &'a Solid<N>,
+    element: usize,
+    tangent: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl<const N: usize> WithSimd for Stiffness<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.elements
+            .element_stiffness(self.element, self.tangent, self.out);
+    }
+}
+
+/// Σ u v: the second half of the products is added to the first, until one is left.
+#[inline(always)]
+fn dot<const N: usize>(u: &[f64; N], v: &[f64; N]) -> f64 {
+    let mut p: [f64; N] = std::array::from_fn(|i| u[i] * v[i]);
+    let mut n = N;
+    while n > 1 {
+        let half = n.div_ceil(2);
+        for i in 0..n - half {
+            p[i] += p[i + half];
+        }
+        n = half;
+    }
+    p[0]
+}
+
+/// The arithmetic of one element, inlined into what is compiled for the processor.
+impl<const N: usize> Solid<N> {
+    #[inline(always)]
+    fn element_gradients(&self, element: usize, displacement: &[f64], strains: &mut [f64]) {
+        let (nodes, axes) = (&self.nodes[element], &self.axes[element]);
+        let u_r: [f64; N] = std::array::from_fn(|i| displacement[2 * nodes[i]]);
+        let u_z: [f64; N] = std::array::from_fn(|i| displacement[2 * nodes[i] + 1]);
+        let turned = |axis: [f64; 2]| -> [f64; N] {
+            std::array::from_fn(|i| axis[0] * u_r[i] + axis[1] * u_z[i])
+        };
+        let (u_1, u_2) = (turned(axes.along), turned(axes.across));
+        for (point, strain) in self
+            .points_of(element)
+            .iter()
+            .zip(strains.chunks_exact_mut(4))
+        {
+            strain[0] += dot(&point.a, &u_1);
+            strain[1] += dot(&point.b, &u_2);
+            strain[2] += dot(&point.h, &u_r);
+            strain[3] += dot(&point.b, &u_1) + dot(&point.a, &u_2);
+        }
+    }
+
+    /// Nodal forces in global axes.
+    #[inline(always)]
+    fn element_forces(&self, element: usize, flux: &[f64]) -> [[f64; 2]; N] {
+        let axes = &self.axes[element];
+        let (mut f_1, mut f_2, mut f_r) = ([0.0; N], [0.0; N], [0.0; N]);
+        for (point, s) in self.points_of(element).iter().zip(flux.chunks_exact(4)) {
+            let s: [f64; 4] = std::array::from_fn(|c| point.weight * s[c]);
+            for i in 0..N {
+                f_1[i] += point.a[i] * s[0] + point.b[i] * s[3];
+                f_2[i] += point.b[i] * s[1] + point.a[i] * s[3];
+                f_r[i] += point.h[i] * s[2];
+            }
+        }
+        std::array::from_fn(|i| {
+            [
+                axes.along[0] * f_1[i] + axes.across[0] * f_2[i] + f_r[i],
+                axes.along[1] * f_1[i] + axes.across[1] * f_2[i],
+            ]
+        })
+    }
+
+    /// Σ Bᵀ D B w, by blocks: with displacements u₁, u₂ along the element's axes,
+    /// column i of B is (a, 0, h e₁, b) for u₁ and (0, b, h e₂, a) for u₂, where e is the radial
+    /// direction in these axes.
+    #[inline(always)]
+    fn element_stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
+        let axes = &self.axes[element];
+        let radial = [axes.along[0], axes.across[0]];
+        let points = self.points_of(element);
+        // D B w of every point: by component, for u₁ and u₂.
+        let mut db = [[[[0.0; N]; 4]; 2]; MOST_POINTS];
+        for ((point, d), db) in points.iter().zip(tangent.chunks_exact(16)).zip(&mut db) {
+            let (w, [on_1, on_2]) = (point.weight, db);
+            for c in 0..4 {
+                let d: [f64; 4] = std::array::from_fn(|e| w * d[4 * c + e]);
+                let hoop = [d[2] * radial[0], d[2] * radial[1]];
+                for j in 0..N {
+                    on_1[c][j] = d[0] * point.a[j] + hoop[0] * point.h[j] + d[3] * point.b[j];
+                    on_2[c][j] = d[1] * point.b[j] + hoop[1] * point.h[j] + d[3] * point.a[j];
+                }
+            }
+        }
+        for i in 0..N {
+            // Rows of u₁ and u₂ of node i.
+            let mut k = [[[0.0; N]; 2]; 2];
+            for (point, db) in points.iter().zip(&db) {
+                let (a, b) = (point.a[i], point.b[i]);
+                let h = [point.h[i] * radial[0], point.h[i] * radial[1]];
+                for (column, d) in db.iter().enumerate() {
+                    for j in 0..N {
+                        k[0][column][j] += a * d[0][j] + h[0] * d[2][j] + b * d[3][j];
+                        k[1][column][j] += b * d[1][j] + h[1] * d[2][j] + a * d[3][j];
+                    }
+                }
+            }
+            let rows = &mut out[4 * N * i..4 * N * (i + 1)];
+            if *axes == Axes::GLOBAL {
+                for j in 0..N {
+                    for c in 0..2 {
+                        rows[2 * j + c] = k[0][c][j];
+                        rows[2 * N + 2 * j + c] = k[1][c][j];
+                    }
+                }
+            } else {
+                // Rᵀ k R, with the axes as rows of R.
+                let r = [axes.along, axes.across];
+                for j in 0..N {
+                    for c in 0..2 {
+                        for e in 0..2 {
+                            rows[2 * N * c + 2 * j + e] = (0..2)
+                                .map(|p| r[p][c] * (k[p][0][j] * r[0][e] + k[p][1][j] * r[1][e]))
+                                .sum();
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,342 @@
+use super::*;
+use approx::assert_relative_eq;
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::PI;
+
+fn assert_close(a: [f64; 4], b: [f64; 4]) {
+    for (a, b) in a.iter().zip(b) {
+        assert_relative_eq!(*a, b, epsilon = 1e-14);
+    }
+}
+
+#[test]
+fn facets_along_the_coordinates_carry_the_global_shear_stress() {
+    let stress = [1.0, 2.0, 3.0, 4.0];
+    let vertical = Axes::of_facet([0.0, -2.0]);
+    assert_close(vertical.stress_from_global(stress), [2.0, 1.0, 3.0, 4.0]);
+    let horizontal = Axes::of_facet([-1.0, 0.0]);
+    assert_close(horizontal.stress_from_global(stress), stress);
+}
+
+#[test]
+fn an_inclined_facet_follows_equation_1_of_the_paper() {
+    let alpha: f64 = 0.3;
+    let (s, c) = alpha.sin_cos();
+    let [s11, s22, s12] = [1.0, 2.0, 4.0];
+    let local = Axes::of_facet([c, s]).stress_from_global([s11, s22, 3.0, s12]);
+    assert_relative_eq!(
+        local[1],
+        s * s * s11 + c * c * s22 - 2.0 * s * c * s12,
+        epsilon = 1e-14
+    );
+    let tau = -s * c * s11 + s * c * s22 + (c * c - s * s) * s12;
+    assert_relative_eq!(local[3], tau, epsilon = 1e-14);
+}
+
+#[test]
+fn turning_a_stress_there_and_back_changes_nothing() {
+    let axes = Axes::of_facet([0.6, 0.8]);
+    let stress = [1.0, -2.0, 3.0, 4.0];
+    assert_close(
+        axes.stress_to_global(axes.stress_from_global(stress)),
+        stress,
+    );
+}
+
+/// Straight sides between these corners, nodes in their middles.
+fn with_middles<const C: usize, const N: usize>(
+    coordinates: &mut Vec<[f64; 2]>,
+    elements: &[[usize; C]],
+) -> Vec<[usize; N]> {
+    let mut middles = std::collections::HashMap::new();
+    let mut with_middles = |corners: &[usize; C]| {
+        std::array::from_fn(|i| {
+            if i < C {
+                return corners[i];
+            }
+            let (a, b) = (corners[i - C], corners[(i - C + 1) % C]);
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                let [p, q] = [coordinates[a], coordinates[b]];
+                coordinates.push([0, 1].map(|c| f64::midpoint(p[c], q[c])));
+                coordinates.len() - 1
+            })
+        })
+    };
+    elements.iter().map(&mut with_middles).collect()
+}
+
+/// The rectangle from (1, 0) to (3, 2) in elements around a corner that lies off its centre.
+struct Patch {
+    coordinates: Vec<[f64; 2]>,
+    elements: Box<dyn Kinematics>,
+}
+
+const CENTRE: [f64; 2] = [1.8, 1.3];
+
+fn patch_of_quads(analysis: Analysis, axes: Axes, rule: (usize, usize)) -> Patch {
+    let mut coordinates = vec![
+        [1.0, 0.0],
+        [2.2, 0.0],
+        [3.0, 0.0],
+        [1.0, 0.9],
+        CENTRE,
+        [3.0, 0.7],
+        [1.0, 2.0],
+        [1.7, 2.0],
+        [3.0, 2.0],
+    ];
+    let corners = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]];
+    let nodes = with_middles(&mut coordinates, &corners);
+    let elements = Quad8::new(analysis, &coordinates, nodes, vec![axes; 4], |_| rule);
+    Patch {
+        elements: Box::new(elements.unwrap()),
+        coordinates,
+    }
+}
+
+fn patch_of_triangles(analysis: Analysis, axes: Axes, n_points: usize) -> Patch {
+    let mut coordinates = vec![[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0], CENTRE];
+    let corners = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+    let nodes = with_middles(&mut coordinates, &corners);
+    let elements = Tri6::new(analysis, &coordinates, nodes, vec![axes; 4], n_points);
+    Patch {
+        elements: Box::new(elements.unwrap()),
+        coordinates,
+    }
+}
+
+/// Patches of all elements and rules.
+fn patches(analysis: Analysis, axes: Axes) -> Vec<Patch> {
+    let quads = [(2, 2), (3, 3)].map(|rule| patch_of_quads(analysis, axes, rule));
+    let triangles = [3, 6, 7].map(|n| patch_of_triangles(analysis, axes, n));
+    quads.into_iter().chain(triangles).collect()
+}
+
+impl Patch {
+    fn displacement(&self, field: impl Fn([f64; 2]) -> [f64; 2]) -> Vec<f64> {
+        self.coordinates.iter().flat_map(|&at| field(at)).collect()
+    }
+
+    fn strains(&self, displacement: &[f64]) -> Vec<f64> {
+        let mut strains = vec![0.0; 4 * self.elements.n_points()];
+        self.elements.add_gradients(displacement, &mut strains);
+        strains
+    }
+
+    fn forces(&self, stress: &[f64]) -> Vec<f64> {
+        let mut force = vec![0.0; 2 * self.coordinates.len()];
+        self.elements.add_forces(stress, &mut force);
+        force
+    }
+
+    /// Stiffness of an element whose points all have this tangent.
+    fn stiffness(&self, element: usize, tangent: &[f64; 16]) -> DMatrix<f64> {
+        let n = 2 * self.elements.nodes(element).len();
+        let mut stiffness = vec![0.0; n * n];
+        let tangents = tangent.repeat(self.elements.points_per_element());
+        self.elements.stiffness(element, &tangents, &mut stiffness);
+        DMatrix::from_row_slice(n, n, &stiffness)
+    }
+}
+
+const ANALYSES: [Analysis; 2] = [Analysis::PlaneStrain, Analysis::Axisymmetric];
+
+/// Linear elasticity with λ = 2 and μ = 3.
+#[rustfmt::skip]
+const ELASTIC: [f64; 16] = [
+    8.0, 2.0, 2.0, 0.0,
+    2.0, 8.0, 2.0, 0.0,
+    2.0, 2.0, 8.0, 0.0,
+    0.0, 0.0, 0.0, 3.0,
+];
+
+#[test]
+fn a_linear_displacement_gives_its_strain_everywhere() {
+    for patch in patches(Analysis::PlaneStrain, Axes::GLOBAL) {
+        let u = patch.displacement(|[x, y]| [0.5 + 2.0 * x - 3.0 * y, 1.0 - x + 4.0 * y]);
+        for strain in patch.strains(&u).chunks_exact(4) {
+            assert_close(strain.try_into().unwrap(), [2.0, 4.0, 0.0, -4.0]);
+        }
+    }
+    for patch in patches(Analysis::Axisymmetric, Axes::GLOBAL) {
+        let u = patch.displacement(|[r, z]| [2.0 * r, 1.0 - r + 4.0 * z]);
+        for strain in patch.strains(&u).chunks_exact(4) {
+            assert_close(strain.try_into().unwrap(), [2.0, 4.0, 2.0, -1.0]);
+        }
+    }
+}
+
+#[test]
+fn rigid_motions_give_no_strain_and_no_force() {
+    let turned = Axes::of_facet([0.8, 0.6]);
+    for axes in [Axes::GLOBAL, turned] {
+        for patch in patches(Analysis::PlaneStrain, axes) {
+            let u = patch.displacement(|[x, y]| [0.3 - 0.7 * y, -0.2 + 0.7 * x]);
+            for strain in patch.strains(&u) {
+                assert_relative_eq!(strain, 0.0, epsilon = 1e-14);
+            }
+            for element in 0..4 {
+                let nodes = patch.elements.nodes(element);
+                let own = nodes
+                    .iter()
+                    .flat_map(|&node| [u[2 * node], u[2 * node + 1]]);
+                let own = DVector::from_vec(own.collect());
+                let force = patch.stiffness(element, &ELASTIC) * own;
+                assert!(force.amax() < 1e-12, "{:e}", force.amax());
+            }
+        }
+        for patch in patches(Analysis::Axisymmetric, axes) {
+            let u = patch.displacement(|_| [0.0, 1.0]);
+            for strain in patch.strains(&u) {
+                assert_relative_eq!(strain, 0.0, epsilon = 1e-14);
+            }
+        }
+    }
+}
+
+/// In plane strain no node inside is loaded; on the boundary Σ f y is the integral of the stress.
+#[test]
+fn a_constant_stress_is_in_equilibrium() {
+    for patch in patches(Analysis::PlaneStrain, Axes::GLOBAL) {
+        let stress = [5.0, -2.0, 1.0, 3.0].repeat(patch.elements.n_points());
+        let forces = patch.forces(&stress);
+        let mut first_moment = [0.0; 2];
+        for (&[x, y], force) in patch.coordinates.iter().zip(forces.chunks_exact(2)) {
+            let inside = x > 1.0 && x < 3.0 && y > 0.0 && y < 2.0;
+            assert!(
+                !inside || force.iter().all(|f| f.abs() < 1e-13),
+                "{force:?}"
+            );
+            for c in 0..2 {
+                first_moment[c] += force[c] * y;
+            }
+        }
+        // ∫ (σ₁₂, σ₂₂) over an area of 4.
+        assert_relative_eq!(first_moment[0], 3.0 * 4.0, max_relative = 1e-13);
+        assert_relative_eq!(first_moment[1], -2.0 * 4.0, max_relative = 1e-13);
+    }
+}
+
+#[test]
+fn areas_and_volumes_are_exact() {
+    for analysis in ANALYSES {
+        for patch in patches(analysis, Axes::GLOBAL) {
+            let sum: f64 = (0..patch.elements.n_points())
+                .map(|point| patch.elements.weight(point))
+                .sum();
+            // The rectangle is 2 by 2, its centroid at r = 2.
+            let exact = match analysis {
+                Analysis::PlaneStrain => 4.0,
+                Analysis::Axisymmetric => 2.0 * PI * 2.0 * 4.0,
+            };
+            assert_relative_eq!(sum, exact, max_relative = 1e-14);
+            let areas = (0..4).map(|element| patch.elements.length(element).powi(2));
+            assert_relative_eq!(areas.sum::<f64>(), 4.0, max_relative = 1e-14);
+        }
+    }
+}
+
+#[test]
+fn stiffness_is_symmetric_and_resists_all_but_rigid_motions() {
+    let turned = Axes::of_facet([0.8, 0.6]);
+    for (analysis, rigid) in [(Analysis::PlaneStrain, 3), (Analysis::Axisymmetric, 1)] {
+        for axes in [Axes::GLOBAL, turned] {
+            // Quads with 2 × 2 points have another mode without strain.
+            for patch in patches(analysis, axes).into_iter().skip(1) {
+                for element in 0..4 {
+                    let stiffness = patch.stiffness(element, &ELASTIC);
+                    let skew = (&stiffness - stiffness.transpose()).amax();
+                    assert!(skew < 1e-13 * stiffness.amax(), "{skew:e}");
+                    let values = stiffness.symmetric_eigenvalues();
+                    let small = values.iter().filter(|v| v.abs() < 1e-12 * values.amax());
+                    assert_eq!(small.count(), rigid);
+                    assert!(values.min() > -1e-12 * values.amax());
+                }
+            }
+        }
+    }
+}
+
+/// K u are the forces of the stress D ε(u), whatever the axes.
+#[test]
+fn stiffness_strain_and_forces_agree() {
+    let tangent: [f64; 16] = std::array::from_fn(|i| ((7 * i) % 11) as f64 - 3.0);
+    for analysis in ANALYSES {
+        for patch in patches(analysis, Axes::of_facet([0.8, 0.6])) {
+            let u = patch.displacement(|[x, y]| [(3.0 * x + y).sin(), (x - 2.0 * y).cos()]);
+            let stress: Vec<f64> = patch
+                .strains(&u)
+                .chunks_exact(4)
+                .flat_map(|e| -> [f64; 4] {
+                    std::array::from_fn(|i| (0..4).map(|j| tangent[4 * i + j] * e[j]).sum())
+                })
+                .collect();
+            let mut forces = patch.forces(&stress);
+            for element in 0..4 {
+                let nodes = patch.elements.nodes(element);
+                let dofs: Vec<usize> = nodes.iter().flat_map(|&n| [2 * n, 2 * n + 1]).collect();
+                let own = DVector::from_iterator(dofs.len(), dofs.iter().map(|&dof| u[dof]));
+                let force = patch.stiffness(element, &tangent) * own;
+                for (&dof, force) in dofs.iter().zip(&force) {
+                    forces[dof] -= force;
+                }
+            }
+            for rest in forces {
+                assert_relative_eq!(rest, 0.0, epsilon = 1e-10);
+            }
+        }
+    }
+}
+
+#[test]
+fn elements_turned_inside_out_are_refused() {
+    let coordinates = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [0.0, 1.0],
+        [0.5, 0.0],
+        [0.5, 0.5],
+        [0.0, 0.5],
+    ];
+    let new = |nodes| {
+        let axes = vec![Axes::GLOBAL];
+        Tri6::new(Analysis::PlaneStrain, &coordinates, vec![nodes], axes, 3)
+    };
+    assert!(new([0, 1, 2, 3, 4, 5]).is_ok());
+    assert_eq!(
+        new([0, 2, 1, 5, 4, 3]).unwrap_err(),
+        BadShape { element: 0 }
+    );
+}
+
+/// A disc of radius 1 as triangles around its centre, their third side a parabola through three
+/// points of the circle: its area misses that of the circle by O(h⁴).
+#[test]
+fn curved_triangles_have_the_area_of_a_disc() {
+    let area = |n: usize| {
+        let angle = 2.0 * PI / n as f64;
+        let on_circle = |k: f64| [(k * angle).cos(), (k * angle).sin()];
+        let (mut coordinates, mut nodes) = (Vec::new(), Vec::new());
+        for k in 0..n {
+            let [a, b, middle] = [0.0, 1.0, 0.5].map(|part| on_circle(k as f64 + part));
+            let first = coordinates.len();
+            let halved = |p: [f64; 2]| p.map(|x| 0.5 * x);
+            coordinates.extend([[0.0; 2], a, b, halved(a), middle, halved(b)]);
+            nodes.push(std::array::from_fn(|i| first + i));
+        }
+        let axes = vec![Axes::GLOBAL; n];
+        let disc = Tri6::new(Analysis::PlaneStrain, &coordinates, nodes, axes, 3).unwrap();
+        let weights = (0..disc.n_points()).map(|point| disc.weight(point));
+        // Triangle and parabola.
+        let (s, c) = (0.5 * angle).sin_cos();
+        let exact = n as f64 * (s * c + 4.0 / 3.0 * s * (1.0 - c));
+        let sum = weights.sum::<f64>();
+        assert_relative_eq!(sum, exact, max_relative = 1e-14);
+        sum
+    };
+    let errors = [8, 16, 32].map(|n| (area(n) - PI).abs());
+    assert!(errors[0] < 1e-2);
+    for pair in errors.windows(2) {
+        assert_relative_eq!(pair[0] / pair[1], 16.0, max_relative = 0.05);
+    }
+}

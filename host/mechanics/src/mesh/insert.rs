@@ -1,0 +1,341 @@
+//! Inserts zero-thickness elements between the elements of a mesh, by splitting nodes.
+//!
+//! Lines are sets of edges, straight or curved, closed, with corners, ends and junctions. Around a
+//! node the elements form sectors: one leads to the next through edges that are not cut. The first
+//! sector keeps the node, every other one gets a copy of it. So a line that ends inside the body
+//! leaves its last node single, a line through it makes two of a node, a line that ends on another
+//! three, and two that cross four, whatever is inserted first.
+//!
+//! An edge is known by the node in its middle, which belongs to no other edge.
+
+use std::collections::HashMap;
+
+/// Nodes of an element: corners counter-clockwise, then the middles of the sides that follow them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Element {
+    /// A 6-node triangle.
+    Triangle([usize; 6]),
+    /// An 8-node quad.
+    Quad([usize; 8]),
+}
+
+impl Element {
+    pub(crate) fn nodes(&self) -> &[usize] {
+        match self {
+            Self::Triangle(nodes) => nodes,
+            Self::Quad(nodes) => nodes,
+        }
+    }
+
+    fn nodes_mut(&mut self) -> &mut [usize] {
+        match self {
+            Self::Triangle(nodes) => nodes,
+            Self::Quad(nodes) => nodes,
+        }
+    }
+
+    /// Where the nodes of every edge stand: ends, counter-clockwise, and middle.
+    fn edges(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
+        let corners = self.nodes().len() / 2;
+        (0..corners).map(move |i| [i, (i + 1) % corners, corners + i])
+    }
+
+    /// Where an edge with this middle stands.
+    fn edge_at(&self, middle: usize) -> Option<[usize; 3]> {
+        let nodes = self.nodes();
+        self.edges().find(|&[_, _, at]| nodes[at] == middle)
+    }
+}
+
+/// Edges along which elements are inserted.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Interface {
+    /// First end, second end and middle of every edge, in the direction of the line.
+    pub(crate) edges: Vec<[usize; 3]>,
+    /// Whether a node on the boundary of the mesh, on which the line ends, is split. Where a line
+    /// ends inside the mesh its two sides stay joined.
+    pub(crate) opens_ends: bool,
+}
+
+/// A zero-thickness element. Its normal points to the left of the line's direction: from `right` to
+/// `left`. At a closed end both have the same node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Joint {
+    /// Number of its interface.
+    pub(crate) interface: usize,
+    /// First end, second end and middle on the right of the line.
+    pub(crate) right: [usize; 3],
+    /// The same on the left.
+    pub(crate) left: [usize; 3],
+}
+
+impl Joint {
+    /// Nodes on the near and on the far side, so that the far side lies where the axis across the
+    /// facet points: towards increasing coordinates (see `Axes::of_facet`), whatever the direction
+    /// of the line.
+    pub(crate) fn near_and_far(&self, coordinates: &[[f64; 2]]) -> [[usize; 3]; 2] {
+        let [a, b, _] = self.right.map(|node| coordinates[node]);
+        let to_the_left = [a[1] - b[1], b[0] - a[0]];
+        let [x, y] = to_the_left;
+        let dominant = if x.abs() > y.abs() { x } else { y };
+        if dominant > 0.0 {
+            [self.right, self.left]
+        } else {
+            [self.left, self.right]
+        }
+    }
+}
+
+/// A mesh with its nodes split.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Split {
+    /// By node, the node that it is a copy of; the first are those that there were, themselves.
+    pub(crate) original: Vec<usize>,
+    /// Elements, in their order.
+    pub(crate) elements: Vec<Element>,
+    /// Inserted elements, interface by interface.
+    pub(crate) joints: Vec<Joint>,
+}
+
+/// Why an element cannot be inserted at an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Fault {
+    /// Number of the interface.
+    pub(crate) interface: usize,
+    /// Number of its edge.
+    pub(crate) edge: usize,
+    /// What is wrong with it.
+    pub(crate) reason: Reason,
+}
+
+/// What can be wrong with an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reason {
+    /// It is not an edge of any element.
+    NoEdge,
+    /// An element lies on one of its sides only.
+    OnBoundary,
+    /// This interface has the edge as well, or the same one twice.
+    TakenBy(usize),
+    /// More than two elements have it, or both on the same side of it.
+    Overlapping,
+}
+
+/// Splits the nodes of a mesh of `n_nodes` nodes along interfaces. Takes time in proportion to the
+/// size of the mesh.
+///
+/// # Errors
+/// [`Fault`], for the first edge at which there is one.
+pub(crate) fn split(
+    n_nodes: usize,
+    elements: &[Element],
+    interfaces: &[Interface],
+) -> Result<Split, Fault> {
+    let cuts = Cuts::new(interfaces)?;
+    let around = elements_around(n_nodes, elements, &cuts);
+    let mut result = Split {
+        original: (0..n_nodes).collect(),
+        elements: elements.to_vec(),
+        joints: Vec::new(),
+    };
+    let sides = sides(elements, interfaces, &around)?;
+    for node in 0..n_nodes {
+        let here = &around.elements[around.start[node]..around.start[node + 1]];
+        if here.is_empty() || cuts.closes(node, interfaces) {
+            continue;
+        }
+        let sector = sectors(node, here, elements, &cuts);
+        let mut copies: Vec<usize> = Vec::new();
+        for (&element, &sector) in here.iter().zip(&sector) {
+            if sector == 0 {
+                continue;
+            }
+            if sector > copies.len() {
+                copies.push(result.original.len());
+                result.original.push(node);
+            }
+            for own in result.elements[element].nodes_mut() {
+                if *own == node {
+                    *own = copies[sector - 1];
+                }
+            }
+        }
+    }
+    // What the nodes of an edge have become in the element on one side of it.
+    let renumbered =
+        |(element, places): Side| places.map(|at| result.elements[element].nodes()[at]);
+    let mut sides = sides.into_iter();
+    for (number, interface) in interfaces.iter().enumerate() {
+        for [right, left] in sides.by_ref().take(interface.edges.len()) {
+            result.joints.push(Joint {
+                interface: number,
+                right: renumbered(right),
+                left: renumbered(left),
+            });
+        }
+    }
+    Ok(result)
+}
+
+/// The edges that are cut.
+struct Cuts {
+    /// Interface of an edge, by its middle.
+    interface: HashMap<usize, usize>,
+    /// By node, how many cut edges end there, and the interface of one of them.
+    ends: HashMap<usize, (usize, usize)>,
+}
+
+impl Cuts {
+    fn new(interfaces: &[Interface]) -> Result<Self, Fault> {
+        let mut cuts = Self {
+            interface: HashMap::new(),
+            ends: HashMap::new(),
+        };
+        for (number, interface) in interfaces.iter().enumerate() {
+            for (edge, &[a, b, middle]) in interface.edges.iter().enumerate() {
+                if let Some(other) = cuts.interface.insert(middle, number) {
+                    return Err(Fault {
+                        interface: number,
+                        edge,
+                        reason: Reason::TakenBy(other),
+                    });
+                }
+                for end in [a, b] {
+                    cuts.ends.entry(end).or_insert((0, number)).0 += 1;
+                }
+            }
+        }
+        Ok(cuts)
+    }
+
+    fn has(&self, node: usize) -> bool {
+        self.ends.contains_key(&node) || self.interface.contains_key(&node)
+    }
+
+    /// Whether a line ends at a node and leaves it as it is. Inside the mesh there is one sector
+    /// around its end anyway.
+    fn closes(&self, node: usize, interfaces: &[Interface]) -> bool {
+        let end = self.ends.get(&node);
+        end.is_some_and(|&(count, interface)| count == 1 && !interfaces[interface].opens_ends)
+    }
+}
+
+/// Elements around every node on a line, ascending; of other nodes none.
+struct Around {
+    start: Vec<usize>,
+    elements: Vec<usize>,
+}
+
+fn elements_around(n_nodes: usize, elements: &[Element], cuts: &Cuts) -> Around {
+    let is_on_line: Vec<bool> = (0..n_nodes).map(|node| cuts.has(node)).collect();
+    let mut start = vec![0; n_nodes + 1];
+    let on_lines = |element: &Element| {
+        let nodes = element.nodes().iter().copied();
+        nodes.filter(|&node| is_on_line[node]).collect::<Vec<_>>()
+    };
+    for node in elements.iter().flat_map(on_lines) {
+        start[node + 1] += 1;
+    }
+    for node in 0..n_nodes {
+        start[node + 1] += start[node];
+    }
+    let mut next = start.clone();
+    let mut around = vec![0; start[n_nodes]];
+    for (number, element) in elements.iter().enumerate() {
+        for node in on_lines(element) {
+            around[next[node]] = number;
+            next[node] += 1;
+        }
+    }
+    Around {
+        start,
+        elements: around,
+    }
+}
+
+/// The sector of every element around a node, numbered as they come.
+fn sectors(node: usize, around: &[usize], elements: &[Element], cuts: &Cuts) -> Vec<usize> {
+    // Elements on either side of the edges that end here and are not cut.
+    let mut beside: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (at, &element) in around.iter().enumerate() {
+        let nodes = elements[element].nodes();
+        for [a, b, middle] in elements[element].edges().map(|edge| edge.map(|i| nodes[i])) {
+            if (a == node || b == node) && !cuts.interface.contains_key(&middle) {
+                beside.entry(middle).or_default().push(at);
+            }
+        }
+    }
+    let mut neighbours = vec![Vec::new(); around.len()];
+    for sides in beside.values() {
+        for pair in sides.windows(2) {
+            neighbours[pair[0]].push(pair[1]);
+            neighbours[pair[1]].push(pair[0]);
+        }
+    }
+    let mut sector = vec![usize::MAX; around.len()];
+    let mut count = 0;
+    for first in 0..around.len() {
+        if sector[first] != usize::MAX {
+            continue;
+        }
+        let mut todo = vec![first];
+        while let Some(at) = todo.pop() {
+            if std::mem::replace(&mut sector[at], count) != count {
+                let open = neighbours[at].iter().copied();
+                todo.extend(open.filter(|&other| sector[other] == usize::MAX));
+            }
+        }
+        count += 1;
+    }
+    sector
+}
+
+/// An element, and where the nodes of one of its edges stand in it.
+type Side = (usize, [usize; 3]);
+
+/// The elements on the right and on the left of every edge, interface by interface.
+fn sides(
+    elements: &[Element],
+    interfaces: &[Interface],
+    around: &Around,
+) -> Result<Vec<[Side; 2]>, Fault> {
+    let mut sides = Vec::new();
+    for (interface, Interface { edges, .. }) in interfaces.iter().enumerate() {
+        for (edge, &[a, b, middle]) in edges.iter().enumerate() {
+            let fault = |reason| Fault {
+                interface,
+                edge,
+                reason,
+            };
+            if middle + 1 >= around.start.len() {
+                return Err(fault(Reason::NoEdge));
+            }
+            let (mut right, mut left) = (None, None);
+            for &element in &around.elements[around.start[middle]..around.start[middle + 1]] {
+                let Some([from, to, at]) = elements[element].edge_at(middle) else {
+                    return Err(fault(Reason::NoEdge));
+                };
+                let nodes = elements[element].nodes();
+                // Counter-clockwise an element lies on the left of its edges.
+                let (side, places) = match [nodes[from], nodes[to]] {
+                    ends if ends == [a, b] => (&mut left, [from, to, at]),
+                    ends if ends == [b, a] => (&mut right, [to, from, at]),
+                    _ => return Err(fault(Reason::NoEdge)),
+                };
+                if side.replace((element, places)).is_some() {
+                    return Err(fault(Reason::Overlapping));
+                }
+            }
+            sides.push(match (right, left) {
+                (Some(right), Some(left)) => [right, left],
+                (None, None) => return Err(fault(Reason::NoEdge)),
+                _ => return Err(fault(Reason::OnBoundary)),
+            });
+        }
+    }
+    Ok(sides)
+}
+
+#[cfg(test)]
+#[path = "insert/tests.rs"]
+mod tests;
