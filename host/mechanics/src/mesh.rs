@@ -1,5 +1,9 @@
 //! Nodes, elements and named lines.
 
+mod insert;
+
+pub use insert::{Along, CannotInsert, Reason};
+
 use indexmap::IndexMap;
 
 /// What a solid element looks like.

@@ -2,7 +2,7 @@
 //! can be checked before the first increment.
 
 use crate::assembly::Tie;
-use crate::element::{Axes, Joint6, Kinematics, Quad8, depth, gauss, line_shape};
+use crate::element::{Axes, Joint6, Kinematics, Quad8, Tri6, depth, gauss, line_shape};
 use crate::group::{Group, PointFailure};
 use crate::mesh::{Mesh, Solid};
 use crate::problem::{
@@ -401,14 +401,19 @@ impl GroupBuilder<'_> {
     }
 
     fn solid(&self) -> Result<Box<dyn Kinematics>, Refusal> {
-        let nodes = self.quads(Cause::MixedShapes)?;
-        let n = if self.integration(Integration::Full) == Integration::Reduced {
-            2
-        } else {
-            3
-        };
-        let axes = vec![Axes::GLOBAL; nodes.len()];
+        let is_reduced = self.integration(Integration::Full) == Integration::Reduced;
+        let axes = |n: usize| vec![Axes::GLOBAL; n];
         let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
+        let triangles = self.solids().map(|solid| solid.nodes().try_into().ok());
+        if let Some(nodes) = triangles.collect::<Option<Vec<[usize; 6]>>>() {
+            let n = if is_reduced { 3 } else { 6 };
+            let axes = axes(nodes.len());
+            let elements = Tri6::new(analysis, coordinates, nodes, axes, n);
+            return Ok(Box::new(elements.map_err(|_| self.bad_shape())?));
+        }
+        let nodes = self.quads(Cause::MixedShapes)?;
+        let n = if is_reduced { 2 } else { 3 };
+        let axes = axes(nodes.len());
         let elements = Quad8::new(analysis, coordinates, nodes, axes, |_| (n, n));
         Ok(Box::new(elements.map_err(|_| self.bad_shape())?))
     }

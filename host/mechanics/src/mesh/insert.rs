@@ -8,72 +8,42 @@
 //!
 //! An edge is known by the node in its middle, which belongs to no other edge.
 
-use std::collections::HashMap;
+use super::{Joint as Inserted, Line, Mesh, Solid};
+use std::collections::{HashMap, HashSet};
 
-/// Nodes of an element: corners counter-clockwise, then the middles of the sides that follow them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Element {
-    /// A 6-node triangle.
-    Triangle([usize; 6]),
-    /// An 8-node quad.
-    Quad([usize; 8]),
-}
-
-impl Element {
-    pub(crate) fn nodes(&self) -> &[usize] {
-        match self {
-            Self::Triangle(nodes) => nodes,
-            Self::Quad(nodes) => nodes,
-        }
-    }
-
-    fn nodes_mut(&mut self) -> &mut [usize] {
-        match self {
-            Self::Triangle(nodes) => nodes,
-            Self::Quad(nodes) => nodes,
-        }
-    }
-
-    /// Where the nodes of every edge stand: ends, counter-clockwise, and middle.
-    fn edges(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
-        let corners = self.nodes().len() / 2;
-        (0..corners).map(move |i| [i, (i + 1) % corners, corners + i])
-    }
-
-    /// Where an edge with this middle stands.
-    fn edge_at(&self, middle: usize) -> Option<[usize; 3]> {
-        let nodes = self.nodes();
-        self.edges().find(|&[_, _, at]| nodes[at] == middle)
-    }
+/// Where an edge with this middle stands among the nodes of an element.
+fn edge_at(element: &Solid, middle: usize) -> Option<[usize; 3]> {
+    let (nodes, edges) = (element.nodes(), element.shape().edges().iter());
+    edges.copied().find(|&[_, _, at]| nodes[at] == middle)
 }
 
 /// Edges along which elements are inserted.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Interface {
+struct Interface {
     /// First end, second end and middle of every edge, in the direction of the line.
-    pub(crate) edges: Vec<[usize; 3]>,
+    edges: Vec<[usize; 3]>,
     /// Whether a node on the boundary of the mesh, on which the line ends, is split. Where a line
     /// ends inside the mesh its two sides stay joined.
-    pub(crate) opens_ends: bool,
+    opens_ends: bool,
 }
 
 /// A zero-thickness element. Its normal points to the left of the line's direction: from `right` to
 /// `left`. At a closed end both have the same node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Joint {
+struct Joint {
     /// Number of its interface.
-    pub(crate) interface: usize,
+    interface: usize,
     /// First end, second end and middle on the right of the line.
-    pub(crate) right: [usize; 3],
+    right: [usize; 3],
     /// The same on the left.
-    pub(crate) left: [usize; 3],
+    left: [usize; 3],
 }
 
 impl Joint {
     /// Nodes on the near and on the far side, so that the far side lies where the axis across the
     /// facet points: towards increasing coordinates (see `Axes::of_facet`), whatever the direction
     /// of the line.
-    pub(crate) fn near_and_far(&self, coordinates: &[[f64; 2]]) -> [[usize; 3]; 2] {
+    fn near_and_far(&self, coordinates: &[[f64; 2]]) -> [[usize; 3]; 2] {
         let [a, b, _] = self.right.map(|node| coordinates[node]);
         let to_the_left = [a[1] - b[1], b[0] - a[0]];
         let [x, y] = to_the_left;
@@ -88,29 +58,29 @@ impl Joint {
 
 /// A mesh with its nodes split.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Split {
+struct Split {
     /// By node, the node that it is a copy of; the first are those that there were, themselves.
-    pub(crate) original: Vec<usize>,
+    original: Vec<usize>,
     /// Elements, in their order.
-    pub(crate) elements: Vec<Element>,
+    elements: Vec<Solid>,
     /// Inserted elements, interface by interface.
-    pub(crate) joints: Vec<Joint>,
+    joints: Vec<Joint>,
 }
 
 /// Why an element cannot be inserted at an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Fault {
+struct Fault {
     /// Number of the interface.
-    pub(crate) interface: usize,
+    interface: usize,
     /// Number of its edge.
-    pub(crate) edge: usize,
+    edge: usize,
     /// What is wrong with it.
-    pub(crate) reason: Reason,
+    reason: Reason,
 }
 
 /// What can be wrong with an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Reason {
+pub enum Reason {
     /// It is not an edge of any element.
     NoEdge,
     /// An element lies on one of its sides only.
@@ -121,14 +91,90 @@ pub(crate) enum Reason {
     Overlapping,
 }
 
+/// A line of the mesh along which the elements of a group are inserted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Along {
+    /// Name of the line.
+    pub line: String,
+    /// Number of the group.
+    pub group: usize,
+    /// Whether an end of the line on the boundary of the mesh is split; inside the mesh its two sides
+    /// stay joined at an end.
+    pub opens_ends: bool,
+}
+
+/// Why elements cannot be inserted along a line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CannotInsert {
+    /// Which of the lines.
+    pub number: usize,
+    /// What is wrong with one of its edges; `None`: there is no such line, or it is a point.
+    pub reason: Option<Reason>,
+}
+
+impl Mesh {
+    /// Inserts zero-thickness elements along lines of any course, by splitting nodes: with corners,
+    /// junctions, closed, or ending inside the mesh. Lines keep their names; their nodes are then
+    /// those on both sides. Takes time in proportion to the size of the mesh.
+    ///
+    /// # Errors
+    /// The first line that cannot be taken; the mesh is then as it was.
+    pub fn insert_joints(&mut self, along: &[Along]) -> Result<(), CannotInsert> {
+        let mut interfaces = Vec::new();
+        for (number, along) in along.iter().enumerate() {
+            let line = self.lines.get(&along.line);
+            let edges = line.map(|line| self.course(line)).unwrap_or_default();
+            if edges.is_empty() {
+                let reason = None;
+                return Err(CannotInsert { number, reason });
+            }
+            interfaces.push(Interface {
+                edges,
+                opens_ends: along.opens_ends,
+            });
+        }
+        let split = split(self.nodes.len(), &self.solids, &interfaces).map_err(|fault| {
+            let (number, reason) = (fault.interface, Some(fault.reason));
+            CannotInsert { number, reason }
+        })?;
+        let nodes = split.original.iter().map(|&node| self.nodes[node]);
+        self.nodes = nodes.collect();
+        self.solids = split.elements;
+        for joint in split.joints {
+            let [minus, plus] = joint.near_and_far(&self.nodes);
+            self.joints.push(Inserted {
+                minus,
+                plus,
+                group: along[joint.interface].group,
+            });
+        }
+        let mut copies: HashMap<usize, Vec<usize>> = HashMap::new();
+        for (node, &original) in split.original.iter().enumerate() {
+            copies.entry(original).or_default().push(node);
+        }
+        for line in self.lines.values_mut() {
+            let known = line.nodes.iter().flat_map(|node| copies[node].clone());
+            line.nodes = known.collect();
+        }
+        Ok(())
+    }
+
+    /// Edges of a line, each once: ends and middle, as the first element that has it goes round.
+    fn course(&self, line: &Line) -> Vec<[usize; 3]> {
+        let mut seen = HashSet::new();
+        let edges = line.edges.iter().map(|&edge| self.edge(edge));
+        edges.filter(|edge| seen.insert(edge[2])).collect()
+    }
+}
+
 /// Splits the nodes of a mesh of `n_nodes` nodes along interfaces. Takes time in proportion to the
 /// size of the mesh.
 ///
 /// # Errors
 /// [`Fault`], for the first edge at which there is one.
-pub(crate) fn split(
+fn split(
     n_nodes: usize,
-    elements: &[Element],
+    elements: &[Solid],
     interfaces: &[Interface],
 ) -> Result<Split, Fault> {
     let cuts = Cuts::new(interfaces)?;
@@ -226,10 +272,10 @@ struct Around {
     elements: Vec<usize>,
 }
 
-fn elements_around(n_nodes: usize, elements: &[Element], cuts: &Cuts) -> Around {
+fn elements_around(n_nodes: usize, elements: &[Solid], cuts: &Cuts) -> Around {
     let is_on_line: Vec<bool> = (0..n_nodes).map(|node| cuts.has(node)).collect();
     let mut start = vec![0; n_nodes + 1];
-    let on_lines = |element: &Element| {
+    let on_lines = |element: &Solid| {
         let nodes = element.nodes().iter().copied();
         nodes.filter(|&node| is_on_line[node]).collect::<Vec<_>>()
     };
@@ -254,12 +300,11 @@ fn elements_around(n_nodes: usize, elements: &[Element], cuts: &Cuts) -> Around 
 }
 
 /// The sector of every element around a node, numbered as they come.
-fn sectors(node: usize, around: &[usize], elements: &[Element], cuts: &Cuts) -> Vec<usize> {
+fn sectors(node: usize, around: &[usize], elements: &[Solid], cuts: &Cuts) -> Vec<usize> {
     // Elements on either side of the edges that end here and are not cut.
     let mut beside: HashMap<usize, Vec<usize>> = HashMap::new();
     for (at, &element) in around.iter().enumerate() {
-        let nodes = elements[element].nodes();
-        for [a, b, middle] in elements[element].edges().map(|edge| edge.map(|i| nodes[i])) {
+        for [a, b, middle] in elements[element].edges() {
             if (a == node || b == node) && !cuts.interface.contains_key(&middle) {
                 beside.entry(middle).or_default().push(at);
             }
@@ -295,7 +340,7 @@ type Side = (usize, [usize; 3]);
 
 /// The elements on the right and on the left of every edge, interface by interface.
 fn sides(
-    elements: &[Element],
+    elements: &[Solid],
     interfaces: &[Interface],
     around: &Around,
 ) -> Result<Vec<[Side; 2]>, Fault> {
@@ -312,7 +357,7 @@ fn sides(
             }
             let (mut right, mut left) = (None, None);
             for &element in &around.elements[around.start[middle]..around.start[middle + 1]] {
-                let Some([from, to, at]) = elements[element].edge_at(middle) else {
+                let Some([from, to, at]) = edge_at(&elements[element], middle) else {
                     return Err(fault(Reason::NoEdge));
                 };
                 let nodes = elements[element].nodes();

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 struct Grid {
     columns: usize,
     coordinates: Vec<[f64; 2]>,
-    elements: Vec<Element>,
+    elements: Vec<Solid>,
     /// Middles of all edges, by their ends.
     middles: BTreeMap<(usize, usize), usize>,
 }
@@ -31,11 +31,11 @@ impl Grid {
                 if is_cut(i, j) {
                     for corners in [[a, b, c], [a, c, d]] {
                         let nodes = grid.with_middles(corners);
-                        grid.elements.push(Element::Triangle(nodes));
+                        grid.elements.push(Solid::triangle(nodes, 0));
                     }
                 } else {
                     let nodes = grid.with_middles([a, b, c, d]);
-                    grid.elements.push(Element::Quad(nodes));
+                    grid.elements.push(Solid::quad(nodes, 0));
                 }
             }
         }
@@ -192,7 +192,7 @@ struct Outcome {
 }
 
 /// Vertices − edges + elements: 1 for every part without a hole, one less for each hole.
-fn characteristic(elements: &[Element]) -> isize {
+fn characteristic(elements: &[Solid]) -> isize {
     let (mut corners, mut middles) = (BTreeSet::<usize>::new(), BTreeSet::<usize>::new());
     for element in elements {
         let (of_corners, of_middles) = element.nodes().split_at(element.nodes().len() / 2);
