@@ -4,13 +4,6 @@
 //! Strains have components 11 22 33 12 with γ = 2ε₁₂, in axes of the element; jumps have normal
 //! and tangential components.
 
-// Mounted here until meshes call it.
-#[path = "mesh/insert.rs"]
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "meshes do not insert joints along any lines yet")
-)]
-mod insert;
 mod joint6;
 mod quad8;
 mod shape;
