@@ -29,10 +29,8 @@ fn main() {
     }
 }
 
-fn analysed(mesh: &Mesh, pattern: &Pattern, with_lines: bool) -> Multifrontal {
-    let lines = mesh.lines();
+fn analysed(pattern: &Pattern, lines: Option<&[[u32; 2]]>) -> Multifrontal {
     let kept = vec![false; pattern.n()];
-    let lines = with_lines.then_some(lines.as_slice());
     Multifrontal::new(pattern, Kind::Unsymmetric, &kept, lines).expect("a sound pattern")
 }
 
@@ -49,14 +47,15 @@ fn operations() {
     for (name, make) in meshes {
         for size in SIZES {
             let mesh = make(size);
-            let pattern = mesh.pattern();
+            let (pattern, lines) = (mesh.pattern(), mesh.lines());
             let values = meshes::values(&pattern, 0.0);
             for with_lines in [true, false] {
-                let mut factors = analysed(&mesh, &pattern, with_lines);
+                let lines = with_lines.then_some(lines.as_slice());
+                let mut factors = analysed(&pattern, lines);
                 let mut best = [f64::INFINITY; 2];
                 for _ in 0..3 {
                     let start = Instant::now();
-                    factors = analysed(&mesh, &pattern, with_lines);
+                    factors = analysed(&pattern, lines);
                     best[0] = best[0].min(start.elapsed().as_secs_f64());
                     let start = Instant::now();
                     factors.factorise(&values).expect("a regular matrix");
@@ -76,16 +75,16 @@ fn operations() {
 #[divan::bench(args = SIZES, sample_size = 1, sample_count = 5)]
 fn analysis(bencher: Bencher<'_, '_>, size: usize) {
     let mesh = meshes::scattered(size);
-    let pattern = mesh.pattern();
+    let (pattern, lines) = (mesh.pattern(), mesh.lines());
     bencher
         .counter(ItemsCount::new(pattern.n()))
-        .bench_local(|| analysed(&mesh, &pattern, true));
+        .bench_local(|| analysed(&pattern, Some(&lines)));
 }
 
 fn factorise(bencher: Bencher<'_, '_>, mesh: &Mesh) {
     let pattern = mesh.pattern();
     let values = meshes::values(&pattern, 0.0);
-    let mut factors = analysed(mesh, &pattern, true);
+    let mut factors = analysed(&pattern, Some(&mesh.lines()));
     bencher
         .counter(ItemsCount::new(pattern.n()))
         .bench_local(|| factors.factorise(&values).expect("a regular matrix"));
