@@ -110,7 +110,7 @@ fn table(text: &str, law: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let source = Source::new("driver.toml", text.replace("@LAW@", law));
     let mut out = Vec::new();
     let driver = Driver::from_source(&source).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let _ = driver.write_csv(&mut out, Path::new("table"));
+    let _ = runs::point::write_csv(&driver, &mut out, Path::new("table"));
     let out = String::from_utf8(out).unwrap();
     let mut lines = out.lines();
     let names = lines

@@ -220,7 +220,6 @@ control = {{ t = {{ jump = 1e-3 }}, n = {{ jump = 0.0 }} }}
     driver
         .run(|row| {
             rows.push([row.flux[1], -row.flux[0]]);
-            Ok(())
         })
         .unwrap();
     rows.split_off(1)

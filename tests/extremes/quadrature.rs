@@ -180,10 +180,9 @@ fn drive(
     let mut driver = Driver::from_source(&Source::new("driver.toml", text)).map_err(refused)?;
     let mut ends = [[0.0; 3]; 2];
     for (end, n) in ends.iter_mut().zip(increments) {
-        driver.set_increments(&[n]);
+        driver.point_mut().set_increments(&[n]);
         let keep = |row: &point::Row<'_>| {
             *end = [row.internal[0], -row.flux[0], row.flux[1]];
-            Ok(())
         };
         driver.run(keep).map_err(refused)?;
     }

@@ -35,7 +35,7 @@ fn last_row(text: &str) -> BTreeMap<String, f64> {
 pub(crate) fn rows(text: &str) -> (Vec<BTreeMap<String, f64>>, PointReport) {
     let driver = Driver::from_source(&Source::new("driver.toml", text)).unwrap();
     let mut out = Vec::new();
-    let report = driver.write_csv(&mut out, Path::new("table")).unwrap();
+    let report = runs::point::write_csv(&driver, &mut out, Path::new("table")).unwrap();
     let table = String::from_utf8(out).unwrap();
     let mut lines = table.lines().map(|line| line.split(','));
     let names: Vec<&str> = lines.next().unwrap().collect();

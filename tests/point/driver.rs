@@ -18,7 +18,7 @@ pub(crate) struct Run {
 pub(crate) fn csv(text: &str) -> (String, Result<PointReport, Error>) {
     let mut out = Vec::new();
     let result = Driver::from_source(&Source::new("driver.toml", text))
-        .and_then(|driver| driver.write_csv(&mut out, Path::new("table")));
+        .and_then(|driver| runs::point::write_csv(&driver, &mut out, Path::new("table")));
     (String::from_utf8(out).unwrap(), result)
 }
 

@@ -296,8 +296,9 @@ impl Model {
     fn check(&self, result: &Result<Silent, Error>, folder: &Path) -> Result<End, String> {
         let end = match result {
             Ok(_) => End::Done,
-            Err(error) if error.kind() == Kind::NoEquilibrium
-                if error.to_string().contains("no equilibrium") =>
+            Err(error)
+                if error.kind() == Kind::NoEquilibrium
+                    && error.to_string().contains("no equilibrium") =>
             {
                 End::Stopped
             }

@@ -174,10 +174,12 @@ impl Path {
             }
             found.is_finite = row.internal.iter().all(|value| value.is_finite());
             rows.push(found);
-            Ok(())
         });
         let (code, words) = match result {
-            Ok(report) => (0, report.warnings.join("; ")),
+            Ok(course) => {
+                let warnings = course.warnings.iter().map(ToString::to_string);
+                (0, warnings.collect::<Vec<_>>().join("; "))
+            }
             Err(error) => (error.exit_code(), error.to_string()),
         };
         Ok(Outcome { rows, code, words })

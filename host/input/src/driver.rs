@@ -317,6 +317,18 @@ impl Driver {
         Ok(driver)
     }
 
+    /// Follows the path to its end; every row goes to `sink`.
+    ///
+    /// # Errors
+    /// As [`point::Driver::run`], at the place in the file if it has one there.
+    pub fn run(&self, mut sink: impl FnMut(&point::Row<'_>)) -> Result<point::Course, Error> {
+        let course = self.point.run(|row| {
+            sink(row);
+            Ok::<_, point::Error>(())
+        });
+        course.map_err(|error| self.located(error))
+    }
+
     /// An error of the driver, at its place in the file if it has one there.
     pub fn located(&self, error: point::Error) -> Error {
         located((&self.source, &self.place_of_initial), error)
