@@ -6,25 +6,25 @@
 use algebra::{LinearSolver, mesh_lines};
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use input::Case;
+use input::case::Axis;
+use law::Operator;
+use mechanics::Model;
+use mechanics::Place;
+use mechanics::Settings;
 use mechanics::assembly::Places;
 use mechanics::assembly::System;
-use input::case::Axis;
-use input::Case;
-use mechanics::Settings;
-use mechanics::Place;
-use text::Source;
-use mechanics::group::Group;
-use text::parse;
-use mechanics::Model;
-use law::Operator;
-use runs::run::Observer;
-use runs::run::run;
 use mechanics::equilibrium::Costs;
 use mechanics::equilibrium::LinearDomain;
 use mechanics::equilibrium::Loads;
 use mechanics::equilibrium::Matrix;
 use mechanics::equilibrium::Newton;
+use mechanics::group::Group;
+use runs::run::Observer;
+use runs::run::run;
 use std::path::Path;
+use text::Source;
+use text::parse;
 
 fn main() {
     divan::main();

@@ -110,13 +110,11 @@ pub(crate) fn execute(command: Command) -> Result<(), Error> {
         Command::LawWorker => Ok(law::isolate::work()?),
         #[cfg(not(unix))]
         Command::LawWorker => Err(Error::usage("there are no workers here")),
-        Command::ProbeLibrary { library, sha256 } => {
-            Ok(vetting::probe(
-                &library,
-                &sha256,
-                &mut std::io::stdout().lock(),
-            )?)
-        }
+        Command::ProbeLibrary { library, sha256 } => Ok(vetting::probe(
+            &library,
+            &sha256,
+            &mut std::io::stdout().lock(),
+        )?),
     }
 }
 
@@ -256,7 +254,7 @@ fn print_schema(file: File) -> Result<(), Error> {
         File::Case => FileKind::Case,
         File::Point => FileKind::Point,
     }))
-        .map_err(|error| Error::internal(error.to_string()))?;
+    .map_err(|error| Error::internal(error.to_string()))?;
     print(&format!("{text}\n"))
 }
 

@@ -71,10 +71,8 @@ fn main() -> ExitCode {
         commands::execute(arguments.command)
     };
     // A panic has printed itself; it is a defect of the program, not of the input.
-    let outcome =
-        std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or_else(|_| {
-            Err(Error::internal("the program panicked; please report it"))
-        });
+    let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))
+        .unwrap_or_else(|_| Err(Error::internal("the program panicked; please report it")));
     ended(outcome)
 }
 
@@ -141,8 +139,7 @@ fn named_shortage(error: Error) -> Error {
     match &error {
         Error::Text(
             text::Error::Unreadable { source, .. } | text::Error::Unwritable { source, .. },
-        ) if source.kind() == std::io::ErrorKind::OutOfMemory =>
-        {
+        ) if source.kind() == std::io::ErrorKind::OutOfMemory => {
             commands::cannot_start("the command", &error)
         }
         _ => error,

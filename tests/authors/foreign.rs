@@ -8,20 +8,20 @@ use crate::compilers::{library, repository};
 use crate::guides::commands;
 use crate::program::{pilum, shell};
 use abi::Hypothesis;
-use text::Source;
+use input::Driver;
 use law::End;
 use law::Law;
 use law::Operator;
 use law::SearchPath;
 use law::Start;
 use law::Strided;
-use input::Driver;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use tests::needs::compiler;
 use tests::tolerance::ROUND_OFF;
+use text::Source;
 
 /// Suffix of the source, id of the law.
 const LAWS: [(&str, &str); 3] = [

@@ -38,8 +38,8 @@ fn every_committed_file_follows_its_schema() {
     let (case, point) = (validator("case"), validator("point"));
     let mut files = Vec::new();
     inputs(&repository("cases"), &mut files);
-    inputs(&repository("host/src/new_law/interface"), &mut files);
-    inputs(&repository("host/src/new_law/continuum"), &mut files);
+    inputs(&repository("host/workshop/src/new_law/interface"), &mut files);
+    inputs(&repository("host/workshop/src/new_law/continuum"), &mut files);
     let (mut cases, mut points) = (0, 0);
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
@@ -66,8 +66,8 @@ fn every_committed_file_follows_its_schema() {
     );
 }
 
-const DRIVER: &str = include_str!("../../host/src/new_law/interface/point.toml");
-const CASE: &str = include_str!("../../host/src/new_law/interface/case.toml");
+const DRIVER: &str = include_str!("../../host/workshop/src/new_law/interface/point.toml");
+const CASE: &str = include_str!("../../host/workshop/src/new_law/interface/case.toml");
 
 /// The text with one place changed.
 fn changed(text: &str, from: &str, to: &str) -> Value {

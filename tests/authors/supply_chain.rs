@@ -24,15 +24,15 @@ const UNSAFE: [(&str, &str); 9] = [
         "the same law as UMAT, for MFront, for CalculiX",
     ),
     (
-        "host/src/memory.rs",
+        "host/runs/src/memory.rs",
         "the allocator, which ends the program with a message",
     ),
     (
-        "host/src/plugin/library.rs",
+        "host/law/src/library.rs",
         "opening libraries and calling them",
     ),
     (
-        "host/src/plugin/library",
+        "host/law/src/library",
         "foreign routines, memory shared with workers, traps of `pilum check`",
     ),
     (

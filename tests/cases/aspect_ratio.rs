@@ -6,15 +6,15 @@
 //!           form; the layer with mean strains against the law at one point; the causes one by one
 
 use input::Case;
+use input::Driver;
 use input::case::CaseFile;
 use mechanics::problem::Integration;
-use text::Source;
-use input::Driver;
 use runs::run::run;
 use std::path::Path;
 use tempfile::TempDir;
 use tests::case::{Silent, column};
 use tests::tolerance::EQUILIBRIUM;
+use text::Source;
 
 /// Aspect ratios L/t; L = 10 mm.
 const RATIOS: [u32; 9] = [1, 5, 10, 25, 50, 100, 1000, 10_000, 1_000_000];

@@ -22,9 +22,9 @@ use crate::mepi_paths::{FONTAINEBLEAU, SILICA, TABLE_4, extremes};
 use crate::mepi_step::{Constants, Mepi};
 use crate::point::{Point, law, reason};
 use abi::Hypothesis;
+use input::Driver;
 use input::Error;
 use text::Source;
-use input::Driver;
 
 /// ξ, σ_n, τ at a slip.
 pub(crate) type Shear = [f64; 3];

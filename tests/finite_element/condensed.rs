@@ -9,9 +9,9 @@
 
 use crate::setup::Results as _;
 use input::Case;
+use mechanics::equilibrium::Reuse;
 use runs::run::Options;
 use runs::run::run_reusing;
-use mechanics::equilibrium::Reuse;
 use serde_json::Value;
 use std::path::Path;
 use tests::case::{Silent, table};

@@ -25,21 +25,21 @@
 use crate::setup::{Finished, Results, assert_close, elastic, run};
 use crate::sliding_block::{self, Kind, PRESS, coulomb, hold_top, slide};
 use input::Case;
-use input::case::CaseFile;
 use input::Error;
+use input::case::CaseFile;
+use law::Stop;
 use mechanics::Place;
-use text::Source;
-use text::parse;
+use mechanics::equilibrium::Reuse;
 use runs::run::Observer;
 use runs::run::Options;
 use runs::run::run_reusing;
-use mechanics::equilibrium::Reuse;
-use law::Stop;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tests::tolerance::EQUILIBRIUM;
+use text::Source;
+use text::parse;
 
 const P: f64 = 80.0;
 const YOUNG: f64 = 1e4;
@@ -286,10 +286,7 @@ fn a_run_stopped_after_a_swap_goes_on_to_the_same_bits() {
     run_until(&text, straight.path(), 100).unwrap();
     // Within the phase of the swap.
     let outcome = run_until(&text, stopped.path(), 2);
-    assert!(
-        outcome.as_ref().is_err_and(Error::is_stop),
-        "{outcome:?}"
-    );
+    assert!(outcome.as_ref().is_err_and(Error::is_stop), "{outcome:?}");
     run_until(&text, stopped.path(), 100).unwrap();
     let [a, b] = [&straight, &stopped]
         .map(|folder| std::fs::read_to_string(folder.path().join("history.csv")).unwrap());

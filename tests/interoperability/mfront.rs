@@ -2,16 +2,16 @@
 //! machine has, and those inside OpenGeoSys.
 
 use crate::{BondedPile, OPENGEOSYS, assert_close, installed, is_there, library};
-use text::Source;
-use law::adapter::Adapter;
-use law::adapter::Foreign;
+use input::Driver;
 use law::Bounds;
 use law::Library;
-use input::Driver;
+use law::adapter::Adapter;
+use law::adapter::Foreign;
 use runs::point::PointReport;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use text::Source;
 
 /// The library with behaviours that comes with OpenGeoSys.
 fn behaviours() -> PathBuf {

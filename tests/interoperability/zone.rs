@@ -3,13 +3,13 @@
 
 use crate::mfront::{driver, rows};
 use crate::{assert_close, beside, last_line};
-use text::Source;
 use input::Driver;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::LazyLock;
 use tempfile::TempDir;
+use text::Source;
 
 /// The library, compiled once.
 static ZONE: LazyLock<(TempDir, PathBuf)> = LazyLock::new(|| {

@@ -1,10 +1,10 @@
 //! Running a driver given as a text, and reading its rows by column.
 
-use input::Error;
-use text::Source;
 use input::Driver;
+use input::Error;
 use runs::point::PointReport;
 use std::path::Path;
+use text::Source;
 
 /// What a driver gave: rows as far as it came, and how it ended.
 #[derive(Debug)]

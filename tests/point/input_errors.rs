@@ -6,9 +6,9 @@
 //! Asserts     exit code, key facts of the message, the underlined text
 
 use crate::driver::attempt;
+use input::Driver;
 use input::Error;
 use text::Source;
-use input::Driver;
 
 const SOLID: &str = "law = 'elastic'\nhypothesis = 'plane_strain'\n[parameters]\n\
     young_modulus = 1e5\npoisson_ratio = 0.25\n";
@@ -21,7 +21,10 @@ const SEGMENT: &str = "[[segment]]\nincrements = 1\ncontrol = {}\n";
 fn refuses(text: &str, parts: &[&str]) {
     let error = Driver::from_source(&Source::new("driver.toml", text)).unwrap_err();
     assert_eq!(error.exit_code(), 1, "{error}\n{text}");
-    assert!(matches!(error, Error::Text(text::Error::Input(_))), "{error:?}");
+    assert!(
+        matches!(error, Error::Text(text::Error::Input(_))),
+        "{error:?}"
+    );
     let all = format!("{error} {error:?}");
     for part in parts {
         assert!(all.contains(part), "`{part}` is not in {error:?}");

@@ -1,10 +1,10 @@
 //! Drivers: controls are met in every row, or the row is not there.
 
 use crate::seeds::{End, hold};
-use text::Source;
 use input::Driver;
 use proptest::prelude::*;
 use std::fmt::Write as _;
+use text::Source;
 
 /// What a number is measured in: the power of the unit of stress.
 type Power = f64;

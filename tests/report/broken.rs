@@ -1,7 +1,7 @@
 //! Folders in which something is missing or broken: a note in the page or an error, no panic.
 
 use crate::folders::{folders, page_of};
-use input::Error;
+use text::Error;
 use results::report::write;
 use std::path::Path;
 use tempfile::TempDir;

@@ -147,7 +147,7 @@ pub(crate) fn folders() -> &'static Folders {
         )]);
         let outcome = reported(&overloaded, &folders.overloaded);
         assert!(
-            outcome.is_err_and(|error| error.kind() == Kind::NoEquilibrium),
+            outcome.as_ref().is_err_and(|error| error.kind() == Kind::NoEquilibrium),
             "{outcome:?}"
         );
         let all = [&folders.layer, &folders.joint, &folders.overloaded].map(Clone::clone);

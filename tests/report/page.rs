@@ -1,7 +1,7 @@
 //! What stands in the page.
 
 use crate::folders::{CASE, edited, folders, page_of};
-use input::Error;
+use text::Error;
 use results::report::default_path;
 use results::report::write;
 use serde_json::Value;

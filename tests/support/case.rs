@@ -1,15 +1,15 @@
 //! Running a case and reading its results.
 
 use input::Case;
-use input::case::CaseFile;
 use input::Error;
+use input::case::CaseFile;
 use mechanics::Place;
-use text::Source;
-use text::parse;
 use runs::run::Observer;
 use runs::run::run;
 use std::collections::BTreeMap;
 use std::path::Path;
+use text::Source;
+use text::parse;
 
 /// An observer that only keeps warnings and counts cut-backs.
 #[derive(Clone, Debug, Default)]

@@ -157,10 +157,7 @@ impl Case {
             laws_of_groups: file.groups.iter().map(laws_of).collect(),
             laws: laws.clone(),
             probe_units: probes::units(self, laws),
-            chosen: file
-                .chosen
-                .as_ref()
-                .map(|chosen| serde_json::json!(chosen)),
+            chosen: file.chosen.as_ref().map(|chosen| serde_json::json!(chosen)),
         }
     }
 
@@ -179,9 +176,10 @@ impl Case {
     }
 
     fn place_refusal(&self, refusal: &Refusal) -> Error {
-        let error = self
-            .source
-            .error(self.span(&refusal.item, &refusal.cause), refusal.to_string());
+        let error = self.source.error(
+            self.span(&refusal.item, &refusal.cause),
+            refusal.to_string(),
+        );
         let hint = match &refusal.cause {
             Cause::NoLine { name, known } => {
                 let known = known.iter().map(String::as_str).collect::<Vec<_>>();

@@ -10,7 +10,6 @@ use results::wanted::{Output, Reduce};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use std::collections::BTreeMap;
-use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use text::{Named, Source, base};
 use toml::Spanned;
@@ -549,13 +548,4 @@ fn accuracy<'de, D: Deserializer<'de>>(input: D) -> Result<Option<Spanned<f64>>,
         value if value > 0.0 && value <= 0.5 => Ok(Some(asked)),
         value => Err(de::Error::custom(format!("{value:?} is outside (0, 0.5]"))),
     }
-}
-
-fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {
-    if value >= least && value <= most {
-        return Ok(value);
-    }
-    Err(E::custom(format!(
-        "{value:?} is outside [{least:?}, {most:?}]"
-    )))
 }

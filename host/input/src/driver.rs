@@ -6,16 +6,14 @@ mod path;
 
 use crate::Error;
 use crate::case::FigureInput;
-use crate::material::{
-    self, ForeignKeys, ParameterTable, ParameterValue, build_law, find_law,
-};
+use crate::figures::check_table_figures;
+use crate::material::{self, ForeignKeys, ParameterTable, ParameterValue, build_law, find_law};
 use crate::schema;
 use indexmap::IndexMap;
 use law::adapter::{Adapter, Externals, Scratch};
 use law::{BuiltLaw, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
-use crate::figures::check_table_figures;
 use results::point_figure::drawable;
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -98,9 +98,9 @@ fn hint(error: &mechanics::Error) -> Option<&'static str> {
              equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
         ),
         mechanics::Error::Interrupted { .. } => Some("go on with --resume"),
-        mechanics::Error::Stopped { .. } => Some(
-            "the last equilibrium is `stopped_at` in summary.json; go on with --resume",
-        ),
+        mechanics::Error::Stopped { .. } => {
+            Some("the last equilibrium is `stopped_at` in summary.json; go on with --resume")
+        }
         _ => None,
     }
 }

@@ -36,7 +36,9 @@ pub fn write(path: &Path) -> Result<PathBuf, Error> {
     };
     let laws = if is_driver(&path)? {
         let drivers = Driver::read_unlocked(&path)?;
-        let laws = drivers.iter().map(|driver| driver.point().law().loaded().clone());
+        let laws = drivers
+            .iter()
+            .map(|driver| driver.point().law().loaded().clone());
         laws.collect()
     } else {
         laws_of_case(&path)?

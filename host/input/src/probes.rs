@@ -105,11 +105,7 @@ impl Resolver<'_> {
         self.source().error(self.span.clone(), message).into()
     }
 
-    fn combination(
-        &self,
-        combine: &Named<f64>,
-        earlier: &Probes,
-    ) -> Result<Probe, Error> {
+    fn combination(&self, combine: &Named<f64>, earlier: &Probes) -> Result<Probe, Error> {
         let ProbeInput {
             line,
             group,

@@ -20,7 +20,6 @@ use super::image::Image;
 use super::library::{Call, CallFailure, Strided};
 use super::{Moment, Site};
 use crate::Error;
-use text::Source;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use schemars::JsonSchema;
@@ -28,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
+use text::Source;
 
 /// What a library is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

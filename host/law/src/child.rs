@@ -183,6 +183,7 @@ fn last_words(pieces: &Receiver<Vec<u8>>) -> Vec<u8> {
 }
 
 #[cfg(unix)]
+/// How a process ended.
 pub fn ending(status: ExitStatus) -> Ending {
     use std::os::unix::process::ExitStatusExt;
     match (status.code(), status.signal()) {
@@ -192,6 +193,7 @@ pub fn ending(status: ExitStatus) -> Ending {
 }
 
 #[cfg(not(unix))]
+/// How a process ended.
 pub fn ending(status: ExitStatus) -> Ending {
     Ending::Exited(status.code().unwrap_or(-1))
 }

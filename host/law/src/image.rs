@@ -5,11 +5,11 @@
 //! profilers, which look for the file), the file itself is opened after it was hashed.
 
 use super::trust;
-use text::file;
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use text::file;
 
 /// Bytes that are read, hashed and copied at a time: they stay in the processor's cache.
 const PIECE: usize = 1 << 17;

@@ -2,7 +2,6 @@
 //! kind of computer.
 
 use crate::Error;
-use text::file;
 use crate::hexadecimal_sha256;
 use abi::raw::{self, MagicBlock};
 use abi::version;
@@ -15,6 +14,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
+use text::file;
 
 /// Symbols of the contract.
 const CONTRACT: [&str; 3] = ["pilum_magic", "pilum_entry", "pilum_rust_layout"];
@@ -271,9 +271,7 @@ fn architecture(architecture: Architecture) -> String {
 }
 
 /// Laws in the manifest section; `None` without one.
-pub fn manifest<'data>(
-    file: &File<'data, impl ReadRef<'data>>,
-) -> Option<Vec<ManifestEntry>> {
+pub fn manifest<'data>(file: &File<'data, impl ReadRef<'data>>) -> Option<Vec<ManifestEntry>> {
     let section = file
         .section_by_name(".pilum")
         .or_else(|| file.section_by_name("__pilum"))?;

@@ -29,13 +29,14 @@ mod stop;
 mod trust;
 pub mod vetting;
 
+pub use abi::Hypothesis;
 pub use built::{BuildCause, BuildFailure, BuiltLaw, UsedParameter, Value};
 pub use call::{
     BatchFailure, BatchSuccess, End, Moment, Operator, PointCall, Request, Site, Start,
 };
 pub use description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
-    words,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+    Tangent, words,
 };
 pub use digest::{hexadecimal, hexadecimal_sha256};
 pub use error::Error;

@@ -3,14 +3,14 @@
 use super::adapter::Foreign;
 use super::{Library, LoadedLaw};
 use crate::Error;
-use text::suggestion;
-use text::file;
-use crate::inspect;
 use crate::Pins;
+use crate::inspect;
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
+use text::file;
+use text::suggestion;
 
 /// Folders to look in, in order, and the libraries opened so far.
 #[derive(Debug)]

@@ -1,9 +1,9 @@
 //! Asking work to stop: a value that whoever may want to stop it shares with whoever does it.
 
-use thiserror::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
+use thiserror::Error;
 
 /// How long an increment under way may still take once it was asked to stop: most increments end
 /// within it, and a whole increment is what a run can be resumed from.

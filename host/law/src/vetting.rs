@@ -5,8 +5,8 @@
 //! once. What did not is tried again every time.
 
 use super::{End, Law, Library, LoadedLaw, Moment, Operator, ParameterDescription, Start, Strided};
-use crate::child::{self, Ending, Work};
 use crate::Error;
+use crate::child::{self, Ending, Work};
 use abi::Hypothesis;
 use std::ffi::OsString;
 use std::io::Write;

@@ -9,12 +9,10 @@ mod tangent;
 
 pub use tangent::Fault;
 
-use crate::problem::{Formulation, InPlane, Material};
 use crate::element::Kinematics;
-use law::{
-    BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls,
-};
+use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
+use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
 use layer::Layer;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -48,7 +48,11 @@ impl From<Refusal> for BuildError {
 
 /// The hypothesis that a group's laws are built for. A thin layer takes interface laws and
 /// continuum laws, which `law` tells.
-pub fn hypothesis(analysis: Analysis, formulation: Formulation, is_interface_law: bool) -> Hypothesis {
+pub fn hypothesis(
+    analysis: Analysis,
+    formulation: Formulation,
+    is_interface_law: bool,
+) -> Hypothesis {
     match (formulation, analysis) {
         (Formulation::ZeroThickness, _) => Hypothesis::Interface2d,
         (Formulation::ThinLayer, _) if is_interface_law => Hypothesis::Interface2d,
@@ -572,8 +576,7 @@ impl GroupBuilder<'_> {
                 stress.extend(axes.stress_from_global(given.unwrap_or_default()));
             } else {
                 let beside = || self.stress_beside(kinematics.nodes(element));
-                let [_, normal, _, shear] =
-                    axes.stress_from_global(given.unwrap_or_else(beside));
+                let [_, normal, _, shear] = axes.stress_from_global(given.unwrap_or_else(beside));
                 stress.extend([normal, shear]);
             }
         }

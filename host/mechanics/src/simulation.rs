@@ -141,9 +141,7 @@ impl Simulation {
         } = Model::build(&problem)?;
         let n_dofs = 2 * problem.mesh.nodes.len();
         let nodes = &problem.mesh.nodes;
-        let turns_freely = groups
-            .iter()
-            .all(|group| phase::turns_freely(group, nodes));
+        let turns_freely = groups.iter().all(|group| phase::turns_freely(group, nodes));
         let mut simulation = Self {
             first_materials: groups.iter().map(|group| group.law.clone()).collect(),
             groups,
@@ -233,7 +231,11 @@ impl Simulation {
     pub fn displacement_of(&self, line: &str) -> Option<[f64; 2]> {
         let nodes = &self.problem.mesh.lines.get(line)?.nodes;
         let n = nodes.len().max(1) as f64;
-        let sum = |c: usize| nodes.iter().map(move |node| self.displacement[2 * node + c]);
+        let sum = |c: usize| {
+            nodes
+                .iter()
+                .map(move |node| self.displacement[2 * node + c])
+        };
         Some([0, 1].map(|c| sum(c).sum::<f64>() / n))
     }
 

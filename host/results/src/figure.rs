@@ -135,6 +135,10 @@ impl Figures {
         }
     }
 
+    /// Draws all figures into a folder.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
     pub fn draw(&self, folder: &Path) -> Result<(), Error> {
         for (figure, curves) in &self.drawn {
             draw_file(folder, figure, &self.title, curves)?;
@@ -153,10 +157,7 @@ impl Figures {
         for (figure, _) in &first.drawn {
             let mut curves = Vec::new();
             for (variant, figures) in variants {
-                let same = figures
-                    .drawn
-                    .iter()
-                    .find(|(f, _)| f.name == figure.name);
+                let same = figures.drawn.iter().find(|(f, _)| f.name == figure.name);
                 let same = same
                     .map(|(_, curves)| curves.as_slice())
                     .unwrap_or_default();
@@ -193,11 +194,7 @@ fn cut_at<'f>(figure: &'f Figure, place: &Place, of: usize) -> Option<&'f Cut> {
 /// Two quantities at the points of a cut, by increasing first one.
 fn cut_points(cut: &Cut, quantities: [&str; 2], groups: &[Group]) -> Vec<(f64, f64)> {
     let inside = |extent: Option<[f64; 2]>, c| extent.is_none_or(|[from, to]| from < c && c < to);
-    let wanted = |group: &&Group| {
-        cut.group
-            .as_ref()
-            .is_none_or(|g| *g == group.name)
-    };
+    let wanted = |group: &&Group| cut.group.as_ref().is_none_or(|g| *g == group.name);
     let mut points = Vec::new();
     for group in groups.iter().filter(wanted) {
         for point in 0..group.kinematics.n_points() {
@@ -226,19 +223,11 @@ fn cut_points(cut: &Cut, quantities: [&str; 2], groups: &[Group]) -> Vec<(f64, f
     points
 }
 
-fn draw_file(
-    folder: &Path,
-    figure: &Figure,
-    title: &str,
-    curves: &[Curve],
-) -> Result<(), Error> {
+fn draw_file(folder: &Path, figure: &Figure, title: &str, curves: &[Curve]) -> Result<(), Error> {
     let path = folder.join(format!("{}.svg", figure.name));
     let labels = Labels {
         title: figure.title.clone().unwrap_or_else(|| title.to_owned()),
-        x: figure
-            .x_label
-            .clone()
-            .unwrap_or_else(|| figure.x.clone()),
+        x: figure.x_label.clone().unwrap_or_else(|| figure.x.clone()),
         y: figure.y_label.clone().unwrap_or_default(),
     };
     let text = svg(&labels, curves)

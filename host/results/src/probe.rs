@@ -19,35 +19,53 @@ pub struct Probes {
 pub enum Probe {
     /// A quantity of integration points.
     Points {
+        /// Number of the group.
         group: usize,
+        /// Numbers of the points within the group.
         points: Vec<usize>,
         /// What each point stands for; empty where all count alike.
         weights: Vec<f64>,
+        /// What of them.
         quantity: PointQuantity,
+        /// How their values become one.
         reduce: Reduce,
+        /// Factor.
         scale: f64,
     },
     /// Displacement component of nodes.
     Displacement {
+        /// The nodes.
         nodes: Vec<usize>,
+        /// 0: x (r); 1: y (z).
         component: usize,
+        /// How their values become one.
         reduce: Reduce,
+        /// Factor.
         scale: f64,
     },
     /// Sum of internal forces at nodes: of all elements (the reaction), of one group, or of some of
     /// its elements.
     Force {
+        /// The nodes.
         nodes: Vec<usize>,
+        /// 0: x (r); 1: y (z).
         component: usize,
+        /// The group; all of them if there is none.
         group: Option<usize>,
+        /// Elements of it, by number within the group; all if there are none.
         elements: Option<Vec<usize>>,
+        /// Factor.
         scale: f64,
     },
     /// What zero-thickness elements along a line hand on from one side to the other.
     HandedOn {
+        /// Number of the group.
         group: usize,
+        /// Elements, by number within the group.
         elements: Vec<usize>,
+        /// 0: x (r); 1: y (z).
         component: usize,
+        /// Factor.
         scale: f64,
     },
     /// Sum of earlier probes with factors.

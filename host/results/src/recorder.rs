@@ -117,7 +117,10 @@ impl Table {
         Ok(table)
     }
 
-    pub(crate) fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(&mut self, cells: I) -> Result<(), Error> {
+    pub(crate) fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(
+        &mut self,
+        cells: I,
+    ) -> Result<(), Error> {
         self.rows
             .write_record(cells)
             .map_err(|error| Error::unwritable(self.file.path(), std::io::Error::other(error)))
@@ -139,7 +142,10 @@ impl Table {
 }
 
 /// Ids of the internal variables of all laws that these groups ever carry, each once.
-pub(crate) fn internal_variables(simulation: &Simulation, of: impl Fn(&Group) -> bool) -> Vec<String> {
+pub(crate) fn internal_variables(
+    simulation: &Simulation,
+    of: impl Fn(&Group) -> bool,
+) -> Vec<String> {
     let groups = simulation.groups();
     let first = groups.iter().map(|group| (group, &group.law));
     let swapped = simulation.swaps().iter().flatten();
@@ -379,11 +385,7 @@ impl Recorder {
     }
 
     /// Values of the probes.
-    fn values(
-        &self,
-        place: &Place,
-        snapshot: &Snapshot<'_>,
-    ) -> Result<Vec<Option<f64>>, Fault> {
+    fn values(&self, place: &Place, snapshot: &Snapshot<'_>) -> Result<Vec<Option<f64>>, Fault> {
         let values = self.probes.values(snapshot);
         match self.probes.overflow(&values) {
             None => Ok(values),

@@ -17,9 +17,9 @@ mod results;
 mod short;
 mod table;
 
+pub use page::STYLE;
 use text::Error;
 use text::write::replace;
-pub use page::STYLE;
 
 use budget::Budget;
 use results::Run;

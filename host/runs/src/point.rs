@@ -1,20 +1,20 @@
 //! Runs of drivers: one law at one integration point, from a file to tables and figures.
 
 use crate::Error;
+use crate::variants::keep;
 use input::driver::Driver;
 use law::Stop;
 use law::adapter::{self, Adapter};
 use law::capsule::{self, Capsule};
 use point::Course;
 use results::figure::Figures;
-use results::wanted::Figure;
 use results::point_figure::{draw_row, drawable};
 use results::point_table::Table;
+use results::wanted::Figure;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use crate::variants::keep;
 use text::write::{Identity, check_own, identity, is_same};
 
 /// What came out of a driver file.
@@ -168,7 +168,9 @@ fn run_all(
     report: &mut dyn FnMut(&PointReport),
 ) -> Result<(), Error> {
     let names: Vec<String> = drivers.iter().filter_map(name).map(str::to_owned).collect();
-    keep(&mut drivers, variant, |driver| name(driver).map(str::to_owned))?;
+    keep(&mut drivers, variant, |driver| {
+        name(driver).map(str::to_owned)
+    })?;
     check_recording(&drivers)?;
     for driver in &drivers {
         let checked = driver.point().check();

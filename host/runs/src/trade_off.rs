@@ -24,12 +24,12 @@ pub use accuracy::{reach, reach_until};
 pub use sampled::Convergence;
 pub use study::{Measurement, Reference, Row, Study};
 
-use input::{Case, Driver, is_driver};
 use crate::Error;
 use crate::variants::keep;
-use text::write::replace;
+use input::{Case, Driver, is_driver};
 use law::Stop;
 use std::path::{Path, PathBuf};
+use text::write::replace;
 use trial::Scratch;
 
 /// What is asked of a study.
@@ -100,7 +100,11 @@ fn run_drivers(
     for driver in &drivers {
         let name = full_name(&stem, driver.point().variant());
         let study = driver_study::study(driver, &name, options.most_increments, stop, say)?;
-        finish(&study, &options.place(&folder, driver.point().variant()), show)?;
+        finish(
+            &study,
+            &options.place(&folder, driver.point().variant()),
+            show,
+        )?;
     }
     Ok(())
 }

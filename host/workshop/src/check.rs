@@ -14,13 +14,11 @@ mod random;
 mod robustness;
 mod specimen;
 
-use law::child::{self, Ending, Work};
 use crate::Error;
-use text::suggestion;
-use text::file;
+use abi::raw;
+use law::child::{self, Ending, Work};
 use law::probe::NO_OUTCOME;
 use law::{Library, LoadedLaw, SearchPath, hexadecimal_sha256};
-use abi::raw;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -29,6 +27,8 @@ use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use text::file;
+use text::suggestion;
 
 /// Arguments of `pilum check`.
 #[derive(Clone, Debug, clap::Args)]

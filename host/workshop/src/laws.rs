@@ -1,12 +1,12 @@
 //! What `pilum laws` prints: the laws found, and a page about one of them, as text or as JSON.
 
 use crate::Error;
+use abi::Hypothesis;
 use law::adapter::conventions;
 use law::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw,
     ParameterDescription, SearchPath,
 };
-use abi::Hypothesis;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;

@@ -2,13 +2,13 @@
 //! whether the tangent is the derivative of the update.
 
 use crate::Error;
+use abi::status::Outcome;
 use law::adapter::Foreign;
 use law::capsule::{Capsule, OutcomePart, status};
 use law::{
     BatchFailure, End, Law, Library, LoadedLaw, Operator, PointCall, Request, SearchPath, Start,
     Strided, words,
 };
-use abi::status::Outcome;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 //! Case files: keys, bases, variants; meshes; laws, loads, probes and figures of small ones.
 
-use crate::{shown, source};
 use crate::ways_in;
+use crate::{shown, source};
 use runs::run::check;
 
 /// Larger meshes are read alone: building one that may be asked for takes a second.
@@ -13,22 +13,22 @@ pub(super) fn read(data: &[u8]) {
     let Some(source) = source(data) else { return };
     // An adapter opens whatever library is named.
     let opens_libraries = source.text().contains("adapter");
-    let Some(cases) = shown(fuzzing::case(source)) else {
+    let Some(cases) = shown(ways_in::case(source)) else {
         return;
     };
     for case in cases.iter().take(MOST_VARIANTS) {
         assert!(!case.default_folder().as_os_str().is_empty(), "no folder");
-        if fuzzing::elements(case) > MOST_ELEMENTS {
+        if ways_in::elements(case) > MOST_ELEMENTS {
             continue;
         }
-        let Some(mesh) = shown(fuzzing::mesh(case)) else {
+        let Some(mesh) = shown(ways_in::mesh(case)) else {
             continue;
         };
         let n = mesh.nodes.len();
-        let quads = mesh.quads.iter().flat_map(|quad| quad.nodes);
+        let solids = mesh.solids.iter().flat_map(|solid| solid.nodes().to_vec());
         let joints = mesh.joints.iter().flat_map(|j| [j.minus, j.plus]);
         assert!(
-            quads.chain(joints.flatten()).all(|node| node < n),
+            solids.chain(joints.flatten()).all(|node| node < n),
             "an element without a node"
         );
         if !opens_libraries {

@@ -5,9 +5,9 @@
     reason = "a description is memory that the host is asked to read"
 )]
 
+use crate::ways_in;
 use abi::raw::{Law, Parameter, Plugin, Variable};
 use abi::version::{FORMULATION_SIZE_1_0, LAW_SIZE_1_0, PARAMETER_SIZE_1_0, VARIABLE_SIZE_1_0};
-use crate::ways_in;
 use std::ffi::c_void;
 use std::mem::size_of;
 use std::ptr::with_exposed_provenance;
@@ -39,7 +39,7 @@ pub(super) fn read(data: &[u8]) {
     };
     // SAFETY: `memory` holds every table with as many entries as are declared (a count beyond
     // `LONGEST` is refused before the table is read), every list and text with its end.
-    let described = unsafe { fuzzing::describe_memory(&plugin) };
+    let described = unsafe { ways_in::describe_memory(&plugin) };
     if let Ok(laws) = described {
         assert_eq!(laws.len(), n_laws as usize, "laws are lost");
         let ids = laws.iter().map(|law| &law.id);

@@ -1,8 +1,8 @@
 //! The three files of an IncrementalDriver, with a line of three dashes between them.
 
 use crate::shown;
-use text::Source;
 use crate::ways_in;
+use text::Source;
 
 /// Parameters and internal variables that the files are read for.
 const N: usize = 2;
@@ -14,5 +14,5 @@ pub(super) fn read(data: &[u8]) {
     let mut files = text.splitn(3, "---\n");
     let names = ["test.inp", "parameters.inp", "initialconditions.inp"];
     let files = names.map(|name| Source::new(name, files.next().unwrap_or_default()));
-    shown(fuzzing::incremental(files.each_ref(), N));
+    shown(ways_in::incremental(files.each_ref(), N));
 }

@@ -12,9 +12,8 @@ mod library;
 mod ways_in;
 
 use input::{Error, Kind};
-use text::Source;
-use crate::ways_in;
 use std::sync::OnceLock;
+use text::Source;
 
 /// What a target does with its bytes.
 type Target = fn(&[u8]);
@@ -61,10 +60,7 @@ fn shown<T>(outcome: Result<T, Error>) -> Option<T> {
     match outcome {
         Ok(value) => Some(value),
         Err(error) => {
-            assert!(
-                error.kind() != Kind::Internal,
-                "an internal error: {error}"
-            );
+            assert!(error.kind() != Kind::Internal, "an internal error: {error}");
             let message = format!("{:?}", miette::Report::new(error));
             assert!(!message.is_empty(), "an error without a message");
             None
@@ -74,12 +70,12 @@ fn shown<T>(outcome: Result<T, Error>) -> Option<T> {
 
 fn lock(data: &[u8]) {
     if let Some(source) = source(data) {
-        shown(fuzzing::lock(&source));
+        shown(ways_in::lock(&source));
     }
 }
 
 fn sidecar(data: &[u8]) {
-    let law = source(data).and_then(|source| shown(fuzzing::sidecar(&source)));
+    let law = source(data).and_then(|source| shown(ways_in::sidecar(&source)));
     for parameter in law.iter().flat_map(|law| &law.parameters) {
         let bounds = parameter.bounds;
         assert!(
@@ -91,21 +87,18 @@ fn sidecar(data: &[u8]) {
 
 /// A capsule that can be read is written as it was read, and replayed without its library.
 fn capsule(data: &[u8]) {
-    let Some(capsule) = source(data).and_then(|source| shown(fuzzing::capsule(source))) else {
+    let Some(capsule) = source(data).and_then(|source| shown(ways_in::capsule(source))) else {
         return;
     };
     let text = capsule.to_string();
-    let again = fuzzing::capsule(Source::new("again.toml", text.as_str()));
+    let again = ways_in::capsule(Source::new("again.toml", text.as_str()));
     assert!(again.is_ok(), "cannot be read back: {text}");
     assert_eq!(
         again.map(|again| again.to_string()).ok(),
         Some(text),
         "is read back as another"
     );
-    shown(fuzzing::replay(
-        &capsule,
-        &law::SearchPath::new(&[]),
-    ));
+    shown(ways_in::replay(&capsule, &law::SearchPath::new(&[])));
 }
 
 #[cfg(test)]

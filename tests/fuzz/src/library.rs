@@ -3,13 +3,14 @@
 
 use crate::shown;
 use crate::ways_in;
+use input::Error;
 
 pub(super) fn read(data: &[u8]) {
-    if let Some(inspection) = shown(fuzzing::inspection(data)) {
+    if let Some(inspection) = shown(ways_in::inspection(data)) {
         assert!(!inspection.to_string().is_empty(), "nothing to say");
-        shown(law::inspect::json(&inspection));
+        shown(law::inspect::json(&inspection).map_err(Error::from));
     }
-    fuzzing::manifest(data);
+    ways_in::manifest(data);
     // Why it has none is a text.
-    let _ = fuzzing::behaviours(data);
+    let _ = ways_in::behaviours(data);
 }

@@ -2,7 +2,6 @@
 
 use super::{Externals, Scratch};
 use crate::Error;
-use text::{Source, suggestion};
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
@@ -11,6 +10,7 @@ use abi::Hypothesis;
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use text::{Source, suggestion};
 use toml::Spanned;
 
 /// Most components of an internal variable; a slip of the pen beyond.

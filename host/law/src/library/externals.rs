@@ -4,7 +4,6 @@
 //! says which one it is to [`trapped`], which ends the process. It is loaded before the library, so
 //! that this finds them however it was linked (`-z now`) and whatever `LD_BIND_NOW` says.
 
-use text::file;
 use crate::inspect;
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY, RTLD_LOCAL, RTLD_NOW};
 use object::{Object, ObjectSymbol, RelocationFlags, RelocationTarget, elf};
@@ -13,6 +12,7 @@ use std::ffi::c_void;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use text::file;
 
 /// Exit code of a process in which a trap was called.
 const TRAPPED: i32 = 71;

@@ -59,12 +59,7 @@ impl Routine {
     ///
     /// # Panics
     /// An argument starts outside the words.
-    pub(crate) fn call(
-        self,
-        words: &mut [u64],
-        at: &[usize; N_ARGUMENTS],
-        n_cmname: usize,
-    ) {
+    pub(crate) fn call(self, words: &mut [u64], at: &[usize; N_ARGUMENTS], n_cmname: usize) {
         assert!(at.iter().all(|first| *first < words.len()));
         let start = words.as_mut_ptr();
         // SAFETY: every place lies inside `words`, see above.

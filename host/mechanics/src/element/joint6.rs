@@ -2,8 +2,8 @@
 
 use super::shape::{gauss, line_shape};
 use super::{Axes, Kinematics, depth};
-use crate::problem::{Analysis, Integration};
 use crate::mesh::Joint;
+use crate::problem::{Analysis, Integration};
 
 /// Zero-thickness elements of one group.
 #[derive(Debug)]

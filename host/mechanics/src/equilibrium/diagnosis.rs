@@ -6,8 +6,8 @@
 //! wrong one, points jump about for no other reason.
 
 use super::newton::{Culprit, PointPlace, Symptom, norm};
-use crate::problem::Formulation;
 use crate::group::{Fault, Group};
+use crate::problem::Formulation;
 
 /// Smallest relative change of a tangent that is worth a word.
 const NOTABLE: f64 = 0.01;

@@ -17,11 +17,13 @@
 //! alone are brought to the state in question, counted from the one before it; the others wait for
 //! the next complete one.
 
-use super::newton::{ACCEPTED_ROUND_OFF, DomainFailure, Loads, STILL_SMALL, last_bit_scattered, norm};
+use super::newton::{
+    ACCEPTED_ROUND_OFF, DomainFailure, Loads, STILL_SMALL, last_bit_scattered, norm,
+};
 use crate::assembly::{System, Tie};
 use crate::group::Group;
-use law::Operator;
 use algebra::{Block, Kind, Multifrontal, Pattern, Singular};
+use law::Operator;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -601,10 +603,7 @@ impl LinearDomain {
         };
         let (origin, increment) = match (&since.complete, &since.latest) {
             (None, Some(increment)) => (latest, increment),
-            (increment, _) => (
-                complete,
-                increment.as_ref().ok_or(DomainFailure::NoState)?,
-            ),
+            (increment, _) => (complete, increment.as_ref().ok_or(DomainFailure::NoState)?),
         };
         for &equation in &part.wanted {
             let dof = free[equation];

@@ -12,8 +12,8 @@ mod path;
 mod relaxation;
 
 pub use failure::{
-    Criterion, Culprit, DomainFailure, Imbalance, Iterations, PointPlace, Reason, Runaway, Singularity,
-    StepFailure, Symptom, Unmet,
+    Criterion, Culprit, DomainFailure, Imbalance, Iterations, PointPlace, Reason, Runaway,
+    Singularity, StepFailure, Symptom, Unmet,
 };
 pub use matrix::Matrix;
 pub use path::Measure;
@@ -21,14 +21,14 @@ pub use path::Measure;
 use super::diagnosis::{self, Snapshot};
 use super::linear_domain::LinearDomain;
 use crate::assembly::{Places, System, norms};
-use crate::settings::{Control, Method, Settings};
 use crate::group::{Group, PointFailure};
-use law::Operator;
-use law::Stop;
+use crate::settings::{Control, Method, Settings};
 use acceleration::Acceleration;
 use acceptance::{Change, Criteria, EXACT, Measures, STALE};
 use algebra::LinearSolver;
 use given::Given;
+use law::Operator;
+use law::Stop;
 use relaxation::Relaxation;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
@@ -773,7 +773,9 @@ impl<'a> Newton<'a> {
     fn predict(&mut self, task: &Task<'_>) -> Result<Vec<f64>, StepFailure> {
         let still = vec![0.0; task.external.len()];
         let operator = self.operator();
-        let balance = self.evaluate(&still, task, operator).map_err(StepFailure::from)?;
+        let balance = self
+            .evaluate(&still, task, operator)
+            .map_err(StepFailure::from)?;
         self.prepare(&still, task)?;
         let mut increment = self.solve(&balance.residual, Some(task.prescribed))?;
         for (value, prescribed) in increment.iter_mut().zip(task.prescribed) {
@@ -831,7 +833,9 @@ impl<'a> Newton<'a> {
             // The groups hold the state of the last fraction tried.
             (Some((length, moved, _)), _) => {
                 let operator = self.operator();
-                let balance = self.evaluate(&moved, task, operator).map_err(StepFailure::from)?;
+                let balance = self
+                    .evaluate(&moved, task, operator)
+                    .map_err(StepFailure::from)?;
                 Ok((length, moved, balance))
             }
             (None, Some(failure)) => Err(failure.into()),

@@ -172,11 +172,7 @@ impl Mesh {
 ///
 /// # Errors
 /// [`Fault`], for the first edge at which there is one.
-fn split(
-    n_nodes: usize,
-    elements: &[Solid],
-    interfaces: &[Interface],
-) -> Result<Split, Fault> {
+fn split(n_nodes: usize, elements: &[Solid], interfaces: &[Interface]) -> Result<Split, Fault> {
     let cuts = Cuts::new(interfaces)?;
     let around = elements_around(n_nodes, elements, &cuts);
     let mut result = Split {

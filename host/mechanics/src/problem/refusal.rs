@@ -369,9 +369,7 @@ impl Cause {
                     "the normal goes across the layer: `normal = \"{other}\"`, or leave it out"
                 ));
             }
-            Self::WhichWayAcross { .. } => {
-                "say `normal = \"x\"` or `normal = \"y\"` for the group"
-            }
+            Self::WhichWayAcross { .. } => "say `normal = \"x\"` or `normal = \"y\"` for the group",
             Self::TurnedSigns { .. } => {
                 "tension is positive: compression is written as a negative number"
             }
@@ -391,9 +389,7 @@ impl Cause {
                 "a support holds it at 0 throughout, unless a phase frees it"
             }
             Self::Tied { .. } => "hold the nodes on both faces too, or leave this one free",
-            Self::Loose { .. } => {
-                "hold a line with [[supports]], or prescribe its displacement"
-            }
+            Self::Loose { .. } => "hold a line with [[supports]], or prescribe its displacement",
             _ => return None,
         };
         Some(hint.to_owned())

@@ -1,11 +1,11 @@
 //! Results beyond what the theory of small strains, or any material, covers. They are computed all
 //! the same, and said.
 
-use crate::problem::{Analysis, Formulation};
 use crate::element::depth;
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::problem::plausible::{LARGE, implausible_stiffness};
+use crate::problem::{Analysis, Formulation};
 use std::collections::HashSet;
 
 /// Share of the bodies' area that may be strained more than that: at a corner such as a pile's toe

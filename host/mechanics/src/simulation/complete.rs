@@ -9,12 +9,7 @@ use std::time::Instant;
 
 impl Simulation {
     /// Takes over a step: the groups that took part in it, and the displacements they know.
-    pub(super) fn accept(
-        &mut self,
-        success: &StepSuccess,
-        phase: &mut UnderWay,
-        lambda: f64,
-    ) {
+    pub(super) fn accept(&mut self, success: &StepSuccess, phase: &mut UnderWay, lambda: f64) {
         let (equations, loads) = (&mut phase.equations, &phase.course.loads);
         for (number, group) in self.groups.iter_mut().enumerate() {
             if equations.system.includes(number) {

@@ -16,7 +16,7 @@ const EQUAL: f64 = 1e-9;
 
 /// Steps in equilibrium.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct History {
+pub(super) struct History {
     /// The latest first.
     steps: VecDeque<Step>,
     /// What the first correction of the latest step that needed one left of the residual, as a
@@ -35,7 +35,7 @@ struct Step {
 
 impl History {
     /// Takes a step over.
-    pub fn add(&mut self, length: f64, success: StepSuccess) {
+    pub(super) fn add(&mut self, length: f64, success: StepSuccess) {
         if let [start, first, ..] = success.iterations.as_slice() {
             let is_plain = first.step_length >= 1.0 && first.viscosity <= 0.0;
             self.contraction = is_plain.then(|| first.residual / start.residual);
@@ -49,7 +49,7 @@ impl History {
     }
 
     /// Length and displacement increments (by place) of the latest step.
-    pub fn latest(&self) -> Option<(f64, &[f64])> {
+    pub(super) fn latest(&self) -> Option<(f64, &[f64])> {
         let step = self.steps.front()?;
         Some((step.length, &step.increment))
     }
@@ -57,7 +57,7 @@ impl History {
     /// What a step of this length probably ends with: the increments extrapolated by the
     /// polynomial that would have predicted the latest ones best, or in proportion to them where
     /// the last steps were not equally long.
-    pub fn guess(&self, length: f64) -> Option<Guess> {
+    pub(super) fn guess(&self, length: f64) -> Option<Guess> {
         let latest = self.steps.front()?;
         let is_equal = |step: &&Step| (step.length - length).abs() <= EQUAL * length;
         let n_equal = self.steps.iter().take_while(is_equal).count();

@@ -1,8 +1,8 @@
 //! Which method `auto` stands for in a phase: it follows from what its laws say of their tangents.
 
-use crate::settings::Method;
 use super::Warning;
 use crate::group::Group;
+use crate::settings::Method;
 use law::Tangent;
 
 /// The method that iterates: what was asked for, or the one that suits the laws.

@@ -1,8 +1,8 @@
 //! A phase: its equations, its loads, and what is out of balance as it begins.
 
-use super::{Simulation, UnderWay, Warning, Watch, PhaseRecord, method};
 use super::history::History;
 use super::state::PhaseCourse;
+use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch, method};
 use crate::assembly::{Bodies, Places, System, fold};
 use crate::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
 use crate::error::Error;
@@ -201,8 +201,7 @@ impl Simulation {
         }
         let force_start = self.force.clone();
         for input in &phase.pressure {
-            self.pressure
-                .insert(input.line.clone(), input.value);
+            self.pressure.insert(input.line.clone(), input.value);
         }
         let mut force_end = vec![0.0; self.displacement.len()];
         for (line, value) in &self.pressure {

@@ -46,12 +46,7 @@ impl Simulation {
     ///
     /// A law that cannot be led through a nil increment is left as it is: it returns the stresses
     /// at the first increment.
-    fn ask_law(
-        &mut self,
-        group: usize,
-        number: usize,
-        watch: &mut dyn Watch,
-    ) -> Result<(), Error> {
+    fn ask_law(&mut self, group: usize, number: usize, watch: &mut dyn Watch) -> Result<(), Error> {
         let phase = &self.problem.phases[number];
         let (name, n) = (phase.name.clone(), phase.increments);
         match self.groups[group].take_over() {

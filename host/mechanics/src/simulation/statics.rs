@@ -11,8 +11,8 @@
 //! iterate makes of it. Of several bodies, each held to its own F, it is √ΣF². The sums are those that
 //! a user sees in the results, plus what is still carried of the forces out of balance at the start.
 
-use crate::problem::Analysis;
 use crate::equilibrium::{Imbalance, ROUND_OFF, STILL_SMALL};
+use crate::problem::Analysis;
 
 /// Forces on a model and what may be left of their sum.
 #[derive(Clone, Debug, Default)]

@@ -3,11 +3,11 @@
 use super::budget::Budget;
 use super::short::Short;
 use super::table::Broken;
-use text::file::open_regular;
 use serde::Serialize;
 use serde_json::Value;
 use std::io::{self, BufRead, BufReader};
 use std::path::Path;
+use text::file::open_regular;
 
 /// Of the first cut-backs there is a table.
 const IN_TABLE: usize = 100;

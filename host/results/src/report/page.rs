@@ -7,7 +7,6 @@ use super::log::Log;
 use super::profile::Profile;
 use super::results::{Ending, History, Run, entries, list, text};
 use super::short::display;
-use text::Error;
 use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
 use serde::Serialize;
@@ -15,6 +14,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use text::Error;
 
 const TEMPLATE: &str = include_str!("page.html");
 /// Looks of a page.

@@ -8,9 +8,9 @@ use super::budget::Budget;
 use super::results::Times;
 use super::short::{Short, thinned};
 use super::table::{Row, Table};
-use text::Error;
 use serde::Serialize;
 use std::path::Path;
+use text::Error;
 
 /// So many times what is shown is kept in memory at most.
 const AHEAD: usize = 4;

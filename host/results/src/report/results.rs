@@ -6,11 +6,11 @@ use super::log::Log;
 use super::profile::Profile;
 use super::short::{Short, extremes, thinned};
 use super::table::Table;
-use text::Error;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use text::Error;
 
 /// A run as its folder shows it.
 #[derive(Debug)]

@@ -1,11 +1,11 @@
 //! Reading the CSV files of a run, whatever has become of them, and however long they are: row by
 //! row, never as a whole.
 
-use text::{Error, Source};
-use text::file::open_regular;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use text::file::open_regular;
+use text::{Error, Source};
 
 /// Of a header that cannot be used, so much is shown.
 const SHOWN: usize = 400;

@@ -1,8 +1,8 @@
 //! The child's side: it says where it is and how it ends, and looks whether it is to stop.
 
 use super::{CALLS, FOLDER, FOLDER_WORDS, Page, WATCHER, word};
-use law::{SharedMemory, calls};
 use law::Stop;
+use law::{SharedMemory, calls};
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use std::fs::File;
 use std::io::{self, Write};

@@ -2,9 +2,9 @@
 //! what it is.
 
 use super::{Page, SIZE, STOPPING, WATCHER, word};
-use law::child::{self, Ending};
 use crate::Error;
 use law::calls::Seen;
+use law::child::{self, Ending};
 use law::{SharedMemory, isolate};
 use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, WaitOptions, kill_process, set_child_subreaper, wait,

@@ -6,12 +6,12 @@ use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
 use super::study::{Measurement, Reference, Row, Study};
 use super::trial::{COUNTS, SOLVER_CHOICES, Scratch, Settings, Trial, repetitions, trial};
-use input::Case;
-use mechanics::problem::{Formulation, Integration};
 use crate::Error;
-use law::BuiltLaw;
 use crate::run::begin;
+use input::Case;
+use law::BuiltLaw;
 use mechanics::equilibrium::Reuse;
+use mechanics::problem::{Formulation, Integration};
 
 /// Factors of the increments.
 const FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];

@@ -1,8 +1,8 @@
 //! The work–precision diagram: error over cost, both logarithmic, as SVG.
 
 use super::study::{Measurement, Row, Study};
-use results::figure::COLOURS;
 use plotters::prelude::*;
+use results::figure::COLOURS;
 
 /// Size of the diagram in points, and of the legend beside it.
 const SIZE: (u32, u32) = (620, 440);

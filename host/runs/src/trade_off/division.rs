@@ -1,10 +1,10 @@
 //! Finer meshes of the same case.
 
-use input::{Case, grid};
-use mechanics::problem::Formulation;
-use input::case::{Axis, PartInput};
 use crate::Error;
+use input::case::{Axis, PartInput};
+use input::{Case, grid};
 use mechanics::mesh::{Mesh, Solid};
+use mechanics::problem::Formulation;
 use toml::Spanned;
 
 /// Divides columns and rows by a whole number, so that the lines of the given mesh stay. Parts
@@ -69,8 +69,8 @@ fn extent(mesh: &Mesh, quad: &Solid) -> [[f64; 2]; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use text::{Source, parse};
     use approx::assert_relative_eq;
+    use text::{Source, parse};
 
     /// A layer of 0.1 m between a graded and an even part.
     const CASE: &str = r#"
@@ -87,11 +87,11 @@ increments = 1
 "#;
 
     fn xs(case: &Case) -> Vec<f64> {
-        let mesh = Mesh::build(&case.source, &case.file).unwrap();
+        let mesh = grid::build(&case.source, &case.file).unwrap();
         let mut xs: Vec<f64> = mesh
-            .quads
+            .solids
             .iter()
-            .flat_map(|quad| extent(&mesh, quad).map(|corner| corner[0]))
+            .flat_map(|solid| extent(&mesh, solid).map(|corner| corner[0]))
             .collect();
         xs.sort_by(f64::total_cmp);
         xs.dedup_by(|a, b| (*a - *b).abs() < 1e-12);

@@ -11,19 +11,19 @@ use super::sampled::Sampled;
 use super::scheme::{Values, short};
 use super::trial::{Scratch, Settings, measure};
 use super::write;
-use mechanics::Simulation;
-use mechanics::equilibrium::Reuse;
-use input::Case;
-use mechanics::problem::Formulation;
-use results::wanted::{Output, When};
 use crate::Error;
-use mechanics::group::Group;
+use crate::run::begin;
+use input::Case;
 use input::material::ParameterValue;
 use law::BuiltLaw;
-use mechanics::mesh::Joint;
-use crate::run::begin;
-use law::{End, Law, Moment, Operator, Start, Strided};
 use law::Stop;
+use law::{End, Law, Moment, Operator, Start, Strided};
+use mechanics::Simulation;
+use mechanics::equilibrium::Reuse;
+use mechanics::group::Group;
+use mechanics::mesh::Joint;
+use mechanics::problem::Formulation;
+use results::wanted::{Output, When};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -113,7 +113,12 @@ impl<'a> Interface<'a> {
             .rfind(|(swapped, _)| *swapped == number)
             .map_or(&group.law, |(_, law)| law);
         let parameters = stiffness_parameters(&law.built)?;
-        let joints = model.problem().mesh.joints.iter().filter(|j| j.group == number);
+        let joints = model
+            .problem()
+            .mesh
+            .joints
+            .iter()
+            .filter(|j| j.group == number);
         let mut logarithms = [0.0; 3];
         let mut n = 0.0;
         for joint in joints {
@@ -405,7 +410,8 @@ fn softer_side(model: &Simulation, joint: &Joint) -> Option<[f64; 3]> {
         if operator.len() != 16 {
             return None;
         }
-        let [from, to] = [0, 2].map(|corner| model.problem().mesh.nodes[quad.corners()[corner]][across]);
+        let [from, to] =
+            [0, 2].map(|corner| model.problem().mesh.nodes[quad.corners()[corner]][across]);
         let size = (to - from).abs();
         Some([operator[5 * across] / size, operator[15] / size, size])
     };

@@ -1,9 +1,9 @@
 //! A study as a table: on a terminal, and as comma-separated values.
 
 use super::study::{Row, Study};
-use text::write::begin;
 use std::fmt::Write as _;
 use std::path::Path;
+use text::write::begin;
 
 impl Study {
     /// The table for a terminal, with what it says.

@@ -3,10 +3,10 @@
 use super::random::Random;
 use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses};
 use super::{Check, Family, Found, Subject, Verdict, failed, refusal, status_name};
-use law::LoadedLaw;
-use law::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME};
 use abi::raw;
 use abi::status::{Outcome, most_severe};
+use law::LoadedLaw;
+use law::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {

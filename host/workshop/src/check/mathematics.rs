@@ -3,9 +3,9 @@
 use super::random::Random;
 use super::specimen::{Specimen, Step, create_form, hypotheses, is_success};
 use super::{Check, Family, Found, Subject, Verdict, skipped};
-use law::probe::{Form, PointEnd, PointStart};
 use abi::Hypothesis;
 use abi::raw;
+use law::probe::{Form, PointEnd, PointStart};
 use nalgebra::{DMatrix, DVector};
 
 const NEEDS: &[&str] = &["repeatable", "results-are-finite", "writes-stay-inside"];

@@ -3,8 +3,8 @@
 use super::random::Random;
 use super::specimen::{is_finite, is_success};
 use super::{Check, Family, Found, Subject, failed, skipped};
-use law::probe::{CAN_TRAP, Fence, Form, Order};
 use abi::raw;
+use law::probe::{CAN_TRAP, Fence, Form, Order};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {

@@ -3,8 +3,8 @@
 use super::random::Random;
 use super::specimen::{Specimen, create_form, first_difference};
 use super::{Check, Family, Found, Subject, Verdict, skipped};
-use law::probe::{Form, Order, PointEnd, PointStart};
 use abi::raw;
+use law::probe::{Form, Order, PointEnd, PointStart};
 use std::hint::black_box;
 
 pub(super) const CHECKS: &[Check] = &[

@@ -3,9 +3,9 @@
 use super::random::Random;
 use super::specimen::{first_difference, is_finite, is_success};
 use super::{Check, Family, Found, Subject, status_name};
-use law::probe::PointStart;
 use abi::raw;
 use abi::status::Outcome;
+use law::probe::PointStart;
 
 pub(super) const CHECKS: &[Check] = &[
     Check {

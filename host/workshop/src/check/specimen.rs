@@ -2,11 +2,11 @@
 
 use super::random::Random;
 use super::{Found, Subject, Verdict, failed, refusal, skipped};
-use text::suggestion;
-use law::probe::{Answer, CreateForm, Form, NO_OUTCOME, PointEnd, PointStart, Probe};
-use law::{FormulationDescription, LoadedLaw, ParameterDescription};
 use abi::Hypothesis;
 use abi::raw;
+use law::probe::{Answer, CreateForm, Form, NO_OUTCOME, PointEnd, PointStart, Probe};
+use law::{FormulationDescription, LoadedLaw, ParameterDescription};
+use text::suggestion;
 
 /// Draws of parameters until a law must have accepted one.
 const MOST_DRAWS: usize = 500;

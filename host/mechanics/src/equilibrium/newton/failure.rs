@@ -321,16 +321,10 @@ impl fmt::Display for Reason {
             ),
             Self::PathEnds => write!(f, "the path ends here"),
             Self::NothingDeforms { any_more: false } => {
-                write!(
-                    f,
-                    "no non-linear group deforms: there is no path to follow"
-                )
+                write!(f, "no non-linear group deforms: there is no path to follow")
             }
             Self::NothingDeforms { any_more: true } => {
-                write!(
-                    f,
-                    "no non-linear group deforms any more: the path ends"
-                )
+                write!(f, "no non-linear group deforms any more: the path ends")
             }
             Self::Leap(times) => write!(
                 f,

@@ -10,8 +10,8 @@ use super::failure::{Runaway, Singularity};
 use super::{Newton, Task};
 use crate::assembly::norms;
 use crate::group::Group;
-use law::Operator;
 use algebra::LinearSolver;
+use law::Operator;
 
 /// What is known of it in the present step; by body.
 #[derive(Debug, Default)]

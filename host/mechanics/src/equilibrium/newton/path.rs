@@ -14,8 +14,8 @@
 
 use super::{Iteration, Iterations, Loads, Newton, Reason, StepFailure, StepSuccess, Task};
 use crate::assembly::Places;
-use crate::problem::Formulation;
 use crate::group::Group;
+use crate::problem::Formulation;
 
 /// Lengths of a correction that are tried, in order.
 const STEP_LENGTHS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
