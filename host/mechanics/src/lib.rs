@@ -52,7 +52,7 @@
 //!     ElementGroup::new("ground", Formulation::Solid, elastic("sand", 5e4)?),
 //! ];
 //! for group in &mut problem.groups {
-//!     group.initial_stress = Some([-100.0, -100.0, -100.0, 0.0]);
+//!     group.initial_stress = Some([-100.0, 0.0, -100.0, 0.0]);
 //! }
 //! let held = |line: &str, fixed| Support { line: line.to_owned(), fixed };
 //! problem.supports = vec![held("axis", vec![Axis::X]), held("outside", vec![Axis::X, Axis::Y])];

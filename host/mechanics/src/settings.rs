@@ -7,6 +7,7 @@ use std::fmt::Debug;
 /// Solver settings.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "SolverInput")]
 pub struct Settings {
     /// Which matrix the iterations use.
     pub method: Method,

@@ -78,6 +78,7 @@ pub enum Reduce {
 /// What is written.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "OutputInput")]
 pub struct Output {
     /// When the profile along interfaces is written.
     pub profile: When,

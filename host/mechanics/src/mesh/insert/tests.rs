@@ -113,10 +113,7 @@ impl Grid {
         let mut owners: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (number, element) in split.elements.iter().enumerate() {
             for [_, _, middle] in element.edges() {
-                owners
-                    .entry(element.nodes()[middle])
-                    .or_default()
-                    .push(number);
+                owners.entry(middle).or_default().push(number);
             }
         }
         let declared = interfaces.iter().flat_map(|interface| &interface.edges);
@@ -389,7 +386,7 @@ fn any_edges_can_be_cut() {
         let mut owners: BTreeMap<usize, usize> = BTreeMap::new();
         for element in &grid.elements {
             for [_, _, middle] in element.edges() {
-                *owners.entry(element.nodes()[middle]).or_default() += 1;
+                *owners.entry(middle).or_default() += 1;
             }
         }
         let all = grid.middles.iter().map(|(&(a, b), &middle)| [a, b, middle]);
