@@ -9,22 +9,13 @@ use divan::counter::ItemsCount;
 use input::Case;
 use input::case::Axis;
 use law::Operator;
-use mechanics::Model;
-use mechanics::Place;
-use mechanics::Settings;
-use mechanics::assembly::Places;
-use mechanics::assembly::System;
-use mechanics::equilibrium::Costs;
-use mechanics::equilibrium::LinearDomain;
-use mechanics::equilibrium::Loads;
-use mechanics::equilibrium::Matrix;
-use mechanics::equilibrium::Newton;
+use mechanics::assembly::{Places, System};
+use mechanics::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton};
 use mechanics::group::Group;
-use runs::run::Observer;
-use runs::run::run;
+use mechanics::{Mesh, Model, Place, Settings};
+use runs::run::{Observer, run};
 use std::path::Path;
-use text::Source;
-use text::parse;
+use text::{Source, parse};
 
 fn main() {
     divan::main();
@@ -39,12 +30,12 @@ fn case(name: &str, variant: Option<&str>) -> Case {
 }
 
 /// Of every degree of freedom, whether it is held or the head's push prescribes it.
-fn prescribed(case: &Case, model: &Model) -> Vec<bool> {
-    let mut prescribed = vec![false; 2 * model.mesh.nodes.len()];
+fn prescribed(case: &Case, mesh: &Mesh) -> Vec<bool> {
+    let mut prescribed = vec![false; 2 * mesh.nodes.len()];
     let supports = case.file.supports.iter();
     let supports = supports.map(|s| (s.line.get_ref().as_str(), s.fixed.as_slice()));
     for (line, fixed) in supports.chain([("pile_head", &[Axis::Y][..])]) {
-        for node in &model.mesh.lines[line].nodes {
+        for node in &mesh.lines[line].nodes {
             for axis in fixed {
                 prescribed[2 * node + usize::from(*axis == Axis::Y)] = true;
             }
@@ -64,8 +55,9 @@ struct Equations {
 impl Equations {
     fn new(mesh: &str) -> Self {
         let case = case("bonded_pile", Some(mesh));
-        let mut model = Model::build(&case).expect("the laws are built");
-        let prescribed = prescribed(&case, &model);
+        let problem = case.pose().expect("the laws are built").problem;
+        let mut model = Model::build(&problem).expect("the laws start");
+        let prescribed = prescribed(&case, &problem.mesh);
         let still = vec![0.0; prescribed.len()];
         for group in &mut model.groups {
             let evaluated = group.evaluate(&still, Operator::Consistent, 0.0, 1.0);
@@ -73,7 +65,7 @@ impl Equations {
         }
         let system = System::new(&model.groups, |_| true, &prescribed, &model.ties, None);
         Self {
-            lines: system.lines(&mesh_lines(&model.mesh.nodes)),
+            lines: system.lines(&mesh_lines(&problem.mesh.nodes)),
             groups: model.groups,
             system,
         }
@@ -169,18 +161,21 @@ fn stressed_chamber() -> Case {
 
 /// The chamber's equations, the head pushed by 0.1 mm.
 struct Chamber {
+    mesh: Mesh,
     model: Model,
     prescribed: Vec<bool>,
     loads: Loads,
-    settings: SolverInput,
+    settings: Settings,
 }
 
 impl Chamber {
     fn new() -> Self {
         let case = stressed_chamber();
-        let model = Model::build(&case).expect("the laws are built");
-        let prescribed = prescribed(&case, &model);
-        let head = &model.mesh.lines["pile_head"].nodes;
+        let problem = case.pose().expect("the laws are built").problem;
+        let model = Model::build(&problem).expect("the laws start");
+        let mesh = problem.mesh;
+        let prescribed = prescribed(&case, &mesh);
+        let head = &mesh.lines["pile_head"].nodes;
         let n_dofs = prescribed.len();
         let mut forces = vec![0.0; n_dofs];
         for group in &model.groups {
@@ -201,6 +196,7 @@ impl Chamber {
             largest: vec![0.0; n_dofs],
         };
         Self {
+            mesh,
             model,
             prescribed,
             loads,
@@ -209,10 +205,8 @@ impl Chamber {
     }
 
     fn condense(&self) -> (LinearDomain, System) {
-        let Model {
-            mesh, groups, ties, ..
-        } = &self.model;
-        let lines = mesh_lines(&mesh.nodes);
+        let Model { groups, ties, .. } = &self.model;
+        let lines = mesh_lines(&self.mesh.nodes);
         let condensed = LinearDomain::new(groups, &self.prescribed, ties, &lines, true, None);
         condensed.expect("supported").expect("linear groups")
     }

@@ -5,13 +5,7 @@
 //! `peers/mfront.c` gives to MFront's laws, from the same random numbers.
 
 use abi::Hypothesis;
-use law::End;
-use law::Law;
-use law::Moment;
-use law::Operator;
-use law::SearchPath;
-use law::Start;
-use law::Strided;
+use law::{End, Law, Moment, Operator, SearchPath, Start, Strided};
 use std::hint::black_box;
 
 /// Soil of the comparison: E, ν, c in kPa, φ, ψ in degrees.

@@ -5,9 +5,8 @@
 //! Asserts   ultimate shear stress, monotony, plateaus; the zero-thickness element against a closed
 //!           form; the layer with mean strains against the law at one point; the causes one by one
 
-use input::Case;
-use input::Driver;
 use input::case::CaseFile;
+use input::{Case, Driver};
 use mechanics::problem::Integration;
 use runs::run::run;
 use std::path::Path;

@@ -1,7 +1,6 @@
 //! Variants of the cases in `cases/`, each run once for all tests.
 
-use input::Case;
-use input::Error;
+use input::{Case, Error};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::{Arc, LazyLock, Mutex, OnceLock};

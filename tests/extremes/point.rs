@@ -3,14 +3,7 @@
 use crate::matrix::Verdict;
 use abi::Hypothesis;
 use abi::status::Outcome;
-use law::BatchFailure;
-use law::End;
-use law::Law;
-use law::LoadedLaw;
-use law::Operator;
-use law::SearchPath;
-use law::Start;
-use law::Strided;
+use law::{BatchFailure, End, Law, LoadedLaw, Operator, SearchPath, Start, Strided};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 

@@ -22,8 +22,7 @@ use crate::mepi_paths::{FONTAINEBLEAU, SILICA, TABLE_4, extremes};
 use crate::mepi_step::{Constants, Mepi};
 use crate::point::{Point, law, reason};
 use abi::Hypothesis;
-use input::Driver;
-use input::Error;
+use input::{Driver, Error};
 use text::Source;
 
 /// ξ, σ_n, τ at a slip.

@@ -7,8 +7,7 @@
 //! ```
 #![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
 
-use input::Case;
-use input::Kind;
+use input::{Case, Kind};
 use results::Figures;
 use runs::point::run_file_variants;
 use std::collections::{BTreeMap, BTreeSet};

@@ -10,8 +10,7 @@
 use crate::setup::Results as _;
 use input::Case;
 use mechanics::equilibrium::Reuse;
-use runs::run::Options;
-use runs::run::run_reusing;
+use runs::run::{Options, run_reusing};
 use serde_json::Value;
 use std::path::Path;
 use tests::case::{Silent, table};

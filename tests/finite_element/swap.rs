@@ -24,22 +24,18 @@
 
 use crate::setup::{Finished, Results, assert_close, elastic, run};
 use crate::sliding_block::{self, Kind, PRESS, coulomb, hold_top, slide};
-use input::Case;
-use input::Error;
 use input::case::CaseFile;
+use input::{Case, Error};
 use law::Stop;
 use mechanics::Place;
 use mechanics::equilibrium::Reuse;
-use runs::run::Observer;
-use runs::run::Options;
-use runs::run::run_reusing;
+use runs::run::{Observer, Options, run_reusing};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tests::tolerance::EQUILIBRIUM;
-use text::Source;
-use text::parse;
+use text::{Source, parse};
 
 const P: f64 = 80.0;
 const YOUNG: f64 = 1e4;

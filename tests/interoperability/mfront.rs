@@ -3,10 +3,8 @@
 
 use crate::{BondedPile, OPENGEOSYS, assert_close, installed, is_there, library};
 use input::Driver;
-use law::Bounds;
-use law::Library;
-use law::adapter::Adapter;
-use law::adapter::Foreign;
+use law::adapter::{Adapter, Foreign};
+use law::{Bounds, Library};
 use runs::point::PointReport;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,7 +1,6 @@
 //! Running a driver given as a text, and reading its rows by column.
 
-use input::Driver;
-use input::Error;
+use input::{Driver, Error};
 use runs::point::PointReport;
 use std::path::Path;
 use text::Source;

@@ -6,8 +6,7 @@
 //! Asserts     exit code, key facts of the message, the underlined text
 
 use crate::driver::attempt;
-use input::Driver;
-use input::Error;
+use input::{Driver, Error};
 use text::Source;
 
 const SOLID: &str = "law = 'elastic'\nhypothesis = 'plane_strain'\n[parameters]\n\

@@ -1,15 +1,12 @@
 //! Running a case and reading its results.
 
-use input::Case;
-use input::Error;
 use input::case::CaseFile;
+use input::{Case, Error};
 use mechanics::Place;
-use runs::run::Observer;
-use runs::run::run;
+use runs::run::{Observer, run};
 use std::collections::BTreeMap;
 use std::path::Path;
-use text::Source;
-use text::parse;
+use text::{Source, parse};
 
 /// An observer that only keeps warnings and counts cut-backs.
 #[derive(Clone, Debug, Default)]

@@ -9,8 +9,7 @@
 //! Costs differ from run to run and are never compared.
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
-use runs::trade_off::Options;
-use runs::trade_off::run;
+use runs::trade_off::{Options, run};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

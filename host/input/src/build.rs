@@ -210,13 +210,13 @@ impl Case {
                 };
                 span.or_else(|| Some(name.span()))
             }),
-            Item::LawOf { group: of, phase } => group(*of).and_then(|(name, group)| {
+            Item::LawOf { group: of, phase } => group(*of).map(|(name, group)| {
                 let swap = || {
                     let laws = &file.phases.get((*phase)?)?.laws;
                     laws.iter().find(|(key, _)| *key == name)
                 };
                 let own = || group.get_ref().law.span();
-                Some(swap().map_or_else(own, |(_, law)| law.span()))
+                swap().map_or_else(own, |(_, law)| law.span())
             }),
             Item::Material(name) => {
                 let mut laws = file.laws.keys();

@@ -159,12 +159,11 @@ impl Error {
         match self {
             Self::Text(text::Error::Internal(_)) => Kind::Internal,
             Self::Text(_) => Kind::Input,
-            Self::Law(_) => Kind::Library,
             Self::CallFails {
                 cannot_follow: true,
                 ..
             } => Kind::NoEquilibrium,
-            Self::CallFails { .. } => Kind::Library,
+            Self::Law(_) | Self::CallFails { .. } => Kind::Library,
             Self::Stopped(_) | Self::StoppedAtOnce { .. } => Kind::Stopped,
             Self::Point(error) => match &**error {
                 point::Error::Misuse { .. } | point::Error::InitialState { .. } => Kind::Input,

@@ -206,6 +206,9 @@ impl Capsule {
     }
 
     /// Takes the text of a capsule.
+    ///
+    /// # Errors
+    /// At the place that does not fit.
     pub fn of_source(source: Source) -> Result<Self, Error> {
         let mut capsule: Self =
             toml::from_str(source.text()).map_err(|why| toml_error(&source, &why))?;
@@ -453,6 +456,9 @@ impl Capsule {
     }
 
     /// The call, with its values in the order of this law.
+    ///
+    /// # Errors
+    /// A name that the law does not know, or that is missing.
     pub fn point_call(&self, law: &Law) -> Result<PointCall, Error> {
         let request = self.request().ok_or_else(|| {
             let message = format!("there is no request `{}`", self.call.request);

@@ -94,6 +94,9 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
 }
 
 /// As [`inspect`], with the bytes of the file.
+///
+/// # Errors
+/// It is no library.
 pub fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<Inspection, Error> {
     let no_library =
         |why: &dyn fmt::Display| Error::library(format!("{} is no library: {why}", path.display()));

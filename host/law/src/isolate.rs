@@ -396,6 +396,9 @@ fn receive<T: for<'de> Deserialize<'de>>(socket: &mut impl Read) -> io::Result<T
 
 /// A file in memory.
 #[cfg(target_os = "linux")]
+///
+/// # Errors
+/// That of the system.
 pub fn memory_file() -> io::Result<File> {
     use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, memfd_create};
     let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
@@ -406,6 +409,9 @@ pub fn memory_file() -> io::Result<File> {
 
 /// A file whose name is gone.
 #[cfg(not(target_os = "linux"))]
+///
+/// # Errors
+/// That of the system.
 pub fn memory_file() -> io::Result<File> {
     use std::sync::atomic::{AtomicU32, Ordering};
     static NUMBER: AtomicU32 = AtomicU32::new(0);

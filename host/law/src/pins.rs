@@ -65,6 +65,9 @@ impl Pins {
     }
 
     /// As [`Pins::of`], without the lock.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] for what is no SHA-256.
     pub fn given<'a>(
         source: &Source,
         laws: impl Iterator<Item = (&'a Spanned<String>, Option<&'a Spanned<String>>)>,
@@ -89,6 +92,9 @@ impl Pins {
     }
 
     /// Reads a lock alone: the number of laws in it.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] at the place that does not fit.
     pub fn of_lock(source: &Source) -> Result<usize, Error> {
         let mut pins = Self::default();
         pins.take_lock(source)?;

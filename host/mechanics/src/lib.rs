@@ -8,7 +8,7 @@
 //! [`element`]s of them; [`assembly`] and [`equilibrium`]; [`simulation`].
 //!
 //! A slice of a pile, 0.2 m high, in elastic ground behind a thin layer of Coulomb's friction: the
-//! ground presses on it, and it is pushed down by a millimetre.
+//! ground presses on it, and it is pushed down by a centimetre.
 //!
 //! ```
 //! use law::{Hypothesis, SearchPath};
@@ -57,7 +57,7 @@
 //! let held = |line: &str, fixed| Support { line: line.to_owned(), fixed };
 //! problem.supports = vec![held("axis", vec![Axis::X]), held("outside", vec![Axis::X, Axis::Y])];
 //! let mut push = Phase::new("push", 10);
-//! push.displacement = vec![Displacement { line: "head".to_owned(), x: None, y: Some(-1e-3) }];
+//! push.displacement = vec![Displacement { line: "head".to_owned(), x: None, y: Some(-1e-2) }];
 //! problem.phases = vec![push];
 //!
 //! let mut simulation = Simulation::new(problem)?;

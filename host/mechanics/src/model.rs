@@ -82,21 +82,17 @@ impl Model {
             for (phase, input) in problem.phases.iter().enumerate() {
                 let swap = input.materials.iter().find(|(of, _)| *of == number);
                 let Some((_, material)) = swap else { continue };
-                let phase_item = Some(phase);
-                check_law(problem, number, group, material, phase_item)?;
+                check_law(problem, number, group, material, Some(phase))?;
                 if phase == 0 {
                     own = Some(material.clone());
                 } else {
                     swaps[phase].push((number, material.clone()));
                 }
             }
-            first.push(match own {
-                Some(material) => material,
-                None => {
-                    check_law(problem, number, group, &group.material, None)?;
-                    group.material.clone()
-                }
-            });
+            if own.is_none() {
+                check_law(problem, number, group, &group.material, None)?;
+            }
+            first.push(own.unwrap_or_else(|| group.material.clone()));
         }
         let surroundings = Surroundings::new(problem);
         let mut groups = Vec::new();

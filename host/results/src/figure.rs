@@ -126,7 +126,6 @@ impl Figures {
                 continue;
             };
             for y in &figure.y {
-                let y = y;
                 curves.push(Curve {
                     name: format!("{y}, {phase} {increment}"),
                     points: cut_points(cut, [&figure.x, y], groups),

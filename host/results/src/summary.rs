@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// Name of a group's own law, and phases with the laws that they give it.
+pub type LawsOfGroup = (String, Vec<(String, String)>);
+
 /// What the record says of a run beside what the simulation knows.
 #[derive(Clone, Debug, Default)]
 pub struct About {
@@ -26,7 +29,7 @@ pub struct About {
     /// Those files: path and text, the case itself last.
     pub files: Vec<(String, String)>,
     /// Of every group the name of its law, and those of the laws that phases give it, by phase.
-    pub laws_of_groups: Vec<(String, Vec<(String, String)>)>,
+    pub laws_of_groups: Vec<LawsOfGroup>,
     /// All laws used, by name and hypothesis.
     pub laws: IndexMap<(String, &'static str), Arc<BuiltLaw>>,
     /// Units of the probes, where factors leave no doubt.
@@ -308,7 +311,7 @@ fn law_calls(groups: &[Group]) -> Value {
 /// Groups in the order of the problem, which is that of the numbers in the fields.
 fn groups(about: &About, simulation: &Simulation) -> Value {
     let groups = simulation.groups().iter().zip(&about.laws_of_groups);
-    let describe = |(group, (law, from_phase)): (&Group, &(String, Vec<(String, String)>))| {
+    let describe = |(group, (law, from_phase)): (&Group, &LawsOfGroup)| {
         let swaps = from_phase.iter();
         let swaps: Map<String, Value> = swaps
             .map(|(phase, law)| (phase.clone(), json!(law)))

@@ -381,7 +381,7 @@ fn follow(
         Err(NoMore::Unwritable(source)) => Err(Ended::Unwritable(source)),
         Err(NoMore::Point(error)) => {
             let error = with_capsule(driver, error, name).map_err(Ended::Failed)?;
-            Err(Ended::Failed(driver.located(error).into()))
+            Err(Ended::Failed(driver.located(error)))
         }
     }
 }

@@ -127,7 +127,9 @@ pub fn run_reusing(
         let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
         let mut all: Vec<String> = of_laws.chain(simulation.warnings().to_vec()).collect();
         all.extend(case.warnings(&simulation));
-        all.iter().for_each(|warning| observer.warning(warning));
+        for warning in &all {
+            observer.warning(warning);
+        }
         warnings.extend(all);
         Recorder::create(folder, wanted, &about, &simulation)?
     };
@@ -377,11 +379,12 @@ fn explained(
         Err(_) => None,
     };
     match (error, follower.fault.take(), kept) {
-        (mechanics::Error::Halted, Some(Fault::File(error)), _) => error.into(),
         (mechanics::Error::Halted, Some(Fault::Overflow { probe, place }), _) => {
             probes::overflow(case, &probe, &place)
         }
-        (_, _, Err(error)) => error.into(),
+        (mechanics::Error::Halted, Some(Fault::File(error)), _) | (_, _, Err(error)) => {
+            error.into()
+        }
         (error, _, Ok(_)) => {
             let error = case.place(error);
             match hint {

@@ -32,6 +32,9 @@ pub struct OtherKind {
 }
 
 /// As [`read`]; a file of the other kind is called so instead of the first key that does not fit.
+///
+/// # Errors
+/// [`Error::Input`] at the place that does not fit; [`Error::Unreadable`].
 pub fn read_kind<T: DeserializeOwned>(
     source: Source,
     other: &OtherKind,
@@ -66,6 +69,9 @@ pub fn read_kind<T: DeserializeOwned>(
 }
 
 /// Reads a file with what it is based on.
+///
+/// # Errors
+/// [`Error::Input`] at the place that does not fit; [`Error::Unreadable`].
 pub fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Variants<T>), Error> {
     let source = with_bases(source, LONGEST_CHAIN)?;
     // Blank lines instead of the files before each one keep spans counting from the start.

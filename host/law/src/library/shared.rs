@@ -59,6 +59,11 @@ impl SharedMemory {
         self.map.len() / size_of::<u64>()
     }
 
+    /// Whether there is no word.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// Makes room for so many words.
     ///
     /// # Errors

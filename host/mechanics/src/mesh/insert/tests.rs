@@ -151,10 +151,9 @@ impl Grid {
             .collect();
         let mut joined: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();
         for (new, old) in split.elements.iter().zip(&self.elements) {
-            for [a, b, middle] in new.edges() {
-                let [p, q] = [a, b].map(|i| new.nodes()[i]);
-                let edge = [p.min(q), p.max(q), new.nodes()[middle]];
-                joined.entry(old.nodes()[middle]).or_default().push(edge);
+            for ([p, q, middle], [_, _, before]) in new.edges().zip(old.edges()) {
+                let edge = [p.min(q), p.max(q), middle];
+                joined.entry(before).or_default().push(edge);
             }
         }
         for (middle, edges) in joined {

@@ -1,0 +1,269 @@
+//! Simulations posed in memory: states that are gone on from twice, simulations beside each other, and
+//! meshes that no grid has.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::float_cmp,
+    reason = "tests panic to fail; equal bits are meant"
+)]
+
+use law::{Hypothesis, SearchPath};
+use mechanics::mesh::{Along, Solid};
+use mechanics::problem::{
+    Analysis, Axis, Displacement, ElementGroup, Formulation, Phase, Pressure, Support,
+};
+use mechanics::{Error, Material, Mesh, Problem, Simulation};
+
+const E: f64 = 1e4;
+const NU: f64 = 0.25;
+
+/// A law of this workspace with its values.
+fn material(id: &str, hypothesis: Hypothesis, values: &[(&str, f64)]) -> Material {
+    let target = std::env::current_exe().unwrap();
+    let deps = target.parent().unwrap().to_owned();
+    let search = SearchPath::new(&[deps.clone(), deps.parent().unwrap().to_owned()]);
+    let values: Vec<_> = values.iter().map(|&(id, v)| (id, v.into())).collect();
+    let law = search.law(id).unwrap().with(hypothesis, &values).unwrap();
+    Material::new(id, law)
+}
+
+fn elastic(hypothesis: Hypothesis) -> Material {
+    let values = [("young_modulus", E), ("poisson_ratio", NU)];
+    material("elastic", hypothesis, &values)
+}
+
+fn joint(friction_angle: f64) -> Material {
+    let values = [
+        ("normal_stiffness", 1e7),
+        ("shear_stiffness", 1e6),
+        ("cohesion", 0.0),
+        ("friction_angle", friction_angle),
+        ("dilatancy_angle", 0.0),
+    ];
+    material("coulomb_joint", Hypothesis::Interface2d, &values)
+}
+
+fn held(line: &str, fixed: &[Axis]) -> Support {
+    Support {
+        line: line.to_owned(),
+        fixed: fixed.to_vec(),
+    }
+}
+
+fn moved(line: &str, x: Option<f64>, y: Option<f64>) -> Displacement {
+    let line = line.to_owned();
+    Displacement { line, x, y }
+}
+
+/// Names the four sides of a rectangle with its lower left corner at the origin.
+fn name_sides(mesh: &mut Mesh, [width, height]: [f64; 2]) {
+    let sides = [
+        ("left", 0, 0.0),
+        ("right", 0, width),
+        ("bottom", 1, 0.0),
+        ("top", 1, height),
+    ];
+    for (name, c, at) in sides {
+        mesh.name_line(name, |edge| {
+            edge.iter().all(|node| (node[c] - at).abs() < 1e-12)
+        });
+    }
+}
+
+/// Quads of a grid, each cut into two triangles along one diagonal or the other.
+fn triangles(mut mesh: Mesh) -> Mesh {
+    let quads = std::mem::take(&mut mesh.solids);
+    for (number, quad) in quads.iter().enumerate() {
+        let [a, b, c, d, ab, bc, cd, da] = quad.nodes().try_into().unwrap();
+        let (first, second) = if number % 2 == 0 { (a, c) } else { (b, d) };
+        let middle = mesh.nodes.len();
+        let ends = [first, second].map(|node| mesh.nodes[node]);
+        mesh.nodes
+            .push([0, 1].map(|i| f64::midpoint(ends[0][i], ends[1][i])));
+        let halves = if number % 2 == 0 {
+            [[a, b, c, ab, bc, middle], [a, c, d, middle, cd, da]]
+        } else {
+            [[a, b, d, ab, middle, da], [b, c, d, bc, cd, middle]]
+        };
+        let group = quad.group;
+        mesh.solids
+            .extend(halves.map(|nodes| Solid::triangle(nodes, group)));
+    }
+    mesh
+}
+
+/// A block that slides on another under a pressure: top loaded, then pushed sideways.
+fn sliding(mesh: fn(Mesh) -> Mesh, friction_angle: f64) -> Problem {
+    let grid = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 0.5, 1.0], |_, row| row);
+    let mut mesh = mesh(grid);
+    name_sides(&mut mesh, [1.0, 1.0]);
+    mesh.name_line("joint", |edge| edge.iter().all(|node| node[1] == 0.5));
+    mesh.insert_joints(&[Along {
+        line: "joint".to_owned(),
+        group: 2,
+        opens_ends: true,
+    }])
+    .unwrap();
+    let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
+    let solid =
+        |name: &str| ElementGroup::new(name, Formulation::Solid, elastic(Hypothesis::PlaneStrain));
+    problem.groups = vec![
+        solid("lower"),
+        solid("upper"),
+        ElementGroup::new("joint", Formulation::ZeroThickness, joint(friction_angle)),
+    ];
+    problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
+    let mut press = Phase::new("press", 2);
+    press.pressure = vec![Pressure {
+        line: "top".to_owned(),
+        value: 100.0,
+    }];
+    press.displacement = vec![moved("top", Some(0.0), None)];
+    let mut push = Phase::new("push", 8);
+    push.displacement = vec![moved("top", Some(0.1), None)];
+    problem.phases = vec![press, push];
+    problem
+}
+
+/// Reactions of the top, increment by increment.
+fn curve(simulation: &mut Simulation) -> Vec<f64> {
+    let mut curve = Vec::new();
+    while simulation.step().unwrap().is_some() {
+        curve.push(simulation.reaction_of("top").unwrap()[0]);
+    }
+    curve
+}
+
+/// Sliding takes N tan φ, N = 100 kPa over 1 m, whatever the elements are.
+#[test]
+fn a_block_slides_at_its_friction() {
+    for mesh in [|mesh| mesh, triangles as fn(Mesh) -> Mesh] {
+        let mut simulation = Simulation::new(sliding(mesh, 30.0)).unwrap();
+        let last = *curve(&mut simulation).last().unwrap();
+        let expected = 100.0 * 30f64.to_radians().tan();
+        assert!((last - expected).abs() < 1e-6 * expected, "{last}");
+    }
+}
+
+/// Uniaxial strain of an elastic column of triangles: σ = M ε to round-off, since a linear field is in
+/// their space.
+#[test]
+fn triangles_carry_a_linear_field_exactly() {
+    let ring = |analysis| {
+        let mut mesh = triangles(Mesh::grid(&[0.0, 0.3, 1.0], &[0.0, 0.8, 2.0], |_, _| 0));
+        name_sides(&mut mesh, [1.0, 2.0]);
+        let mut problem = Problem::new(analysis, mesh);
+        let hypothesis = match analysis {
+            Analysis::PlaneStrain => Hypothesis::PlaneStrain,
+            Analysis::Axisymmetric => Hypothesis::Axisymmetric,
+        };
+        problem.groups = vec![ElementGroup::new(
+            "soil",
+            Formulation::Solid,
+            elastic(hypothesis),
+        )];
+        problem.supports = vec![
+            held("left", &[Axis::X]),
+            held("right", &[Axis::X]),
+            held("bottom", &[Axis::Y]),
+        ];
+        let mut press = Phase::new("press", 1);
+        press.displacement = vec![moved("top", None, Some(-0.02))];
+        problem.phases = vec![press];
+        let mut simulation = Simulation::new(problem).unwrap();
+        simulation.run(&mut ()).unwrap();
+        (simulation.reaction_of("top").unwrap()[1], simulation)
+    };
+    let modulus = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU));
+    let stress = -modulus * 0.02 / 2.0;
+    let (plane, simulation) = ring(Analysis::PlaneStrain);
+    assert!((plane - stress).abs() < 1e-10 * stress.abs(), "{plane}");
+    let group = &simulation.groups()[0];
+    for point in 0..group.kinematics.n_points() {
+        let found = group.global_stress(point).unwrap();
+        assert!(
+            (found[1] - stress).abs() < 1e-10 * stress.abs(),
+            "{found:?}"
+        );
+    }
+    let (turn, _) = ring(Analysis::Axisymmetric);
+    let area = std::f64::consts::PI;
+    assert!((turn - stress * area).abs() < 1e-10 * (stress * area).abs());
+}
+
+/// From one state twice, and from a copy of it in another simulation: the same bits.
+#[test]
+fn a_state_is_gone_on_from_twice() {
+    let problem = sliding(|mesh| mesh, 30.0);
+    let mut simulation = Simulation::new(problem.clone()).unwrap();
+    assert!(simulation.state().is_none());
+    for _ in 0..5 {
+        simulation.step().unwrap();
+    }
+    let state = simulation.state().unwrap();
+    let there = simulation.snapshot().displacement.to_vec();
+    let first = curve(&mut simulation);
+    assert_eq!(first.len(), 5);
+    simulation.go_to(state.clone()).unwrap();
+    assert_eq!(simulation.snapshot().displacement, there);
+    assert_eq!(curve(&mut simulation), first);
+    let mut other = Simulation::new(problem).unwrap();
+    other.go_to(state.clone()).unwrap();
+    assert_eq!(curve(&mut other), first);
+    // A state of another mesh is no state of this one.
+    let mut finer = Simulation::new(sliding(triangles, 30.0)).unwrap();
+    assert!(matches!(finer.go_to(state), Err(Error::OtherState(_))));
+}
+
+/// Simulations in threads of one process give what each gives alone.
+#[test]
+fn simulations_do_not_see_each_other() {
+    let angles = [20.0, 35.0, 20.0, 35.0];
+    let alone = angles.map(|angle| {
+        let mut simulation = Simulation::new(sliding(|mesh| mesh, angle)).unwrap();
+        curve(&mut simulation)
+    });
+    let together = std::thread::scope(|scope| {
+        let threads = angles.map(|angle| {
+            scope.spawn(move || {
+                let mut simulation = Simulation::new(sliding(|mesh| mesh, angle)).unwrap();
+                curve(&mut simulation)
+            })
+        });
+        threads.map(|thread| thread.join().unwrap())
+    });
+    assert_eq!(alone, together);
+    assert_eq!(together[0], together[2]);
+    assert!(together[0] != together[1]);
+}
+
+/// What does not fit is said with the part that it is, not in a sentence.
+#[test]
+fn a_problem_that_cannot_be_is_refused_by_its_part() {
+    use mechanics::problem::{Cause, Item};
+    let refused = |change: &dyn Fn(&mut Problem)| {
+        let mut problem = sliding(|mesh| mesh, 30.0);
+        change(&mut problem);
+        match Simulation::new(problem) {
+            Err(Error::Refused(refusal)) => *refusal,
+            other => panic!("{other:?}"),
+        }
+    };
+    let loose = refused(&|problem| {
+        problem.supports.clear();
+        problem.phases[0].displacement.clear();
+    });
+    assert_eq!(loose.item, Item::Phase(0));
+    assert!(matches!(loose.cause, Cause::Loose { part: None, .. }));
+    let missing = refused(&|problem| problem.phases[1].displacement[0].line = "lid".to_owned());
+    assert_eq!(missing.item, Item::Displacement(1, 0));
+    assert!(matches!(missing.cause, Cause::NoLine { .. }));
+    let none = refused(&|problem| problem.phases.clear());
+    assert_eq!((none.item, none.cause), (Item::Problem, Cause::NoPhase));
+    let mixed = refused(&|problem| {
+        let mut nodes = problem.mesh.solids[0].nodes().to_vec();
+        nodes.truncate(6);
+        problem.mesh.solids[0] = Solid::triangle(nodes.try_into().unwrap(), 0);
+    });
+    assert!(matches!(mixed.cause, Cause::MixedShapes(_)), "{mixed:?}");
+}
