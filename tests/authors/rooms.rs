@@ -31,7 +31,7 @@ fn drawn(page: &str) -> Arrows {
     let cells = rows.map(|row| row.split('|').skip(1).map(str::trim).collect::<Vec<_>>());
     cells
         .map(|cells| {
-            let room = quoted(cells[0]).pop_first().expect("a room's name");
+            let room = quoted(cells[0]).pop_first().unwrap();
             (room, quoted(cells[1]))
         })
         .collect()
@@ -39,7 +39,7 @@ fn drawn(page: &str) -> Arrows {
 
 /// Dependencies of a manifest, those for tests and benches left out.
 fn dependencies(manifest: &str) -> BTreeSet<String> {
-    let manifest: toml::Table = manifest.parse().expect("a manifest");
+    let manifest: toml::Table = manifest.parse().unwrap();
     let own = manifest.get("dependencies").into_iter();
     let targets = manifest.get("target").and_then(toml::Value::as_table);
     let of_targets = targets.into_iter().flat_map(toml::Table::values);
@@ -78,7 +78,7 @@ fn the_table_goes_one_way() {
     let page = read("host/README.md");
     let arrows = drawn(&page);
     assert!(arrows.len() > 8, "{arrows:?}");
-    let place = |room: &String| page.find(&format!("\n| `{room}` |")).expect("a row");
+    let place = |room: &String| page.find(&format!("\n| `{room}` |")).unwrap();
     for (room, below) in &arrows {
         for other in below {
             assert!(place(other) < place(room), "`{room}` stands on `{other}`");

@@ -8,7 +8,7 @@
 //! [`element`]s of them; [`assembly`] and [`equilibrium`]; [`simulation`].
 //!
 //! A slice of a pile, 0.2 m high, in elastic ground behind a thin layer of Coulomb's friction: the
-//! ground presses on it, and it is pushed down by a centimetre.
+//! ground presses on it, and it is pushed down by two millimetres.
 //!
 //! ```
 //! use law::{Hypothesis, SearchPath};
@@ -39,7 +39,7 @@
 //! // Columns: pile, layer, ground.
 //! let r = [0.0, 0.1, 0.11, 0.2, 0.5, 1.0];
 //! let mut mesh = Mesh::grid(&r, &[0.0, 0.2], |column, _| column.min(2));
-//! for (name, c, at) in [("axis", 0, 0.0), ("outside", 0, 1.0), ("bottom", 1, 0.0)] {
+//! for (name, c, at) in [("outside", 0, 1.0), ("bottom", 1, 0.0), ("top", 1, 0.2)] {
 //!     mesh.name_line(name, |edge| edge.iter().all(|node| node[c] == at));
 //! }
 //! mesh.name_line("head", |edge| edge.iter().all(|node| node[1] == 0.2 && node[0] <= 0.1));
@@ -54,10 +54,11 @@
 //! for group in &mut problem.groups {
 //!     group.initial_stress = Some([-100.0, 0.0, -100.0, 0.0]);
 //! }
-//! let held = |line: &str, fixed| Support { line: line.to_owned(), fixed };
-//! problem.supports = vec![held("axis", vec![Axis::X]), held("outside", vec![Axis::X, Axis::Y])];
+//! // A slice of something long: nothing moves outward.
+//! let lines = [("outside", vec![Axis::X, Axis::Y]), ("bottom", vec![Axis::X]), ("top", vec![Axis::X])];
+//! problem.supports = lines.map(|(line, fixed)| Support { line: line.to_owned(), fixed }).to_vec();
 //! let mut push = Phase::new("push", 10);
-//! push.displacement = vec![Displacement { line: "head".to_owned(), x: None, y: Some(-1e-2) }];
+//! push.displacement = vec![Displacement { line: "head".to_owned(), x: None, y: Some(-2e-3) }];
 //! problem.phases = vec![push];
 //!
 //! let mut simulation = Simulation::new(problem)?;

@@ -10,18 +10,18 @@ use std::path::Path;
 use text::Source;
 use workshop::replay::repeat;
 
-pub use law::describe_memory;
+pub(crate) use law::describe_memory;
 
 /// A case file with all its variants.
 ///
 /// # Errors
 /// Those of [`Case::load`].
-pub fn case(source: Source) -> Result<Vec<Case>, Error> {
+pub(crate) fn case(source: Source) -> Result<Vec<Case>, Error> {
     Case::of(source)
 }
 
 /// Number of elements that a case asks for.
-pub fn elements(case: &Case) -> usize {
+pub(crate) fn elements(case: &Case) -> usize {
     let of = |parts: &[toml::Spanned<PartInput>]| {
         let parts = parts.iter().map(|part| part.get_ref().n);
         parts.fold(0, usize::saturating_add)
@@ -34,7 +34,7 @@ pub fn elements(case: &Case) -> usize {
 ///
 /// # Errors
 /// Those of [`grid::build`].
-pub fn mesh(case: &Case) -> Result<Mesh, Error> {
+pub(crate) fn mesh(case: &Case) -> Result<Mesh, Error> {
     grid::build(&case.source, &case.file)
 }
 
@@ -42,7 +42,7 @@ pub fn mesh(case: &Case) -> Result<Mesh, Error> {
 ///
 /// # Errors
 /// Those of [`Driver::read`].
-pub fn drivers(source: Source) -> Result<Vec<Driver>, Error> {
+pub(crate) fn drivers(source: Source) -> Result<Vec<Driver>, Error> {
     Driver::variants(source, false)
 }
 
@@ -51,7 +51,7 @@ pub fn drivers(source: Source) -> Result<Vec<Driver>, Error> {
 ///
 /// # Errors
 /// Those of [`Driver::read_incremental`].
-pub fn incremental(files: [&Source; 3], n: usize) -> Result<usize, Error> {
+pub(crate) fn incremental(files: [&Source; 3], n: usize) -> Result<usize, Error> {
     Driver::parse_incremental(files, n)
 }
 
@@ -59,7 +59,7 @@ pub fn incremental(files: [&Source; 3], n: usize) -> Result<usize, Error> {
 ///
 /// # Errors
 /// As when the case beside it is read.
-pub fn lock(source: &Source) -> Result<usize, Error> {
+pub(crate) fn lock(source: &Source) -> Result<usize, Error> {
     Ok(Pins::of_lock(source)?)
 }
 
@@ -67,7 +67,7 @@ pub fn lock(source: &Source) -> Result<usize, Error> {
 ///
 /// # Errors
 /// Those of [`Capsule::read`].
-pub fn capsule(source: Source) -> Result<Capsule, Error> {
+pub(crate) fn capsule(source: Source) -> Result<Capsule, Error> {
     Ok(Capsule::of_source(source)?)
 }
 
@@ -76,7 +76,7 @@ pub fn capsule(source: Source) -> Result<Capsule, Error> {
 ///
 /// # Errors
 /// As when a capsule is replayed.
-pub fn replay(capsule: &Capsule, search: &SearchPath) -> Result<String, Error> {
+pub(crate) fn replay(capsule: &Capsule, search: &SearchPath) -> Result<String, Error> {
     let law = search.law(capsule.law_id())?;
     let mut said = String::new();
     repeat(capsule, &law, &mut |line| said.push_str(line)).map(|()| said)
@@ -86,7 +86,7 @@ pub fn replay(capsule: &Capsule, search: &SearchPath) -> Result<String, Error> {
 ///
 /// # Errors
 /// At the place that does not fit.
-pub fn sidecar(source: &Source) -> Result<LawDescription, Error> {
+pub(crate) fn sidecar(source: &Source) -> Result<LawDescription, Error> {
     Ok(adapter::sidecar(source)?)
 }
 
@@ -94,12 +94,12 @@ pub fn sidecar(source: &Source) -> Result<LawDescription, Error> {
 ///
 /// # Errors
 /// It is no library.
-pub fn inspection(bytes: &[u8]) -> Result<Inspection, Error> {
+pub(crate) fn inspection(bytes: &[u8]) -> Result<Inspection, Error> {
     Ok(inspect_bytes(Path::new("library"), bytes)?)
 }
 
 /// Laws in the manifest of a library, where the search path looks for them.
-pub fn manifest(bytes: &[u8]) -> Option<usize> {
+pub(crate) fn manifest(bytes: &[u8]) -> Option<usize> {
     let cache = object::ReadCache::new(std::io::Cursor::new(bytes));
     let file = object::File::parse(&cache).ok()?;
     law::inspect::manifest(&file).map(|laws| laws.len())
@@ -109,6 +109,6 @@ pub fn manifest(bytes: &[u8]) -> Option<usize> {
 ///
 /// # Errors
 /// It has none.
-pub fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
+pub(crate) fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
     adapter::behaviours(bytes)
 }
