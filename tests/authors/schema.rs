@@ -38,8 +38,14 @@ fn every_committed_file_follows_its_schema() {
     let (case, point) = (validator("case"), validator("point"));
     let mut files = Vec::new();
     inputs(&repository("cases"), &mut files);
-    inputs(&repository("host/workshop/src/new_law/interface"), &mut files);
-    inputs(&repository("host/workshop/src/new_law/continuum"), &mut files);
+    inputs(
+        &repository("host/workshop/src/new_law/interface"),
+        &mut files,
+    );
+    inputs(
+        &repository("host/workshop/src/new_law/continuum"),
+        &mut files,
+    );
     let (mut cases, mut points) = (0, 0);
     for path in files {
         let text = fs::read_to_string(&path).unwrap();

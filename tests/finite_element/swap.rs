@@ -266,6 +266,7 @@ fn run_until(text: &str, folder: &Path, increments: usize) -> Result<(), Error> 
         source,
         file,
         variant: None,
+        opener: law::Opener::default(),
     };
     let options = Options {
         resume: true,

@@ -1,10 +1,10 @@
 //! Folders in which something is missing or broken: a note in the page or an error, no panic.
 
 use crate::folders::{folders, page_of};
-use text::Error;
 use results::report::write;
 use std::path::Path;
 use tempfile::TempDir;
+use text::Error;
 
 const FILES: [&str; 7] = [
     "history.csv",

@@ -1,12 +1,12 @@
 //! What stands in the page.
 
 use crate::folders::{CASE, edited, folders, page_of};
-use text::Error;
 use results::report::default_path;
 use results::report::write;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tests::case::run_text;
+use text::Error;
 
 /// The data for the page's script, as text.
 fn json(page: &str) -> &str {

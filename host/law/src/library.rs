@@ -37,7 +37,7 @@ use std::ffi::{CStr, c_char};
 use std::mem::{MaybeUninit, size_of};
 use std::path::Path;
 use std::ptr::{null, null_mut};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// Longest text that is copied out of a library, in bytes.
 const LONGEST_TEXT: usize = 4096;
@@ -88,15 +88,29 @@ unsafe impl Sync for LawHandle {}
 /// `dlerror` is not safe in threads everywhere, so libraries are opened one at a time.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
+/// Libraries that this process has loaded, by SHA-256. Of the whole process by nature: none is ever
+/// unloaded, and the same bytes loaded again for each [`Opener`](crate::Opener) would only pile up.
+/// Whether a library may be used is its opener's decision, made before it is looked for here.
+static LOADED: Mutex<Vec<(String, OpenLibrary)>> = Mutex::new(Vec::new());
+
 /// Opens a library, shakes hands and copies its description. It is opened from the bytes that were
 /// hashed where the system allows it.
 ///
 /// # Errors
 /// What is wrong with the library, in words.
 pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
-    let _guard = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, library)) = loaded.iter().find(|(sha256, _)| *sha256 == image.sha256) {
+        return Ok(library.clone());
+    }
+    let sha256 = image.sha256.clone();
+    let library = load_and_describe(path, image)?;
+    loaded.push((sha256, library.clone()));
+    Ok(library)
+}
+
+fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
 
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =
