@@ -8,8 +8,8 @@ use cases::{run_cases, write_report};
 use clap::CommandFactory;
 use input::schema::{self, FileKind};
 use input::{Case, Error};
-use law::adapter::{self, Adapter};
-use law::{SearchPath, Stop, vetting};
+use law::adapter::Adapter;
+use law::{Opener, SearchPath, Stop, vetting};
 use runs::run::Options;
 use runs::{supervision, trade_off};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use text::write::refuse_other;
 
-pub(crate) fn execute(command: Command) -> Result<(), Error> {
+pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
     match command {
         Command::Run {
             case,
@@ -35,8 +35,15 @@ pub(crate) fn execute(command: Command) -> Result<(), Error> {
                 checkpoints: Some(Duration::from_secs_f64(checkpoint)),
             };
             let stop = stop_on_signals()?;
-            recorded(record.as_deref(), || {
-                run_cases(&case, variant.as_deref(), out.as_deref(), options, &stop)
+            recorded(record.as_deref(), opener, |opener| {
+                run_cases(
+                    opener,
+                    &case,
+                    variant.as_deref(),
+                    out.as_deref(),
+                    options,
+                    &stop,
+                )
             })
         }
         Command::Point {
@@ -47,9 +54,9 @@ pub(crate) fn execute(command: Command) -> Result<(), Error> {
             record,
         } => {
             let stop = stop_on_signals()?;
-            recorded(record.as_deref(), || {
+            recorded(record.as_deref(), opener, |opener| {
                 let (umat, variant) = (umat.as_deref(), variant.as_deref());
-                run_point(&driver, umat, variant, csv.as_deref(), &stop)
+                run_point(opener, &driver, umat, variant, csv.as_deref(), &stop)
             })
         }
         Command::Report { folders, out } => write_report(&folders, out),
@@ -68,6 +75,7 @@ pub(crate) fn execute(command: Command) -> Result<(), Error> {
                 most_increments: max_increments,
                 interface_stiffness,
                 stop: stop_on_signals()?,
+                opener,
             };
             printing(|out| {
                 let mut show = |text: &str| out.line(text);
@@ -77,9 +85,9 @@ pub(crate) fn execute(command: Command) -> Result<(), Error> {
             })
         }
         Command::Check(arguments) => {
-            printing(|out| workshop::check::run(&arguments, &mut |text| out.text(text)))
+            printing(|out| workshop::check::run(&arguments, &opener, &mut |text| out.text(text)))
         }
-        Command::Laws { id, law_path, json } => show_laws(id.as_deref(), &law_path, json),
+        Command::Laws { id, law_path, json } => show_laws(&opener, id.as_deref(), &law_path, json),
         Command::NewLaw(project) => print(&project.write()?),
         Command::Schema { file } => print_schema(file),
         Command::Completions { shell } => {
@@ -98,13 +106,13 @@ pub(crate) fn execute(command: Command) -> Result<(), Error> {
             }
         }
         Command::Lock { input } => {
-            let lock = input::lock::write(&input)?;
+            let lock = input::lock::write(&opener, &input)?;
             print(&format!("lock in {}\n", lock.display()))
         }
         Command::Replay {
             capsule, record, ..
-        } => recorded(record.as_deref(), || {
-            printing(|out| workshop::replay::replay(&capsule, &mut |line| out.line(line)))
+        } => recorded(record.as_deref(), opener, |opener| {
+            printing(|out| workshop::replay::replay(&capsule, opener, &mut |line| out.line(line)))
         }),
         #[cfg(unix)]
         Command::LawWorker => Ok(law::isolate::work()?),
@@ -120,9 +128,13 @@ pub(crate) fn execute(command: Command) -> Result<(), Error> {
 
 /// Does something while one call of a UMAT is recorded, if a file for it is given, and says whether
 /// it was.
-fn recorded(file: Option<&Path>, action: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
+fn recorded(
+    file: Option<&Path>,
+    opener: Opener,
+    action: impl FnOnce(&Opener) -> Result<(), Error>,
+) -> Result<(), Error> {
     let Some(file) = file else {
-        return action();
+        return action(&opener);
     };
     let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
     let unwritable = |source| text::Error::unwritable(&path, source);
@@ -134,8 +146,7 @@ fn recorded(file: Option<&Path>, action: impl FnOnce() -> Result<(), Error>) -> 
     std::fs::File::create(&partial)
         .and_then(|_| std::fs::remove_file(&partial))
         .map_err(unwritable)?;
-    adapter::record_to(partial.clone());
-    let outcome = action();
+    let outcome = action(&opener.recording_to(partial.clone()));
     if partial.is_file() {
         std::fs::rename(&partial, &path).map_err(unwritable)?;
         say!("all arguments of one call in {}", file.display());
@@ -147,9 +158,6 @@ fn recorded(file: Option<&Path>, action: impl FnOnce() -> Result<(), Error>) -> 
 
 /// Refuses to record where it is not plain which law is meant.
 fn check_recording(cases: &[Case]) -> Result<(), Error> {
-    if adapter::is_recorded_to().is_none() {
-        return Ok(());
-    }
     let [case] = cases else {
         let message = "--record is for one run: name one with --variant";
         return Err(Error::usage(message.to_owned()));
@@ -215,6 +223,7 @@ pub(crate) fn cannot_start(what: &str, why: &impl std::fmt::Display) -> Error {
 
 /// Tables go to standard output or files, what came out of each driver to the error stream.
 fn run_point(
+    opener: &Opener,
     driver: &Path,
     umat: Option<&Path>,
     variant: Option<&str>,
@@ -223,23 +232,28 @@ fn run_point(
 ) -> Result<(), Error> {
     let report = |report: &runs::point::PointReport| say!("{report}");
     match umat {
-        Some(umat) => runs::point::run_incremental(driver, umat, csv, stop, report),
+        Some(umat) => runs::point::run_incremental(opener, driver, umat, csv, stop, report),
         None if driver.extension().is_some_and(|ending| ending == "inp") => {
             Err(Error::usage(format!(
                 "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
                 driver.display()
             )))
         }
-        None => runs::point::run_file_until(driver, variant, csv, stop, report),
+        None => runs::point::run_file_until(opener, driver, variant, csv, stop, report),
     }
 }
 
-fn show_laws(id: Option<&str>, folders: &[PathBuf], json: bool) -> Result<(), Error> {
+fn show_laws(
+    opener: &Opener,
+    id: Option<&str>,
+    folders: &[PathBuf],
+    json: bool,
+) -> Result<(), Error> {
     if let Some(missing) = folders.iter().find(|folder| !folder.is_dir()) {
         let message = format!("--law-path: there is no folder {}", missing.display());
         return Err(Error::usage(message));
     }
-    let search = SearchPath::new(folders);
+    let search = SearchPath::of(opener, folders);
     let text = match (id, json) {
         (None, false) => workshop::laws::list(&search),
         (None, true) => workshop::laws::list_json(&search)?,

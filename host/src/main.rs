@@ -8,7 +8,7 @@ mod say;
 use arguments::Arguments;
 use clap::Parser;
 use input::Error;
-use law::Trust;
+use law::{Opener, Trust};
 use results::report;
 use runs::supervision;
 use say::Output;
@@ -62,13 +62,13 @@ fn main() -> ExitCode {
             .or_else(|| supervision::is_again().then_some(AS_LONG_AS_IT_TAKES))
             .map(Duration::from_secs_f64),
     };
-    trust.set();
+    let opener = Opener::new(trust);
     let run = || {
         if cfg!(not(unix)) && trust.isolate.is_some() {
             let message = "--isolate needs a Unix system";
             return Err(Error::usage(message));
         }
-        commands::execute(arguments.command)
+        commands::execute(arguments.command, opener)
     };
     // A panic has printed itself; it is a defect of the program, not of the input.
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))

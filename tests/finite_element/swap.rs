@@ -262,6 +262,7 @@ fn run_until(text: &str, folder: &Path, increments: usize) -> Result<(), Error> 
         source,
         file,
         variant: None,
+        opener: law::Opener::default(),
     };
     let options = Options {
         resume: true,

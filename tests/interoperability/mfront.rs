@@ -4,7 +4,7 @@
 use crate::{BondedPile, OPENGEOSYS, assert_close, installed, is_there, library};
 use input::Driver;
 use law::adapter::{Adapter, Foreign};
-use law::{Bounds, Library};
+use law::{Bounds, Opener};
 use runs::point::PointReport;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -190,7 +190,7 @@ fn bounds_and_defaults_of_our_laws_are_exported() {
         ("coulomb_joint", "interface_2d"),
         ("mepi", "interface_2d"),
     ] {
-        let native = Library::open(&library(file)).unwrap();
+        let native = Opener::default().open(&library(file)).unwrap();
         let foreign = Foreign {
             adapter: Adapter::Mfront,
             library: library(file),
@@ -201,7 +201,9 @@ fn bounds_and_defaults_of_our_laws_are_exported() {
             externals: None,
             scratch: None,
         };
-        let foreign = Library::open_foreign(&foreign, |_| Ok(())).unwrap();
+        let foreign = Opener::default()
+            .open_foreign(&foreign, |_| Ok(()))
+            .unwrap();
         let mut n = 0;
         for law in native.laws() {
             let behaviour = foreign.law(&spelled(&law.id)).unwrap();

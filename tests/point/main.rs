@@ -16,6 +16,7 @@ mod mepi;
 mod mepi_softening;
 mod mepi_truth;
 mod mohr_coulomb;
+mod openers;
 mod oriented_mohr_coulomb;
 mod rules;
 mod runaway;

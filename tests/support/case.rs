@@ -40,6 +40,7 @@ pub fn run_text(text: &str, folder: &Path) -> Result<Silent, Error> {
         source,
         file,
         variant: None,
+        opener: law::Opener::default(),
     };
     run(&case, folder, &mut observer)?;
     Ok(observer)

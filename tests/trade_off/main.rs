@@ -47,6 +47,7 @@ fn study(input: &Path, interface_stiffness: bool) -> (TempDir, String) {
         most_increments: 1000,
         interface_stiffness,
         stop: law::Stop::never(),
+        opener: law::Opener::default(),
     };
     let mut said = String::new();
     run(input, &options, &mut |text| said += text, &mut |_| ()).unwrap();

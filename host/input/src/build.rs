@@ -61,7 +61,7 @@ impl Case {
         let mesh = grid::build(source, file)?;
         let pins = file.laws.values().map(Spanned::get_ref);
         let pins = Pins::of(source, pins.map(|law| (&law.law, law.sha256.as_ref())))?;
-        let search = SearchPath::new(&self.law_folders()?).pinned(pins);
+        let search = SearchPath::of(&self.opener, &self.law_folders()?).pinned(pins);
         let mut shelf = LawShelf {
             source,
             file,

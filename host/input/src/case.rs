@@ -3,6 +3,7 @@
 
 use crate::material::{ForeignKeys, ParameterTable, ParameterValue};
 use crate::{Error, schema};
+use law::Opener;
 use law::adapter::{Adapter, Externals, Foreign, Scratch};
 use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Formulation, InPlane, Integration};
@@ -30,6 +31,8 @@ pub struct Case {
     pub file: CaseFile,
     /// Name of the variant, if the file stands for several cases.
     pub variant: Option<String>,
+    /// What its laws' libraries are opened with.
+    pub opener: Opener,
 }
 
 impl Case {
@@ -51,13 +54,25 @@ impl Case {
     /// # Errors
     /// [`text::Error::Input`] at the place that does not fit.
     pub fn of(source: Source) -> Result<Vec<Self>, Error> {
+        let opener = Opener::default();
         let (source, files) = base::read_kind(source, &DRIVER)?;
         let case = |(variant, file)| Self {
             source: source.clone(),
             file,
             variant,
+            opener: opener.clone(),
         };
         Ok(files.into_iter().map(case).collect())
+    }
+
+    /// The case, its laws' libraries opened with this; by default with what neither probes nor
+    /// isolates.
+    #[must_use]
+    pub fn opened_by(self, opener: &Opener) -> Self {
+        Self {
+            opener: opener.clone(),
+            ..self
+        }
     }
 
     /// Folder for the results if none is given: `results/<case>`, or `results/<case>/<variant>`.

@@ -11,7 +11,7 @@ use crate::material::{self, ForeignKeys, ParameterTable, ParameterValue, build_l
 use crate::schema;
 use indexmap::IndexMap;
 use law::adapter::{Adapter, Externals, Scratch};
-use law::{BuiltLaw, Pins, SearchPath};
+use law::{BuiltLaw, Opener, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
 use results::point_figure::drawable;
@@ -148,6 +148,8 @@ pub struct Driver {
     place_of_initial: Range<usize>,
     /// What the file says, if it is a driver file.
     file: Option<DriverFile>,
+    /// What the law's library is opened with, should it be built anew.
+    opener: Opener,
 }
 
 impl Driver {
@@ -156,15 +158,23 @@ impl Driver {
     /// # Errors
     /// The file cannot be read, and those of [`Driver::from_source`].
     pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
-        Self::variants(Source::read(path)?, true)
+        Self::read_with(&Opener::default(), path)
     }
 
-    /// As [`Driver::read`], whatever the lock beside the file says.
+    /// As [`Driver::read`]; the law's library is opened with this.
     ///
     /// # Errors
     /// As [`Driver::read`].
-    pub fn read_unlocked(path: &Path) -> Result<Vec<Self>, Error> {
-        Self::variants(Source::read(path)?, false)
+    pub fn read_with(opener: &Opener, path: &Path) -> Result<Vec<Self>, Error> {
+        Self::build_all(opener, Source::read(path)?, true)
+    }
+
+    /// As [`Driver::read_with`], whatever the lock beside the file says.
+    ///
+    /// # Errors
+    /// As [`Driver::read`].
+    pub fn read_unlocked(opener: &Opener, path: &Path) -> Result<Vec<Self>, Error> {
+        Self::build_all(opener, Source::read(path)?, false)
     }
 
     /// Takes the text of a driver file without variants and builds its law.
@@ -185,12 +195,17 @@ impl Driver {
     /// # Errors
     /// As [`Driver::read`].
     pub fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
+        Self::build_all(&Opener::default(), source, locked)
+    }
+
+    fn build_all(opener: &Opener, source: Source, locked: bool) -> Result<Vec<Self>, Error> {
         let (source, files) = read_kind(source, &CASE)?;
-        let driver = |(variant, file)| Self::build(&source, variant, file, locked);
+        let driver = |(variant, file)| Self::build(opener, &source, variant, file, locked);
         files.into_iter().map(driver).collect()
     }
 
     fn build(
+        opener: &Opener,
         source: &Source,
         variant: Option<String>,
         file: DriverFile,
@@ -219,7 +234,7 @@ impl Driver {
         } else {
             Pins::given(source, law)?
         };
-        let search = SearchPath::new(&folders).pinned(pins);
+        let search = SearchPath::of(opener, &folders).pinned(pins);
         let keys = ForeignKeys {
             adapter: file.adapter.as_ref(),
             library: file.library.as_ref(),
@@ -247,6 +262,7 @@ impl Driver {
             source: source.clone(),
             place_of_initial,
             file: Some(file),
+            opener: opener.clone(),
         })
     }
 
@@ -269,6 +285,7 @@ impl Driver {
             source: source.clone(),
             place_of_initial,
             file: None,
+            opener: Opener::default(),
         })
     }
 
@@ -308,7 +325,7 @@ impl Driver {
         };
         material::set_parameters(&mut file.parameters, values);
         let variant = self.point.variant().map(str::to_owned);
-        let mut driver = Self::build(&self.source, variant, file, true)?;
+        let mut driver = Self::build(&self.opener, &self.source, variant, file, true)?;
         let point = driver.point_mut();
         point.set_increments(&self.point.segment_increments());
         point.stop_on(self.point.stop());

@@ -13,7 +13,7 @@ use crate::driver::Driver;
 use crate::material::{ParameterTable, ParameterValue, build_law, find_law};
 use abi::Hypothesis;
 use law::adapter::{Adapter, Foreign};
-use law::{Library, Pins, SearchPath};
+use law::{Opener, Pins, SearchPath};
 use lines::Lines;
 use point::{Control, Frame, N_MAX, Restrictions, Segment, Vector};
 use restrictions::restrictions;
@@ -50,7 +50,7 @@ impl Driver {
     /// # Errors
     /// A file cannot be read; what is not understood or cannot be done, at its place; the library
     /// cannot be used.
-    pub fn read_incremental(test: &Path, umat: &Path) -> Result<Self, Error> {
+    pub fn read_incremental(opener: &Opener, test: &Path, umat: &Path) -> Result<Self, Error> {
         let source = Source::read(test)?;
         let segments = segments(&source)?;
         let foreign = Foreign {
@@ -63,10 +63,10 @@ impl Driver {
             externals: None,
             scratch: None,
         };
-        let library = Library::open_foreign(&foreign, |_| Ok(()))?;
+        let library = opener.open_foreign(&foreign, |_| Ok(()))?;
         let id = library.laws().next().map(|law| law.id.clone());
         let id = Spanned::new(0..0, id.unwrap_or_default());
-        let search = SearchPath::new(&[]).pinned(Pins::default());
+        let search = SearchPath::of(opener, &[]).pinned(Pins::default());
         let loaded = find_law(&source, &search, &id, Some(&foreign))?;
         let ids: Vec<String> = loaded
             .description()

@@ -8,7 +8,7 @@ use crate::case::Case;
 use crate::driver::Driver;
 use crate::material::find_law;
 use crate::{Error, is_driver};
-use law::{LoadedLaw, Pins, SearchPath, lock_path};
+use law::{LoadedLaw, Opener, Pins, SearchPath, lock_path};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,20 +28,20 @@ struct Entry<'a> {
 ///
 /// # Errors
 /// The file or a library cannot be used, or the lock cannot be written.
-pub fn write(path: &Path) -> Result<PathBuf, Error> {
+pub fn write(opener: &Opener, path: &Path) -> Result<PathBuf, Error> {
     let path = if path.is_dir() {
         path.join("case.toml")
     } else {
         path.to_owned()
     };
     let laws = if is_driver(&path)? {
-        let drivers = Driver::read_unlocked(&path)?;
+        let drivers = Driver::read_unlocked(opener, &path)?;
         let laws = drivers
             .iter()
             .map(|driver| driver.point().law().loaded().clone());
         laws.collect()
     } else {
-        laws_of_case(&path)?
+        laws_of_case(opener, &path)?
     };
     let mut entries = BTreeMap::new();
     for law in &laws {
@@ -68,13 +68,14 @@ pub fn write(path: &Path) -> Result<PathBuf, Error> {
 }
 
 /// The laws that groups use, in any phase of any variant.
-fn laws_of_case(path: &Path) -> Result<Vec<LoadedLaw>, Error> {
+fn laws_of_case(opener: &Opener, path: &Path) -> Result<Vec<LoadedLaw>, Error> {
     let mut laws = Vec::new();
     for case in Case::load(path)? {
         let file = &case.file;
         let declared = file.laws.values().map(Spanned::get_ref);
         let pins = declared.map(|law| (&law.law, law.sha256.as_ref()));
-        let search = SearchPath::new(&case.law_folders()?).pinned(Pins::given(&case.source, pins)?);
+        let search =
+            SearchPath::of(opener, &case.law_folders()?).pinned(Pins::given(&case.source, pins)?);
         let groups = file
             .groups
             .values()

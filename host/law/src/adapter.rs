@@ -26,7 +26,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::path::PathBuf;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use text::Source;
 
 /// What a library is made for.
@@ -100,32 +100,6 @@ pub struct Foreign {
     pub externals: Option<Externals>,
     /// What becomes of its scratch files; else the sidecar says it.
     pub scratch: Option<Scratch>,
-}
-
-static RECORD: OnceLock<PathBuf> = OnceLock::new();
-
-/// From now on, UMATs that this process opens write the arguments of one call to this file, where
-/// no key `record` says otherwise. Returns whether it was set; later files are ignored.
-pub fn record_to(path: PathBuf) -> bool {
-    RECORD.set(path).is_ok()
-}
-
-/// The file of [`record_to`].
-pub fn is_recorded_to() -> Option<&'static PathBuf> {
-    RECORD.get()
-}
-
-impl Foreign {
-    /// As the file names it, and with what this process was told beside it.
-    pub(crate) fn completed(&self) -> Self {
-        let mut foreign = self.clone();
-        if foreign.adapter == Adapter::Umat && foreign.record.is_none() {
-            foreign.record = RECORD.get().cloned();
-            // A replay calls anew, in other workers, after the call that is meant.
-            foreign.records_once = true;
-        }
-        foreign
-    }
 }
 
 /// A law of a foreign library, without parameters yet.

@@ -24,6 +24,9 @@ pub const SIZE: usize = COUNT + 1 + NAMES * NAME;
 const COPY: usize = THREADS * WORDS;
 const COUNT: usize = COPY + WORDS;
 
+// What follows is of the whole process by nature: whoever watches it reads this one memory, and a
+// copy of the process (fork) is told from it by one word.
+
 /// The memory, and where in it the places begin.
 static SHARED: OnceLock<(SharedMemory, usize)> = OnceLock::new();
 /// A word that is 1 in this process and 0 in a copy of it.

@@ -198,6 +198,7 @@ pub fn ending(status: ExitStatus) -> Ending {
     Ending::Exited(status.code().unwrap_or(-1))
 }
 
+// Of the whole process: what it was started for never changes.
 static IS_CHILD: AtomicBool = AtomicBool::new(false);
 
 /// Whether this process is a child: [`enter`] was called.

@@ -6,6 +6,7 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+// Of the whole process by nature: limits, signals and folders belong to it.
 static AT_START: OnceLock<Custody> = OnceLock::new();
 
 /// How it was at the start.

@@ -20,7 +20,7 @@ use crate::Error;
 use crate::child::{self, Ending};
 use crate::law::LawInstance;
 use crate::opened::Origin;
-use crate::{Library, Moment, Site, Trust};
+use crate::{Library, Moment, Opener, Site};
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use printed::{Output, Printed};
@@ -499,7 +499,7 @@ impl IsolatedInstance {
                 }),
                 folder: None,
             },
-            limit: Trust::current().isolate.unwrap_or(CALL),
+            limit: library.call_limit.unwrap_or(CALL),
             idle: Mutex::default(),
             turn: is_serial.then(Mutex::default),
             overwritten: Mutex::default(),
@@ -657,14 +657,15 @@ fn serve() -> io::Result<()> {
             Err(Error::library("it was changed"))
         }
     };
+    let opener = Opener::default();
     let opened = match start.foreign {
-        None => Library::open_if(Path::new(&start.path), same),
+        None => opener.open_if(Path::new(&start.path), same),
         Some(foreign) => {
             let here = Foreign {
                 in_process: true,
                 ..foreign
             };
-            Library::open_foreign(&here, same)
+            opener.open_foreign(&here, same)
         }
     };
     let library = match opened {

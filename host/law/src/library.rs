@@ -37,7 +37,7 @@ use std::ffi::{CStr, c_char};
 use std::mem::{MaybeUninit, size_of};
 use std::path::Path;
 use std::ptr::{null, null_mut};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// Longest text that is copied out of a library, in bytes.
 const LONGEST_TEXT: usize = 4096;
@@ -88,15 +88,29 @@ unsafe impl Sync for LawHandle {}
 /// `dlerror` is not safe in threads everywhere, so libraries are opened one at a time.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
+/// Libraries that this process has loaded, by SHA-256. Of the whole process by nature: none is ever
+/// unloaded, and the same bytes loaded again for each [`Opener`](crate::Opener) would only pile up.
+/// Whether a library may be used is its opener's decision, made before it is looked for here.
+static LOADED: Mutex<Vec<(String, OpenLibrary)>> = Mutex::new(Vec::new());
+
 /// Opens a library, shakes hands and copies its description. It is opened from the bytes that were
 /// hashed where the system allows it.
 ///
 /// # Errors
 /// What is wrong with the library, in words.
 pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
-    let _guard = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, library)) = loaded.iter().find(|(sha256, _)| *sha256 == image.sha256) {
+        return Ok(library.clone());
+    }
+    let sha256 = image.sha256.clone();
+    let library = load_and_describe(path, image)?;
+    loaded.push((sha256, library.clone()));
+    Ok(library)
+}
+
+fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
 
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =
@@ -842,15 +856,52 @@ mod tests {
         }
     }
 
+    /// A text of this many bytes that starts with `start`, and what lies behind it.
+    fn long_text(start: &str, length: usize) -> Vec<u8> {
+        let mut bytes = format!("{start:x<length$}\0behind").into_bytes();
+        bytes.push(0);
+        bytes
+    }
+
+    fn copied(bytes: &[u8], allowance: &Allowance) -> Result<String, String> {
+        text(bytes.as_ptr().cast(), "doc", allowance)
+    }
+
+    // Hosts may refuse what no author writes. This one takes a page of memory, 4 KiB with its NUL,
+    // for one text, and 16 MiB, a thousandth of a workstation's memory, for all of a library. The
+    // numbers stand here once more, so that a slip in the constants is seen.
+
+    #[test]
+    fn a_text_is_copied_up_to_a_page() {
+        let longest = long_text("doc ", 4095);
+        let copy = copied(&longest, &Allowance::default()).unwrap();
+        assert_eq!(copy.as_bytes(), &longest[..4095]);
+        let why = copied(&long_text("doc ", 4096), &Allowance::default()).unwrap_err();
+        assert!(why.contains("longer than 4096 bytes"), "{why}");
+    }
+
     #[test]
     fn texts_are_copied_up_to_a_total() {
-        let long = [vec![b'a'; LONGEST_TEXT - 1], vec![0]].concat();
-        let copy = |allowance: &Allowance| text(long.as_ptr().cast(), "doc", allowance);
+        // 16 777 216 = 4097 * 4095 + 1: after so many of the longest texts one byte is left.
         let allowance = Allowance::default();
-        let n = (0..MOST_TEXT)
-            .take_while(|_| copy(&allowance).is_ok())
-            .count();
-        assert_eq!(n, MOST_TEXT / (LONGEST_TEXT - 1));
+        for number in 0..4097 {
+            let long = long_text(&format!("text {number} "), 4095);
+            let copy = copied(&long, &allowance).unwrap();
+            assert_eq!(copy.as_bytes(), &long[..4095]);
+        }
+        let refused = |bytes: &[u8]| {
+            let why = copied(bytes, &allowance).unwrap_err();
+            assert!(why.contains("longer than 16 MB together"), "{why}");
+        };
+        // One byte more than there is room for; what is refused takes no room.
+        refused(b"ab\0");
+        // Just below, then at the limit.
+        assert_eq!(copied(b"\0", &allowance).unwrap(), "");
+        assert_eq!(copied(b"z\0", &allowance).unwrap(), "z");
+        // Above it. A text without bytes needs no room.
+        refused(b"z\0");
+        refused(b" \0");
+        assert_eq!(copied(b"\0", &allowance).unwrap(), "");
     }
 
     #[test]

@@ -1,30 +1,32 @@
 //! Opened libraries and the laws in them.
 
-use crate::adapter::{self, Foreign, ForeignLaw};
+use crate::adapter::{Foreign, ForeignLaw};
 use crate::calls::{self, Doing};
-use crate::image::Image;
 #[cfg(unix)]
 use crate::isolate;
 use crate::law::LawInstance;
-use crate::library::{self, LawHandle, probe};
-use crate::{Error, Law, LawDescription, Moment, Trust, custody, search, vetting};
+use crate::library::{LawHandle, probe};
+use crate::opener::Stamp;
+use crate::{Law, LawDescription, Moment, custody, search};
 use abi::Hypothesis;
 use abi::raw;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::SystemTime;
+use std::sync::Arc;
+use std::time::Duration;
 
 /// An opened library. It is never unloaded.
 #[derive(Debug)]
 pub struct Library {
     pub(crate) path: PathBuf,
-    sha256: String,
-    warnings: Vec<String>,
-    stamp: Option<Stamp>,
+    pub(crate) sha256: String,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) stamp: Option<Stamp>,
     pub(crate) laws: Vec<(LawDescription, Origin)>,
-    foreign: Option<Foreign>,
+    pub(crate) foreign: Option<Foreign>,
     /// SHA-256 of the file that describes it, where it does not do so itself.
-    sidecar: Option<String>,
+    pub(crate) sidecar: Option<String>,
+    /// How long one call of a worker may take, if its opener has said so.
+    pub(crate) call_limit: Option<Duration>,
 }
 
 /// Where a law is called.
@@ -42,133 +44,7 @@ pub(crate) enum Origin {
     },
 }
 
-/// What changes with a file's contents. Within one process a file with an equal stamp is not
-/// hashed again.
-type Stamp = (u64, SystemTime);
-
-fn stamp(path: &Path) -> Option<Stamp> {
-    let metadata = path.metadata().ok()?;
-    Some((metadata.len(), metadata.modified().ok()?))
-}
-
-/// Libraries opened by this process so far. Equal bytes are opened once, wherever they lie.
-static OPENED: Mutex<Vec<Arc<Library>>> = Mutex::new(Vec::new());
-
 impl Library {
-    /// Opens a library: permissions, hash, handshake, description, in this order.
-    ///
-    /// # Errors
-    /// [`Error::Library`] with the path and what is wrong.
-    pub fn open(path: &Path) -> Result<Arc<Self>, Error> {
-        Self::open_if(path, |_| Ok(()))
-    }
-
-    /// Opens a library whose SHA-256 is approved; nothing of it runs before.
-    ///
-    /// # Errors
-    /// As [`Library::open`], and those of `approve`.
-    pub fn open_if(
-        path: &Path,
-        approve: impl Fn(&str) -> Result<(), Error>,
-    ) -> Result<Arc<Self>, Error> {
-        let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
-        let stamp = stamp(path);
-        let known = |library: &&Arc<Self>| library.path == path && library.stamp == stamp;
-        if let Some(library) = opened.iter().find(known).filter(|_| stamp.is_some()) {
-            approve(&library.sha256)?;
-            return Ok(Arc::clone(library));
-        }
-        let fault = |why| Error::library(format!("library {} {why}", path.display()));
-        let mut image = Image::read(path).map_err(fault)?;
-        approve(&image.sha256)?;
-        let sha256 = image.sha256.clone();
-        let warnings = std::mem::take(&mut image.warnings);
-        let same = opened.iter().find(|library| library.sha256 == sha256);
-        let laws = if let Some(library) = same {
-            library.laws.clone()
-        } else {
-            Self::laws_of(path, image)?
-        };
-        let library = Arc::new(Self {
-            path: path.to_owned(),
-            sha256,
-            warnings,
-            stamp,
-            laws,
-            sidecar: None,
-            foreign: None,
-        });
-        opened.push(Arc::clone(&library));
-        Ok(library)
-    }
-
-    /// Opens the library in this process, after it was tried in another, or asks a worker.
-    fn laws_of(path: &Path, image: Image) -> Result<Vec<(LawDescription, Origin)>, Error> {
-        let unusable = |why| Error::library(format!("library {}: {why}", path.display()));
-        let trust = Trust::current();
-        #[cfg(unix)]
-        if trust.isolate.is_some() {
-            return isolate::describe(path, &image.sha256).map_err(unusable);
-        }
-        if trust.probe {
-            vetting::vet(path, &image.sha256)?;
-        }
-        let laws = library::open(path, image).map_err(unusable)?.laws;
-        let here = |(law, handle)| (law, Origin::Here(handle));
-        Ok(laws.into_iter().map(here).collect())
-    }
-
-    /// Opens a library that is made for another program, if its SHA-256 is approved. Its code runs
-    /// in worker processes unless it is said to run in this one.
-    ///
-    /// # Errors
-    /// [`Error::Library`] with the path and what is wrong, and those of `approve`.
-    pub fn open_foreign(
-        foreign: &Foreign,
-        approve: impl Fn(&str) -> Result<(), Error>,
-    ) -> Result<Arc<Self>, Error> {
-        let path = &foreign.library;
-        let fault = |why: String| Error::library(format!("library {} {why}", path.display()));
-        let mut image = Image::read(path).map_err(fault)?;
-        approve(&image.sha256)?;
-        if cfg!(not(unix)) && !foreign.in_process {
-            return Err(fault(
-                "can only run in this process here: `in_process = true`".to_owned(),
-            ));
-        }
-        let foreign = &foreign.completed();
-        let opened = adapter::open(foreign, &image)?;
-        let (externals, scratch) = opened.wishes;
-        let foreign = Foreign {
-            externals: foreign.externals.or(externals),
-            scratch: foreign.scratch.or(scratch),
-            ..foreign.clone()
-        };
-        #[cfg(unix)]
-        let apart = !foreign.in_process || Trust::current().isolate.is_some();
-        let origin = |law: Arc<dyn ForeignLaw>| {
-            #[cfg(unix)]
-            if apart {
-                let is_serial = law.is_serial();
-                return Origin::Apart { is_serial };
-            }
-            Origin::Foreign(law)
-        };
-        Ok(Arc::new(Self {
-            path: path.clone(),
-            warnings: std::mem::take(&mut image.warnings),
-            sha256: image.sha256.clone(),
-            stamp: None,
-            laws: opened
-                .laws
-                .into_iter()
-                .map(|(description, law)| (description, origin(law)))
-                .collect(),
-            sidecar: opened.sidecar,
-            foreign: Some(foreign),
-        }))
-    }
-
     /// How it is named, if it is made for another program.
     pub fn foreign(&self) -> Option<&Foreign> {
         self.foreign.as_ref()

@@ -1,7 +1,7 @@
 //! Where libraries are looked for. Only explicit folders count, never the working directory.
 
 use super::adapter::Foreign;
-use super::{Library, LoadedLaw};
+use super::{Library, LoadedLaw, Opener};
 use crate::Error;
 use crate::Pins;
 use crate::inspect;
@@ -12,11 +12,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use text::file;
 use text::suggestion;
 
-/// Folders to look in, in order, and the libraries opened so far.
+/// Folders to look in, in order, and the libraries opened so far. A library that changes on the way
+/// stays what it was.
 #[derive(Debug)]
 pub struct SearchPath {
     folders: Vec<PathBuf>,
     pins: Pins,
+    opener: Opener,
     opened: Mutex<BTreeMap<PathBuf, Arc<Library>>>,
 }
 
@@ -33,6 +35,11 @@ impl SearchPath {
     /// First the given folders (from a case file), then those of `PILUM_LAW_PATH`, then the
     /// folder of the program and its `deps`.
     pub fn new(from_case: &[PathBuf]) -> Self {
+        Self::of(&Opener::default(), from_case)
+    }
+
+    /// As [`SearchPath::new`]; libraries are opened with this.
+    pub fn of(opener: &Opener, from_case: &[PathBuf]) -> Self {
         let mut folders = from_case.to_vec();
         if let Some(list) = std::env::var_os("PILUM_LAW_PATH") {
             folders.extend(std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty()));
@@ -41,6 +48,7 @@ impl SearchPath {
         Self {
             folders,
             pins: Pins::default(),
+            opener: opener.clone(),
             opened: Mutex::default(),
         }
     }
@@ -113,10 +121,10 @@ impl SearchPath {
     /// A law of a library that is made for another program.
     ///
     /// # Errors
-    /// As [`Library::open_foreign`]; [`Error::Library`] if it has no such law.
+    /// As [`Opener::open_foreign`]; [`Error::Library`] if it has no such law.
     pub fn foreign_law(&self, id: &str, foreign: &Foreign) -> Result<LoadedLaw, Error> {
         let approve = |sha256: &str| self.pins.check(id, &foreign.library, sha256);
-        let library = Library::open_foreign(foreign, approve)?;
+        let library = self.opener.open_foreign(foreign, approve)?;
         library
             .law(id)
             .ok_or_else(|| no_such_law(&library, &foreign.library, id))
@@ -125,7 +133,7 @@ impl SearchPath {
     /// Opens a library, once.
     ///
     /// # Errors
-    /// As [`Library::open`].
+    /// As [`Opener::open`].
     pub fn open(&self, path: &Path) -> Result<Arc<Library>, Error> {
         self.open_for(path, None)
     }
@@ -137,7 +145,7 @@ impl SearchPath {
             approve(library.sha256())?;
             return Ok(Arc::clone(library));
         }
-        let library = Library::open_if(path, approve)?;
+        let library = self.opener.open_if(path, approve)?;
         opened.insert(path.to_owned(), Arc::clone(&library));
         Ok(library)
     }

@@ -1,37 +1,17 @@
-//! Whom this process trusts. A library has all rights of the user once it is opened; these rules
+//! What libraries are trusted with. A library has all rights of the user once it is opened; these rules
 //! prevent accidents and surprises, not attacks by the user's own programs.
 
-use crate::child;
 use std::path::Path;
-use std::sync::OnceLock;
 use std::time::Duration;
 
-/// How this process deals with libraries.
+/// How libraries are dealt with. Only the `pilum` program can probe and isolate: the children are
+/// this program again.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trust {
     /// Try libraries that are not known yet in a child process first.
     pub probe: bool,
     /// Call laws in worker processes; one call may take this long.
     pub isolate: Option<Duration>,
-}
-
-static TRUST: OnceLock<Trust> = OnceLock::new();
-
-impl Trust {
-    /// Sets it for this process, before the first library is opened. Only the `pilum` program can
-    /// probe and isolate: the children are this program again. Without it neither is done.
-    /// Returns whether it was set; later settings are ignored.
-    pub fn set(self) -> bool {
-        TRUST.set(self).is_ok()
-    }
-
-    /// That of this process. A child is where libraries are tried and called, so it does neither.
-    pub(crate) fn current() -> Self {
-        if child::is_child() {
-            return Self::default();
-        }
-        TRUST.get().copied().unwrap_or_default()
-    }
 }
 
 /// Refuses files that every user may change or replace. Returns what the user should know of

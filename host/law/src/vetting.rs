@@ -4,7 +4,7 @@
 //! What passed is remembered by its SHA-256 and the version of this program, so that it is tried
 //! once. What did not is tried again every time.
 
-use super::{End, Law, Library, LoadedLaw, Moment, Operator, ParameterDescription, Start, Strided};
+use super::{End, Law, LoadedLaw, Moment, Opener, Operator, ParameterDescription, Start, Strided};
 use crate::Error;
 use crate::child::{self, Ending, Work};
 use abi::Hypothesis;
@@ -128,7 +128,7 @@ pub fn probe(path: &Path, sha256: &str, out: &mut dyn Write) -> Result<(), Error
             Err(Error::library("it was changed"))
         }
     };
-    let Ok(library) = Library::open_if(path, same) else {
+    let Ok(library) = Opener::default().open_if(path, same) else {
         return say(REFUSED).map_err(speechless);
     };
     let ids: Vec<String> = library.laws().map(|law| law.id.clone()).collect();

@@ -3,9 +3,9 @@
 use crate::Error;
 use crate::variants::keep;
 use input::driver::Driver;
-use law::Stop;
-use law::adapter::{self, Adapter};
+use law::adapter::Adapter;
 use law::capsule::{self, Capsule};
+use law::{Opener, Stop};
 use point::Course;
 use results::figure::Figures;
 use results::point_figure::{draw_row, drawable};
@@ -121,7 +121,14 @@ pub fn run_file_variants(
     csv: Option<&Path>,
     report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    run_file_until(path, variant, csv, &Stop::never(), report)
+    run_file_until(
+        &Opener::default(),
+        path,
+        variant,
+        csv,
+        &Stop::never(),
+        report,
+    )
 }
 
 /// As [`run_file_variants`], to be stopped on its way.
@@ -130,17 +137,18 @@ pub fn run_file_variants(
 /// As [`run_file_variants`]; also that it was stopped, after the rows found until then have been
 /// written.
 pub fn run_file_until(
+    opener: &Opener,
     path: &Path,
     variant: Option<&str>,
     csv: Option<&Path>,
     stop: &Stop,
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    let mut drivers = Driver::read(path)?;
+    let mut drivers = Driver::read_with(opener, path)?;
     for driver in &mut drivers {
         driver.point_mut().stop_on(stop);
     }
-    run_all(drivers, path, variant, csv, &mut report)
+    run_all(opener, drivers, path, variant, csv, &mut report)
 }
 
 /// Runs input of the IncrementalDriver of A. Niemunis with a UMAT. Rows go to `csv`, or to the
@@ -149,18 +157,20 @@ pub fn run_file_until(
 /// # Errors
 /// As [`run_file_until`].
 pub fn run_incremental(
+    opener: &Opener,
     path: &Path,
     umat: &Path,
     csv: Option<&Path>,
     stop: &Stop,
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    let mut driver = Driver::read_incremental(path, umat)?;
+    let mut driver = Driver::read_incremental(opener, path, umat)?;
     driver.point_mut().stop_on(stop);
-    run_all(vec![driver], path, None, csv, &mut report)
+    run_all(opener, vec![driver], path, None, csv, &mut report)
 }
 
 fn run_all(
+    opener: &Opener,
     mut drivers: Vec<Driver>,
     path: &Path,
     variant: Option<&str>,
@@ -171,7 +181,9 @@ fn run_all(
     keep(&mut drivers, variant, |driver| {
         name(driver).map(str::to_owned)
     })?;
-    check_recording(&drivers)?;
+    if opener.record().is_some() {
+        check_recording(&drivers)?;
+    }
     for driver in &drivers {
         let checked = driver.point().check();
         checked.map_err(|error| driver.located(error))?;
@@ -189,9 +201,6 @@ fn name(driver: &Driver) -> Option<&str> {
 
 /// Only one run of a UMAT can be recorded.
 fn check_recording(drivers: &[Driver]) -> Result<(), Error> {
-    if adapter::is_recorded_to().is_none() {
-        return Ok(());
-    }
     let [driver] = drivers else {
         return Err(usage("--record is for one run: name one with --variant"));
     };

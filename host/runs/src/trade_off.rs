@@ -27,7 +27,7 @@ pub use study::{Measurement, Reference, Row, Study};
 use crate::Error;
 use crate::variants::keep;
 use input::{Case, Driver, is_driver};
-use law::Stop;
+use law::{Opener, Stop};
 use std::path::{Path, PathBuf};
 use text::write::replace;
 use trial::Scratch;
@@ -47,6 +47,8 @@ pub struct Options {
     pub interface_stiffness: bool,
     /// Who may want the study to stop.
     pub stop: Stop,
+    /// What libraries of laws are opened with.
+    pub opener: Opener,
 }
 
 /// Studies a driver or a case, or all its variants, and writes the results. `show` takes the
@@ -87,7 +89,7 @@ fn run_drivers(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
-    let mut drivers = Driver::read(path)?;
+    let mut drivers = Driver::read_with(&options.opener, path)?;
     let stop = &options.stop;
     for driver in &mut drivers {
         driver.point_mut().stop_on(stop);
@@ -115,7 +117,8 @@ fn run_cases(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
-    let mut cases = Case::load(path)?;
+    let cases = Case::load(path)?.into_iter();
+    let mut cases: Vec<Case> = cases.map(|case| case.opened_by(&options.opener)).collect();
     keep(&mut cases, options.variant.as_deref(), |c| {
         c.variant.clone()
     })?;

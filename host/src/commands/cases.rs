@@ -4,7 +4,7 @@ use super::check_recording;
 use crate::progress::Progress;
 use crate::say::{self, say};
 use input::{Case, Error};
-use law::Stop;
+use law::{Opener, Stop};
 use mechanics::equilibrium::Reuse;
 use results::{Figures, remove_comparison, report};
 use runs::run::{Observer as _, Options, check, run_reusing};
@@ -15,15 +15,19 @@ use std::path::{Path, PathBuf};
 /// Runs a case, or all variants of one, and writes the report of each, and their comparison. A
 /// variant that fails does not stop the others; the last failure is the outcome.
 pub(super) fn run_cases(
+    opener: &Opener,
     path: &Path,
     variant: Option<&str>,
     out: Option<&Path>,
     options: Options,
     stop: &Stop,
 ) -> Result<(), Error> {
-    let mut cases = Case::load(path)?;
+    let cases = Case::load(path)?.into_iter();
+    let mut cases: Vec<Case> = cases.map(|case| case.opened_by(opener)).collect();
     variants::keep(&mut cases, variant, |case| case.variant.clone())?;
-    check_recording(&cases)?;
+    if opener.record().is_some() {
+        check_recording(&cases)?;
+    }
     // All variants are checked before the first one runs.
     if cases.len() > 1 {
         cases.iter().try_for_each(check)?;

@@ -18,7 +18,7 @@ use crate::Error;
 use abi::raw;
 use law::child::{self, Ending, Work};
 use law::probe::NO_OUTCOME;
-use law::{Library, LoadedLaw, SearchPath, hexadecimal_sha256};
+use law::{LoadedLaw, Opener, SearchPath, hexadecimal_sha256};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -179,6 +179,7 @@ struct Subject {
     path: PathBuf,
     seed: u64,
     settings: Vec<(String, f64)>,
+    opener: Opener,
 }
 
 impl Subject {
@@ -188,7 +189,8 @@ impl Subject {
 
     /// The laws of the library.
     fn laws(&self) -> Result<Vec<LoadedLaw>, Verdict> {
-        let library = Library::open(&self.path).map_err(|why| failed(why.to_string()))?;
+        let library = self.opener.open(&self.path);
+        let library = library.map_err(|why| failed(why.to_string()))?;
         let ids = library.laws().map(|law| law.id.as_str());
         Ok(ids.filter_map(|id| library.law(id)).collect())
     }
@@ -248,7 +250,11 @@ struct Report<'a> {
 /// # Errors
 /// [`text::Error::Usage`] for an unknown check or settings that no law can have, [`text::Error::Unreadable`],
 /// [`law::Error::Library`] if there is no such law or a check fails or crashes.
-pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Error> {
+pub fn run(
+    arguments: &Arguments,
+    opener: &Opener,
+    print: &mut dyn FnMut(&str),
+) -> Result<(), Error> {
     let ids: Vec<&str> = checks().map(|check| check.id).collect();
     for id in &arguments.only {
         let is_inner = arguments.in_process && id == SETTINGS.id;
@@ -263,7 +269,7 @@ pub fn run(arguments: &Arguments, print: &mut dyn FnMut(&str)) -> Result<(), Err
     }
     let path = library_path(arguments.library.as_deref().unwrap_or_default())?;
     if arguments.in_process {
-        let answer = in_process(arguments, path)?;
+        let answer = in_process(arguments, opener, path)?;
         print(&format!("\n{ANSWER}{answer}\n"));
         return Ok(());
     }
@@ -451,12 +457,13 @@ struct Answer {
 }
 
 /// Runs one check here. The answer as JSON.
-fn in_process(arguments: &Arguments, path: PathBuf) -> Result<String, Error> {
+fn in_process(arguments: &Arguments, opener: &Opener, path: PathBuf) -> Result<String, Error> {
     child::enter().map_err(|error| Error::internal(error.to_string()))?;
     let subject = Subject {
         path,
         seed: arguments.seed,
         settings: arguments.set.clone(),
+        opener: opener.clone(),
     };
     let check = checks()
         .chain([&SETTINGS])

@@ -6,7 +6,7 @@ use abi::status::Outcome;
 use law::adapter::Foreign;
 use law::capsule::{Capsule, OutcomePart, status};
 use law::{
-    BatchFailure, End, Law, Library, LoadedLaw, Operator, PointCall, Request, SearchPath, Start,
+    BatchFailure, End, Law, LoadedLaw, Opener, Operator, PointCall, Request, SearchPath, Start,
     Strided, words,
 };
 use std::fmt::Write as _;
@@ -30,9 +30,9 @@ type Answer = (Vec<f64>, Vec<f64>, Vec<f64>);
 /// # Errors
 /// The capsule or its law cannot be used; or, after the report, the call fails as before:
 /// [`Error::CallFails`].
-pub fn replay(path: &Path, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
+pub fn replay(path: &Path, opener: &Opener, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
     let capsule = Capsule::read(path)?;
-    repeat(&capsule, &find(&capsule)?, say)
+    repeat(&capsule, &find(&capsule, opener)?, say)
 }
 
 /// Repeats the call with this law.
@@ -104,8 +104,8 @@ fn compare(capsule: &Capsule, law: &Law, say: &mut dyn FnMut(&str)) -> Result<()
 }
 
 /// The law, from the capsule's library if that is still there.
-fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
-    let search = SearchPath::new(&[]);
+fn find(capsule: &Capsule, opener: &Opener) -> Result<LoadedLaw, Error> {
+    let search = SearchPath::of(opener, &[]);
     let part = &capsule.law;
     if !part.library.is_file() {
         return Ok(search.law(&part.id)?);
@@ -124,7 +124,7 @@ fn find(capsule: &Capsule) -> Result<LoadedLaw, Error> {
         };
         return Ok(search.foreign_law(&part.id, &foreign)?);
     }
-    let library = Library::open(&part.library)?;
+    let library = opener.open(&part.library)?;
     library.law(&part.id).ok_or_else(|| {
         Error::library(format!(
             "library {} has no law `{}`",

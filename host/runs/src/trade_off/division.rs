@@ -105,6 +105,7 @@ increments = 1
             file: parse(&source).unwrap(),
             source,
             variant: None,
+            opener: law::Opener::default(),
         };
         let coarse = xs(&case);
         divide(&mut case, 2).unwrap();

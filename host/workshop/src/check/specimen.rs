@@ -292,6 +292,7 @@ pub(super) fn settings_fit(subject: &Subject) -> Found {
         path: subject.path.clone(),
         seed: subject.seed,
         settings: Vec::new(),
+        opener: subject.opener.clone(),
     };
     for law in laws {
         for (formulation, hypothesis) in hypotheses(&law) {

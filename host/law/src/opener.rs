@@ -1,0 +1,235 @@
+//! Opening libraries: whom to trust, what to record, what is open already.
+
+use crate::adapter::{self, Adapter, Foreign, ForeignLaw};
+use crate::image::Image;
+#[cfg(unix)]
+use crate::isolate;
+use crate::opened::Origin;
+use crate::{Error, LawDescription, Library, Trust, child, library, vetting};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+/// What libraries are opened with. The program makes one and hands it down; two of them know nothing
+/// of each other. Copies share what is opened.
+///
+/// The default neither probes nor isolates, and records nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Opener {
+    trust: Trust,
+    record: Option<PathBuf>,
+    /// Equal bytes are opened once, wherever they lie.
+    opened: Arc<Mutex<Vec<Arc<Library>>>>,
+}
+
+/// What changes with a file's contents. A file with an equal stamp is not hashed again.
+pub(crate) type Stamp = (u64, SystemTime);
+
+fn stamp(path: &Path) -> Option<Stamp> {
+    let metadata = path.metadata().ok()?;
+    Some((metadata.len(), metadata.modified().ok()?))
+}
+
+impl Opener {
+    /// Opens libraries with this trust.
+    pub fn new(trust: Trust) -> Self {
+        Self {
+            trust,
+            ..Self::default()
+        }
+    }
+
+    /// UMATs that are opened from now on write the arguments of one call to this file, where no key
+    /// `record` says otherwise.
+    #[must_use]
+    pub fn recording_to(self, path: PathBuf) -> Self {
+        Self {
+            record: Some(path),
+            ..self
+        }
+    }
+
+    /// The file of [`Opener::recording_to`].
+    pub fn record(&self) -> Option<&Path> {
+        self.record.as_deref()
+    }
+
+    /// The trust that holds here. A child is where libraries are tried and called, so it does
+    /// neither.
+    fn trust(&self) -> Trust {
+        if child::is_child() {
+            return Trust::default();
+        }
+        self.trust
+    }
+
+    /// Opens a library: permissions, hash, handshake, description, in this order.
+    ///
+    /// # Errors
+    /// [`Error::Library`] with the path and what is wrong.
+    pub fn open(&self, path: &Path) -> Result<Arc<Library>, Error> {
+        self.open_if(path, |_| Ok(()))
+    }
+
+    /// Opens a library whose SHA-256 is approved; nothing of it runs before.
+    ///
+    /// # Errors
+    /// As [`Opener::open`], and those of `approve`.
+    pub fn open_if(
+        &self,
+        path: &Path,
+        approve: impl Fn(&str) -> Result<(), Error>,
+    ) -> Result<Arc<Library>, Error> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        let stamp = stamp(path);
+        let known = |library: &&Arc<Library>| library.path == path && library.stamp == stamp;
+        if let Some(library) = opened.iter().find(known).filter(|_| stamp.is_some()) {
+            approve(&library.sha256)?;
+            return Ok(Arc::clone(library));
+        }
+        let fault = |why| Error::library(format!("library {} {why}", path.display()));
+        let mut image = Image::read(path).map_err(fault)?;
+        approve(&image.sha256)?;
+        let sha256 = image.sha256.clone();
+        let warnings = std::mem::take(&mut image.warnings);
+        let same = opened.iter().find(|library| library.sha256 == sha256);
+        let laws = if let Some(library) = same {
+            library.laws.clone()
+        } else {
+            self.laws_of(path, image)?
+        };
+        let library = Arc::new(Library {
+            path: path.to_owned(),
+            sha256,
+            warnings,
+            stamp,
+            laws,
+            sidecar: None,
+            foreign: None,
+            call_limit: self.trust().isolate,
+        });
+        opened.push(Arc::clone(&library));
+        Ok(library)
+    }
+
+    /// Opens the library in this process, after it was tried in another, or asks a worker.
+    fn laws_of(&self, path: &Path, image: Image) -> Result<Vec<(LawDescription, Origin)>, Error> {
+        let unusable = |why| Error::library(format!("library {}: {why}", path.display()));
+        let trust = self.trust();
+        #[cfg(unix)]
+        if trust.isolate.is_some() {
+            return isolate::describe(path, &image.sha256).map_err(unusable);
+        }
+        if trust.probe {
+            vetting::vet(path, &image.sha256)?;
+        }
+        let laws = library::open(path, image).map_err(unusable)?.laws;
+        let here = |(law, handle)| (law, Origin::Here(handle));
+        Ok(laws.into_iter().map(here).collect())
+    }
+
+    /// Opens a library that is made for another program, if its SHA-256 is approved. Its code runs
+    /// in worker processes unless it is said to run in this one.
+    ///
+    /// # Errors
+    /// [`Error::Library`] with the path and what is wrong, and those of `approve`.
+    pub fn open_foreign(
+        &self,
+        foreign: &Foreign,
+        approve: impl Fn(&str) -> Result<(), Error>,
+    ) -> Result<Arc<Library>, Error> {
+        let path = &foreign.library;
+        let fault = |why: String| Error::library(format!("library {} {why}", path.display()));
+        let mut image = Image::read(path).map_err(fault)?;
+        approve(&image.sha256)?;
+        if cfg!(not(unix)) && !foreign.in_process {
+            return Err(fault(
+                "can only run in this process here: `in_process = true`".to_owned(),
+            ));
+        }
+        let foreign = &self.completed(foreign);
+        let opened = adapter::open(foreign, &image)?;
+        let (externals, scratch) = opened.wishes;
+        let foreign = Foreign {
+            externals: foreign.externals.or(externals),
+            scratch: foreign.scratch.or(scratch),
+            ..foreign.clone()
+        };
+        let call_limit = self.trust().isolate;
+        #[cfg(unix)]
+        let apart = !foreign.in_process || call_limit.is_some();
+        let origin = |law: Arc<dyn ForeignLaw>| {
+            #[cfg(unix)]
+            if apart {
+                let is_serial = law.is_serial();
+                return Origin::Apart { is_serial };
+            }
+            Origin::Foreign(law)
+        };
+        Ok(Arc::new(Library {
+            path: path.clone(),
+            warnings: std::mem::take(&mut image.warnings),
+            sha256: image.sha256.clone(),
+            stamp: None,
+            laws: opened
+                .laws
+                .into_iter()
+                .map(|(description, law)| (description, origin(law)))
+                .collect(),
+            sidecar: opened.sidecar,
+            foreign: Some(foreign),
+            call_limit,
+        }))
+    }
+
+    /// As a file names it, and with what was asked for beside it.
+    fn completed(&self, foreign: &Foreign) -> Foreign {
+        let mut foreign = foreign.clone();
+        if foreign.adapter == Adapter::Umat && foreign.record.is_none() {
+            foreign.record.clone_from(&self.record);
+            // A replay calls anew, in other workers, after the call that is meant.
+            foreign.records_once = true;
+        }
+        foreign
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn umat(record: Option<&str>) -> Foreign {
+        Foreign {
+            adapter: Adapter::Umat,
+            library: PathBuf::from("law.so"),
+            sidecar: None,
+            in_process: false,
+            record: record.map(PathBuf::from),
+            records_once: false,
+            externals: None,
+            scratch: None,
+        }
+    }
+
+    #[test]
+    fn only_the_opener_that_records_does() {
+        let place = |opener: &Opener, foreign: &Foreign| opener.completed(foreign).record;
+        let [first, second] = ["first.toml", "second.toml"].map(|file| {
+            let opener = Opener::default().recording_to(PathBuf::from(file));
+            std::thread::spawn(move || place(&opener, &umat(None)))
+        });
+        let silent = std::thread::spawn(move || place(&Opener::default(), &umat(None)));
+        assert_eq!(first.join().unwrap(), Some("first.toml".into()));
+        assert_eq!(second.join().unwrap(), Some("second.toml".into()));
+        assert_eq!(silent.join().unwrap(), None);
+        // A file's own key comes first; only UMATs are recorded.
+        let opener = Opener::default().recording_to(PathBuf::from("asked.toml"));
+        let own = umat(Some("own.toml"));
+        assert_eq!(place(&opener, &own), Some("own.toml".into()));
+        let mfront = Foreign {
+            adapter: Adapter::Mfront,
+            ..umat(None)
+        };
+        assert_eq!(place(&opener, &mfront), None);
+    }
+}
