@@ -33,7 +33,7 @@ const UNSAFE: [(&str, &str); 9] = [
     ),
     (
         "host/law/src/library",
-        "foreign routines, memory shared with workers, traps of `pilum check`",
+        "foreign routines, memory shared with workers, calls of `pilum check`",
     ),
     (
         "tests/fuzz/src/description.rs",

@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 50] = [
+const GALLERY: [(&str, &str, &str, Point); 49] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -134,12 +134,6 @@ const GALLERY: [(&str, &str, &str, Point); 50] = [
     ("bad_input", "inputs-stay-untouched", "crashed", CannotTell),
     ("bad_nan", "results-are-finite", "failed", Refuses),
     ("bad_unwritten", "results-are-finite", "failed", CannotTell),
-    (
-        "bad_allocation",
-        "integrate-does-not-allocate",
-        "failed",
-        CannotTell,
-    ),
     ("bad_global_state", "repeatable", "failed", CannotTell),
     (
         "bad_global_parameters",

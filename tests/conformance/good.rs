@@ -107,7 +107,6 @@ fn ids_are_stable() {
             "reads-stay-inside",
             "inputs-stay-untouched",
             "results-are-finite",
-            "integrate-does-not-allocate",
             "repeatable",
             "independent-of-split",
             "independent-of-order",

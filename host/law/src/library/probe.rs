@@ -3,7 +3,6 @@
 //! hands over and gets back is safe.
 
 mod pages;
-mod traps;
 
 use super::{HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, load};
 use abi::raw::{self, Batch, Host, Instance, MagicBlock, Status, View, ViewMut};
@@ -15,8 +14,6 @@ use std::io;
 use std::mem::size_of;
 use std::path::Path;
 use std::ptr::{null, null_mut};
-pub use traps::CAN_TRAP;
-use traps::Traps;
 
 /// What cells hold before a law has written them: a NaN that no computation makes.
 const UNWRITTEN: f64 = f64::from_bits(0x7ff8_dead_beef_a5a5);
@@ -114,8 +111,6 @@ pub struct Form {
     pub first_point: u64,
     /// Length of the increment in time.
     pub time_increment: f64,
-    /// An allocation during the call ends the process with a trap, where [`CAN_TRAP`].
-    pub trapped: bool,
 }
 
 impl Form {
@@ -132,7 +127,6 @@ impl Form {
             batch_bytes: BATCH_BYTES,
             first_point: 0,
             time_increment: 1.0,
-            trapped: false,
         }
     }
 }
@@ -509,12 +503,9 @@ impl Probe {
             message_capacity: form.message.unwrap_or(0),
         };
         let letter = in_pages(&batch, form.batch_bytes)?;
-        let traps = Traps::new(form.trapped)?;
-        traps.set();
         // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
         // function; a batch that tells less than version 1.0 has to be refused unread.
         let returned = unsafe { called(self.instance.instance, letter.pointer().cast()) };
-        traps.remove();
         let statuses = status
             .bytes()
             .chunks_exact(size_of::<Status>())

@@ -2,9 +2,9 @@
 
 use super::random::Random;
 use super::specimen::{is_finite, is_success};
-use super::{Check, Family, Found, Subject, failed, skipped};
+use super::{Check, Family, Found, Subject};
 use abi::raw;
-use law::probe::{CAN_TRAP, Fence, Form, Order};
+use law::probe::{Fence, Form, Order};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -38,14 +38,6 @@ pub(super) const CHECKS: &[Check] = &[
                       Outputs are NaN before the call.",
         needs: &["integrate-works"],
         run: results_are_finite,
-    },
-    Check {
-        id: "integrate-does-not-allocate",
-        family: Family::Memory,
-        description: "`integrate` and `init_state` call no function of the C library's allocator, \
-                      the first call excepted. Traps stand at their entries (Linux on x86-64).",
-        needs: &["integrate-works"],
-        run: integrate_does_not_allocate,
     },
 ];
 
@@ -154,18 +146,4 @@ fn results_are_finite(subject: &Subject) -> Found {
         }
     }
     Ok(format!("{n_successes} points"))
-}
-
-fn integrate_does_not_allocate(subject: &Subject) -> Found {
-    if !CAN_TRAP {
-        return Err(skipped("this machine has no traps"));
-    }
-    // Once without traps: what is loaded or prepared at the first call of a thread is not the
-    // law's doing.
-    in_form(subject, "allocation", |_| ())?;
-    let n = in_form(subject, "allocation", |form| form.trapped = true)?;
-    if n == 0 {
-        return Err(failed("there was no point to try"));
-    }
-    Ok(format!("{n} points"))
 }
