@@ -7,13 +7,20 @@
 //!   δ = f − Σ γ_i (s_i + y_i),   γ from min ‖f − Σ γ_i y_i‖,
 //!
 //! first goes where f would be least and moves by what is left of f from there.
+//!
+//! The matrix is renewed where even so there is no progress.
 
 use super::norm;
+use super::outcome::Iteration;
 
 /// Moves that are remembered.
 const DEPTH: usize = 5;
 /// A y_i that is a combination of others up to this share of itself says nothing new.
 const INDEPENDENT: f64 = 1e-6;
+/// The matrix is renewed where this many iterations (the state before them included) have not brought
+/// the residual down to this fraction.
+const PATIENCE: usize = 6;
+const PROGRESS: f64 = 0.1;
 
 /// Moves so far, the last one at the end.
 #[derive(Debug, Default)]
@@ -22,9 +29,27 @@ pub(super) struct Acceleration {
     moves: Vec<[Vec<f64>; 2]>,
     /// f, and the move taken from there.
     last: Option<[Vec<f64>; 2]>,
+    /// Where the iterations with the present matrix start.
+    since: usize,
 }
 
 impl Acceleration {
+    /// Without moves, for a matrix that has been renewed at this iteration.
+    pub(super) fn since(iteration: usize) -> Self {
+        Self {
+            since: iteration,
+            ..Self::default()
+        }
+    }
+
+    /// Whether the iterations with the present matrix make too little progress.
+    pub(super) fn stalls(&self, iterations: &[Iteration]) -> bool {
+        let Some([before, .., last]) = iterations[self.since..].last_chunk::<PATIENCE>() else {
+            return false;
+        };
+        last.residual > PROGRESS * before.residual
+    }
+
     /// δ from f.
     pub(super) fn improve(&mut self, correction: Vec<f64>) -> Vec<f64> {
         if let Some([before, moved]) = self.last.take() {
@@ -111,6 +136,21 @@ mod tests {
             acceleration.took(&moved, 1.0);
         }
         assert!(sizes[3] > 1e-3 && sizes[4] < 1e-12, "{sizes:?}");
+    }
+
+    #[test]
+    fn a_matrix_stalls_that_was_given_time_and_made_no_progress() {
+        let iteration = |residual| Iteration {
+            residual,
+            correction: None,
+            step_length: 1.0,
+            viscosity: 0.0,
+        };
+        let slow = [1.0, 0.9, 0.8, 0.6, 0.4, 0.2].map(iteration);
+        assert!(Acceleration::default().stalls(&slow));
+        assert!(!Acceleration::since(1).stalls(&slow));
+        let fast = [1.0, 0.9, 0.8, 0.6, 0.4, 0.09].map(iteration);
+        assert!(!Acceleration::default().stalls(&fast));
     }
 
     #[test]

@@ -5,9 +5,10 @@
 //! without stress, a load that grows tenfold), the step is answered elastically once: a matrix of
 //! its own, so that what the iterations hold factorised stays as it is.
 
+use super::Newton;
 use super::acceptance::{Change, Forces, MOVES};
 use super::failure::{Runaway, Singularity};
-use super::{Newton, Task};
+use super::residual::Task;
 use crate::assembly::norms;
 use crate::group::Group;
 use algebra::LinearSolver;
@@ -113,7 +114,7 @@ impl Newton<'_> {
 
     /// Of every body, whether it has moved by more than its own size and far beyond what can be
     /// expected.
-    pub(super) fn away(&mut self, increment: &[f64], task: &Task<'_>) -> Vec<bool> {
+    pub(super) fn away(&mut self, increment: &[f64], task: &Task) -> Vec<bool> {
         self.runaway = None;
         let n = self.places.bodies.n;
         // What is linear cannot run away.
@@ -164,7 +165,7 @@ impl Newton<'_> {
         &mut self,
         in_play: &[f64],
         floors: &[f64],
-        task: &Task<'_>,
+        task: &Task,
     ) -> (Vec<f64>, bool) {
         let n = in_play.len();
         let mut forces: Vec<Forces> = (0..n)
@@ -227,7 +228,7 @@ impl Newton<'_> {
 
     /// Answers the step elastically, or with the tangents at its start if a law knows no elastic
     /// ones. The groups' tangents stay; their trial state does not.
-    fn elastic_answer(&mut self, task: &Task<'_>) -> Option<Elastic> {
+    fn elastic_answer(&mut self, task: &Task) -> Option<Elastic> {
         // Nor is what measures the iterations counted among them.
         let kept = |group: &Group| (group.tangents().to_vec(), group.law_calls.clone());
         let kept: Vec<_> = self.groups.iter().map(kept).collect();
@@ -242,7 +243,7 @@ impl Newton<'_> {
         answer
     }
 
-    fn answer(&mut self, operator: Operator, task: &Task<'_>) -> Option<Elastic> {
+    fn answer(&mut self, operator: Operator, task: &Task) -> Option<Elastic> {
         let (mut solver, mut internal) = self.solver_at_start(operator, task.period).ok()?;
         if self.domain.is_some() {
             for (&place, force) in self.places.boundary.iter().zip(&self.domain_forces) {
@@ -250,7 +251,8 @@ impl Newton<'_> {
             }
         }
         let mut coupling = vec![0.0; self.places.free.len()];
-        self.places.scatter(task.prescribed, &mut self.displacement);
+        self.places
+            .scatter(&task.prescribed, &mut self.displacement);
         self.system
             .prescribed_forces(self.groups, &self.displacement, &mut coupling);
         let free = self.places.free.iter().zip(&coupling);
@@ -258,7 +260,7 @@ impl Newton<'_> {
             .map(|(&place, coupling)| task.external[place] - internal[place] - coupling)
             .collect();
         let solution = solver.solve(&right).ok()?;
-        let mut increment = task.prescribed.to_vec();
+        let mut increment = task.prescribed.clone();
         for (&place, value) in self.places.free.iter().zip(solution) {
             increment[place] = value;
         }

@@ -1,26 +1,22 @@
-//! Which matrix the corrections are computed with, and when it is renewed.
+//! The matrix that corrections are computed with: assembled, factorised, solved with.
 
-use super::{Newton, Reason, StepFailure, Task};
+use super::Newton;
+use super::failure::{Reason, StepFailure};
 use crate::settings::Method;
 use law::Operator;
 use std::time::Instant;
-
-/// A matrix is kept as long as each correction leaves no more than this fraction of the residual:
-/// of equations beside a condensed domain, and of all others. Found by trial: a few iterations more
-/// are cheap where the laws of an interface are all there is to evaluate.
-const FAST: [f64; 2] = [0.03, 0.01];
 
 /// What the solver of a phase holds factorised.
 #[derive(Debug, Default)]
 pub struct Matrix {
     /// There is one to compute corrections with.
-    held: bool,
+    pub(super) held: bool,
     /// The groups still keep the tangents it was assembled from.
-    has_tangents: bool,
+    pub(super) has_tangents: bool,
     /// There is only one: all groups are linear.
     pub(super) is_constant: bool,
     /// Largest entry of the last one.
-    pub(super) largest: f64,
+    largest: f64,
     /// The same of every body, where there are several.
     largest_by_body: Vec<f64>,
 }
@@ -58,82 +54,12 @@ impl Matrix {
 }
 
 impl Newton<'_> {
-    /// Begins a step: with the matrix of the last one only if an interrupted run would have it, too.
-    pub(super) fn begin(&mut self) {
-        self.renewed = false;
-        self.matrix.held &= self.matrix.has_tangents;
-        self.solver.check_next();
-    }
-
-    /// Ends a step. What a failed one leaves behind belongs to no state; and a matrix that was
-    /// factorised another way would not be so again.
-    pub(super) fn end(&mut self, is_equilibrium: bool) {
-        if !self.matrix.is_constant {
-            let may_stay = is_equilibrium || self.settings.method != Method::Auto;
-            self.matrix.has_tangents &= may_stay && !self.solver.has_fallen_back();
-        }
-    }
-
-    /// Whether the matrix is that of an earlier step, though another could be had.
-    pub(super) fn is_stale(&self) -> bool {
-        self.settings.method == Method::Auto && !self.matrix.is_constant && !self.renewed
-    }
-
-    /// Whether the next correction needs another matrix.
-    fn renews(&self) -> bool {
-        !self.matrix.held
-            || !self.matrix.is_constant
-                && match self.settings.method {
-                    Method::Auto => self.contraction > FAST[usize::from(self.domain.is_none())],
-                    Method::Newton => true,
-                    Method::ModifiedNewton => !self.renewed,
-                    Method::InitialStress => false,
-                    Method::QuasiNewton => self.stalls,
-                }
-    }
-
-    /// What laws are asked for in an evaluation that a correction follows.
-    pub(super) fn operator(&self) -> Operator {
-        match self.settings.method {
-            _ if !self.renews() => Operator::None,
-            Method::InitialStress => Operator::Elastic,
-            _ => Operator::Consistent,
-        }
-    }
-
     /// Notes that laws are about to compute this operator.
     pub(super) fn will_compute(&mut self, operator: Operator) {
         self.tangents = Operator::None;
         if operator != Operator::None && !self.matrix.is_constant {
             self.matrix.has_tangents = false;
         }
-    }
-
-    /// Renews the matrix where the method wants it. `increment` is the state of the last
-    /// evaluation, which is repeated if it left out the tangents. Says whether there is another
-    /// matrix now.
-    ///
-    /// # Errors
-    /// A law fails, or the matrix is singular.
-    pub(super) fn prepare(
-        &mut self,
-        increment: &[f64],
-        task: &Task<'_>,
-    ) -> Result<bool, StepFailure> {
-        if !self.renews() {
-            return Ok(false);
-        }
-        let operator = self.operator();
-        if self.tangents != operator {
-            self.evaluate(increment, task, operator)
-                .map_err(StepFailure::from)?;
-        }
-        let values = self.stiffness();
-        self.factorise(values, 1.0)?;
-        self.matrix.hold();
-        self.renewed = true;
-        self.stalls = false;
-        Ok(true)
     }
 
     /// The matrix from the tangents that the groups hold, without the domain.

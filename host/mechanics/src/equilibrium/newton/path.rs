@@ -12,13 +12,22 @@
 //!
 //! - K δ_r = r, K δ_q = q = dr/dλ (prescribed displacements included, also in δ_q), dλ = (s − c·(Δu + δ_r)) / c·δ_q, δ = δ_r + dλ δ_q.
 
-use super::{Iteration, Iterations, Loads, Newton, Reason, StepFailure, StepSuccess, Task};
+use super::Newton;
+use super::failure::{Iterations, Reason, StepFailure};
+use super::iterate::{Control, Correction, State};
+use super::line_search::{LineSearch, Otherwise};
+use super::loads::Loads;
+use super::outcome::Iteration;
+use super::residual::Task;
 use crate::assembly::Places;
 use crate::group::Group;
 use crate::problem::Formulation;
+use law::Operator;
 
-/// Lengths of a correction that are tried, in order.
+/// Lengths of a correction that the line search tries.
 const STEP_LENGTHS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// How far from its distance a state may be, relative to it.
+const THERE: f64 = 1e-6;
 
 /// What a step along the path is measured by: c.
 #[derive(Debug)]
@@ -74,143 +83,166 @@ impl Measure {
     }
 }
 
-impl Newton<'_> {
-    /// Seeks equilibrium at this distance along the path from load factor `from`, starting from a
-    /// guess of the displacement increments and of the load factor's. Returns the load factor too.
-    ///
-    /// # Errors
-    /// No equilibrium within the allowed iterations, or a law or the equations failed.
-    pub fn step_along(
-        &mut self,
-        loads: &Loads,
+/// A step to a given distance along the path.
+#[derive(Debug)]
+pub(super) struct ArcLength<'c> {
+    loads: &'c Loads,
+    measure: &'c Measure,
+    distance: f64,
+    /// Load factor at the start, and time at the phase's.
+    from: f64,
+    time: f64,
+    /// Displacement increments and increment of the load factor to start from.
+    guess: (Vec<f64>, f64),
+    /// Change of the prescribed displacements with the load factor, by place.
+    rate: Vec<f64>,
+    /// Change of the residual with it, by equation.
+    right: Vec<f64>,
+}
+
+impl<'c> ArcLength<'c> {
+    /// A step of this distance from load factor `from`.
+    pub(super) fn new(
+        newton: &Newton<'_>,
+        loads: &'c Loads,
         [from, time]: [f64; 2],
-        (measure, distance): (&Measure, f64),
+        (measure, distance): (&'c Measure, f64),
         guess: (Vec<f64>, f64),
-    ) -> Result<(StepSuccess, f64), StepFailure> {
-        self.set_out(loads);
-        let mut iterations = Vec::new();
-        let outcome = self.iterate_along(
+    ) -> Self {
+        Self {
             loads,
-            [from, time],
-            (measure, distance),
+            measure,
+            distance,
+            from,
+            time,
             guess,
-            &mut iterations,
-        );
-        outcome.map_err(|failure| self.explained(failure, iterations, from, (time + from, 0.0)))
+            rate: newton.places.gather(&loads.prescribed_rate()),
+            right: newton.load_rate(loads),
+        }
     }
 
-    fn iterate_along(
+    /// What an iterate at this increment of the load factor is held against.
+    fn task(&self, newton: &Newton<'_>, rise: f64) -> Task {
+        let external = self.loads.external(self.from + rise);
+        Task {
+            external: newton.places.gather(&external),
+            imposed: newton.imposed(&external),
+            prescribed: self.rate.iter().map(|rate| rise * rate).collect(),
+            period: (self.time + self.from, rise.abs()),
+        }
+    }
+
+    /// δ and dλ, with the matrix there is.
+    fn correction(
+        &self,
+        newton: &mut Newton<'_>,
+        state: &State,
+    ) -> Result<Correction, StepFailure> {
+        let of_residual = newton.solve(&state.balance.residual, None)?;
+        let mut of_load = newton.solve(&self.right, Some(&self.rate))?;
+        for (value, rate) in of_load.iter_mut().zip(&self.rate) {
+            *value += rate;
+        }
+        newton.places.follow(&mut of_load);
+        let measure = self.measure;
+        let missing = self.distance - measure.of(&state.increment) - measure.of(&of_residual);
+        let rise = missing / measure.of(&of_load);
+        if !rise.is_finite() {
+            return Err(Reason::LoadMovesNothing.into());
+        }
+        let pairs = of_residual.iter().zip(&of_load);
+        Ok(Correction {
+            increment: pairs.map(|(r, q)| r + rise * q).collect(),
+            rise,
+        })
+    }
+}
+
+impl Control for ArcLength<'_> {
+    fn predict(&mut self, newton: &mut Newton<'_>) -> Result<State, StepFailure> {
+        let guess = std::mem::take(&mut self.guess);
+        newton.starts_from(&guess.0, false);
+        let operator = newton.operator();
+        self.evaluate(newton, guess, operator)
+    }
+
+    /// The load factor sets the prescribed displacements.
+    fn evaluate(
+        &self,
+        newton: &mut Newton<'_>,
+        (mut increment, rise): (Vec<f64>, f64),
+        operator: Operator,
+    ) -> Result<State, StepFailure> {
+        let task = self.task(newton, rise);
+        for &place in &newton.places.prescribed {
+            increment[place] = task.prescribed[place];
+        }
+        newton.places.follow(&mut increment);
+        if let Some(domain) = newton.domain {
+            newton.domain_forces = domain.forces_at(self.from + rise);
+        }
+        let balance = newton.evaluate(&increment, &task, operator)?;
+        Ok(State {
+            increment,
+            rise,
+            balance,
+        })
+    }
+
+    /// The distance is held only by a correction: no guess is accepted as it is.
+    fn accept(
+        &self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> Option<f64> {
+        let last = iterations.last().filter(|last| last.correction.is_some())?;
+        let off = (self.measure.of(&state.increment) - self.distance).abs();
+        let is_there = off <= THERE * self.distance.abs();
+        (is_there && newton.is_equilibrium(&state.balance, last)).then_some(0.0)
+    }
+
+    fn correct(
         &mut self,
-        loads: &Loads,
-        [from, time]: [f64; 2],
-        (measure, distance): (&Measure, f64),
-        (mut increment, mut rise): (Vec<f64>, f64),
+        newton: &mut Newton<'_>,
+        state: &State,
         iterations: &mut Vec<Iteration>,
-    ) -> Result<(StepSuccess, f64), StepFailure> {
-        let rate = self.places.gather(&loads.prescribed_rate());
-        let right = self.load_rate(loads);
-        self.starts_from(&increment, false);
-        let mut balance = self.evaluate_along(loads, &rate, [from, time], &mut increment, rise)?;
-        iterations.push(Iteration::first(&balance));
-        for _ in 0..self.settings.max_iterations() {
-            self.may_go_on()?;
-            let external = loads.external(from + rise);
-            let task = Task {
-                external: &self.places.gather(&external),
-                imposed: self.imposed(&external),
-                prescribed: &scaled(&rate, rise),
-                period: (time + from, rise.abs()),
-            };
-            self.prepare(&increment, &task)?;
-            let of_residual = self.solve(&balance.residual, None)?;
-            let mut of_load = self.solve(&right, Some(&rate))?;
-            for (value, rate) in of_load.iter_mut().zip(&rate) {
-                *value += rate;
-            }
-            self.places.follow(&mut of_load);
-            let missing = distance - measure.of(&increment) - measure.of(&of_residual);
-            let more = missing / measure.of(&of_load);
-            if !more.is_finite() {
-                return Err(Reason::LoadMovesNothing.into());
-            }
-            let correction: Vec<f64> = of_residual
-                .iter()
-                .zip(&of_load)
-                .map(|(r, q)| r + more * q)
-                .collect();
-            // As far as the residual does not grow; never less than the shortest length.
-            let tries = if self.settings.line_search {
-                STEP_LENGTHS.len()
-            } else {
-                1
-            };
-            let mut lengths = STEP_LENGTHS[..tries].iter().copied().peekable();
-            let length = loop {
-                let Some(length) = lengths.next() else {
-                    return Err(Reason::PathEnds.into());
-                };
-                self.may_go_on()?;
-                let moved = increment.iter().zip(&correction);
-                let mut moved: Vec<f64> = moved.map(|(u, d)| u + length * d).collect();
-                let risen = rise + length * more;
-                let is_last = lengths.peek().is_none();
-                match self.evaluate_along(loads, &rate, [from, time], &mut moved, risen) {
-                    Ok(at) if is_last || at.relative <= balance.relative => {
-                        (increment, balance, rise) = (moved, at, risen);
-                        break length;
-                    }
-                    Err(failure) if is_last => return Err(failure),
-                    _ => {}
-                }
-            };
-            let last = self.took(&balance, &correction, &increment, length);
-            iterations.push(last);
-            let is_there = (measure.of(&increment) - distance).abs() <= 1e-6 * distance.abs();
-            if is_there && self.is_equilibrium(&balance, &last) {
-                let success = StepSuccess {
-                    increment,
-                    iterations: std::mem::take(iterations),
-                    unreliable: balance.unreliable,
-                    relaxed: false,
-                    round_off: 0.0,
-                    scales: balance.scales,
-                };
-                return Ok((success, from + rise));
-            }
+    ) -> Result<State, StepFailure> {
+        let task = self.task(newton, state.rise);
+        newton.prepare(&state.increment, &task)?;
+        let correction = self.correction(newton, state)?;
+        let (length, next) = newton.search(self, state, &correction, false)?;
+        iterations.push(newton.took(&next, &correction.increment, length));
+        Ok(next)
+    }
+
+    /// As far as the residual does not grow, but never less than the shortest length: on its way
+    /// round a turning point it has to.
+    fn line_search(&self, _newton: &Newton<'_>, from: &State) -> LineSearch {
+        LineSearch {
+            lengths: &STEP_LENGTHS,
+            enough: from.balance.relative,
+            otherwise: Otherwise::Shortest,
         }
+    }
+
+    fn give_up(
+        &self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> StepFailure {
         let correction = iterations.last().and_then(|last| last.correction);
-        let n = self.settings.max_iterations();
-        Err(Reason::Unmet(Iterations::Path(n), self.unmet(&balance, correction)).into())
+        let n = newton.settings.max_iterations();
+        Reason::Unmet(
+            Iterations::Path(n),
+            newton.unmet(&state.balance, correction),
+        )
+        .into()
     }
+}
 
-    /// As [`Self::evaluate`] at a load factor, which sets the prescribed displacements.
-    fn evaluate_along(
-        &mut self,
-        loads: &Loads,
-        rate: &[f64],
-        [from, time]: [f64; 2],
-        increment: &mut [f64],
-        rise: f64,
-    ) -> Result<super::Balance, StepFailure> {
-        let external = loads.external(from + rise);
-        for &place in &self.places.prescribed {
-            increment[place] = rise * rate[place];
-        }
-        self.places.follow(increment);
-        if let Some(domain) = self.domain {
-            self.domain_forces = domain.forces_at(from + rise);
-        }
-        let task = Task {
-            external: &self.places.gather(&external),
-            imposed: self.imposed(&external),
-            prescribed: &scaled(rate, rise),
-            period: (time + from, rise.abs()),
-        };
-        let operator = self.operator();
-        self.evaluate(increment, &task, operator)
-            .map_err(StepFailure::from)
-    }
-
+impl Newton<'_> {
     /// Change of the residual with the load factor at constant displacements, by equation; without
     /// that of prescribed displacements in the groups that iterate.
     fn load_rate(&self, loads: &Loads) -> Vec<f64> {
@@ -223,9 +255,4 @@ impl Newton<'_> {
         }
         self.places.free.iter().map(|&place| rate[place]).collect()
     }
-}
-
-/// Increments at this rate.
-fn scaled(rate: &[f64], rise: f64) -> Vec<f64> {
-    rate.iter().map(|rate| rise * rate).collect()
 }

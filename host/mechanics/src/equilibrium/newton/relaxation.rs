@@ -15,7 +15,11 @@
 //! the residual has fallen; they alone decide on convergence, by the same tolerances. The motion
 //! changes the path within the step only: laws still see one increment from the last equilibrium.
 
-use super::{Balance, Iteration, Iterations, Newton, Reason, StepFailure, Task};
+use super::Newton;
+use super::failure::{Iterations, Reason, StepFailure};
+use super::outcome::Iteration;
+use super::residual::{Balance, Task};
+use crate::settings::{Control, Settings};
 use law::Operator;
 
 /// α. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
@@ -33,15 +37,108 @@ const FIRST: usize = 10;
 /// What a new least residual must be below, relative to the old one.
 const PROGRESS: f64 = 0.9;
 
-/// A relaxation under way.
+/// What relaxation has done in a step.
 #[derive(Debug)]
 pub(super) struct Relaxation {
+    course: Course,
+    /// Where the last series of Newton iterations starts.
+    first: usize,
+    /// Where Newton iterations first came to a standstill: displacement increments, and how many
+    /// iterations they were.
+    standstill: (Vec<f64>, usize),
+}
+
+#[derive(Debug)]
+enum Course {
+    /// The settings want none.
+    Off,
+    /// Newton iterations have not come to a standstill yet.
+    Ready,
+    UnderWay(Motion),
+    /// It led nowhere. Newton iterations had to go on alone.
+    InVain,
+}
+
+/// A motion under way.
+#[derive(Debug)]
+struct Motion {
     /// Elastic stiffness, in the matrix's pattern; without the domain.
     elastic: Vec<f64>,
     /// Displacement increments reached.
     increment: Vec<f64>,
     /// Viscous steps so far.
     steps: usize,
+}
+
+impl Relaxation {
+    /// Of a step to a given load factor.
+    pub(super) fn new(settings: &Settings) -> Self {
+        // Methods that keep their matrix are slow without having come to an end. Arc-length control
+        // has a way of its own to leave a branch.
+        let is_wanted =
+            settings.relaxation && settings.control == Control::Load && settings.method.is_newton();
+        Self {
+            course: if is_wanted {
+                Course::Ready
+            } else {
+                Course::Off
+            },
+            first: 0,
+            standstill: (Vec::new(), 0),
+        }
+    }
+
+    /// The last series of Newton iterations, with the state that it started from. A relaxed state
+    /// is allowed as many as the first one was.
+    pub(super) fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
+        &iterations[self.first..]
+    }
+
+    /// Whether it led to the present state.
+    pub(super) fn is_under_way(&self) -> bool {
+        matches!(self.course, Course::UnderWay(_))
+    }
+
+    /// Whether it was tried and led nowhere.
+    pub(super) fn was_in_vain(&self) -> bool {
+        matches!(self.course, Course::InVain)
+    }
+
+    /// Where Newton iterations stand still, the state that they go on from: a relaxed one or, if
+    /// there is none, that of the first standstill. `None` where they get on.
+    ///
+    /// # Errors
+    /// The step is stopped, or a law fails.
+    pub(super) fn relieve(
+        &mut self,
+        newton: &mut Newton<'_>,
+        task: &Task,
+        increment: &[f64],
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<Option<(Vec<f64>, Balance)>, StepFailure> {
+        let series = self.series(iterations);
+        if matches!(self.course, Course::Off | Course::InVain) || !stands_still(series) {
+            return Ok(None);
+        }
+        if matches!(self.course, Course::Ready) {
+            self.standstill = (increment.to_vec(), series.len());
+            let motion = newton.start_motion(task);
+            self.course = motion.map_or(Course::InVain, Course::UnderWay);
+        }
+        if let Course::UnderWay(motion) = &mut self.course
+            && let Ok(relaxed) = newton.relax(motion, task, iterations)
+        {
+            self.first = iterations.len() - 1;
+            return Ok(Some(relaxed));
+        }
+        newton.may_go_on()?;
+        // Newton iterations go on where they stood, for as many as are left to them.
+        self.course = Course::InVain;
+        let (increment, so_many) = std::mem::take(&mut self.standstill);
+        let balance = newton.evaluate(&increment, task, Operator::Consistent)?;
+        self.first = iterations.len() - so_many;
+        Ok(Some((increment, balance)))
+    }
 }
 
 /// Whether these Newton iterations have come to a standstill.
@@ -61,58 +158,49 @@ pub(super) fn stands_still(iterations: &[Iteration]) -> bool {
 }
 
 impl Newton<'_> {
-    /// Starts a relaxation from the elastic answer to the step; `None` if a law has no elastic
+    /// The motion from the elastic answer to the step; `None` if a law has no elastic
     /// operator or elasticity alone leaves the equations singular.
-    pub(super) fn start_relaxation(&mut self, task: &Task<'_>) -> Option<Relaxation> {
+    fn start_motion(&mut self, task: &Task) -> Option<Motion> {
         let still = vec![0.0; task.external.len()];
         let before = self.evaluate(&still, task, Operator::Elastic).ok()?;
         let elastic = self.stiffness();
         self.factorise(elastic.clone(), 1.0).ok()?;
-        let mut increment = self.solve(&before.residual, Some(task.prescribed)).ok()?;
-        for (value, prescribed) in increment.iter_mut().zip(task.prescribed) {
-            *value += prescribed;
-        }
-        self.places.follow(&mut increment);
-        Some(Relaxation {
+        Some(Motion {
             elastic,
-            increment,
+            increment: self.answer_to(&before.residual, task).ok()?,
             steps: 0,
         })
     }
 
-    /// Carries a relaxation on until the residual has fallen enough to try Newton iterations.
+    /// Carries a motion on until the residual has fallen enough to try Newton iterations.
     ///
     /// # Errors
     /// The residual did not fall, or a law or the equations failed.
-    pub(super) fn relax(
+    fn relax(
         &mut self,
-        relaxation: &mut Relaxation,
-        task: &Task<'_>,
+        motion: &mut Motion,
+        task: &Task,
         iterations: &mut Vec<Iteration>,
     ) -> Result<(Vec<f64>, Balance), StepFailure> {
-        let mut balance = self
-            .evaluate(&relaxation.increment, task, Operator::Consistent)
-            .map_err(StepFailure::from)?;
+        let mut balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
         let mut largest = balance.relative;
-        while relaxation.steps < MAX_STEPS {
+        while motion.steps < MAX_STEPS {
             self.may_go_on()?;
-            relaxation.steps += 1;
-            let correction = self.viscous_correction(&balance.residual, &relaxation.elastic)?;
-            for (u, d) in relaxation.increment.iter_mut().zip(&correction) {
+            motion.steps += 1;
+            let correction = self.viscous_correction(&balance.residual, &motion.elastic)?;
+            for (u, d) in motion.increment.iter_mut().zip(&correction) {
                 *u += d;
             }
             let before = balance.relative;
-            balance = self
-                .evaluate(&relaxation.increment, task, Operator::Consistent)
-                .map_err(StepFailure::from)?;
-            let taken = self.took(&balance, &correction, &relaxation.increment, 1.0);
+            balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
+            let taken = self.took_to(&balance, &correction, &motion.increment, 1.0);
             iterations.push(Iteration {
                 viscosity: VISCOSITY,
                 ..taken
             });
             largest = largest.max(balance.relative);
             if balance.relative < before && balance.relative <= FALL * largest {
-                return Ok((relaxation.increment.clone(), balance));
+                return Ok((motion.increment.clone(), balance));
             }
         }
         let correction = iterations.last().and_then(|last| last.correction);

@@ -1,0 +1,256 @@
+//! The part of a domain that results look at, and its state in equilibrium with the boundary.
+
+use super::{LinearDomain, LookedAt, Origin, Standing};
+use crate::equilibrium::newton::{
+    ACCEPTED_ROUND_OFF, DomainFailure, STILL_SMALL, last_bit_scattered, norm,
+};
+use crate::group::Group;
+use law::Operator;
+
+/// Corrections of a complete state, at most.
+const REFINEMENTS: usize = 3;
+/// A complete state whose residual is within this of the tolerance is not corrected at all.
+const REFINED: f64 = 0.1;
+
+/// Some groups of a domain, with what gives their displacements.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// Of every group of the model, whether it belongs to the part.
+    pub(super) groups: Vec<bool>,
+    /// Equations of their unknowns and of others that are wanted.
+    wanted: Vec<usize>,
+    /// Equations inside the domain of which no other group of the domain takes part.
+    inner: Vec<usize>,
+    /// Supernodes of the wanted equations, and those above them.
+    fronts: Vec<bool>,
+}
+
+/// Displacement increments since both of them, by degree of freedom, as far as groups count from
+/// there.
+#[derive(Debug)]
+struct Since {
+    complete: Option<Vec<f64>>,
+    latest: Option<Vec<f64>>,
+}
+
+/// A state to be reached.
+#[derive(Debug)]
+pub(super) struct Goal<'g> {
+    /// External forces, by degree of freedom.
+    pub(super) external: &'g [f64],
+    pub(super) lambda: f64,
+    /// The residual is measured against forces no smaller than this.
+    pub(super) scale: f64,
+    pub(super) tolerance: f64,
+}
+
+impl LinearDomain {
+    /// The part that is looked at; none if it is all of the domain, or another one than that which
+    /// the latest state is of.
+    pub(super) fn choose_part(&mut self, looked_at: Option<LookedAt<'_>>) {
+        let Some(LookedAt { groups, dofs }) = looked_at else {
+            self.part = None;
+            return;
+        };
+        let of_latest = self.standing.part.as_deref();
+        if of_latest.is_some_and(|latest| latest != groups) {
+            self.part = None;
+        } else if self.part.as_ref().is_none_or(|part| part.groups != groups) {
+            let mut numbered = groups.iter().enumerate();
+            let others = numbered.any(|(number, in_part)| !in_part && self.system.includes(number));
+            self.part = others.then(|| self.of_groups(groups, dofs));
+        }
+    }
+
+    pub(super) fn of_groups(&self, groups: &[bool], dofs: &[usize]) -> Part {
+        let mut wanted = vec![false; self.system.n_equations()];
+        let mut shared = vec![false; self.system.n_equations()];
+        for (number, in_part) in groups.iter().enumerate() {
+            let mark = if *in_part { &mut wanted } else { &mut shared };
+            let dofs = self.system.dofs_of(number);
+            for equation in dofs.filter_map(|dof| self.system.equation(dof)) {
+                mark[equation] = true;
+            }
+        }
+        let own = |&equation: &usize| {
+            wanted[equation] && !shared[equation] && !self.on_boundary[equation]
+        };
+        let inner = (0..wanted.len()).filter(own).collect();
+        let known = dofs.iter().flat_map(|&dof| self.system.masters(dof));
+        for equation in known.filter_map(|dof| self.system.equation(dof)) {
+            wanted[equation] = true;
+        }
+        Part {
+            groups: groups.to_vec(),
+            inner,
+            fronts: self.factors.fronts_of(&wanted),
+            wanted: (0..wanted.len()).filter(|&e| wanted[e]).collect(),
+        }
+    }
+
+    /// Trial state of a part in equilibrium with its goal and where the boundary is; its internal
+    /// forces. Displacements are filled in.
+    pub(super) fn settle(
+        &mut self,
+        part: &Part,
+        groups: &mut [Group],
+        goal: &Goal<'_>,
+        displacement: &mut [f64],
+    ) -> Result<Vec<f64>, DomainFailure> {
+        let increment = |origin: &Origin| self.increment(origin, part, goal.lambda, displacement);
+        let Standing {
+            complete, latest, ..
+        } = &self.standing;
+        let is_looked_at = self.of_latest(part);
+        let mut since = Since {
+            complete: (!is_looked_at).then(|| increment(complete)),
+            latest: self.standing.part.as_ref().map(|_| increment(latest)),
+        };
+        let free = self.system.free();
+        let still = vec![0.0; self.boundary.len()];
+        let mut tries = 0..REFINEMENTS;
+        let mut before = f64::INFINITY;
+        let (relative, internal) = loop {
+            let internal = self.evaluate(groups, &since, part)?;
+            let mut residual = vec![0.0; free.len()];
+            for &equation in &part.inner {
+                residual[equation] = goal.external[free[equation]] - internal[free[equation]];
+            }
+            let scale = norm(&internal).max(goal.scale).max(f64::MIN_POSITIVE);
+            let relative = norm(&residual) / scale;
+            if relative <= REFINED * goal.tolerance {
+                break (0.0, internal);
+            }
+            if relative <= goal.tolerance && before.is_finite() {
+                break (0.0, internal);
+            }
+            // A residual that no longer falls has come down to round-off.
+            if relative > 0.5 * before || tries.next().is_none() {
+                let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
+                let is_round_off = relative <= ACCEPTED_ROUND_OFF * last_bit;
+                if is_round_off && relative <= STILL_SMALL {
+                    break (relative, internal);
+                }
+                // All forces there are, are what rounding leaves of none: a body that was moved as
+                // a whole.
+                if is_round_off && ACCEPTED_ROUND_OFF * last_bit >= 1.0 {
+                    break (0.0, internal);
+                }
+                return Err(DomainFailure::Residual {
+                    left: relative,
+                    tolerance: goal.tolerance,
+                    last_bit,
+                });
+            }
+            before = relative;
+            let fronts = Some(part.fronts.as_slice());
+            let (y, _) = self.factors.forward(&residual, fronts);
+            let correction = self.factors.backward(&y, &still, fronts);
+            for increment in since.complete.iter_mut().chain(&mut since.latest) {
+                for &equation in &part.wanted {
+                    increment[free[equation]] += correction[equation];
+                }
+                self.system.follow(increment);
+            }
+        };
+        let (origin, increment) = match (&since.complete, &since.latest) {
+            (None, Some(increment)) => (latest, increment),
+            (increment, _) => (complete, increment.as_ref().ok_or(DomainFailure::NoState)?),
+        };
+        for &equation in &part.wanted {
+            let dof = free[equation];
+            displacement[dof] = origin.displacement[dof] + increment[dof];
+        }
+        self.standing.round_off = self.standing.round_off.max(relative);
+        Ok(internal)
+    }
+
+    /// Whether a part is the one that the latest state is of.
+    fn of_latest(&self, part: &Part) -> bool {
+        self.standing.part.as_ref() == Some(&part.groups)
+    }
+
+    /// Displacement increments since a state, by degree of freedom: given ones, and those of a
+    /// part's unknowns as they follow from the boundary and the load factor.
+    fn increment(
+        &self,
+        origin: &Origin,
+        part: &Part,
+        lambda: f64,
+        displacement: &[f64],
+    ) -> Vec<f64> {
+        let rise = lambda - origin.lambda;
+        let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
+        let fronts = Some(part.fronts.as_slice());
+        let values = self.factors.backward(&y, &origin.moved, fronts);
+        let moved = displacement.iter().zip(&origin.displacement);
+        let mut increment: Vec<f64> = moved.map(|(u, origin)| u - origin).collect();
+        for &equation in &part.wanted {
+            increment[self.system.free()[equation]] = values[equation];
+        }
+        self.system.follow(&mut increment);
+        increment
+    }
+
+    /// Trial state of a part's groups under displacement increments; their internal forces, by
+    /// degree of freedom.
+    fn evaluate(
+        &self,
+        groups: &mut [Group],
+        since: &Since,
+        part: &Part,
+    ) -> Result<Vec<f64>, DomainFailure> {
+        let mut internal = vec![0.0; self.system.n_dofs()];
+        for (number, group) in groups.iter_mut().enumerate() {
+            if !self.system.includes(number) || !part.groups[number] {
+                continue;
+            }
+            let latest = self.standing.part.as_ref();
+            let increment = if latest.is_some_and(|latest| latest[number]) {
+                &since.latest
+            } else {
+                &since.complete
+            };
+            let increment = increment.as_ref().ok_or(DomainFailure::NoState)?;
+            group
+                .evaluate(increment, Operator::None, 0.0, 0.0)
+                .map_err(|failure| DomainFailure::Law(Box::new(failure)))?;
+            group
+                .kinematics
+                .add_forces(&group.stress.trial, &mut internal);
+        }
+        self.system.fold(&mut internal);
+        Ok(internal)
+    }
+
+    /// Change of the internal forces (2-norm) if every displacement increment is larger or smaller
+    /// by its last bit, as the sum over many elements scatters them. The trial state stays.
+    fn last_bit(
+        &self,
+        part: &Part,
+        groups: &mut [Group],
+        since: &Since,
+        internal: &[f64],
+    ) -> Result<f64, DomainFailure> {
+        let scattered = |increment: &Vec<f64>| {
+            let mut scattered = last_bit_scattered(increment);
+            self.system.follow(&mut scattered);
+            scattered
+        };
+        let scattered = Since {
+            complete: since.complete.as_ref().map(scattered),
+            latest: since.latest.as_ref().map(scattered),
+        };
+        let moved = self.evaluate(groups, &scattered, part)?;
+        self.evaluate(groups, since, part)?;
+        let dofs = part
+            .inner
+            .iter()
+            .map(|&equation| self.system.free()[equation]);
+        Ok(norm(
+            &dofs
+                .map(|dof| moved[dof] - internal[dof])
+                .collect::<Vec<f64>>(),
+        ))
+    }
+}

@@ -1,0 +1,74 @@
+//! What is found out about a step that found no equilibrium.
+
+use super::Newton;
+use super::failure::{Culprit, Iterations, Reason, StepFailure};
+use super::iterate::{Control, Correction, State};
+use super::outcome::Iteration;
+use super::residual::Task;
+use crate::equilibrium::diagnosis::{self, Snapshot};
+use law::Operator;
+
+impl Newton<'_> {
+    /// A failure with all that can be said of it.
+    pub(super) fn explained(
+        &mut self,
+        failure: StepFailure,
+        iterations: Vec<Iteration>,
+        lambda: f64,
+        period: (f64, f64),
+    ) -> StepFailure {
+        let failure = StepFailure {
+            iterations,
+            runaway: self.runaway,
+            ..failure
+        };
+        if failure.is_singular() {
+            let singularity = self.singularity(period);
+            self.tangents = Operator::None;
+            self.will_compute(Operator::Elastic);
+            failure.explained(singularity, lambda)
+        } else {
+            failure
+        }
+    }
+
+    /// What is said of iterations that have come to their end.
+    pub(super) fn no_equilibrium(
+        &mut self,
+        control: &impl Control,
+        state: &State,
+        task: &Task,
+        correction: Option<f64>,
+        relaxed_in_vain: bool,
+    ) -> StepFailure {
+        let n = self.settings.max_iterations();
+        let unmet = self.unmet(&state.balance, correction);
+        // What ran away did so in the last iterate, not in the one that is only tried.
+        let runaway = self.runaway;
+        let culprit = self.diagnose(control, state, task);
+        self.runaway = runaway;
+        StepFailure {
+            culprit,
+            ..Reason::Unmet(Iterations::Newton(n, relaxed_in_vain), unmet).into()
+        }
+    }
+
+    /// Does one iteration more and compares: what keeps Newton iterations from settling. With a
+    /// kept matrix they are slow, which says nothing of a point.
+    fn diagnose(&mut self, control: &impl Control, state: &State, task: &Task) -> Option<Culprit> {
+        if !self.settings.method.is_newton() {
+            return None;
+        }
+        self.kept.contraction = f64::INFINITY;
+        self.prepare(&state.increment, task).ok()?;
+        let before = Snapshot::of(self.groups);
+        let correction = Correction {
+            increment: self.solve(&state.balance.residual, None).ok()?,
+            rise: 0.0,
+        };
+        let (_, moved) = self.search(control, state, &correction, true).ok()?;
+        self.evaluate(&moved.increment, task, Operator::Consistent)
+            .ok()?;
+        diagnosis::compare(self.groups, &before, task.period)
+    }
+}

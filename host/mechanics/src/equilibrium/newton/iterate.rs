@@ -1,0 +1,138 @@
+//! The loop: predict, evaluate, accept, correct.
+//!
+//! What a step holds fixed is its [`Control`]: the load factor at its end, or the distance along the
+//! path of equilibrium. The loop asks it for everything that depends on that.
+
+use super::Newton;
+use super::failure::StepFailure;
+use super::line_search::LineSearch;
+use super::outcome::Iteration;
+use super::residual::Balance;
+use law::Operator;
+
+/// An iterate.
+#[derive(Debug)]
+pub(super) struct State {
+    /// Displacement increments, by place.
+    pub(super) increment: Vec<f64>,
+    /// Increment of the load factor.
+    pub(super) rise: f64,
+    /// What that leaves out of balance.
+    pub(super) balance: Balance,
+}
+
+impl State {
+    /// Displacement increments and load factor after this fraction of a correction.
+    pub(super) fn moved_by(&self, length: f64, correction: &Correction) -> (Vec<f64>, f64) {
+        let pairs = self.increment.iter().zip(&correction.increment);
+        (
+            pairs.map(|(u, d)| u + length * d).collect(),
+            self.rise + length * correction.rise,
+        )
+    }
+}
+
+/// What is added to an iterate.
+#[derive(Debug)]
+pub(super) struct Correction {
+    /// To the displacement increments, by place.
+    pub(super) increment: Vec<f64>,
+    /// To the load factor.
+    pub(super) rise: f64,
+}
+
+/// An iterate that is accepted.
+#[derive(Debug)]
+pub(super) struct Equilibrium {
+    pub(super) state: State,
+    /// The relative residual if it had to be taken for round-off; else 0.
+    pub(super) round_off: f64,
+}
+
+/// What a step holds fixed, and what follows for its iterations.
+pub(super) trait Control {
+    /// The first iterate.
+    fn predict(&mut self, newton: &mut Newton<'_>) -> Result<State, StepFailure>;
+
+    /// The iterate at these displacement increments and this increment of the load factor.
+    fn evaluate(
+        &self,
+        newton: &mut Newton<'_>,
+        at: (Vec<f64>, f64),
+        operator: Operator,
+    ) -> Result<State, StepFailure>;
+
+    /// Whether an iterate is accepted: with how much of its residual taken for round-off.
+    fn accept(
+        &self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> Option<f64>;
+
+    /// The next iterate. What was done is added to the iterations.
+    fn correct(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<State, StepFailure>;
+
+    /// How far a correction is followed from here.
+    fn line_search(&self, newton: &Newton<'_>, from: &State) -> LineSearch;
+
+    /// The iterations that count towards the largest number allowed.
+    fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
+        iterations
+    }
+
+    /// Whether an iterate that no correction can be computed for is in equilibrium all the same.
+    fn has_settled(&self, _newton: &mut Newton<'_>, _state: &State) -> bool {
+        false
+    }
+
+    /// What is said of iterations that have come to their end.
+    fn give_up(
+        &self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> StepFailure;
+}
+
+impl Newton<'_> {
+    /// Seeks equilibrium under this control.
+    ///
+    /// # Errors
+    /// No equilibrium within the allowed iterations, or a law or the equations failed.
+    pub(super) fn iterate(
+        &mut self,
+        control: &mut impl Control,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<Equilibrium, StepFailure> {
+        let mut state = control.predict(self)?;
+        iterations.push(Iteration::first(&state.balance));
+        loop {
+            self.may_go_on()?;
+            if let Some(round_off) = control.accept(self, &state, iterations) {
+                return Ok(Equilibrium { state, round_off });
+            }
+            if self.is_over(control.series(iterations)) {
+                return Err(control.give_up(self, &state, iterations));
+            }
+            state = match control.correct(self, &state, iterations) {
+                Err(failure) if failure.is_singular() && control.has_settled(self, &state) => {
+                    let round_off = 0.0;
+                    return Ok(Equilibrium { state, round_off });
+                }
+                corrected => corrected?,
+            };
+        }
+    }
+
+    /// Whether no more iterations are allowed. The state before the first correction is one of the
+    /// series.
+    pub(super) fn is_over(&self, series: &[Iteration]) -> bool {
+        series.len() > self.settings.max_iterations()
+    }
+}

@@ -1,0 +1,174 @@
+//! The kept matrix: as long as corrections with it take nearly all of the residual away, the matrix of
+//! an earlier iteration, or of the step before, is not replaced.
+//!
+//! Whether another one is wanted is known before a state is evaluated; only then are laws asked for
+//! tangents.
+
+use super::Newton;
+use super::failure::StepFailure;
+use super::iterate::{Control, Correction, State};
+use super::outcome::Iteration;
+use super::residual::Task;
+use crate::settings::Method;
+use law::Operator;
+
+/// A matrix is kept as long as each correction leaves no more than this fraction of the residual:
+/// of equations beside a condensed domain, and of all others. Found by trial: a few iterations more
+/// are cheap where the laws of an interface are all there is to evaluate.
+const FAST: [f64; 2] = [0.03, 0.01];
+
+/// What decides in a step whether the matrix is kept.
+#[derive(Debug)]
+pub(super) struct Kept {
+    /// The matrix has been renewed in this step.
+    renewed: bool,
+    /// It makes too little progress.
+    pub(super) stalls: bool,
+    /// Fraction of the residual that the next correction will probably leave.
+    pub(super) contraction: f64,
+}
+
+impl Default for Kept {
+    /// Nothing is known: no matrix is trusted.
+    fn default() -> Self {
+        Self {
+            renewed: false,
+            stalls: false,
+            contraction: f64::INFINITY,
+        }
+    }
+}
+
+impl Newton<'_> {
+    /// Begins a step: with the matrix of the last one only if an interrupted run would have it, too.
+    pub(super) fn begin(&mut self) {
+        self.kept.renewed = false;
+        self.matrix.held &= self.matrix.has_tangents;
+        self.solver.check_next();
+    }
+
+    /// Ends a step. What a failed one leaves behind belongs to no state; and a matrix that was
+    /// factorised another way would not be so again.
+    pub(super) fn end(&mut self, is_equilibrium: bool) {
+        if !self.matrix.is_constant {
+            let may_stay = is_equilibrium || self.settings.method != Method::Auto;
+            self.matrix.has_tangents &= may_stay && !self.solver.has_fallen_back();
+        }
+    }
+
+    /// Whether the matrix is that of an earlier step, though another could be had.
+    pub(super) fn is_stale(&self) -> bool {
+        self.settings.method == Method::Auto && !self.matrix.is_constant && !self.kept.renewed
+    }
+
+    /// Whether the next correction needs another matrix.
+    fn renews(&self) -> bool {
+        !self.matrix.held
+            || !self.matrix.is_constant
+                && match self.settings.method {
+                    Method::Auto => {
+                        self.kept.contraction > FAST[usize::from(self.domain.is_none())]
+                    }
+                    Method::Newton => true,
+                    Method::ModifiedNewton => !self.kept.renewed,
+                    Method::InitialStress => false,
+                    Method::QuasiNewton => self.kept.stalls,
+                }
+    }
+
+    /// What laws are asked for in an evaluation that a correction follows.
+    pub(super) fn operator(&self) -> Operator {
+        match self.settings.method {
+            _ if !self.renews() => Operator::None,
+            Method::InitialStress => Operator::Elastic,
+            _ => Operator::Consistent,
+        }
+    }
+
+    /// Renews the matrix where the method wants it. `increment` is the state of the last
+    /// evaluation, which is repeated if it left out the tangents. Says whether there is another
+    /// matrix now.
+    ///
+    /// # Errors
+    /// A law fails, or the matrix is singular.
+    pub(super) fn prepare(&mut self, increment: &[f64], task: &Task) -> Result<bool, StepFailure> {
+        if !self.renews() {
+            return Ok(false);
+        }
+        let operator = self.operator();
+        if self.tangents != operator {
+            self.evaluate(increment, task, operator)
+                .map_err(StepFailure::from)?;
+        }
+        let values = self.stiffness();
+        self.factorise(values, 1.0)?;
+        self.matrix.hold();
+        self.kept.renewed = true;
+        self.kept.stalls = false;
+        Ok(true)
+    }
+
+    /// Takes up what the last correction achieved, and renews the matrix where the method wants it.
+    /// Says whether there is another one now.
+    pub(super) fn renew(
+        &mut self,
+        iterations: &[Iteration],
+        increment: &[f64],
+        task: &Task,
+    ) -> Result<bool, StepFailure> {
+        let achieved = achieved(iterations);
+        self.kept.contraction = achieved.unwrap_or(self.kept.contraction);
+        let renewed = self.prepare(increment, task)?;
+        if renewed && achieved.is_some() {
+            // The residual will fall quadratically: r₃ / r₂ = (r₂ / r₁)².
+            self.kept.contraction *= self.kept.contraction;
+        }
+        Ok(renewed)
+    }
+
+    /// One whole correction with the matrix of an earlier step. `None` if the matrix is not one, or
+    /// if the residual grows: then the matrix of this state has taken its place.
+    pub(super) fn correct_with_kept(
+        &mut self,
+        control: &impl Control,
+        state: &State,
+        task: &Task,
+    ) -> Result<Option<(Iteration, State)>, StepFailure> {
+        if !self.is_stale() {
+            return Ok(None);
+        }
+        let correction = Correction {
+            increment: self.solve(&state.balance.residual, None)?,
+            rise: 0.0,
+        };
+        let operator = self.operator();
+        let moved = control.evaluate(self, state.moved_by(1.0, &correction), operator);
+        let enough = control.line_search(self, state).enough;
+        if let Ok(next) = moved
+            && next.balance.relative <= enough
+        {
+            let taken = self.took(&next, &correction.increment, 1.0);
+            return Ok(Some((taken, next)));
+        }
+        // The groups hold another state.
+        self.tangents = Operator::None;
+        self.kept.contraction = f64::INFINITY;
+        self.prepare(&state.increment, task)?;
+        Ok(None)
+    }
+}
+
+/// Fraction of the residual that the last correction left; `None` before the first one, infinite if
+/// it was not taken as a whole.
+fn achieved(iterations: &[Iteration]) -> Option<f64> {
+    let [.., before, last] = iterations else {
+        return None;
+    };
+    let is_whole = last.step_length >= 1.0 && last.viscosity <= 0.0;
+    let ratio = last.residual / before.residual;
+    Some(if is_whole && ratio.is_finite() {
+        ratio
+    } else {
+        f64::INFINITY
+    })
+}

@@ -1,0 +1,209 @@
+//! Steps whose load factor is given: the strategies of Newton's method under load control.
+//!
+//! A standstill is [relaxed](super::relaxation); a [kept matrix](super::kept) is tried before that of
+//! the present state; slow corrections are [accelerated](super::acceleration).
+
+use super::acceleration::Acceleration;
+use super::failure::StepFailure;
+use super::iterate::{Control, Correction, State};
+use super::line_search::{LineSearch, Otherwise};
+use super::outcome::Iteration;
+use super::relaxation::{self, Relaxation};
+use super::residual::Task;
+use super::{Newton, norm};
+use crate::settings::Method;
+use law::Operator;
+
+/// Lengths of a correction that the line search tries.
+const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
+
+/// A step to a given load factor.
+#[derive(Debug)]
+pub(super) struct LoadControl {
+    task: Task,
+    /// Displacement increments to start from; the tangent at the start predicts them if there are
+    /// none.
+    guess: Option<Vec<f64>>,
+    /// With a quasi-Newton matrix only.
+    acceleration: Option<Acceleration>,
+    pub(super) relaxation: Relaxation,
+}
+
+impl LoadControl {
+    /// A step to this end.
+    pub(super) fn new(newton: &Newton<'_>, task: Task, guess: Option<Vec<f64>>) -> Self {
+        let is_quasi = newton.settings.method == Method::QuasiNewton;
+        Self {
+            task,
+            guess,
+            acceleration: is_quasi.then(Acceleration::default),
+            relaxation: Relaxation::new(newton.settings),
+        }
+    }
+
+    /// The correction of an iterate with the matrix there is.
+    fn correction(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+    ) -> Result<Correction, StepFailure> {
+        let correction = newton.solve(&state.balance.residual, None)?;
+        Ok(Correction {
+            increment: match &mut self.acceleration {
+                Some(acceleration) => acceleration.improve(correction),
+                None => correction,
+            },
+            rise: 0.0,
+        })
+    }
+}
+
+impl Control for LoadControl {
+    fn predict(&mut self, newton: &mut Newton<'_>) -> Result<State, StepFailure> {
+        let from_tangent = self.guess.is_none();
+        let increment = match self.guess.take() {
+            Some(guess) => newton.completed(guess, &self.task.prescribed),
+            None => newton.predict(&self.task)?,
+        };
+        newton.starts_from(&increment, from_tangent);
+        let operator = newton.operator();
+        self.evaluate(newton, (increment, self.task.period.1), operator)
+    }
+
+    fn evaluate(
+        &self,
+        newton: &mut Newton<'_>,
+        (increment, rise): (Vec<f64>, f64),
+        operator: Operator,
+    ) -> Result<State, StepFailure> {
+        let balance = newton.evaluate(&increment, &self.task, operator)?;
+        Ok(State {
+            increment,
+            rise,
+            balance,
+        })
+    }
+
+    fn accept(
+        &self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> Option<f64> {
+        if newton.is_equilibrium(&state.balance, iterations.last()?) {
+            return Some(0.0);
+        }
+        // What rounding leaves is looked for only where iterations lead no further: it costs two
+        // evaluations.
+        let series = self.series(iterations);
+        let stands_still = newton.settings.method.is_newton() && relaxation::stands_still(series);
+        let ends = stands_still || newton.is_over(series);
+        let is_round_off =
+            ends && newton.is_round_off(&state.increment, &state.balance, &self.task);
+        is_round_off.then_some(state.balance.relative)
+    }
+
+    fn correct(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<State, StepFailure> {
+        let relaxed = self
+            .relaxation
+            .relieve(newton, &self.task, &state.increment, iterations)?;
+        if let Some((increment, balance)) = relaxed {
+            let rise = state.rise;
+            return Ok(State {
+                increment,
+                rise,
+                balance,
+            });
+        }
+        if let Some(acceleration) = &self.acceleration {
+            newton.kept.stalls = acceleration.stalls(iterations);
+        }
+        if newton.renew(self.series(iterations), &state.increment, &self.task)?
+            && let Some(acceleration) = &mut self.acceleration
+        {
+            // What moves with another matrix achieved says nothing of this one.
+            *acceleration = Acceleration::since(iterations.len() - 1);
+        }
+        if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
+            iterations.push(taken);
+            return Ok(next);
+        }
+        let correction = self.correction(newton, state)?;
+        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
+        let ends = newton.probably_ends(state.balance.relative, size);
+        let (length, next) = newton.search(self, state, &correction, ends)?;
+        if let Some(acceleration) = &mut self.acceleration {
+            acceleration.took(&correction.increment, length);
+        }
+        iterations.push(newton.took(&next, &correction.increment, length));
+        Ok(next)
+    }
+
+    fn line_search(&self, newton: &Newton<'_>, from: &State) -> LineSearch {
+        LineSearch {
+            lengths: &STEP_LENGTHS,
+            // Below the tolerance the residual may grow: there it is round-off.
+            enough: from.balance.relative.max(newton.settings.force_tolerance),
+            otherwise: Otherwise::Best,
+        }
+    }
+
+    fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
+        self.relaxation.series(iterations)
+    }
+
+    fn has_settled(&self, newton: &mut Newton<'_>, state: &State) -> bool {
+        newton.has_settled(&state.increment, &state.balance, &self.task)
+    }
+
+    fn give_up(
+        &self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> StepFailure {
+        let correction = iterations.last().and_then(|last| last.correction);
+        let in_vain = self.relaxation.was_in_vain();
+        newton.no_equilibrium(self, state, &self.task, correction, in_vain)
+    }
+}
+
+impl Newton<'_> {
+    /// Displacement increments that the tangent at the start predicts.
+    fn predict(&mut self, task: &Task) -> Result<Vec<f64>, StepFailure> {
+        let still = vec![0.0; task.external.len()];
+        let operator = self.operator();
+        let balance = self.evaluate(&still, task, operator)?;
+        self.prepare(&still, task)?;
+        self.answer_to(&balance.residual, task)
+    }
+
+    /// Displacement increments, prescribed ones included, that answer a residual with the matrix
+    /// there is.
+    pub(super) fn answer_to(
+        &mut self,
+        residual: &[f64],
+        task: &Task,
+    ) -> Result<Vec<f64>, StepFailure> {
+        let mut increment = self.solve(residual, Some(&task.prescribed))?;
+        for (value, prescribed) in increment.iter_mut().zip(&task.prescribed) {
+            *value += prescribed;
+        }
+        self.places.follow(&mut increment);
+        Ok(increment)
+    }
+
+    /// A guess with the increments of prescribed and tied degrees of freedom.
+    fn completed(&self, mut guess: Vec<f64>, prescribed: &[f64]) -> Vec<f64> {
+        for &place in &self.places.prescribed {
+            guess[place] = prescribed[place];
+        }
+        self.places.follow(&mut guess);
+        guess
+    }
+}

@@ -1,0 +1,82 @@
+//! What goes into a step and what comes of it, apart from [failures](super::failure).
+
+use super::residual::Balance;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// Where the iterations of a step start.
+#[derive(Clone, Debug)]
+pub struct Guess {
+    /// Displacement increments, by place.
+    pub increment: Vec<f64>,
+    /// Fraction of the residual that the first correction will probably leave, as it did in the
+    /// last step; `None` if nothing is known.
+    pub contraction: Option<f64>,
+}
+
+/// One iteration, for the log.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Iteration {
+    /// Relative residual after it.
+    pub residual: f64,
+    /// Relative correction; null before the first one.
+    pub correction: Option<f64>,
+    /// Fraction of the correction that was taken.
+    pub step_length: f64,
+    /// Share of the elastic stiffness added to the tangent; 0 in a Newton iteration.
+    pub viscosity: f64,
+}
+
+impl Iteration {
+    /// The state before the first correction.
+    pub(super) fn first(balance: &Balance) -> Self {
+        Self {
+            residual: balance.relative,
+            correction: None,
+            step_length: 1.0,
+            viscosity: 0.0,
+        }
+    }
+
+    /// The state after this fraction of a correction of this relative size.
+    pub(super) fn of(balance: &Balance, correction: f64, step_length: f64) -> Self {
+        Self {
+            residual: balance.relative,
+            correction: Some(correction),
+            step_length,
+            viscosity: 0.0,
+        }
+    }
+}
+
+/// A step that reached equilibrium. The groups' trial state is that of equilibrium.
+#[derive(Clone, Debug)]
+pub struct StepSuccess {
+    /// Displacement increments, by place.
+    pub increment: Vec<f64>,
+    /// What happened.
+    pub iterations: Vec<Iteration>,
+    /// Points whose laws call their result inaccurate.
+    pub unreliable: Option<String>,
+    /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
+    pub relaxed: bool,
+    /// Relative residual that had to be taken for round-off, above the tolerance; else 0.
+    pub round_off: f64,
+    /// What the residual was measured against, by body.
+    pub scales: Vec<f64>,
+}
+
+/// Seconds by part, and counts.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Costs {
+    /// Laws, with the strains before and the forces after them.
+    pub laws: Duration,
+    /// Assembly of matrices.
+    pub assembly: Duration,
+    /// Factorisation and solution.
+    pub equations: Duration,
+    /// Evaluations of all groups.
+    pub evaluations: u64,
+    /// Matrices factorised.
+    pub factorisations: u64,
+}

@@ -1,0 +1,159 @@
+//! Evaluation: what displacement increments leave out of balance.
+
+use super::{Newton, ROUND_OFF};
+use crate::assembly::norms;
+use crate::group::{Group, PointFailure};
+use law::Operator;
+use std::time::Instant;
+
+/// A step's end: what an iterate is held against.
+#[derive(Debug)]
+pub(super) struct Task {
+    /// External forces, by place.
+    pub(super) external: Vec<f64>,
+    /// Norm of those on all degrees of freedom, or of the forces at the start of the phase; by body.
+    pub(super) imposed: Vec<f64>,
+    /// Increments of prescribed displacements, by place.
+    pub(super) prescribed: Vec<f64>,
+    /// Time at the start, and its increment.
+    pub(super) period: (f64, f64),
+}
+
+/// Residual by equation, and the residual's norm relative to the forces in play.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Balance {
+    pub(super) residual: Vec<f64>,
+    /// The largest of all bodies.
+    pub(super) relative: f64,
+    pub(super) by_body: Vec<f64>,
+    /// What it is relative to, by body.
+    pub(super) scales: Vec<f64>,
+    /// Of every body, whether it has run away.
+    pub(super) away: Vec<bool>,
+    pub(super) unreliable: Option<String>,
+}
+
+impl Newton<'_> {
+    /// Norm of external forces, or of the forces at the start of the phase; by body.
+    pub(super) fn imposed(&self, external: &[f64]) -> Vec<f64> {
+        let bodies = &self.places.bodies;
+        let norms = norms(&bodies.of_dof, bodies.n, external);
+        let both = norms.iter().zip(&self.at_start);
+        both.map(|(norm, at_start)| norm.max(*at_start)).collect()
+    }
+
+    /// Trial state, internal forces and residual under displacement increments; also the
+    /// tangents if an `operator` is wanted.
+    pub(super) fn evaluate(
+        &mut self,
+        increment: &[f64],
+        task: &Task,
+        operator: Operator,
+    ) -> Result<Balance, PointFailure> {
+        let away = self.away(increment, task);
+        let start = Instant::now();
+        self.will_compute(operator);
+        let (mut internal, mut unreliable) = self.internal_forces(increment, task, operator)?;
+        // Forces in play before those of the domain cancel them out.
+        let trial = |group: &Group, _: usize| group.stress.trial.clone();
+        let in_play = self.forces_by_body(&internal, &trial);
+        let floors = self.floors(increment, task);
+        let (scales, has_moved) = self.scales(&in_play, &floors, task);
+        if has_moved {
+            (internal, unreliable) = self.internal_forces(increment, task, operator)?;
+        }
+        self.tangents = operator;
+        if let Some(domain) = self.domain {
+            let boundary = &self.places.boundary;
+            let moved: Vec<f64> = boundary.iter().map(|&place| increment[place]).collect();
+            let mut forces = self.domain_forces.clone();
+            domain.add_product(&moved, &mut forces);
+            for (&place, force) in boundary.iter().zip(forces) {
+                internal[place] += force;
+            }
+        }
+        let free = self.places.free.iter();
+        let residual: Vec<f64> = free
+            .map(|&place| task.external[place] - internal[place])
+            .collect();
+        let bodies = &self.places.bodies;
+        let sizes = norms(&bodies.of_equation, bodies.n, &residual);
+        let both = sizes.iter().zip(&scales);
+        let by_body: Vec<f64> = both
+            .map(|(size, &scale)| if scale > 0.0 { size / scale } else { 0.0 })
+            .collect();
+        self.costs.laws += start.elapsed();
+        Ok(Balance {
+            residual,
+            relative: largest(&by_body),
+            by_body,
+            scales,
+            away,
+            unreliable,
+        })
+    }
+
+    /// Trial state and internal forces by place, without those of the domain, under displacement
+    /// increments. Says which law calls its result unreliable.
+    fn internal_forces(
+        &mut self,
+        increment: &[f64],
+        task: &Task,
+        operator: Operator,
+    ) -> Result<(Vec<f64>, Option<String>), PointFailure> {
+        self.costs.evaluations += 1;
+        self.places.scatter(increment, &mut self.displacement);
+        let outcome = self.evaluate_groups(task.period, operator);
+        let mut internal = self.places.take(&mut self.force);
+        let unreliable = outcome?;
+        self.places.fold(&mut internal);
+        Ok((internal, unreliable))
+    }
+
+    /// Forces by body that count as none where no force has ever acted: round-off of K u.
+    fn floors(&self, increment: &[f64], task: &Task) -> Vec<f64> {
+        let bodies = &self.places.bodies;
+        let sizes = self.by_body(increment);
+        let of_domain = super::norm(&self.domain_forces);
+        (0..bodies.n)
+            .map(|body| {
+                let cancelling = self.matrix.largest_of(body) * sizes[body] + of_domain;
+                // Forces no larger than that are themselves what rounding leaves.
+                if task.imposed[body] > ROUND_OFF * cancelling {
+                    0.0
+                } else {
+                    ROUND_OFF * cancelling / self.settings.force_tolerance
+                }
+            })
+            .collect()
+    }
+
+    /// Trial state of the groups under the displacements in their room; the forces are added up in
+    /// theirs. Says which law calls its result unreliable.
+    pub(super) fn evaluate_groups(
+        &mut self,
+        (time, time_increment): (f64, f64),
+        operator: Operator,
+    ) -> Result<Option<String>, PointFailure> {
+        let mut unreliable = None;
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            if !self.system.includes(number) {
+                continue;
+            }
+            let success = group.evaluate(&self.displacement, operator, time, time_increment)?;
+            group
+                .kinematics
+                .add_forces(&group.stress.trial, &mut self.force);
+            unreliable = unreliable.or(success
+                .unreliable
+                .map(|(_, why)| format!("group `{}`: {why}", group.name)));
+        }
+        Ok(unreliable)
+    }
+}
+
+/// The largest of some sizes; not a number if one is none.
+fn largest(sizes: &[f64]) -> f64 {
+    let larger = |a: f64, b: &f64| if *b > a || b.is_nan() { *b } else { a };
+    sizes.iter().fold(0.0, larger)
+}
