@@ -15,7 +15,7 @@ use mechanics::group::Group;
 use mechanics::{Mesh, Model, Place, Settings};
 use runs::run::{Observer, run};
 use std::path::Path;
-use text::{Source, parse};
+use text::Source;
 
 fn main() {
     divan::main();
@@ -151,12 +151,8 @@ fn stressed_chamber() -> Case {
         .replace("formulation =", &format!("{stress}formulation ="))
         .replace("\"full\"\nlaw = \"sand\"", "\"full\"\nlaw = \"mepi\"");
     let source = Source::new("chamber.toml", text);
-    let file = parse(&source).expect("a case");
-    Case {
-        source,
-        file,
-        variant: None,
-    }
+    let mut cases = Case::of(source).expect("a case");
+    cases.pop().expect("one case")
 }
 
 /// The chamber's equations, the head pushed by 0.1 mm.

@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use text::write::refuse_other;
 
+#[expect(clippy::too_many_lines, reason = "one arm for each command")]
 pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
     match command {
         Command::Run {

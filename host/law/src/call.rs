@@ -81,7 +81,7 @@ pub struct Start<'a> {
     pub time_increment: f64,
     /// Which step and increment it is.
     pub moment: Moment,
-    /// Where the points lie; empty if the law does not ask ([`Law::asks_for_sites`]).
+    /// Where the points lie; empty if the law does not ask ([`crate::Law::asks_for_sites`]).
     pub sites: &'a [Site],
 }
 

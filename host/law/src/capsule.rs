@@ -200,7 +200,7 @@ impl Capsule {
     /// Reads a capsule.
     ///
     /// # Errors
-    /// [`Error::Unreadable`]; [`Error::Input`] at the place that does not fit.
+    /// [`text::Error::Unreadable`]; [`text::Error::Input`] at the place that does not fit.
     pub fn read(path: &Path) -> Result<Self, Error> {
         Self::of_source(Source::read(path)?)
     }
@@ -251,7 +251,7 @@ impl Capsule {
     /// Writes the capsule.
     ///
     /// # Errors
-    /// [`Error::Unwritable`].
+    /// [`text::Error::Unwritable`].
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         Ok(replace(path, self.to_string())?)
     }

@@ -50,7 +50,7 @@ impl Pins {
     /// file.
     ///
     /// # Errors
-    /// [`Error::Input`] for what is no SHA-256, or a lock that cannot be read.
+    /// [`text::Error::Input`] for what is no SHA-256, or a lock that cannot be read.
     pub fn of<'a>(
         source: &Source,
         laws: impl Iterator<Item = (&'a Spanned<String>, Option<&'a Spanned<String>>)>,

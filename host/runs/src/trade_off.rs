@@ -56,7 +56,7 @@ pub struct Options {
 ///
 /// # Errors
 /// Bad input before anything is written; the failure of the file's own settings or of every
-/// reference; [`Error::Unwritable`].
+/// reference; [`text::Error::Unwritable`].
 pub fn run(
     path: &Path,
     options: &Options,

@@ -36,7 +36,7 @@ const ORDERS: [f64; 2] = [0.3, 1.0];
 /// `folder` is where the study may write, and leaves nothing.
 ///
 /// # Errors
-/// Bad input before anything is written; no equilibrium with any settings; [`Error::Unwritable`].
+/// Bad input before anything is written; no equilibrium with any settings; [`text::Error::Unwritable`].
 pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
     reach_until(case, folder, &Stop::never(), &mut |_| ())
 }
@@ -44,7 +44,7 @@ pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
 /// As [`reach`], to be stopped on its way. `say` takes what is being done.
 ///
 /// # Errors
-/// As [`reach`]; [`Error::Stopped`].
+/// As [`reach`]; [`law::Stopped`].
 pub fn reach_until(
     case: &Case,
     folder: &Path,

@@ -11,7 +11,7 @@ impl Study {
     /// The page.
     ///
     /// # Errors
-    /// [`Error::Internal`].
+    /// [`text::Error::Internal`].
     pub(super) fn page(&self, diagram: &str) -> Result<String, Error> {
         let mut environment = Environment::new();
         environment

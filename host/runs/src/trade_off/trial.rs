@@ -186,7 +186,7 @@ impl Scratch {
     /// A folder inside another one, which is made if needed.
     ///
     /// # Errors
-    /// [`Error::Unwritable`].
+    /// [`text::Error::Unwritable`].
     pub(super) fn new(within: &Path, stop: &Stop) -> Result<Self, Error> {
         let folder = within.join(".trial");
         std::fs::create_dir_all(&folder).map_err(|source| text::Error::Unwritable {
