@@ -107,6 +107,8 @@ pub struct BatchFailure {
     pub message: String,
     /// The smallest step factor asked for, if only smaller steps are asked for.
     pub factor: Option<f64>,
+    /// The law claimed success, with a result that is not finite.
+    pub claims_success: bool,
     /// What the law was asked at the point.
     pub call: Option<Box<PointCall>>,
 }

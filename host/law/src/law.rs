@@ -109,7 +109,7 @@ impl Law {
     /// that is numeric about routines made for other programs.
     pub fn breaks_down(&self, failure: &BatchFailure) -> bool {
         let is_foreign = self.library().foreign().is_some();
-        failure.outcome == Outcome::Numeric && (is_foreign || failure.message == NOT_FINITE)
+        failure.outcome == Outcome::Numeric && (is_foreign || failure.claims_success)
     }
 
     /// Whether the law is told where its points lie.
@@ -354,6 +354,7 @@ fn judge(
                 outcome: Outcome::CutStep,
                 message,
                 factor: Some(factor),
+                claims_success: false,
                 call: None,
             })
         }
@@ -362,6 +363,7 @@ fn judge(
             outcome,
             message,
             factor: None,
+            claims_success: false,
             call: None,
         }),
     }
@@ -388,6 +390,7 @@ fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), B
                     outcome: Outcome::Numeric,
                     message: NOT_FINITE.to_owned(),
                     factor: None,
+                    claims_success: true,
                     call: None,
                 });
             }

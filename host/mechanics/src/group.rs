@@ -524,6 +524,7 @@ impl Group {
                         flux[i]
                     ),
                     factor: None,
+                    claims_success: false,
                     call: None,
                 });
             }

@@ -318,6 +318,7 @@ mod tests {
             outcome,
             message: "its words".to_owned(),
             factor: None,
+            claims_success: false,
             call: None,
         }
     }
