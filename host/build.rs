@@ -1,5 +1,5 @@
 //! Lets libraries find the utility routines in the program that user subroutines of Abaqus call
-//! (`src/plugin/library/abaqus.rs`).
+//! (`law/src/library/abaqus.rs`).
 
 use std::env::var;
 
