@@ -362,11 +362,10 @@ impl Resolver<'_> {
             return true;
         }
         let is_weighted = matches!(self.input.reduce, Some(Reduce::Average | Reduce::Integral));
-        let n = group.kinematics.points_per_element();
-        let first = point - point % n;
+        let points = group.kinematics.points_of(group.kinematics.place_of(point).0);
         let middle = [0, 1].map(|c| {
-            let of_element = (first..first + n).map(|point| group.kinematics.position(point)[c]);
-            of_element.sum::<f64>() / n as f64
+            let of_element = points.clone().map(|point| group.kinematics.position(point)[c]);
+            of_element.sum::<f64>() / points.len() as f64
         });
         is_weighted && self.touches(position) && self.inside(middle)
     }

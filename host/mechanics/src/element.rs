@@ -5,6 +5,8 @@
 //! and tangential components.
 
 mod joint6;
+mod mixed;
+mod projection;
 mod quad8;
 mod shape;
 mod solid;
@@ -13,12 +15,14 @@ mod tests;
 mod tri6;
 
 pub use joint6::Joint6;
+pub use mixed::Mixed;
 pub use quad8::Quad8;
 pub use shape::{gauss, line_shape};
-pub use solid::{BadShape, Solid};
+pub use solid::{BadShape, Solid, Strains};
 pub use tri6::Tri6;
 
 use crate::problem::Analysis;
+use std::ops::Range;
 
 /// Two unit vectors: along the facet (1) and across it (2).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,8 +84,12 @@ impl Axes {
 pub trait Kinematics: std::fmt::Debug + Send + Sync {
     /// Number of elements.
     fn n_elements(&self) -> usize;
-    /// Integration points of one element.
-    fn points_per_element(&self) -> usize;
+    /// Number of integration points.
+    fn n_points(&self) -> usize;
+    /// Integration points of an element.
+    fn points_of(&self, element: usize) -> Range<usize>;
+    /// Element of an integration point, and the point's number within it.
+    fn place_of(&self, point: usize) -> (usize, usize);
     /// Components of strain (4) or jump (2).
     fn n_components(&self) -> usize;
     /// Nodes of an element.
@@ -90,6 +98,8 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn position(&self, point: usize) -> [f64; 2];
     /// Weight of an integration point: the volume (of an interface: the area) it stands for.
     fn weight(&self, point: usize) -> f64;
+    /// What of an element's volume each of its nodes stands for, ∫ N dV; nothing of interfaces.
+    fn volumes(&self, element: usize) -> &[f64];
     /// Characteristic length of an element: the square root of its area, of an interface its
     /// length.
     fn length(&self, element: usize) -> f64;
@@ -102,11 +112,6 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     /// Stiffness of an element from the tangents of its points (row-major), row-major, two
     /// degrees of freedom per node, in global axes. Overwrites `out`.
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]);
-
-    /// Number of integration points.
-    fn n_points(&self) -> usize {
-        self.n_elements() * self.points_per_element()
-    }
 }
 
 /// What a unit of area in the plane stands for.

@@ -6,6 +6,8 @@
 mod layer;
 mod takeover;
 mod tangent;
+mod varying;
+mod water;
 
 pub use tangent::Fault;
 
@@ -14,10 +16,14 @@ use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
 use layer::Layer;
+use law::Law;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::ops::Range;
 pub use takeover::TakeOver;
+use varying::Varying;
+use water::Pores;
 
 /// Points that one thread takes at a time.
 const BATCH: usize = 1024;
@@ -26,15 +32,16 @@ const BATCH: usize = 1024;
 const PROBE: [f64; 4] = [1e-4, -5e-5, 2.5e-5, 7.5e-5];
 const LINEAR: f64 = 1e-8;
 
-/// Number of a batch, and where its fluxes, internal variables and operators go.
-type Batch<'a> = (usize, &'a mut [f64], &'a mut [f64], &'a mut [f64]);
+/// Points of a batch, their law, and where their fluxes, internal variables and operators go.
+type Batch<'a> = (Range<usize>, &'a Law, [&'a mut [f64]; 3]);
 
 /// Values of all points, before and during an increment.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Field {
     /// At the start of the increment.
     pub committed: Vec<f64>,
     /// As of the last iteration; empty before the first one of a phase.
+    #[serde(skip)]
     pub trial: Vec<f64>,
 }
 
@@ -142,6 +149,7 @@ pub struct GroupState<'g> {
     law_calls: Cow<'g, [LawCalls]>,
     /// Tangents, where a matrix made of them is still in use.
     tangent: Option<Cow<'g, [f64]>>,
+    pores: Option<Cow<'g, Pores>>,
 }
 
 impl GroupState<'_> {
@@ -155,6 +163,7 @@ impl GroupState<'_> {
             jump: Cow::Owned(self.jump.into_owned()),
             law_calls: Cow::Owned(self.law_calls.into_owned()),
             tangent: self.tangent.map(|tangent| Cow::Owned(tangent.into_owned())),
+            pores: self.pores.map(|pores| Cow::Owned(pores.into_owned())),
         }
     }
 }
@@ -180,7 +189,13 @@ pub struct Group {
     pub moment: Moment,
     /// Calls of the laws used so far; the last one is that of the current law.
     pub law_calls: Vec<LawCalls>,
+    /// It is there: it has stiffness, weight and stress.
+    pub is_active: bool,
     layer: Option<Layer>,
+    /// Pore water that follows the deformation, if it does or did.
+    pores: Option<Pores>,
+    /// Laws of the elements, if their parameters vary.
+    varying: Option<Varying>,
     /// Where the points lie, if the law asks.
     sites: Vec<Site>,
     /// What it is called where calls of laws are watched.
@@ -209,7 +224,7 @@ impl Group {
     ) -> Result<Self, PointFailure> {
         let n = kinematics.n_points() * kinematics.n_components();
         let layer = thickness.map(|(thickness, in_plane)| {
-            Layer::new(thickness, in_plane, kinematics.points_per_element())
+            Layer::new(thickness, in_plane, kinematics.points_of(0).len())
         });
         let mut group = Self {
             name,
@@ -221,7 +236,10 @@ impl Group {
             law: law.clone(),
             moment: Moment::default(),
             law_calls: Vec::new(),
+            is_active: true,
             layer,
+            pores: None,
+            varying: None,
             sites: Vec::new(),
             watched: 0,
             tangent: Vec::new(),
@@ -255,6 +273,7 @@ impl Group {
             jump: jump.unwrap_or_default().into(),
             law_calls: (&self.law_calls).into(),
             tangent: with_tangents.then(|| (&self.tangent).into()),
+            pores: self.pores.as_ref().map(Cow::Borrowed),
         }
     }
 
@@ -281,6 +300,7 @@ impl Group {
             return Err(wrong());
         }
         self.stress = Field::new(state.stress.into_owned());
+        self.pores = state.pores.map(Cow::into_owned);
         self.start_law(law, Some(state.internal.to_vec()))
             .map_err(|failure| failure.to_string())?;
         // Initial values that the case file gives held at the start of the law only.
@@ -298,6 +318,28 @@ impl Group {
         self.law_calls = state.law_calls.into_owned();
         self.forget_trial();
         Ok(())
+    }
+
+    /// A group that is there from now on, free of strain, with this stress in axes of its elements. Its
+    /// law starts anew.
+    ///
+    /// # Errors
+    /// The law cannot start from the stress.
+    pub fn appear(&mut self, stress: Vec<f64>) -> Result<(), PointFailure> {
+        self.is_active = true;
+        self.strain.committed.fill(0.0);
+        self.stress = Field::new(stress);
+        self.start_law(self.law.clone(), None)
+    }
+
+    /// A group that is no longer there: without stress and strain.
+    pub fn disappear(&mut self) {
+        self.is_active = false;
+        self.pores = None;
+        for field in self.fields() {
+            field.committed.fill(0.0);
+            field.forget_trial();
+        }
     }
 
     fn start_law(&mut self, law: Material, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
@@ -318,15 +360,14 @@ impl Group {
         } else {
             Vec::new()
         };
+        self.varying = Varying::new(&self.law, &*self.kinematics)
+            .map_err(|failure| self.locate(&cannot_build(&failure)))?;
         let starts_anew = kept.is_none();
-        let mut internal = if let Some(kept) = kept {
-            kept
-        } else {
-            let stress = (self.stress.committed.as_slice(), self.flux_place());
-            calls::of_group(self.watched, 0, self.kinematics.points_per_element());
-            law.initial_state(n_points, stress)
-                .map_err(|failure| self.locate(&failure))?
+        let mut internal = match kept {
+            Some(kept) => kept,
+            None => self.initial_state()?,
         };
+        let law = &self.law.built.law;
         for &(number, value) in &self.law.initial {
             let of_points = internal.iter_mut().skip(number).step_by(law.n_states());
             of_points.for_each(|v| *v = value);
@@ -337,12 +378,14 @@ impl Group {
         }
         let n = law.n_components();
         let element_n = self.kinematics.n_components();
-        self.tangents_are_constant = law.formulation().linear && !self.uses_layer();
+        let is_uniform = self.varying.is_none() && self.pores.is_none();
+        self.tangents_are_constant = law.formulation().linear && is_uniform && !self.uses_layer();
         if self.tangents_are_constant {
             let one = self
                 .operator_of_first_point()
                 .map_err(|failure| self.locate(&failure))?;
-            self.tangent = one.repeat(self.kinematics.points_per_element());
+            let most = (0..self.kinematics.n_elements()).map(|e| self.kinematics.points_of(e).len());
+            self.tangent = one.repeat(most.max().unwrap_or(0));
             return Ok(());
         }
         self.tangent = vec![0.0; n_points * element_n * element_n];
@@ -364,13 +407,47 @@ impl Group {
         Ok(())
     }
 
+    /// What the law makes of the stresses before anything has happened.
+    fn initial_state(&self) -> Result<Vec<f64>, PointFailure> {
+        let place = self.flux_place();
+        calls::of_group(self.watched, 0, self.kinematics.points_of(0).len());
+        let mut internal = Vec::new();
+        for (points, law) in self.pieces(usize::MAX) {
+            let flux = &self.stress.committed[points.start * place.point..points.end * place.point];
+            let state = law.initial_state(points.len(), (flux, place));
+            internal.extend(state.map_err(|failure| {
+                self.locate(&BatchFailure {
+                    point: points.start + failure.point,
+                    ..failure
+                })
+            })?);
+        }
+        Ok(internal)
+    }
+
+    /// Consecutive points of one law, at most so many at a time.
+    fn pieces(&self, most: usize) -> Vec<(Range<usize>, &Law)> {
+        let all = [(0..self.kinematics.n_points(), 0)];
+        let runs = self.varying.as_ref().map_or(&all[..], |varying| &varying.runs);
+        let law = |number: usize| match &self.varying {
+            Some(varying) => &varying.law(number).law,
+            None => &self.law.built.law,
+        };
+        let pieces = runs.iter().flat_map(|(run, number)| {
+            let starts = run.clone().step_by(most.min(run.len().max(1)));
+            let end = run.end;
+            starts.map(move |start| (start..end.min(start.saturating_add(most)), law(*number)))
+        });
+        pieces.collect()
+    }
+
     fn site(&self, point: usize) -> Site {
-        let per_element = self.kinematics.points_per_element().max(1);
+        let (element, within) = self.kinematics.place_of(point);
         Site {
             position: self.kinematics.position(point),
-            length: self.kinematics.length(point / per_element),
-            element: (point / per_element) as u32 + 1,
-            point: (point % per_element) as u32 + 1,
+            length: self.kinematics.length(element),
+            element: element as u32 + 1,
+            point: within as u32 + 1,
         }
     }
 
@@ -427,6 +504,7 @@ impl Group {
         self.strain.trial.clone_from(&self.strain.committed);
         self.kinematics
             .add_gradients(increment, &mut self.strain.trial);
+        self.follow_pores(time, time_increment);
         if self.tangents_are_constant {
             self.evaluate_linear();
             return Ok(BatchSuccess::default());
@@ -450,7 +528,11 @@ impl Group {
             }
             result
         } else {
-            self.run_law(operator, time, time_increment, &mut tangent)
+            let result = self.run_law(operator, time, time_increment, &mut tangent);
+            if operator != Operator::None {
+                self.stiffen(&mut tangent);
+            }
+            result
         };
         self.tangent = tangent;
         result.map_err(|failure| self.locate(&failure))
@@ -561,27 +643,26 @@ impl Group {
         let law = &self.law.built.law;
         let (n, n_states) = (law.n_components(), law.n_states());
         let rows = Strided::rows(n);
+        // The trial state is written while the rest of the group is read.
+        let mut flux_end = std::mem::take(&mut self.stress.trial);
+        let mut states_end = std::mem::take(&mut self.internal.trial);
         let (committed, state) = (&self.stress.committed, &self.internal.committed);
         let (moment, sites) = (self.moment, &self.sites);
-        let (watched, per_element) = (self.watched, self.kinematics.points_per_element());
-        let batch = |(number, flux, state_end, operator_end): Batch<'_>| {
-            let first = number * BATCH;
-            calls::of_group(watched, first, per_element);
-            let n_points = flux.len() / place.point;
-            let points = |values: &'_ [f64], stride: usize| {
-                first * stride..values.len().min((first + n_points) * stride)
-            };
+        let (watched, per_element) = (self.watched, self.kinematics.points_of(0).len());
+        let batch = |(points, law, [flux, state_end, operator_end]): Batch<'_>| {
+            calls::of_group(watched, points.start, per_element);
+            let of = |stride: usize| points.start * stride..points.end * stride;
             law.integrate(
                 &Start {
-                    n_points,
-                    gradient: (&gradient.committed[points(&gradient.committed, n)], rows),
-                    gradient_end: (&gradient.trial[points(&gradient.trial, n)], rows),
-                    flux: (&committed[points(committed, place.point)], place),
-                    state: &state[points(state, n_states)],
+                    n_points: points.len(),
+                    gradient: (&gradient.committed[of(n)], rows),
+                    gradient_end: (&gradient.trial[of(n)], rows),
+                    flux: (&committed[of(place.point)], place),
+                    state: &state[of(n_states)],
                     time,
                     time_increment,
                     moment,
-                    sites: sites.get(first..first + n_points).unwrap_or_default(),
+                    sites: sites.get(points.clone()).unwrap_or_default(),
                 },
                 operator,
                 End {
@@ -591,27 +672,31 @@ impl Group {
                 },
             )
             .map_err(|failure| BatchFailure {
-                point: first + failure.point,
+                point: points.start + failure.point,
                 ..failure
             })
             .map(|success| BatchSuccess {
-                unreliable: success.unreliable.map(|(point, why)| (first + point, why)),
+                unreliable: success.unreliable.map(|(point, why)| (points.start + point, why)),
             })
         };
-        let (flux, state_end) = (&mut self.stress.trial, &mut self.internal.trial);
-        if self.kinematics.n_points() <= BATCH {
-            return batch((0, flux, state_end, operators));
+        let mut rest = [&mut flux_end[..], &mut states_end[..], operators];
+        let mut work = Vec::new();
+        for (points, law) in self.pieces(BATCH) {
+            let sizes = [place.point, n_states, n * n].map(|stride| points.len() * stride);
+            let [flux, states, operators] = rest;
+            let (flux, flux_left) = flux.split_at_mut(sizes[0]);
+            let (states, states_left) = states.split_at_mut(sizes[1]);
+            let (operators, operators_left) = operators.split_at_mut(sizes[2]);
+            rest = [flux_left, states_left, operators_left];
+            work.push((points, law, [flux, states, operators]));
         }
-        let mut states = state_end.chunks_mut(BATCH * n_states.max(1));
-        let work: Vec<Batch<'_>> = flux
-            .chunks_mut(BATCH * place.point)
-            .zip(operators.chunks_mut(BATCH * n * n))
-            .enumerate()
-            .map(|(number, (flux, operators))| {
-                (number, flux, states.next().unwrap_or_default(), operators)
-            })
-            .collect();
-        let outcomes: Vec<_> = work.into_par_iter().map(batch).collect();
+        let outcomes: Vec<_> = if self.kinematics.n_points() <= BATCH {
+            work.into_iter().map(batch).collect()
+        } else {
+            work.into_par_iter().map(batch).collect()
+        };
+        self.stress.trial = flux_end;
+        self.internal.trial = states_end;
         let mut all = BatchSuccess::default();
         for outcome in outcomes {
             all.unreliable = all.unreliable.or(outcome?.unreliable);
@@ -620,16 +705,16 @@ impl Group {
     }
 
     fn locate(&self, failure: &BatchFailure) -> PointFailure {
-        let per_element = self.kinematics.points_per_element().max(1);
         let point = failure
             .point
             .min(self.kinematics.n_points().saturating_sub(1));
+        let (element, within) = self.kinematics.place_of(point);
         PointFailure {
             group: self.name.clone(),
             law: self.law.name.clone(),
             law_id: self.law.built.law.description().id.clone(),
-            element: point / per_element + 1,
-            point: point % per_element + 1,
+            element: element + 1,
+            point: within + 1,
             position: self.kinematics.position(point),
             failure: BatchFailure {
                 // The law counts points of the batch; the element says more.
@@ -646,13 +731,13 @@ impl Group {
     /// Tangents of an element's points as of the last evaluation.
     pub fn element_tangents(&self, element: usize) -> &[f64] {
         let n = self.kinematics.n_components();
-        let length = self.kinematics.points_per_element() * n * n;
-        let start = if self.tangents_are_constant {
+        let points = self.kinematics.points_of(element);
+        let first = if self.tangents_are_constant {
             0
         } else {
-            element * length
+            points.start
         };
-        &self.tangent[start..start + length]
+        &self.tangent[first * n * n..(first + points.len()) * n * n]
     }
 
     /// Tangents as of the last evaluation that computed them.
@@ -671,12 +756,11 @@ impl Group {
         let n = self.kinematics.n_components();
         let mut strain = vec![0.0; self.strain.committed.len()];
         self.kinematics.add_gradients(increment, &mut strain);
-        let per_element = self.kinematics.points_per_element();
         let mut change = vec![0.0; strain.len()];
         let points = strain.chunks_exact(n).zip(change.chunks_exact_mut(n));
         for (point, (strain, change)) in points.enumerate() {
-            let tangents = self.element_tangents(point / per_element);
-            let tangent = &tangents[point % per_element * n * n..][..n * n];
+            let (element, within) = self.kinematics.place_of(point);
+            let tangent = &self.element_tangents(element)[within * n * n..][..n * n];
             for (change, row) in change.iter_mut().zip(tangent.chunks_exact(n)) {
                 *change = row.iter().zip(strain).map(|(d, e)| d * e).sum();
             }
@@ -709,8 +793,9 @@ impl Group {
 
     fn fields(&mut self) -> impl Iterator<Item = &mut Field> {
         let jump = self.layer.as_mut().map(|layer| &mut layer.jump);
+        let excess = self.pores.as_mut().map(|pores| &mut pores.excess);
         let others = [&mut self.strain, &mut self.stress, &mut self.internal];
-        others.into_iter().chain(jump)
+        others.into_iter().chain(jump).chain(excess)
     }
 
     /// Thickness at a point of a thin layer.
@@ -721,19 +806,55 @@ impl Group {
     /// Stress of a point in global axes (committed); `None` for zero-thickness elements.
     pub fn global_stress(&self, point: usize) -> Option<[f64; 4]> {
         let s = self.stress.committed.get(4 * point..4 * point + 4)?;
-        let axes = self
-            .kinematics
-            .axes(point / self.kinematics.points_per_element());
+        let axes = self.kinematics.axes(self.kinematics.place_of(point).0);
         (self.kinematics.n_components() == 4)
             .then(|| axes.stress_to_global([s[0], s[1], s[2], s[3]]))
+    }
+
+    /// Stress that an element carries at a place in or beside it, in global axes (committed): the plane
+    /// that is nearest to the stresses at its points.
+    pub fn carried_at(&self, element: usize, at: [f64; 2]) -> [f64; 4] {
+        let (points, axes) = (self.kinematics.points_of(element), self.kinematics.axes(element));
+        let carried = self.carried();
+        let n = points.len() as f64;
+        let mut middle = [0.0; 2];
+        let mut mean = [0.0; 4];
+        let global = |point: usize| {
+            let s = &carried[4 * point..4 * point + 4];
+            axes.stress_to_global([s[0], s[1], s[2], s[3]])
+        };
+        for point in points.clone() {
+            let (place, stress) = (self.kinematics.position(point), global(point));
+            (0..2).for_each(|c| middle[c] += place[c] / n);
+            (0..4).for_each(|c| mean[c] += stress[c] / n);
+        }
+        let arm = |place: [f64; 2]| [place[0] - middle[0], place[1] - middle[1]];
+        // Normal equations of the slopes.
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        let mut with = [[0.0; 2]; 4];
+        for point in points {
+            let ([x, y], stress) = (arm(self.kinematics.position(point)), global(point));
+            (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+            for c in 0..4 {
+                with[c][0] += x * (stress[c] - mean[c]);
+                with[c][1] += y * (stress[c] - mean[c]);
+            }
+        }
+        let determinant = xx * yy - xy * xy;
+        let [x, y] = arm(at);
+        std::array::from_fn(|c| {
+            if determinant <= 0.0 {
+                return mean[c];
+            }
+            let [a, b] = with[c];
+            mean[c] + (x * (yy * a - xy * b) + y * (xx * b - xy * a)) / determinant
+        })
     }
 
     /// Strain of a point in global axes (committed), γ = 2ε; `None` for zero-thickness elements.
     pub fn global_strain(&self, point: usize) -> Option<[f64; 4]> {
         let e = self.strain.committed.get(4 * point..4 * point + 4)?;
-        let axes = self
-            .kinematics
-            .axes(point / self.kinematics.points_per_element());
+        let axes = self.kinematics.axes(self.kinematics.place_of(point).0);
         (self.kinematics.n_components() == 4).then(|| {
             let [e_11, e_22, e_33, e_12] = axes.stress_to_global([e[0], e[1], e[2], e[3] / 2.0]);
             [e_11, e_22, e_33, 2.0 * e_12]
@@ -753,18 +874,19 @@ impl Group {
     /// Nodal forces of this group's elements (committed), by degree of freedom.
     pub fn forces(&self, n_dofs: usize) -> Vec<f64> {
         let mut force = vec![0.0; n_dofs];
-        self.kinematics
-            .add_forces(&self.stress.committed, &mut force);
+        self.kinematics.add_forces(&self.carried(), &mut force);
         force
     }
 
     /// Nodal forces of some of this group's elements (committed), by degree of freedom.
     pub fn forces_of(&self, elements: &[usize], n_dofs: usize) -> Vec<f64> {
-        let length = self.kinematics.points_per_element() * self.kinematics.n_components();
-        let mut stress = vec![0.0; self.stress.committed.len()];
+        let n = self.kinematics.n_components();
+        let carried = self.carried();
+        let mut stress = vec![0.0; carried.len()];
         for &element in elements {
-            let own = element * length..(element + 1) * length;
-            stress[own.clone()].copy_from_slice(&self.stress.committed[own]);
+            let points = self.kinematics.points_of(element);
+            let own = points.start * n..points.end * n;
+            stress[own.clone()].copy_from_slice(&carried[own]);
         }
         let mut force = vec![0.0; n_dofs];
         self.kinematics.add_forces(&stress, &mut force);
@@ -775,7 +897,6 @@ impl Group {
     /// (committed), kN. At an end that is not doubled the nodal forces of both sides cancel; the
     /// tractions do not.
     pub fn handed_on(&self, elements: &[usize], component: usize) -> f64 {
-        let n = self.kinematics.points_per_element();
         let of_point = |element: usize, point: usize| {
             let axes = self.kinematics.axes(element);
             let [normal, tangential] = [0, 1].map(|c| self.stress.committed[2 * point + c]);
@@ -783,7 +904,7 @@ impl Group {
             self.kinematics.weight(point) * traction
         };
         let of_element = |&element: &usize| {
-            let points = element * n..(element + 1) * n;
+            let points = self.kinematics.points_of(element);
             points.map(|point| of_point(element, point)).sum::<f64>()
         };
         -elements.iter().map(of_element).sum::<f64>()
@@ -812,5 +933,17 @@ impl Group {
                 Some((jump, pair(&self.stress.committed)))
             }
         }
+    }
+}
+
+/// A law that cannot be built with the values of an element.
+fn cannot_build(failure: &law::BuildFailure) -> BatchFailure {
+    BatchFailure {
+        point: 0,
+        outcome: Outcome::Parameter,
+        message: failure.to_string(),
+        factor: None,
+        claims_success: false,
+        call: None,
     }
 }

@@ -5,7 +5,7 @@
 //! goes out to whoever [`Watch`]es, and what goes wrong comes back as data ([`Error`]).
 //!
 //! In the order in which data flows: [`problem`] and [`mesh`]; [`model`], which makes [`group`]s of
-//! [`element`]s of them; [`assembly`] and [`equilibrium`]; [`simulation`].
+//! [`element`]s of them, in the [`ground`]; [`assembly`] and [`equilibrium`]; [`simulation`].
 //!
 //! A slice of a pile, 0.2 m high, in elastic ground behind a thin layer of Coulomb's friction: the
 //! ground presses on it, and it is pushed down by two millimetres.
@@ -52,7 +52,7 @@
 //!     ElementGroup::new("ground", Formulation::Solid, elastic("sand", 5e4)?),
 //! ];
 //! for group in &mut problem.groups {
-//!     group.initial_stress = Some([-100.0, 0.0, -100.0, 0.0]);
+//!     group.initial_stress = Some([-100.0, 0.0, -100.0, 0.0].into());
 //! }
 //! // A slice of something long: nothing moves outward.
 //! let lines = [("outside", vec![Axis::X, Axis::Y]), ("bottom", vec![Axis::X]), ("top", vec![Axis::X])];
@@ -77,6 +77,7 @@ pub mod assembly;
 pub mod element;
 pub mod equilibrium;
 mod error;
+pub mod ground;
 pub mod group;
 pub mod mesh;
 pub mod model;

@@ -2,12 +2,15 @@
 //! can be checked before the first increment.
 
 use crate::assembly::Tie;
-use crate::element::{Axes, Joint6, Kinematics, Quad8, Tri6, depth, gauss, line_shape};
+use crate::element::{
+    Axes, Joint6, Kinematics, Mixed, Quad8, Strains, Tri6,
+};
+use crate::ground::InitialStresses;
 use crate::group::{Group, PointFailure};
 use crate::mesh::{Mesh, Solid};
 use crate::problem::{
-    Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, Integration, Item, Key, Material,
-    Phase, Problem, Refusal, constraints, plausible, tension,
+    Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item, Key,
+    Material, Problem, Refusal, check, constraints, plausible, tension,
 };
 use abi::Hypothesis;
 use law::{End, Moment, Operator, Start, Strided};
@@ -15,8 +18,6 @@ use std::collections::{HashMap, HashSet};
 
 /// A layer whose one side is so many times the other has no doubt about its normal.
 const CLEARLY: f64 = 2.0;
-/// Most increments of a phase.
-const MOST_INCREMENTS: usize = 10_000_000;
 
 /// What a problem is made of once its elements stand.
 #[derive(Debug)]
@@ -67,13 +68,7 @@ impl Model {
     /// # Errors
     /// The part of the problem that does not fit, or the point whose law cannot start.
     pub fn build(problem: &Problem) -> Result<Self, BuildError> {
-        check_phases(problem)?;
-        let n = problem.groups.len();
-        let of_elements = problem.mesh.solids.iter().map(|solid| solid.group);
-        let of_joints = problem.mesh.joints.iter().map(|joint| joint.group);
-        if let Some(group) = of_elements.chain(of_joints).find(|&group| group >= n) {
-            return Err(Refusal::new(Item::Problem, Cause::NoGroup(group)).into());
-        }
+        check::problem(problem)?;
         // A phase's laws hold from it on; the first phase's replace those of the groups at once.
         let mut swaps = vec![Vec::new(); problem.phases.len()];
         let mut first = Vec::new();
@@ -95,6 +90,7 @@ impl Model {
             first.push(own.unwrap_or_else(|| group.material.clone()));
         }
         let surroundings = Surroundings::new(problem);
+        let initial = InitialStresses::new(problem);
         let mut groups = Vec::new();
         let mut ties = Ties::default();
         for (number, material) in first.into_iter().enumerate() {
@@ -102,6 +98,7 @@ impl Model {
                 problem,
                 mesh: &problem.mesh,
                 surroundings: &surroundings,
+                initial: &initial,
                 number,
                 group: &problem.groups[number],
             };
@@ -131,62 +128,6 @@ impl Model {
         }
         Ok(())
     }
-}
-
-/// References within phases, and counts.
-fn check_phases(problem: &Problem) -> Result<(), Refusal> {
-    if problem.phases.is_empty() {
-        return Err(Refusal::new(Item::Problem, Cause::NoPhase));
-    }
-    let mut middles: HashMap<usize, usize> = HashMap::new();
-    for edge in problem.mesh.solids.iter().flat_map(Solid::edges) {
-        *middles.entry(edge[2]).or_default() += 1;
-    }
-    let mut names: Vec<&str> = Vec::new();
-    for (number, phase) in problem.phases.iter().enumerate() {
-        let refuse = |cause| Err(Refusal::new(Item::Phase(number), cause));
-        let name = phase.name.as_str();
-        if name.trim().is_empty() {
-            return refuse(Cause::PhaseWithoutName);
-        }
-        if names.contains(&name) {
-            return refuse(Cause::TwoPhases(name.to_owned()));
-        }
-        names.push(name);
-        if phase.increments == 0 || phase.increments > MOST_INCREMENTS {
-            return refuse(Cause::Increments(phase.increments));
-        }
-        let n = problem.groups.len();
-        if let Some((group, _)) = phase.materials.iter().find(|(group, _)| *group >= n) {
-            return refuse(Cause::NoGroup(*group));
-        }
-        check_pressures(&problem.mesh, number, phase, &middles)?;
-    }
-    Ok(())
-}
-
-/// `middles`: how many elements have this middle of an edge.
-fn check_pressures(
-    mesh: &Mesh,
-    number: usize,
-    phase: &Phase,
-    middles: &HashMap<usize, usize>,
-) -> Result<(), Refusal> {
-    let mut lines: Vec<&str> = Vec::new();
-    for (place, input) in phase.pressure.iter().enumerate() {
-        let item = Item::Pressure(number, place);
-        let name = input.line.as_str();
-        if lines.contains(&name) {
-            return Err(Refusal::new(item, Cause::TwoPressures(name.to_owned())));
-        }
-        lines.push(name);
-        let line = constraints::line(mesh, name, &item)?;
-        let shared = |&edge: &(usize, usize)| middles[&mesh.edge(edge)[2]] > 1;
-        if line.edges.is_empty() || line.edges.iter().any(shared) {
-            return Err(Refusal::new(item, Cause::NoBoundary(name.to_owned())));
-        }
-    }
-    Ok(())
 }
 
 /// Whether a group can carry a law.
@@ -259,10 +200,9 @@ fn impossible_layer(group: &ElementGroup, material: &Material) -> Option<[f64; 2
     (operator[0] <= 4.0 / 3.0 * operator[3]).then(|| [operator[0], operator[3]])
 }
 
-/// Solids of every group, and which group lies beside the middle of an edge.
+/// Solids of every group.
 struct Surroundings {
     of_group: Vec<Vec<usize>>,
-    beside: HashMap<usize, usize>,
 }
 
 impl Surroundings {
@@ -271,19 +211,7 @@ impl Surroundings {
         for (number, solid) in problem.mesh.solids.iter().enumerate() {
             of_group[solid.group].push(number);
         }
-        // Mid-side nodes beside a zero-thickness element belong to one solid each.
-        let joints = problem.mesh.joints.iter();
-        let wanted = joints.flat_map(|joint| [joint.minus[2], joint.plus[2]]);
-        let wanted: HashSet<usize> = wanted.collect();
-        let mut beside = HashMap::new();
-        for solid in &problem.mesh.solids {
-            for [_, _, middle] in solid.edges() {
-                if wanted.contains(&middle) {
-                    beside.entry(middle).or_insert(solid.group);
-                }
-            }
-        }
-        Self { of_group, beside }
+        Self { of_group }
     }
 }
 
@@ -305,6 +233,7 @@ struct GroupBuilder<'a> {
     problem: &'a Problem,
     mesh: &'a Mesh,
     surroundings: &'a Surroundings,
+    initial: &'a InitialStresses<'a>,
     number: usize,
     group: &'a ElementGroup,
 }
@@ -374,6 +303,9 @@ impl GroupBuilder<'_> {
         }
         let fits = match integration {
             None | Some(Integration::Full | Integration::Reduced) => true,
+            Some(Integration::BBar | Integration::Projected) => {
+                *formulation == Formulation::Solid
+            }
             Some(Integration::Mean) => *formulation == Formulation::ThinLayer,
             Some(Integration::Nodes) => *formulation == Formulation::ZeroThickness,
         };
@@ -400,21 +332,45 @@ impl GroupBuilder<'_> {
         self.refuse(Cause::BadShape(self.group.name.clone()))
     }
 
+    /// Elements in global axes, in the order of the mesh: runs of one shape each.
     fn solid(&self) -> Result<Box<dyn Kinematics>, Refusal> {
-        let is_reduced = self.integration(Integration::Full) == Integration::Reduced;
-        let axes = |n: usize| vec![Axes::GLOBAL; n];
+        let solids: Vec<&Solid> = self.solids().collect();
+        let runs = solids.chunk_by(|a, b| a.shape() == b.shape());
+        let mut parts = runs
+            .map(|run| self.of_one_shape(run))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(if parts.len() == 1 {
+            parts.remove(0)
+        } else {
+            Box::new(Mixed::new(parts))
+        })
+    }
+
+    /// Elements of one shape in global axes.
+    fn of_one_shape(&self, solids: &[&Solid]) -> Result<Box<dyn Kinematics>, Refusal> {
+        let integration = self.integration(Integration::Full);
         let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
-        let triangles = self.solids().map(|solid| solid.nodes().try_into().ok());
+        let axes = vec![Axes::GLOBAL; solids.len()];
+        let nodes = |solid: &&Solid| solid.nodes().try_into().ok();
+        let triangles = solids.iter().map(nodes);
         if let Some(nodes) = triangles.collect::<Option<Vec<[usize; 6]>>>() {
-            let n = if is_reduced { 3 } else { 6 };
-            let axes = axes(nodes.len());
-            let elements = Tri6::new(analysis, coordinates, nodes, axes, n);
+            let (strains, n) = match integration {
+                Integration::BBar => (Strains::LinearVolume, 6),
+                Integration::Reduced => (Strains::AtPoints, 3),
+                _ => (Strains::Projected, 3),
+            };
+            let elements = Tri6::new(analysis, coordinates, nodes, axes, strains, n);
             return Ok(Box::new(elements.map_err(|_| self.bad_shape())?));
         }
-        let nodes = self.quads(Cause::MixedShapes)?;
-        let n = if is_reduced { 2 } else { 3 };
-        let axes = axes(nodes.len());
-        let elements = Quad8::new(analysis, coordinates, nodes, axes, |_| (n, n));
+        let nodes = solids.iter().map(|solid| solid.nodes().try_into().ok());
+        let nodes: Vec<[usize; 8]> = nodes.flatten().collect();
+        let (strains, n) = match integration {
+            Integration::BBar => (Strains::LinearVolume, 3),
+            Integration::Reduced => (Strains::AtPoints, 2),
+            Integration::Projected => (Strains::Projected, 2),
+            _ => (Strains::AtPoints, 3),
+        };
+        let elements = Quad8::new(analysis, coordinates, nodes, axes, strains, |_| (n, n));
         Ok(Box::new(elements.map_err(|_| self.bad_shape())?))
     }
 
@@ -448,7 +404,8 @@ impl GroupBuilder<'_> {
             _ => (3, 3),
         };
         let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
-        let elements = Quad8::new(analysis, coordinates, nodes, axes, rule);
+        let strains = Strains::AtPoints;
+        let elements = Quad8::new(analysis, coordinates, nodes, axes, strains, rule);
         Ok((Box::new(elements.map_err(|_| self.bad_shape())?), thickness))
     }
 
@@ -520,7 +477,7 @@ impl GroupBuilder<'_> {
     /// Refuses an initial stress that the law cannot stand, though it stands it with compression as
     /// a negative number.
     fn refuse_turned_signs(&self, material: &Material) -> Result<(), Refusal> {
-        let Some(stress) = self.group.initial_stress else {
+        let Some(InitialStress::Constant(stress)) = self.group.initial_stress else {
             return Ok(());
         };
         match tension::turned(&material.built.law, self.group.formulation, stress) {
@@ -563,32 +520,26 @@ impl GroupBuilder<'_> {
     /// Initial stress of all points, in axes of the elements. A zero-thickness element without
     /// one of its own starts with that of the ground on its two sides, projected on its facet.
     fn initial_stress(&self, kinematics: &dyn Kinematics) -> Vec<f64> {
-        let given = self.group.initial_stress;
+        let is_given = self.group.initial_stress.is_some();
         let mut stress = Vec::with_capacity(kinematics.n_components() * kinematics.n_points());
         for point in 0..kinematics.n_points() {
-            let element = point / kinematics.points_per_element();
-            let axes = kinematics.axes(element);
+            let (element, _) = kinematics.place_of(point);
+            let (axes, at) = (kinematics.axes(element), kinematics.position(point));
+            let own = || self.initial.at(self.number, at).unwrap_or_default();
             if kinematics.n_components() == 4 {
-                stress.extend(axes.stress_from_global(given.unwrap_or_default()));
+                stress.extend(axes.stress_from_global(own()));
             } else {
-                let beside = || self.stress_beside(kinematics.nodes(element));
-                let [_, normal, _, shear] = axes.stress_from_global(given.unwrap_or_else(beside));
+                let nodes = kinematics.nodes(element);
+                let found = if is_given {
+                    own()
+                } else {
+                    self.initial.beside([nodes[2], nodes[5]], at)
+                };
+                let [_, normal, _, shear] = axes.stress_from_global(found);
                 stress.extend([normal, shear]);
             }
         }
         stress
-    }
-
-    /// Mean of the initial stresses on the two sides of a zero-thickness element.
-    fn stress_beside(&self, nodes: &[usize]) -> [f64; 4] {
-        let beside = [nodes[2], nodes[5]].map(|middle| {
-            let group = self.surroundings.beside.get(&middle);
-            let group = group.map(|&group| &self.problem.groups[group]);
-            group
-                .and_then(|group| group.initial_stress)
-                .unwrap_or_default()
-        });
-        std::array::from_fn(|c| f64::midpoint(beside[0][c], beside[1][c]))
     }
 }
 
@@ -607,28 +558,4 @@ fn tie_middles(nodes: &[usize; 8], across: Across, ties: &mut Ties) {
             }
         }
     }
-}
-
-/// Nodal forces of a unit pressure on a boundary line.
-pub fn unit_pressure(analysis: Analysis, mesh: &Mesh, edges: &[(usize, usize)]) -> Vec<f64> {
-    let mut force = vec![0.0; 2 * mesh.nodes.len()];
-    for &edge in edges {
-        let nodes = mesh.edge(edge);
-        let (points, weights) = gauss(3);
-        for (&xi, weight) in points.iter().zip(weights) {
-            let (n, d) = line_shape(xi);
-            let sum = |f: &[f64; 3], c: usize| -> f64 {
-                (0..3).map(|i| f[i] * mesh.nodes[nodes[i]][c]).sum()
-            };
-            // Edges run counter-clockwise: (dy, −dx) points outward, the pressure inward.
-            let inward = [-sum(&d, 1), sum(&d, 0)];
-            let weight = weight * depth(analysis, sum(&n, 0));
-            for i in 0..3 {
-                for c in 0..2 {
-                    force[2 * nodes[i] + c] += weight * n[i] * inward[c];
-                }
-            }
-        }
-    }
-    force
 }

@@ -1,12 +1,15 @@
 //! What is to be computed, as plain values: mesh, groups with their laws, supports, phases with their
 //! loads, settings. Units: kN, m, kPa; tension positive.
 
+pub(crate) mod check;
 pub(crate) mod constraints;
+mod ground;
 mod held;
 pub(crate) mod plausible;
 mod refusal;
 pub(crate) mod tension;
 
+pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
 pub use refusal::{Cause, Item, Key, Refusal};
 
 use crate::mesh::Mesh;
@@ -26,6 +29,8 @@ pub struct Problem {
     pub mesh: Mesh,
     /// Groups of elements; elements of the mesh name them by number.
     pub groups: Vec<ElementGroup>,
+    /// Ground water; none by default.
+    pub water: Option<Water>,
     /// Displacements held at zero from the start.
     pub supports: Vec<Support>,
     /// Loading phases, in order.
@@ -41,6 +46,7 @@ impl Problem {
             analysis,
             mesh,
             groups: Vec::new(),
+            water: None,
             supports: Vec::new(),
             phases: Vec::new(),
             settings: Settings::default(),
@@ -58,6 +64,9 @@ pub struct Material {
     pub built: Arc<BuiltLaw>,
     /// Initial values of internal variables that override the law's own, by number.
     pub initial: Vec<(usize, f64)>,
+    /// Parameters that vary with the height y (z), by name; `built` has their values somewhere. Each
+    /// element takes those at its centre.
+    pub varying: Vec<(String, Profile)>,
 }
 
 impl Material {
@@ -67,6 +76,7 @@ impl Material {
             name: name.into(),
             built: built.into(),
             initial: Vec::new(),
+            varying: Vec::new(),
         }
     }
 
@@ -96,9 +106,22 @@ pub struct ElementGroup {
     pub normal: Option<Axis>,
     /// Thin layer with an interface law: elasticity along the layer; `None`: that of (18), (19).
     pub in_plane: Option<InPlane>,
-    /// Stress before the first phase, components 11 22 33 12 in global axes, kPa. `None`: zero; of
-    /// zero-thickness elements that of the ground on their two sides.
-    pub initial_stress: Option<[f64; 4]>,
+    /// Effective stress before the first phase. `None`: zero; of zero-thickness elements that of the
+    /// ground on their two sides.
+    pub initial_stress: Option<InitialStress>,
+    /// Weight of the ground above the water, kN/m³.
+    pub unit_weight: f64,
+    /// Weight of the ground below the water, kN/m³. `None`: the same.
+    pub saturated_unit_weight: Option<f64>,
+    /// Water fills its pores below the water table: the law sees effective stresses.
+    pub pore_water: bool,
+    /// It is there from the start; else a phase may activate it.
+    pub is_active: bool,
+    /// Whether pore water leaves freely.
+    pub drainage: Drainage,
+    /// Poisson's ratio of undrained ground, which gives the stiffness of its pore water:
+    /// K_w/n = 2G (1 + ν_u)/(3 (1 − 2ν_u)) − K'.
+    pub undrained_poisson_ratio: f64,
 }
 
 impl ElementGroup {
@@ -112,6 +135,12 @@ impl ElementGroup {
             normal: None,
             in_plane: None,
             initial_stress: None,
+            unit_weight: 0.0,
+            saturated_unit_weight: None,
+            pore_water: true,
+            is_active: true,
+            drainage: Drainage::Drained,
+            undrained_poisson_ratio: 0.495,
         }
     }
 }
@@ -134,6 +163,26 @@ pub struct Phase {
     pub increments: usize,
     /// Laws of groups, by number, from this phase on.
     pub materials: Vec<(usize, Material)>,
+    /// Groups, by number, that are there from this phase on: solids free of stress, interfaces with
+    /// the stress beside them.
+    pub activate: Vec<usize>,
+    /// Groups, by number, that are not there from this phase on. What they carried is released in its
+    /// course; faces of zero-thickness elements become one.
+    pub deactivate: Vec<usize>,
+    /// Unit weights of groups, by number, above and below the water, kN/m³, as at the end of the phase.
+    pub unit_weight: Vec<(usize, f64)>,
+    /// Water table at the end of the phase.
+    pub water_level: Option<Profile>,
+    /// Whether pore water of groups, by number, leaves freely from this phase on.
+    pub drainage: Vec<(usize, Drainage)>,
+    /// Lines whose nodes move alike from this phase on: in both directions, without rotation. Where a
+    /// line reaches the axis of symmetry it does not move radially.
+    pub rigid: Vec<String>,
+    /// What the phase changes, as a factor on the change, by the phase's time from 0 to 1: pairs of
+    /// time and factor, linear between. Empty: a straight ramp from 0 to 1.
+    pub course: Vec<[f64; 2]>,
+    /// Forces, as totals at the end of the phase.
+    pub force: Vec<Force>,
     /// Displacements are counted from the start of this phase.
     pub reset_displacements: bool,
     /// Prescribed displacements, as totals at the end of the phase.
@@ -151,6 +200,14 @@ impl Phase {
             name: name.into(),
             increments,
             materials: Vec::new(),
+            activate: Vec::new(),
+            deactivate: Vec::new(),
+            unit_weight: Vec::new(),
+            water_level: None,
+            drainage: Vec::new(),
+            rigid: Vec::new(),
+            course: Vec::new(),
+            force: Vec::new(),
             reset_displacements: false,
             displacement: Vec::new(),
             free: Vec::new(),
@@ -184,8 +241,19 @@ pub struct Free {
 pub struct Pressure {
     /// The line.
     pub line: String,
-    /// Towards the body positive.
-    pub value: f64,
+    /// Towards the body positive; over the height y (z).
+    pub value: Profile,
+}
+
+/// A force on a line, spread evenly over it: kN of the whole turn, or kN/m.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Force {
+    /// The line.
+    pub line: String,
+    /// In x (r).
+    pub x: Option<f64>,
+    /// In y (z).
+    pub y: Option<f64>,
 }
 
 /// A coordinate direction.
@@ -260,14 +328,18 @@ impl Formulation {
     }
 }
 
-/// Where the law is evaluated.
+/// Where the law is evaluated, and with which strains.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Integration {
-    /// 3 × 3 Gauss points (zero thickness: 3 Gauss points).
+    /// Quads: 3 × 3 Gauss points; triangles: 3 points, as `projected` (zero thickness: 3 Gauss points).
     Full,
-    /// 2 × 2 Gauss points (zero thickness: 2 Gauss points).
+    /// Quads: 2 × 2 Gauss points; triangles: 3 (zero thickness: 2 Gauss points).
     Reduced,
+    /// Solids: as many points as `reduced`, with strains whose nodal forces are integrated exactly.
+    Projected,
+    /// Solids: all Gauss points (quads 9, triangles 6), with a volume strain that is linear in each element.
+    BBar,
     /// Thin layer: 3 points along the layer on its mid-surface, mid-thickness nodes tied.
     Mean,
     /// Zero thickness: the three nodes (Newton–Cotes).

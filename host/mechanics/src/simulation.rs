@@ -4,6 +4,7 @@
 mod beyond;
 mod complete;
 mod history;
+mod loads;
 mod method;
 mod path;
 mod phase;
@@ -11,6 +12,7 @@ mod record;
 mod start;
 mod state;
 mod statics;
+mod ties;
 mod warning;
 mod watch;
 
@@ -22,6 +24,7 @@ pub use watch::{Increment, Part, Watch, When};
 use crate::assembly::Tie;
 use crate::equilibrium::{Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
+use crate::ground::Loading;
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -68,7 +71,10 @@ pub struct Snapshot<'a> {
 pub struct Simulation {
     problem: Problem,
     groups: Vec<Group>,
+    /// Middles of layers, which always follow their faces.
     ties: Vec<Tie>,
+    /// All that follows others in the present phase.
+    tied: Vec<Tie>,
     swaps: Vec<Vec<(usize, Material)>>,
     first_materials: Vec<Material>,
     warnings: Vec<String>,
@@ -76,8 +82,8 @@ pub struct Simulation {
     displacement: Vec<f64>,
     /// Prescribed displacements by degree of freedom.
     prescribed: BTreeMap<usize, f64>,
-    /// Pressures by line.
-    pressure: BTreeMap<String, f64>,
+    /// What acts at the start of the phase, and at its end.
+    loading: [Loading; 2],
     /// External forces.
     force: Vec<f64>,
     /// Internal less external forces of the last state that was completed.
@@ -141,16 +147,20 @@ impl Simulation {
         } = Model::build(&problem)?;
         let n_dofs = 2 * problem.mesh.nodes.len();
         let nodes = &problem.mesh.nodes;
-        let turns_freely = groups.iter().all(|group| phase::turns_freely(group, nodes));
+        // A line that is kept from turning takes up moments.
+        let is_kept = problem.phases.iter().any(|phase| !phase.rigid.is_empty());
+        let turns_freely =
+            !is_kept && groups.iter().all(|group| phase::turns_freely(group, nodes));
         let mut simulation = Self {
             first_materials: groups.iter().map(|group| group.law.clone()).collect(),
+            tied: ties.clone(),
             groups,
             ties,
             swaps,
             warnings,
             displacement: vec![0.0; n_dofs],
             prescribed: BTreeMap::new(),
-            pressure: BTreeMap::new(),
+            loading: [Loading::before(&problem), Loading::before(&problem)],
             force: vec![0.0; n_dofs],
             reaction: vec![0.0; n_dofs],
             time: 0.0,
@@ -165,6 +175,12 @@ impl Simulation {
             problem,
         };
         simulation.beyond.knows(&simulation.groups);
+        for (group, input) in simulation.groups.iter_mut().zip(&simulation.problem.groups) {
+            if !input.is_active {
+                group.disappear();
+            }
+        }
+        simulation.force = simulation.loading[1].forces(&simulation.problem, &simulation.groups);
         for support in &simulation.problem.supports {
             for dof in simulation.dofs(&support.line, &support.fixed) {
                 simulation.prescribed.insert(dof, 0.0);
@@ -214,7 +230,7 @@ impl Simulation {
         Snapshot {
             mesh: &self.problem.mesh,
             groups: &self.groups,
-            ties: &self.ties,
+            ties: &self.tied,
             displacement: &self.displacement,
             reaction: &self.reaction,
         }
@@ -412,6 +428,10 @@ impl Simulation {
         };
         let mut done = Progress::default();
         while phase.course.lambda < target {
+            if phase.course.lambda >= phase.course.loads.leg[1] {
+                self.turn(place, n, phase)?;
+            }
+            let target = target.min(phase.course.loads.leg[1]);
             let (start, step) = (phase.course.lambda, phase.course.step);
             // A remainder that is hardly longer than the step is taken at once.
             let end = if target - start <= 1.0001 * step {
@@ -459,6 +479,19 @@ impl Simulation {
             }
         }
         Ok(done)
+    }
+
+    /// Goes on to the next leg of the phase's course, from a complete state.
+    fn turn(&mut self, place: &Place, n: usize, phase: &mut UnderWay) -> Result<(), Error> {
+        let lambda = phase.course.lambda;
+        self.complete(phase, None)
+            .map_err(|reason| no_equilibrium(place, lambda, n, reason.into(), None))?;
+        if self.next_leg(phase.number, &mut phase.course)
+            && let Some(domain) = &mut phase.equations.domain
+        {
+            domain.start(&self.groups, &phase.course.loads, &self.displacement);
+        }
+        Ok(())
     }
 
     /// Takes over a step that reached equilibrium at load factor λ, with all that is to be said of

@@ -260,10 +260,4 @@ fn a_problem_that_cannot_be_is_refused_by_its_part() {
     assert!(matches!(missing.cause, Cause::NoLine { .. }));
     let none = refused(&|problem| problem.phases.clear());
     assert_eq!((none.item, none.cause), (Item::Problem, Cause::NoPhase));
-    let mixed = refused(&|problem| {
-        let mut nodes = problem.mesh.solids[0].nodes().to_vec();
-        nodes.truncate(6);
-        problem.mesh.solids[0] = Solid::triangle(nodes.try_into().unwrap(), 0);
-    });
-    assert!(matches!(mixed.cause, Cause::MixedShapes(_)), "{mixed:?}");
 }

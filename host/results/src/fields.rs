@@ -97,9 +97,9 @@ fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
     let columns = names.iter().enumerate().map(|(number, name)| {
         let mut values = Vec::new();
         for group in snapshot.groups {
-            let n = group.kinematics.points_per_element();
             for element in 0..group.kinematics.n_elements() {
-                let points = element * n..(element + 1) * n;
+                let points = group.kinematics.points_of(element);
+                let n = points.len();
                 let sum: f64 = points
                     .map(|point| match number {
                         0..4 => group.global_stress(point).map(|s| s[number]),

@@ -51,17 +51,17 @@ impl Points {
 
     pub(crate) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
         for group in groups {
-            let per_element = group.kinematics.points_per_element();
             for point in 0..group.kinematics.n_points() {
                 let Some(stress) = group.global_stress(point) else {
                     break;
                 };
+                let (element, within) = group.kinematics.place_of(point);
                 let mut row = vec![
                     place.phase.clone(),
                     place.increment.to_string(),
                     group.name.clone(),
-                    (point / per_element + 1).to_string(),
-                    (point % per_element + 1).to_string(),
+                    (element + 1).to_string(),
+                    (within + 1).to_string(),
                 ];
                 row.extend(group.kinematics.position(point).map(number));
                 row.extend(stress.map(number));

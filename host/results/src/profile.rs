@@ -53,20 +53,20 @@ impl Profile {
 
     pub(crate) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
         for group in groups {
-            let per_element = group.kinematics.points_per_element();
             for point in 0..group.kinematics.n_points() {
                 let Some((jump, traction)) = group.jump_and_traction(point) else {
                     break;
                 };
                 let [x, y] = group.kinematics.position(point);
-                let along = group.kinematics.axes(point / per_element).along;
+                let (element, within) = group.kinematics.place_of(point);
+                let along = group.kinematics.axes(element).along;
                 let s = along[0] * x + along[1] * y;
                 let mut row = vec![
                     place.phase.clone(),
                     place.increment.to_string(),
                     group.name.clone(),
-                    (point / per_element + 1).to_string(),
-                    (point % per_element + 1).to_string(),
+                    (element + 1).to_string(),
+                    (within + 1).to_string(),
                 ];
                 let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]];
                 row.extend(values.map(number));

@@ -320,7 +320,7 @@ fn groups(about: &About, simulation: &Simulation) -> Value {
             "name": group.name,
             "formulation": group.formulation.name(),
             "elements": group.kinematics.n_elements(),
-            "points_per_element": group.kinematics.points_per_element(),
+            "points_per_element": group.kinematics.points_of(0).len(),
             "law": law,
             "laws_from_phase": swaps,
         })

@@ -32,7 +32,7 @@ impl Bodies {
             let nodes = group.kinematics.nodes(element).iter().copied();
             nodes.filter(|&node| !is_held(node)).collect()
         };
-        for group in groups {
+        for group in groups.iter().filter(|group| group.is_active) {
             for element in 0..group.kinematics.n_elements() {
                 if let [first, others @ ..] = loose(group, element).as_slice() {
                     for &node in others {
@@ -47,6 +47,10 @@ impl Bodies {
         let mut of_element = Vec::new();
         for group in groups {
             let mut bodies = Vec::new();
+            if !group.is_active {
+                of_element.push(vec![SHARED; group.kinematics.n_elements()]);
+                continue;
+            }
             for element in 0..group.kinematics.n_elements() {
                 let Some(&first) = loose(group, element).first() else {
                     bodies.push(SHARED);

@@ -4,6 +4,7 @@ use super::shape::{gauss, line_shape};
 use super::{Axes, Kinematics, depth};
 use crate::mesh::Joint;
 use crate::problem::{Analysis, Integration};
+use std::ops::Range;
 
 /// Zero-thickness elements of one group.
 #[derive(Debug)]
@@ -71,8 +72,8 @@ impl Joint6 {
         }
     }
 
-    fn points_of(&self, element: usize) -> &[Point] {
-        &self.points[element * self.points_per_element..][..self.points_per_element]
+    fn own(&self, element: usize) -> &[Point] {
+        &self.points[self.points_of(element)]
     }
 }
 
@@ -81,8 +82,16 @@ impl Kinematics for Joint6 {
         self.nodes.len()
     }
 
-    fn points_per_element(&self) -> usize {
-        self.points_per_element
+    fn n_points(&self) -> usize {
+        self.points.len()
+    }
+
+    fn points_of(&self, element: usize) -> Range<usize> {
+        element * self.points_per_element..(element + 1) * self.points_per_element
+    }
+
+    fn place_of(&self, point: usize) -> (usize, usize) {
+        (point / self.points_per_element, point % self.points_per_element)
     }
 
     fn n_components(&self) -> usize {
@@ -101,6 +110,10 @@ impl Kinematics for Joint6 {
         self.points[point].weight
     }
 
+    fn volumes(&self, _element: usize) -> &[f64] {
+        &[]
+    }
+
     fn length(&self, element: usize) -> f64 {
         self.lengths[element]
     }
@@ -113,7 +126,7 @@ impl Kinematics for Joint6 {
         let mut jumps = out.chunks_exact_mut(2);
         for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
             let u = |node: usize, c: usize| displacement[2 * node + c];
-            for (point, jump) in self.points_of(element).iter().zip(&mut jumps) {
+            for (point, jump) in self.own(element).iter().zip(&mut jumps) {
                 let opening: [f64; 2] = std::array::from_fn(|c| {
                     (0..3)
                         .map(|i| point.n[i] * (u(nodes[i + 3], c) - u(nodes[i], c)))
@@ -128,7 +141,7 @@ impl Kinematics for Joint6 {
     fn add_forces(&self, flux: &[f64], force: &mut [f64]) {
         let mut tractions = flux.chunks_exact(2);
         for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
-            for (point, t) in self.points_of(element).iter().zip(&mut tractions) {
+            for (point, t) in self.own(element).iter().zip(&mut tractions) {
                 for c in 0..2 {
                     let traction = axes.across[c] * t[0] + axes.along[c] * t[1];
                     for i in 0..3 {
@@ -145,7 +158,7 @@ impl Kinematics for Joint6 {
         out.fill(0.0);
         let axes = &self.axes[element];
         let directions = [axes.across, axes.along];
-        for (point, tangent) in self.points_of(element).iter().zip(tangent.chunks_exact(4)) {
+        for (point, tangent) in self.own(element).iter().zip(tangent.chunks_exact(4)) {
             // The law's 2 × 2 tangent in global axes.
             let d = |c: usize, e: usize| -> f64 {
                 let pairs = (0..2).flat_map(|i| (0..2).map(move |j| (i, j)));

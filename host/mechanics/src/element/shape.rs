@@ -11,6 +11,44 @@ pub(super) struct Reference<const N: usize> {
     pub(super) shape: fn([f64; 2]) -> Functions<N>,
     /// Area between the corners of an element whose nodes lie here.
     pub(super) area: fn(&[[f64; 2]; N]) -> f64,
+    /// A rule that integrates B r σ and N r exactly where σ is linear in the coordinates and the sides are
+    /// straight: degree 5 in ξ and in η of quads, 3 of triangles.
+    pub(super) exact: fn() -> Vec<RulePoint>,
+    /// Of a few points of the law, the function that is one at the first and zero at the others, at
+    /// the second.
+    pub(super) function: fn([f64; 2], [f64; 2]) -> f64,
+}
+
+/// An integration point of the reference element.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RulePoint {
+    pub(super) at: [f64; 2],
+    /// Its weight is the product.
+    pub(super) weights: [f64; 2],
+}
+
+/// The rule with `n_xi` × `n_eta` Gauss points of a quad.
+pub(super) fn quad_rule(n_xi: usize, n_eta: usize) -> Vec<RulePoint> {
+    let ((xi, w_xi), (eta, w_eta)) = (gauss(n_xi), gauss(n_eta));
+    let mut points = Vec::with_capacity(n_xi * n_eta);
+    for (&eta, &w_eta) in eta.iter().zip(w_eta) {
+        for (&xi, &w_xi) in xi.iter().zip(w_xi) {
+            points.push(RulePoint {
+                at: [xi, eta],
+                weights: [w_xi, w_eta],
+            });
+        }
+    }
+    points
+}
+
+/// The rule with `n` Gauss points of a triangle: 3, 6 or 7.
+pub(super) fn triangle_rule(n: usize) -> Vec<RulePoint> {
+    let point = |&(at, weight): &([f64; 2], f64)| RulePoint {
+        at,
+        weights: [weight, 1.0],
+    };
+    gauss_triangle(n).iter().map(point).collect()
 }
 
 /// The 8-node quad, ξ and η from −1 to 1.
@@ -19,6 +57,9 @@ pub(super) const QUAD8: Reference<8> = Reference {
     area: |&[a, b, c, d, ..]| {
         0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1])).abs()
     },
+    exact: || quad_rule(3, 3),
+    // Bilinear between the 2 × 2 points at ±1/√3.
+    function: |[a, b], [xi, eta]| 0.25 * (1.0 + 3.0 * a * xi) * (1.0 + 3.0 * b * eta),
 };
 
 /// The 6-node triangle with corners (0, 0), (1, 0), (0, 1).
@@ -26,6 +67,13 @@ pub(super) const TRI6: Reference<6> = Reference {
     shape: |[xi, eta]| triangle_shape(xi, eta),
     area: |&[a, b, c, ..]| {
         0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs()
+    },
+    exact: || triangle_rule(6),
+    // Linear between the points with area coordinates (2/3, 1/6, 1/6).
+    function: |a, at| {
+        let area = |[xi, eta]: [f64; 2]| [1.0 - xi - eta, xi, eta];
+        let products = area(a).into_iter().zip(area(at)).map(|(a, b)| a * b);
+        4.0 * products.sum::<f64>() - 1.0
     },
 };
 

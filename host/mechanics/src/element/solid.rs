@@ -4,11 +4,12 @@
     reason = "only what is inlined is compiled for the processor's own vector instructions"
 )]
 
-use super::shape::{Functions, Reference};
-use super::{Axes, Kinematics, depth};
+use super::shape::{Functions, Reference, RulePoint};
+use super::{Axes, Kinematics, depth, projection};
 use crate::problem::Analysis;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Elements that one thread takes at a time.
 const PIECE: usize = 256;
@@ -21,22 +22,45 @@ pub struct Solid<const N: usize> {
     nodes: Vec<[usize; N]>,
     axes: Vec<Axes>,
     lengths: Vec<f64>,
+    /// ∫ N dV of every element.
+    volumes: Vec<[f64; N]>,
+    has_linear_volume: bool,
     points_per_element: usize,
     points: Vec<Point<N>>,
 }
 
-/// An integration point. With displacement components u₁, u₂ along the element's axes:
+/// A point where the law is evaluated. With displacement components u₁, u₂ along the element's axes:
 /// ε₁₁ = Σ a u₁, ε₂₂ = Σ b u₂, γ₁₂ = Σ (b u₁ + a u₂), ε₃₃ = Σ h u_r.
 #[derive(Clone, Debug)]
-struct Point<const N: usize> {
+pub(super) struct Point<const N: usize> {
     /// ∂N/∂x₁.
-    a: [f64; N],
+    pub(super) a: [f64; N],
     /// ∂N/∂x₂.
-    b: [f64; N],
+    pub(super) b: [f64; N],
     /// N/r; zero in plane strain.
-    h: [f64; N],
-    weight: f64,
-    position: [f64; 2],
+    pub(super) h: [f64; N],
+    pub(super) weight: f64,
+    pub(super) position: [f64; 2],
+}
+
+/// Where the law of an element is evaluated, and how its strains come about.
+#[derive(Clone, Debug)]
+pub(super) struct Rule {
+    /// Points of the law.
+    pub(super) points: Vec<RulePoint>,
+    /// What becomes of the strains.
+    pub(super) strains: Strains,
+}
+
+/// What becomes of an element's strains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Strains {
+    /// Those at the points.
+    AtPoints,
+    /// Those at the points, with a volume strain that is linear in the coordinates.
+    LinearVolume,
+    /// Their [projection](super::projection) on as many functions as there are points.
+    Projected,
 }
 
 /// An element that is turned inside out or has no area.
@@ -44,14 +68,6 @@ struct Point<const N: usize> {
 pub struct BadShape {
     /// Number of the element within the group.
     pub element: usize,
-}
-
-/// An integration point of the reference element.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RulePoint {
-    pub(super) at: [f64; 2],
-    /// Its weight is the product.
-    pub(super) weights: [f64; 2],
 }
 
 impl<const N: usize> Solid<N> {
@@ -66,38 +82,66 @@ impl<const N: usize> Solid<N> {
         coordinates: &[[f64; 2]],
         nodes: Vec<[usize; N]>,
         axes: Vec<Axes>,
-        rule: impl Fn(usize) -> Vec<RulePoint>,
+        rule: impl Fn(usize) -> Rule,
     ) -> Result<Self, BadShape> {
         let mut points = Vec::new();
         let mut points_per_element = 0;
         let mut lengths = Vec::with_capacity(nodes.len());
+        let mut volumes = Vec::with_capacity(nodes.len());
+        let mut has_linear_volume = false;
         for (element, nodes) in nodes.iter().enumerate() {
             let places = nodes.map(|n| coordinates[n]);
-            let rule = rule(element);
-            points_per_element = rule.len();
-            for RulePoint { at, weights } in rule {
-                let shape = (reference.shape)(at);
-                let point = Point::new(analysis, &places, &axes[element], shape)
-                    .ok_or(BadShape { element })?;
-                points.push(Point {
-                    weight: point.weight * weights[0] * weights[1],
-                    ..point
-                });
+            let bad = BadShape { element };
+            let at = |points: &[RulePoint]| -> Option<Vec<Point<N>>> {
+                let point = |&RulePoint { at, weights }: &RulePoint| {
+                    let shape = (reference.shape)(at);
+                    let point = Point::new(analysis, &places, &axes[element], shape)?;
+                    Some(Point {
+                        weight: point.weight * weights[0] * weights[1],
+                        ..point
+                    })
+                };
+                points.iter().map(point).collect()
+            };
+            let Rule {
+                points: rule,
+                strains,
+            } = rule(element);
+            let exact = (reference.exact)();
+            let fine = at(&exact).ok_or(bad)?;
+            let mut own = at(&rule).ok_or(bad)?;
+            match strains {
+                Strains::AtPoints => {}
+                Strains::LinearVolume => has_linear_volume = true,
+                Strains::Projected => {
+                    let of_point = |q: usize, at: [f64; 2]| (reference.function)(rule[q].at, at);
+                    let value = |q: usize, fine: usize| of_point(q, exact[fine].at);
+                    projection::project(&mut own, &fine, value).ok_or(bad)?;
+                }
             }
+            let volume = |i: usize| {
+                let weights = exact.iter().zip(&fine);
+                weights.map(|(at, point)| (reference.shape)(at.at).0[i] * point.weight).sum()
+            };
+            volumes.push(std::array::from_fn(volume));
+            points_per_element = own.len();
+            points.extend(own);
             lengths.push((reference.area)(&places).sqrt());
         }
         Ok(Self {
             nodes,
             axes,
             lengths,
+            volumes,
+            has_linear_volume,
             points_per_element,
             points,
         })
     }
 
     /// Points of an element.
-    fn points_of(&self, element: usize) -> &[Point<N>] {
-        &self.points[element * self.points_per_element..][..self.points_per_element]
+    fn own(&self, element: usize) -> &[Point<N>] {
+        &self.points[self.points_of(element)]
     }
 }
 
@@ -147,8 +191,16 @@ impl<const N: usize> Kinematics for Solid<N> {
         self.nodes.len()
     }
 
-    fn points_per_element(&self) -> usize {
-        self.points_per_element
+    fn n_points(&self) -> usize {
+        self.points.len()
+    }
+
+    fn points_of(&self, element: usize) -> Range<usize> {
+        element * self.points_per_element..(element + 1) * self.points_per_element
+    }
+
+    fn place_of(&self, point: usize) -> (usize, usize) {
+        (point / self.points_per_element, point % self.points_per_element)
     }
 
     fn n_components(&self) -> usize {
@@ -165,6 +217,10 @@ impl<const N: usize> Kinematics for Solid<N> {
 
     fn weight(&self, point: usize) -> f64 {
         self.points[point].weight
+    }
+
+    fn volumes(&self, element: usize) -> &[f64] {
+        &self.volumes[element]
     }
 
     fn length(&self, element: usize) -> f64 {
@@ -228,6 +284,10 @@ impl<const N: usize> Kinematics for Solid<N> {
     }
 
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
+        if self.has_linear_volume {
+            let (points, axes) = (self.own(element), &self.axes[element]);
+            return projection::linear_volume_stiffness(points, axes, tangent, out);
+        }
         let elements = self;
         Arch::new().dispatch(Stiffness {
             elements,
@@ -252,9 +312,17 @@ impl<const N: usize> WithSimd for Gradients<'_, N> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let per_element = 4 * self.elements.points_per_element;
+        let (elements, u) = (self.elements, self.displacement);
         for (element, out) in (self.first..).zip(self.out.chunks_exact_mut(per_element)) {
-            self.elements
-                .element_gradients(element, self.displacement, out);
+            if elements.has_linear_volume {
+                let mut strains = vec![0.0; per_element];
+                elements.element_gradients(element, u, &mut strains);
+                projection::linear_volume_strain(elements.own(element), &mut strains);
+                let both = out.iter_mut().zip(strains);
+                both.for_each(|(out, strain)| *out += strain);
+            } else {
+                elements.element_gradients(element, u, out);
+            }
         }
     }
 }
@@ -274,7 +342,13 @@ impl<const N: usize> WithSimd for Forces<'_, N> {
         let fluxes = self.flux.chunks_exact(4 * self.elements.points_per_element);
         let mut forces = Vec::with_capacity(fluxes.len());
         for (element, flux) in (self.first..).zip(fluxes) {
-            forces.push(self.elements.element_forces(element, flux));
+            if self.elements.has_linear_volume {
+                let mut flux = flux.to_vec();
+                projection::linear_volume_stress(self.elements.own(element), &mut flux);
+                forces.push(self.elements.element_forces(element, &flux));
+            } else {
+                forces.push(self.elements.element_forces(element, flux));
+            }
         }
         forces
     }
@@ -325,7 +399,7 @@ impl<const N: usize> Solid<N> {
         };
         let (u_1, u_2) = (turned(axes.along), turned(axes.across));
         for (point, strain) in self
-            .points_of(element)
+            .own(element)
             .iter()
             .zip(strains.chunks_exact_mut(4))
         {
@@ -341,7 +415,7 @@ impl<const N: usize> Solid<N> {
     fn element_forces(&self, element: usize, flux: &[f64]) -> [[f64; 2]; N] {
         let axes = &self.axes[element];
         let (mut f_1, mut f_2, mut f_r) = ([0.0; N], [0.0; N], [0.0; N]);
-        for (point, s) in self.points_of(element).iter().zip(flux.chunks_exact(4)) {
+        for (point, s) in self.own(element).iter().zip(flux.chunks_exact(4)) {
             let s: [f64; 4] = std::array::from_fn(|c| point.weight * s[c]);
             for i in 0..N {
                 f_1[i] += point.a[i] * s[0] + point.b[i] * s[3];
@@ -364,7 +438,7 @@ impl<const N: usize> Solid<N> {
     fn element_stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
         let axes = &self.axes[element];
         let radial = [axes.along[0], axes.across[0]];
-        let points = self.points_of(element);
+        let points = self.own(element);
         // D B w of every point: by component, for u₁ and u₂.
         let mut db = [[[[0.0; N]; 4]; 2]; MOST_POINTS];
         for ((point, d), db) in points.iter().zip(tangent.chunks_exact(16)).zip(&mut db) {

@@ -1,8 +1,8 @@
 //! 6-node triangles.
 
-use super::shape::{TRI6, gauss_triangle};
-use super::solid::RulePoint;
-use super::{Axes, BadShape, Solid};
+use super::shape::{TRI6, triangle_rule};
+use super::solid::Rule;
+use super::{Axes, BadShape, Solid, Strains};
 use crate::problem::Analysis;
 
 /// 6-node triangles of one group: corners counter-clockwise, then the middles of the sides that
@@ -10,7 +10,7 @@ use crate::problem::Analysis;
 pub type Tri6 = Solid<6>;
 
 impl Tri6 {
-    /// Elements with 3, 6 or 7 Gauss points, in the given axes.
+    /// Elements with 3, 6 or 7 Gauss points, in the given axes. Only 3 points can have projected strains.
     ///
     /// # Errors
     /// An element whose Jacobian is not positive.
@@ -19,16 +19,13 @@ impl Tri6 {
         coordinates: &[[f64; 2]],
         nodes: Vec<[usize; 6]>,
         axes: Vec<Axes>,
+        strains: Strains,
         n_points: usize,
     ) -> Result<Self, BadShape> {
-        let points = |_: usize| {
-            let rule = gauss_triangle(n_points).iter();
-            let point = |&([xi, eta], weight): &([f64; 2], f64)| RulePoint {
-                at: [xi, eta],
-                weights: [weight, 1.0],
-            };
-            rule.map(point).collect()
+        let rule = |_: usize| Rule {
+            points: triangle_rule(n_points),
+            strains,
         };
-        Self::of_reference(&TRI6, analysis, coordinates, nodes, axes, points)
+        Self::of_reference(&TRI6, analysis, coordinates, nodes, axes, rule)
     }
 }

@@ -36,9 +36,9 @@ impl Snapshot {
 /// None of a linear group: it keeps no iteration from settling.
 fn states(group: &Group) -> impl Iterator<Item = PointState> {
     let n = group.kinematics.n_components();
-    let per_element = group.kinematics.points_per_element();
     let state = move |point: usize| {
-        let tangents = group.element_tangents(point / per_element);
+        let (element, within) = group.kinematics.place_of(point);
+        let tangents = group.element_tangents(element);
         let stress = &group.stress.trial[n * point..][..n];
         PointState {
             stress: if group.formulation == Formulation::ThinLayer {
@@ -47,7 +47,7 @@ fn states(group: &Group) -> impl Iterator<Item = PointState> {
             } else {
                 stress.to_vec()
             },
-            tangent: tangents[point % per_element * n * n..][..n * n].to_vec(),
+            tangent: tangents[within * n * n..][..n * n].to_vec(),
         }
     };
     let n_points = if group.is_linear() {
@@ -122,12 +122,12 @@ pub(super) fn compare(groups: &[Group], before: &Snapshot, period: (f64, f64)) -
 
 /// What happens at a point.
 fn culprit(group: &Group, point: usize, what: Symptom, others: usize) -> Culprit {
-    let per_element = group.kinematics.points_per_element();
+    let (element, within) = group.kinematics.place_of(point);
     let at = PointPlace {
         group: group.name.clone(),
         law: group.law.built.law.description().id.clone(),
-        element: point / per_element + 1,
-        point: point % per_element + 1,
+        element: element + 1,
+        point: within + 1,
         position: group.kinematics.position(point),
     };
     Culprit { at, what, others }

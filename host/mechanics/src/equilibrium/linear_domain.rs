@@ -114,11 +114,11 @@ impl LinearDomain {
         always: bool,
         mut reuse: Option<&mut Reuse>,
     ) -> Result<Option<(Self, System)>, Singular> {
-        let mut system = System::new(groups, Group::is_linear, prescribed, ties, None);
+        let mut system = System::new(groups, |group| group.is_active && group.is_linear(), prescribed, ties, None);
         if system.n_equations() == 0 {
             return Ok(None);
         }
-        let is_other = |group: &Group| !group.is_linear();
+        let is_other = |group: &Group| group.is_active && !group.is_linear();
         let rest = System::new(groups, is_other, prescribed, ties, Some(&system));
         let n_boundary = rest.boundary().len();
         let n_interior = system.n_equations() - n_boundary;
@@ -216,10 +216,7 @@ impl LinearDomain {
     /// Sets up a phase that starts from the groups' committed state and these displacements.
     pub fn start(&mut self, groups: &[Group], loads: &Loads, displacement: &[f64]) {
         let n_dofs = self.system.n_dofs();
-        let mut prescribed = vec![0.0; n_dofs];
-        for &(dof, start, end) in &loads.prescribed {
-            prescribed[dof] = end - start;
-        }
+        let prescribed = loads.prescribed_rate();
         let mut right = vec![0.0; self.system.n_equations()];
         self.system
             .prescribed_forces(groups, &prescribed, &mut right);
@@ -238,11 +235,11 @@ impl LinearDomain {
             if self.system.includes(number) {
                 group
                     .kinematics
-                    .add_forces(&group.stress.committed, &mut internal);
+                    .add_forces(&group.carried(), &mut internal);
             }
         }
         self.system.fold(&mut internal);
-        self.is_complete(0.0, displacement, &internal);
+        self.is_complete(loads.leg[0], displacement, &internal);
     }
 
     /// As [`Self::start`], within a phase.

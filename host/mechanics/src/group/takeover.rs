@@ -30,6 +30,8 @@ pub struct TakeOver {
     pub position: [f64; 2],
     /// Normal and shear stress there, found and returned; `None` for solids.
     pub traction: Option<[[f64; 2]; 2]>,
+    /// Stresses 11 and 22 there, in axes of the element, found and returned; of interfaces the traction.
+    pub stress: [[f64; 2]; 2],
 }
 
 impl std::fmt::Display for TakeOver {
@@ -43,6 +45,7 @@ impl std::fmt::Display for TakeOver {
             place: [element, point],
             position: [x, y],
             traction,
+            ..
         } = self;
         write!(
             f,
@@ -116,18 +119,21 @@ impl Group {
         }
         let [_, normal, _, shear] = [0, 1, 2, 3].map(|c| if n == 2 { c / 2 } else { c });
         let pair = |field: &[f64]| [field[n * most + normal], field[n * most + shear]];
+        let first = |field: &[f64]| [field[n * most], field[n * most + 1]];
+        let stress = [first(committed), first(trial)];
         let has_facet = n == 2 || self.layer.is_some();
         let traction = has_facet.then(|| [pair(committed), pair(trial)]);
-        let per_element = self.kinematics.points_per_element().max(1);
+        let (element, within) = self.kinematics.place_of(most);
         let report = TakeOver {
             group: self.name.clone(),
             law: self.law.name.clone(),
             change: changes[most],
             relative: changes[most] / largest,
             points: [differ, changes.len()],
-            place: [most / per_element + 1, most % per_element + 1],
+            place: [element + 1, within + 1],
             position: self.kinematics.position(most),
             traction,
+            stress,
         };
         self.stress.commit();
         self.internal.commit();

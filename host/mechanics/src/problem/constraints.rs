@@ -4,7 +4,7 @@ use super::held::{Motion, Part, loose, parts};
 use super::{Analysis, Axis, Cause, Displacement, Free, Item, Phase, Pressure, Problem, Refusal};
 use crate::assembly::Tie;
 use crate::mesh::{Line, Mesh};
-use crate::model::unit_pressure;
+use crate::ground::unit_pressure;
 use std::collections::{HashMap, HashSet};
 
 /// A node is on the axis of symmetry within this fraction of the largest radius.
@@ -18,10 +18,11 @@ const NOTHING: f64 = 1e-9;
 /// # Errors
 /// The line or the phase.
 pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refusal> {
+    let mut active: Vec<bool> = problem.groups.iter().map(|group| group.is_active).collect();
     let mut constraints = Constraints {
         problem,
         mesh: &problem.mesh,
-        parts: parts(&problem.mesh),
+        parts: parts(&problem.mesh, &|group| active[group]),
         held: HashMap::new(),
     };
     for (number, support) in problem.supports.iter().enumerate() {
@@ -41,6 +42,11 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
     // What is held in each phase.
     let mut held: Vec<HashSet<usize>> = Vec::new();
     for (number, phase) in problem.phases.iter().enumerate() {
+        if !phase.activate.is_empty() || !phase.deactivate.is_empty() {
+            phase.activate.iter().for_each(|&group| active[group] = true);
+            phase.deactivate.iter().for_each(|&group| active[group] = false);
+            constraints.parts = parts(&problem.mesh, &|group| active[group]);
+        }
         let mut released = Vec::new();
         for (place, free) in phase.free.iter().enumerate() {
             constraints.release(free, Item::Free(number, place), &mut released)?;
@@ -190,7 +196,8 @@ impl<'a> Constraints<'a> {
         input: &Pressure,
         held: &[HashSet<usize>],
     ) -> Result<Option<String>, Refusal> {
-        if input.value == 0.0 {
+        let largest = input.value.values().fold(0.0, |a: f64, b| a.max(b.abs()));
+        if largest == 0.0 {
             return Ok(None);
         }
         let line = line(self.mesh, &input.line, &item)?;
@@ -232,7 +239,7 @@ impl<'a> Constraints<'a> {
              on reactions: it acts where the displacement is held or prescribed",
             phase.name,
             100.0 * lost / all,
-            (input.value * lost).abs()
+            largest * lost
         )))
     }
 

@@ -24,8 +24,9 @@ pub(super) enum Motion {
     Rotation,
 }
 
-/// The parts of a mesh, in the order of their first nodes.
-pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
+/// The parts of a mesh, in the order of their first nodes, of groups that are active. Faces of interfaces
+/// that are not are one.
+pub(super) fn parts(mesh: &Mesh, is_active: &dyn Fn(usize) -> bool) -> Vec<Part> {
     let mut root: Vec<usize> = (0..mesh.nodes.len()).collect();
     let mut join = |nodes: &mut dyn Iterator<Item = usize>| {
         let Some(first) = nodes.next() else { return };
@@ -38,7 +39,7 @@ pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
         }
     };
     let mut is_used = vec![false; mesh.nodes.len()];
-    for solid in &mesh.solids {
+    for solid in mesh.solids.iter().filter(|solid| is_active(solid.group)) {
         join(&mut solid.nodes().iter().copied());
         solid.nodes().iter().for_each(|&node| is_used[node] = true);
     }
@@ -68,7 +69,8 @@ pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
         .joints
         .iter()
         .map(|joint| (joint.minus[0], joint.group));
-    for (node, group) in solids.chain(joints) {
+    let joints = joints.filter(|&(node, _)| is_used[node]);
+    for (node, group) in solids.chain(joints).filter(|(_, group)| is_active(*group)) {
         let part = number[find(&mut root, node)];
         if seen.insert((part, group)) {
             parts[part].groups.push(group);
@@ -163,7 +165,7 @@ mod tests {
     #[test]
     fn bodies_that_touch_nothing_are_parts_of_their_own() {
         let mesh = apart();
-        let parts = parts(&mesh);
+        let parts = parts(&mesh, &|_| true);
         let groups: Vec<_> = parts.iter().map(|part| part.groups.clone()).collect();
         assert_eq!(groups, [[0], [1]]);
         let [x, y] = parts[1].centre;
@@ -173,7 +175,7 @@ mod tests {
     #[test]
     fn three_motions_are_to_be_held() {
         let mesh = apart();
-        let parts = parts(&mesh);
+        let parts = parts(&mesh, &|_| true);
         // Degrees of freedom of nodes 0 and 1, at (0, 0) and (1, 0).
         let motion = |held: &[usize]| loose(&mesh, &parts[0], false, |dof| held.contains(&dof));
         assert_eq!(motion(&[]), Some(Motion::X));
@@ -190,7 +192,7 @@ mod tests {
     #[test]
     fn about_an_axis_only_the_way_along_it_is_to_be_held() {
         let mesh = apart();
-        let parts = parts(&mesh);
+        let parts = parts(&mesh, &|_| true);
         let motion = |held: usize| loose(&mesh, &parts[0], true, |dof| dof == held);
         assert_eq!(motion(0), Some(Motion::Y));
         assert_eq!(motion(1), None);

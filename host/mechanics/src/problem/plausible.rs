@@ -146,9 +146,9 @@ fn other_thickness(group: &Group, law: &Material) -> Option<String> {
     let description = built.law.description();
     let declared = description.parameters.iter().zip(&built.parameters);
     let (parameter, used) = declared.into_iter().find(|(p, _)| means_thickness(p))?;
-    let per_element = group.kinematics.points_per_element();
     let elements = 0..group.kinematics.n_elements();
-    let thickness = elements.filter_map(|element| group.thickness(element * per_element));
+    let first = |element| group.kinematics.points_of(element).start;
+    let thickness = elements.filter_map(|element| group.thickness(first(element)));
     let off = |t: &f64| (used.value / t - 1.0).abs();
     let worst = thickness.max_by(|a, b| off(a).total_cmp(&off(b)))?;
     (off(&worst) > SAME_THICKNESS).then(|| {

@@ -31,6 +31,29 @@ pub enum Item {
     Free(usize, usize),
     /// A pressure of a phase.
     Pressure(usize, usize),
+    /// A force of a phase.
+    Force(usize, usize),
+    /// A line that a phase makes rigid.
+    Rigid(usize, usize),
+    /// The course of a phase.
+    Course(usize),
+    /// A group that a phase activates or deactivates.
+    Activation {
+        /// The phase.
+        phase: usize,
+        /// The group.
+        group: usize,
+        /// It is activated; else deactivated.
+        is_activated: bool,
+    },
+    /// The unit weight that a phase gives a group.
+    UnitWeight(usize, usize),
+    /// The drainage that a phase gives a group.
+    DrainageOf(usize, usize),
+    /// The water, or what a phase makes of it.
+    Water(Option<usize>),
+    /// A parameter of a material that varies, by names.
+    Varying(String, String),
 }
 
 /// What is said of a group.
@@ -44,6 +67,10 @@ pub enum Key {
     InPlane,
     /// Stress before the first phase.
     InitialStress,
+    /// Weight of the ground.
+    UnitWeight,
+    /// Whether pore water leaves.
+    Drainage,
 }
 
 /// A part of a problem that does not fit.
@@ -89,8 +116,6 @@ pub enum Cause {
     LostPressure(String),
     /// A group has no elements.
     NoElements(String),
-    /// A group has elements of several shapes.
-    MixedShapes(String),
     /// A thin layer has elements that are no quads.
     LayerOfTriangles(String),
     /// Something that does not go with the formulation.
@@ -187,6 +212,56 @@ pub enum Cause {
         /// The node.
         at: [f64; 2],
     },
+    /// Displacements that move alike are prescribed to move differently: a node, and two increments, m.
+    MovesAlike([f64; 2], [f64; 2]),
+    /// A number that is none, or infinite.
+    NotFinite(&'static str),
+    /// A number outside its bounds, and what they are.
+    OutOfBounds(&'static str, f64, &'static str),
+    /// A group that is there already, or not there, cannot be activated, or deactivated.
+    AlreadySo {
+        /// The group.
+        group: String,
+        /// It is there.
+        is_active: bool,
+    },
+    /// A group is activated and deactivated in one phase.
+    BothWays(String),
+    /// A line has two forces in one phase.
+    TwoForces(String),
+    /// A line lies on elements that are not there.
+    NotThere(String),
+    /// A course that does not lead from (0, 0) to time 1.
+    BadCourse,
+    /// A course under arc-length control, which has a time of its own.
+    CourseOfArcLength,
+    /// A phase changes the water of a problem that has none.
+    NoWater,
+    /// The water table lies below the mesh everywhere: its level and the mesh's lowest node, m.
+    WaterBelow(f64, f64),
+    /// Earth pressure at rest that the law cannot carry.
+    AtRestOutsideStrength {
+        /// The group.
+        group: String,
+        /// The material.
+        material: String,
+        /// Where.
+        at: [f64; 2],
+        /// σ'_h and σ'_v there, compression positive.
+        stress: [f64; 2],
+        /// What the law makes of them.
+        returned: [f64; 2],
+    },
+    /// A law's elasticity does not suit undrained ground.
+    Undrained(String),
+    /// A value of a parameter that varies does not fit.
+    Varies(String),
+    /// A joint in a group that is not one of zero-thickness elements, or a solid in one that is.
+    OtherElements(String, Formulation),
+    /// An element or a line refers to what there is not.
+    OutOfRange(&'static str),
+    /// A pressure on an interface acts on one of its faces only.
+    OnInterface(String),
     /// A part of the model is not held.
     Loose {
         /// The phase.
@@ -205,6 +280,8 @@ impl Key {
             Self::Normal => "`normal`",
             Self::InPlane => "`in_plane`",
             Self::InitialStress => "`initial_stress`",
+            Self::UnitWeight => "`unit_weight`",
+            Self::Drainage => "`drainage`",
         }
     }
 }
@@ -231,10 +308,6 @@ impl fmt::Display for Cause {
                  or prescribed as long as it lasts"
             ),
             Self::NoElements(group) => write!(f, "no element belongs to group `{group}`"),
-            Self::MixedShapes(group) => write!(
-                f,
-                "group `{group}` has triangles and quads; elements of a group have one shape"
-            ),
             Self::LayerOfTriangles(group) => write!(
                 f,
                 "group `{group}` is a thin layer, which is made of quads, and has triangles"
@@ -331,6 +404,64 @@ impl fmt::Display for Cause {
                 "phase `{phase}`: the node at ({x}, {y}) in the middle of a layer with \
                  `integration = \"mean\"` follows the layer's faces and cannot be held alone"
             ),
+            Self::MovesAlike([x, y], [a, b]) => write!(
+                f,
+                "the node at ({x}, {y}) moves alike with others that are prescribed differently: by \
+                 {a} and {b} m in this phase"
+            ),
+            Self::NotFinite(what) => write!(f, "{what} is not a finite number"),
+            Self::OutOfBounds(what, value, bounds) => {
+                write!(f, "{what} is {value}, expected {bounds}")
+            }
+            Self::AlreadySo { group, is_active } => write!(
+                f,
+                "group `{group}` is {} at the start of this phase",
+                if *is_active { "active already" } else { "not active" }
+            ),
+            Self::BothWays(group) => {
+                write!(f, "group `{group}` is activated and deactivated in one phase")
+            }
+            Self::TwoForces(line) => write!(f, "line `{line}` has two forces in this phase"),
+            Self::NotThere(line) => {
+                write!(f, "line `{line}` lies on elements that are not active in this phase")
+            }
+            Self::BadCourse => write!(
+                f,
+                "a `course` leads from [0, 0] to time 1: pairs [time, factor] with rising times"
+            ),
+            Self::CourseOfArcLength => {
+                write!(f, "a `course` has a time of its own, arc-length control another")
+            }
+            Self::NoWater => write!(f, "this phase changes the water, and there is none"),
+            Self::WaterBelow(level, lowest) => write!(
+                f,
+                "the water table, {level} m at its highest, lies below the mesh, which starts at {lowest} m"
+            ),
+            Self::AtRestOutsideStrength {
+                group,
+                material,
+                at: [x, y],
+                stress: [h, v],
+                returned: [r_h, r_v],
+            } => write!(
+                f,
+                "the earth pressure at rest of group `{group}` is outside the strength of law \
+                 `{material}`: at ({x:.4}, {y:.4}) horizontal {h:.4}, vertical {v:.4} kPa, where the \
+                 law returns {r_h:.4} and {r_v:.4}"
+            ),
+            Self::Undrained(why) => write!(f, "undrained ground: {why}"),
+            Self::Varies(why) => write!(f, "{why}"),
+            Self::OtherElements(group, formulation) => write!(
+                f,
+                "group `{group}` has elements that are not of its formulation `{}`",
+                formulation.name()
+            ),
+            Self::OutOfRange(what) => write!(f, "{what} refers to what there is not"),
+            Self::OnInterface(line) => write!(
+                f,
+                "a pressure on line `{line}`, along which zero-thickness elements stand, would act on \
+                 one of their faces only"
+            ),
             Self::Loose { phase, part, axis } => {
                 write!(f, "phase `{phase}`: nothing holds ")?;
                 match part {
@@ -376,8 +507,13 @@ impl Cause {
             Self::ImpossibleLayer(_) => {
                 "raise the normal stiffness, or set `in_plane = \"none\"` for the group"
             }
+            Self::AtRestOutsideStrength { .. } => {
+                "K_0 lies between active and passive pressure: at the surface cohesion, or another K_0"
+            }
+            Self::AlreadySo { is_active: true, .. } => {
+                "`active = false` on the group keeps it out from the start"
+            }
             Self::LocalAxes { .. } => "use the formulation `thin_layer`",
-            Self::MixedShapes(_) => "make two groups of it",
             Self::FreeForNothing { .. } => {
                 "leave one of the two out; a displacement stays until a phase frees it"
             }

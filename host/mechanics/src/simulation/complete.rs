@@ -25,11 +25,10 @@ impl Simulation {
         }
         let places = &equations.places;
         places.add(&success.increment, &mut self.displacement);
-        let ends = loads.force_start.iter().zip(&loads.force_end);
-        for (force, (start, end)) in self.force.iter_mut().zip(ends) {
-            *force = start + lambda * (end - start);
+        for (force, now) in self.force.iter_mut().zip(loads.forces(lambda)) {
+            *force = now;
         }
-        if lambda >= 1.0 {
+        if lambda >= loads.leg[1] {
             // Totals that were asked for are met exactly, whatever the increments added up to.
             for &(dof, _, end) in &loads.prescribed {
                 self.displacement[dof] = end;
@@ -59,11 +58,10 @@ impl Simulation {
         let mut reaction = vec![0.0; self.displacement.len()];
         for (number, group) in self.groups.iter().enumerate() {
             if equations.system.includes(number) {
-                let stress = &group.stress.committed;
-                group.kinematics.add_forces(stress, &mut reaction);
+                group.kinematics.add_forces(&group.carried(), &mut reaction);
             }
         }
-        fold(&self.ties, &mut reaction);
+        fold(&self.tied, &mut reaction);
         // Where a part of a domain is looked at, the forces on its boundary stand for the rest.
         let mut beside = None;
         if let Some(domain) = &mut equations.domain {
@@ -92,6 +90,9 @@ impl Simulation {
             self.check_balance(equations, loads, lambda, &reaction, beside.as_deref())?;
         }
         equations.system.follow(&mut self.displacement);
+        for (tie, offset) in self.tied.iter().zip(&course.offsets) {
+            self.displacement[tie.dof] += offset;
+        }
         for (force, external) in reaction.iter_mut().zip(&self.force) {
             *force -= external;
         }
@@ -127,8 +128,8 @@ impl Simulation {
             is_free[dof] = true;
         }
         let supports = || {
-            let prescribed = self.prescribed.keys();
-            prescribed.map(|&dof| (dof, internal[dof]))
+            let prescribed = loads.prescribed.iter();
+            prescribed.map(|&(dof, ..)| (dof, internal[dof]))
         };
         let unknowns = || {
             let numbered = is_free.iter().enumerate().filter(|(_, is_free)| **is_free);

@@ -7,7 +7,6 @@ use crate::assembly::{Bodies, Places, System, fold};
 use crate::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
 use crate::error::Error;
 use crate::group::Group;
-use crate::model::unit_pressure;
 use crate::problem::Axis;
 use crate::settings::Equations;
 use algebra::{LinearSolver, Singular, mesh_lines};
@@ -63,7 +62,9 @@ impl Simulation {
         let input = &self.problem.phases[number];
         let (name, increments) = (input.name.clone(), input.increments);
         watch.phase(&name, increments);
-        let loads = self.start(number, watch)?;
+        let prescribed = self.start(number, watch)?;
+        let offsets = self.offsets();
+        let loads = self.loads_on(number, 0, &prescribed);
         let (equations, loads) = self.equations_of(number, loads, None)?;
         let imbalance = equations.out_of_balance;
         if imbalance > 1e-6 {
@@ -83,9 +84,26 @@ impl Simulation {
             has_matrix: false,
             largest: 0.0,
             record,
+            leg: 0,
+            prescribed,
+            offsets,
         };
         self.enter(number, equations, course, watch);
         Ok(())
+    }
+
+    /// What ties leave between displacements that follow and those that they follow: nothing where they
+    /// have always done so.
+    fn offsets(&self) -> Vec<f64> {
+        let offset = |tie: &crate::assembly::Tie| {
+            if self.ties.contains(tie) {
+                return 0.0;
+            }
+            let masters = tie.masters.iter();
+            let followed: f64 = masters.map(|&(dof, weight)| weight * self.displacement[dof]).sum();
+            self.displacement[tie.dof] - followed
+        };
+        self.tied.iter().map(offset).collect()
     }
 
     /// Takes up a phase where it stands.
@@ -126,8 +144,9 @@ impl Simulation {
             number,
             equations,
             record,
-            ..
+            course,
         } = phase;
+        self.keep_loads(number, &course.prescribed);
         let of_domain = equations
             .domain
             .as_ref()
@@ -154,9 +173,10 @@ impl Simulation {
         loads: Loads,
         course: Option<&PhaseCourse>,
     ) -> Result<(PhaseEquations, Loads), Error> {
-        let n_dofs = self.displacement.len();
-        let is_prescribed = (0..n_dofs).map(|dof| self.prescribed.contains_key(&dof));
-        let is_prescribed: Vec<bool> = is_prescribed.collect();
+        let mut is_prescribed = vec![false; self.displacement.len()];
+        for &(dof, ..) in &loads.prescribed {
+            is_prescribed[dof] = true;
+        }
         self.equations(number, &is_prescribed, loads, course)
             .map_err(|Singular| Error::Singular {
                 phase: self.problem.phases[number].name.clone(),
@@ -178,55 +198,6 @@ impl Simulation {
             .collect()
     }
 
-    /// Loads of a phase; takes over its changes of constraints.
-    pub(super) fn loads(&mut self, number: usize) -> Loads {
-        let phase = self.problem.phases[number].clone();
-        if phase.reset_displacements {
-            self.displacement.fill(0.0);
-            self.prescribed.values_mut().for_each(|value| *value = 0.0);
-        }
-        for input in &phase.free {
-            for dof in self.dofs(&input.line, &input.components) {
-                self.prescribed.remove(&dof);
-            }
-        }
-        for input in &phase.displacement {
-            for (value, axis) in [(input.x, Axis::X), (input.y, Axis::Y)] {
-                if let Some(value) = value {
-                    for dof in self.dofs(&input.line, &[axis]) {
-                        self.prescribed.insert(dof, value);
-                    }
-                }
-            }
-        }
-        let force_start = self.force.clone();
-        for input in &phase.pressure {
-            self.pressure.insert(input.line.clone(), input.value);
-        }
-        let mut force_end = vec![0.0; self.displacement.len()];
-        for (line, value) in &self.pressure {
-            if let Some(line) = self.problem.mesh.lines.get(line) {
-                let unit = unit_pressure(self.problem.analysis, &self.problem.mesh, &line.edges);
-                force_end
-                    .iter_mut()
-                    .zip(unit)
-                    .for_each(|(force, unit)| *force += value * unit);
-            }
-        }
-        Loads {
-            force_start,
-            force_end,
-            prescribed: self
-                .prescribed
-                .iter()
-                .map(|(&dof, &end)| (dof, self.displacement[dof], end))
-                .collect(),
-            out_of_balance: Vec::new(),
-            scale: 0.0,
-            largest: Vec::new(),
-        }
-    }
-
     /// The equations of a phase, at its start or where it stands; the loads with what is out of
     /// balance at its start.
     fn equations(
@@ -236,7 +207,7 @@ impl Simulation {
         mut loads: Loads,
         course: Option<&PhaseCourse>,
     ) -> Result<(PhaseEquations, Loads), Singular> {
-        let (groups, ties) = (&self.groups, &self.ties);
+        let (groups, ties) = (&self.groups, &self.tied);
         let lines = mesh_lines(&self.problem.mesh.nodes);
         self.reuse.is_last_phase = number + 1 == self.problem.phases.len();
         let wanted = self.problem.settings.equations;
@@ -252,12 +223,13 @@ impl Simulation {
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),
             None => (
-                System::new(groups, |_| true, is_prescribed, ties, None),
+                System::new(groups, |group| group.is_active, is_prescribed, ties, None),
                 None,
             ),
         };
         let all_symmetric = groups
             .iter()
+            .filter(|group| group.is_active)
             .all(|group| group.is_linear() && group.is_symmetric());
         let symmetric = domain.is_none() && all_symmetric;
         let own_lines = system.lines(&lines);
@@ -287,7 +259,7 @@ impl Simulation {
         }
         let bodies = Bodies::new(
             &self.groups,
-            &self.ties,
+            &self.tied,
             &self.problem.mesh.nodes,
             is_prescribed,
         );
@@ -332,12 +304,12 @@ impl Simulation {
     fn out_of_balance(&mut self, unknowns: &[usize], loads: &mut Loads) -> f64 {
         let n_dofs = self.displacement.len();
         let mut internal = vec![0.0; n_dofs];
-        for group in &self.groups {
+        for group in self.groups.iter().filter(|group| group.is_active) {
             group
                 .kinematics
-                .add_forces(&group.stress.committed, &mut internal);
+                .add_forces(&group.carried(), &mut internal);
         }
-        fold(&self.ties, &mut internal);
+        fold(&self.tied, &mut internal);
         loads.out_of_balance = vec![0.0; n_dofs];
         let (mut rest, mut against_end, mut play) = (0.0, 0.0, 0.0);
         for &dof in unknowns {

@@ -2,43 +2,128 @@
 //! over; loads.
 
 use super::{Simulation, Warning, Watch};
-use crate::assembly::fold;
-use crate::equilibrium::{Loads, StepFailure};
+use super::loads::Prescribed;
+use crate::equilibrium::StepFailure;
 use crate::error::{Error, Place};
+use crate::ground::beside_joints;
 use crate::group::Group;
 use crate::model::Model;
+use crate::problem::{Cause, Drainage, InitialStress, Item, Key, Refusal};
 use law::Moment;
 
 /// Change of stress, relative to the largest of its group, that is worth a word.
 const WORTH_A_WORD: f64 = 1e-6;
+/// The same, of earth pressure at rest, from which the law's strength is what is meant and not its own
+/// tolerance.
+const OUTSIDE: f64 = 1e-3;
 
 impl Simulation {
-    /// Starts a phase: its laws and its loads.
-    pub(super) fn start(&mut self, number: usize, watch: &mut dyn Watch) -> Result<Loads, Error> {
+    /// Starts a phase: what is there, its laws and its loads. Returns its prescribed displacements.
+    pub(super) fn start(
+        &mut self,
+        number: usize,
+        watch: &mut dyn Watch,
+    ) -> Result<Vec<Prescribed>, Error> {
+        let phase = self.problem.phases[number].clone();
         let mut starts = vec![number == 0; self.groups.len()];
         let moment = Moment {
             step: self.time as u32 + 1,
             increment: 1,
             step_start: self.time,
         };
+        let cannot_start = |failure| Error::CannotStart(Box::new(failure));
+        let start = self.loading[1].clone();
+        self.loading = [start.clone(), start.changed_by(&phase)];
+        let beside: Vec<Vec<f64>> = phase.activate.iter().map(|&g| self.stress_beside(g)).collect();
+        for &group in &phase.deactivate {
+            self.groups[group].disappear();
+        }
         for (group, law) in self.swaps[number].clone() {
             starts[group] = true;
             self.groups[group].moment = moment;
-            self.groups[group]
-                .set_law(law)
-                .map_err(|failure| Error::CannotStart(Box::new(failure)))?;
+            self.groups[group].set_law(law).map_err(cannot_start)?;
+        }
+        for (&group, stress) in phase.activate.iter().zip(beside) {
+            starts[group] = true;
+            self.groups[group].moment = moment;
+            self.groups[group].appear(stress).map_err(cannot_start)?;
         }
         Model::check_layers(&self.groups)?;
         for group in (0..self.groups.len()).filter(|&group| starts[group]) {
             self.groups[group].moment = moment;
-            self.ask_law(group, number, watch)?;
+            if self.groups[group].is_active {
+                self.ask_law(group, number, watch)?;
+            }
         }
+        for (number_of, group) in self.groups.iter_mut().enumerate() {
+            let own = &self.problem.groups[number_of];
+            let changed = phase.drainage.iter().find(|(of, _)| *of == number_of);
+            let present = match changed {
+                Some((_, drainage)) => Some(*drainage),
+                None if number == 0 => Some(own.drainage),
+                // The stiffness of the pore water follows from that of the law.
+                None if starts[number_of] && group.is_undrained() => Some(Drainage::Undrained),
+                None => None,
+            };
+            if let Some(drainage) = present.filter(|_| group.is_active) {
+                group.moment = moment;
+                let set = group.set_drainage(drainage, own.undrained_poisson_ratio);
+                set.map_err(cannot_start)?;
+            }
+        }
+        let prescribed = self.take_loads(number)?;
         // The equations of the phase are set up in the room of trial states.
         self.groups.iter_mut().for_each(Group::forget_trial);
-        let mut loads = self.loads(number);
-        fold(&self.ties, &mut loads.force_start);
-        fold(&self.ties, &mut loads.force_end);
-        Ok(loads)
+        Ok(prescribed)
+    }
+
+    /// Stress with which a group appears: none in solids; in interfaces that computed beside them, in
+    /// axes of the elements. Water between the faces carries its own pressure.
+    fn stress_beside(&self, number: usize) -> Vec<f64> {
+        let kinematics = &self.groups[number].kinematics;
+        let n = kinematics.n_points();
+        if kinematics.n_components() == 4 {
+            return vec![0.0; 4 * n];
+        }
+        let solids = &self.problem.mesh.solids;
+        // Number of each solid within its group.
+        let mut counts = vec![0; self.groups.len()];
+        let within: Vec<usize> = solids
+            .iter()
+            .map(|solid| {
+                counts[solid.group] += 1;
+                counts[solid.group] - 1
+            })
+            .collect();
+        let beside = beside_joints(&self.problem.mesh);
+        let water = self.loading[0].water(&self.problem);
+        let mut stress = Vec::with_capacity(2 * n);
+        for point in 0..n {
+            let (element, _) = kinematics.place_of(point);
+            let (nodes, at) = (kinematics.nodes(element), kinematics.position(point));
+            let pressure = water.as_ref().map_or(0.0, |water| water.pressure(at));
+            let of_side = |face: usize| {
+                let solid = *beside.get(&face)?;
+                let group = solids[solid].group;
+                if !self.groups[group].is_active {
+                    return None;
+                }
+                let mut total = self.groups[group].carried_at(within[solid], at);
+                if self.problem.groups[group].pore_water {
+                    total[..3].iter_mut().for_each(|component| *component -= pressure);
+                }
+                Some(total)
+            };
+            let sides: Vec<[f64; 4]> = [nodes[2], nodes[5]].into_iter().filter_map(of_side).collect();
+            let share = 1.0 / sides.len().max(1) as f64;
+            let mean = std::array::from_fn(|c| share * sides.iter().map(|side| side[c]).sum::<f64>());
+            let [_, mut normal, _, shear] = kinematics.axes(element).stress_from_global(mean);
+            if self.problem.groups[number].pore_water && !sides.is_empty() {
+                normal += pressure;
+            }
+            stress.extend([normal, shear]);
+        }
+        stress
     }
 
     /// Takes over what the law of a group, which starts now, makes of the stresses it finds, and
@@ -52,6 +137,19 @@ impl Simulation {
         match self.groups[group].take_over() {
             Ok(None) => Ok(()),
             Ok(Some(change)) => {
+                let own = &self.problem.groups[group];
+                let at_rest = matches!(own.initial_stress, Some(InitialStress::AtRest(_)));
+                if number == 0 && at_rest && change.relative > OUTSIDE {
+                    let cause = Cause::AtRestOutsideStrength {
+                        group: change.group,
+                        material: change.law,
+                        at: change.position,
+                        stress: change.stress[0].map(|stress| -stress),
+                        returned: change.stress[1].map(|stress| -stress),
+                    };
+                    let item = Item::GroupKey(group, Key::InitialStress);
+                    return Err(Refusal::new(item, cause).into());
+                }
                 if change.relative > WORTH_A_WORD {
                     watch.warning(&Warning::TookOver(name, change));
                 }

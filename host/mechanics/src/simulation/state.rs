@@ -1,8 +1,10 @@
 //! All that a simulation needs to go on from a whole increment as if it had never stopped.
 
+use super::loads::Prescribed;
 use super::{History, PhaseRecord, Simulation};
 use crate::equilibrium::{Loads, Standing};
 use crate::error::Error;
+use crate::ground::Loading;
 use crate::group::{Group, GroupState};
 use crate::problem::Material;
 use serde::{Deserialize, Serialize};
@@ -17,7 +19,7 @@ pub struct State<'s> {
     groups: Vec<GroupState<'s>>,
     displacement: Cow<'s, [f64]>,
     prescribed: Cow<'s, BTreeMap<usize, f64>>,
-    pressure: Cow<'s, BTreeMap<String, f64>>,
+    loading: Cow<'s, [Loading; 2]>,
     force: Cow<'s, [f64]>,
     /// Pseudo-time at the start of the phase.
     time: f64,
@@ -46,6 +48,12 @@ pub(super) struct PhaseCourse {
     pub(super) largest: f64,
     /// The phase so far.
     pub(super) record: PhaseRecord,
+    /// Which leg of the phase's course it is on.
+    pub(super) leg: usize,
+    /// Prescribed displacements over the whole phase.
+    pub(super) prescribed: Vec<Prescribed>,
+    /// What displacements that follow others are off theirs.
+    pub(super) offsets: Vec<f64>,
 }
 
 impl State<'_> {
@@ -65,7 +73,7 @@ impl State<'_> {
                 .collect(),
             displacement: Cow::Owned(self.displacement.into_owned()),
             prescribed: Cow::Owned(self.prescribed.into_owned()),
-            pressure: Cow::Owned(self.pressure.into_owned()),
+            loading: Cow::Owned(self.loading.into_owned()),
             force: Cow::Owned(self.force.into_owned()),
             time: self.time,
             largest_force: self.largest_force,
@@ -111,7 +119,7 @@ impl Simulation {
             groups: self.groups.iter().map(|g| g.state(has_matrix)).collect(),
             displacement: (&self.displacement).into(),
             prescribed: Cow::Borrowed(&self.prescribed),
-            pressure: Cow::Borrowed(&self.pressure),
+            loading: Cow::Borrowed(&self.loading),
             force: (&self.force).into(),
             time: self.time,
             largest_force: self.largest_force,
@@ -150,7 +158,12 @@ impl Simulation {
         }
         self.displacement = state.displacement.into_owned();
         self.prescribed = state.prescribed.into_owned();
-        self.pressure = state.pressure.into_owned();
+        self.loading = state.loading.into_owned();
+        for (group, &is_active) in self.groups.iter_mut().zip(&self.loading[1].active) {
+            group.is_active = is_active;
+        }
+        let own = state.course.prescribed.clone();
+        self.tied = self.tied_in(state.phase, own)?.ties;
         self.force = state.force.into_owned();
         self.time = state.time;
         self.largest_force = state.largest_force;

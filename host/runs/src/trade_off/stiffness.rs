@@ -446,8 +446,8 @@ fn add_diagonals(
     diagonal: &mut BTreeMap<usize, f64>,
 ) {
     let elements = &group.kinematics;
-    let tangent = operator.repeat(elements.points_per_element());
     for element in 0..elements.n_elements() {
+        let tangent = operator.repeat(elements.points_of(element).len());
         let nodes = elements.nodes(element);
         if !wanted(nodes) {
             continue;

@@ -217,7 +217,7 @@ impl LinearDomain {
                 .map_err(|failure| DomainFailure::Law(Box::new(failure)))?;
             group
                 .kinematics
-                .add_forces(&group.stress.trial, &mut internal);
+                .add_forces(&group.carried_on_trial(), &mut internal);
         }
         self.system.fold(&mut internal);
         Ok(internal)

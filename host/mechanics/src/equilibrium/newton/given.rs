@@ -72,13 +72,13 @@ impl Newton<'_> {
                 if !self.system.includes(number) {
                     continue;
                 }
-                let per_element =
-                    group.kinematics.points_per_element() * group.kinematics.n_components();
+                let n = group.kinematics.n_components();
                 let mut own = stress(group, number);
                 let of_element = &self.places.bodies.of_element[number];
-                for (stress, &of) in own.chunks_exact_mut(per_element).zip(of_element) {
+                for (element, &of) in of_element.iter().enumerate() {
                     if of as usize != body {
-                        stress.fill(0.0);
+                        let points = group.kinematics.points_of(element);
+                        own[points.start * n..points.end * n].fill(0.0);
                     }
                 }
                 group.kinematics.add_forces(&own, &mut self.force);
@@ -215,12 +215,12 @@ impl Newton<'_> {
             if self.system.includes(number) {
                 group
                     .kinematics
-                    .add_forces(&group.stress.committed, &mut self.force);
+                    .add_forces(&group.carried(), &mut self.force);
             }
         }
         let mut internal = self.places.take(&mut self.force);
         self.places.fold(&mut internal);
-        let committed = |group: &Group, _: usize| group.stress.committed.clone();
+        let committed = |group: &Group, _: usize| group.carried().into_owned();
         let last = self.forces_by_body(&internal, &committed);
         self.given.last = Some(last.clone());
         last

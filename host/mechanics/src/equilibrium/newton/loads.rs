@@ -4,16 +4,19 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Loads over a phase, as functions of the load factor λ from 0 to 1.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+/// Loads over a leg of a phase, linear in the phase's time λ from 0 to 1; a phase without a course is one
+/// leg.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Loads {
-    /// External forces at λ = 0, by degree of freedom.
+    /// Times at which the leg starts and ends.
+    pub leg: [f64; 2],
+    /// External forces at the leg's start, by degree of freedom.
     pub force_start: Vec<f64>,
-    /// External forces at λ = 1.
+    /// External forces at its end.
     pub force_end: Vec<f64>,
-    /// Prescribed displacements: degree of freedom, value at λ = 0, value at λ = 1.
+    /// Prescribed displacements: degree of freedom, value at the leg's start, value at its end.
     pub prescribed: Vec<(usize, f64, f64)>,
-    /// Forces out of balance at the start, carried to equilibrium in proportion to λ.
+    /// Forces out of balance at the start of the phase, carried to equilibrium in proportion to λ.
     pub out_of_balance: Vec<f64>,
     /// Largest of the forces (2-norms) at the start of the phase, and what rounding leaves of those of
     /// earlier phases: where all forces vanish, the residual is still measured against something.
@@ -22,28 +25,56 @@ pub struct Loads {
     pub largest: Vec<f64>,
 }
 
+impl Default for Loads {
+    fn default() -> Self {
+        Self {
+            leg: [0.0, 1.0],
+            force_start: Vec::new(),
+            force_end: Vec::new(),
+            prescribed: Vec::new(),
+            out_of_balance: Vec::new(),
+            scale: 0.0,
+            largest: Vec::new(),
+        }
+    }
+}
+
 impl Loads {
+    /// How far along the leg λ is.
+    fn share(&self, lambda: f64) -> f64 {
+        (lambda - self.leg[0]) / self.length()
+    }
+
+    fn length(&self) -> f64 {
+        self.leg[1] - self.leg[0]
+    }
+
+    /// External forces, without those out of balance.
+    pub fn forces(&self, lambda: f64) -> impl Iterator<Item = f64> {
+        let share = self.share(lambda);
+        let ends = self.force_start.iter().zip(&self.force_end);
+        ends.map(move |(start, end)| start + share * (end - start))
+    }
+
     /// External forces and what is left of the forces out of balance.
     pub fn external(&self, lambda: f64) -> Vec<f64> {
-        let ends = self.force_start.iter().zip(&self.force_end);
-        ends.zip(&self.out_of_balance)
-            .map(|((start, end), rest)| start + lambda * (end - start) + (1.0 - lambda) * rest)
-            .collect()
+        let forces = self.forces(lambda).zip(&self.out_of_balance);
+        forces.map(|(force, rest)| force + (1.0 - lambda) * rest).collect()
     }
 
     /// Change of the external forces with λ, by degree of freedom.
     pub(super) fn external_rate(&self) -> Vec<f64> {
         let ends = self.force_start.iter().zip(&self.force_end);
         ends.zip(&self.out_of_balance)
-            .map(|((start, end), rest)| end - start - rest)
+            .map(|((start, end), rest)| (end - start) / self.length() - rest)
             .collect()
     }
 
     /// Change of prescribed displacements with λ, by degree of freedom.
-    pub(super) fn prescribed_rate(&self) -> Vec<f64> {
+    pub fn prescribed_rate(&self) -> Vec<f64> {
         let mut rate = vec![0.0; self.force_start.len()];
         for &(dof, start, end) in &self.prescribed {
-            rate[dof] = end - start;
+            rate[dof] = (end - start) / self.length();
         }
         rate
     }
@@ -52,17 +83,17 @@ impl Loads {
     pub(super) fn prescribed_increments(&self, from: f64, to: f64) -> Vec<f64> {
         let mut increments = vec![0.0; self.force_start.len()];
         for &(dof, start, end) in &self.prescribed {
-            increments[dof] = Self::value(start, end, to) - Self::value(start, end, from);
+            increments[dof] = self.value(start, end, to) - self.value(start, end, from);
         }
         increments
     }
 
     /// Value of a prescribed displacement; exact at both ends.
-    fn value(start: f64, end: f64, lambda: f64) -> f64 {
-        if lambda >= 1.0 {
+    fn value(&self, start: f64, end: f64, lambda: f64) -> f64 {
+        if lambda >= self.leg[1] {
             end
         } else {
-            start + lambda * (end - start)
+            start + self.share(lambda) * (end - start)
         }
     }
 }

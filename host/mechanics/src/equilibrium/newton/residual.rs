@@ -55,7 +55,7 @@ impl Newton<'_> {
         self.will_compute(operator);
         let (mut internal, mut unreliable) = self.internal_forces(increment, task, operator)?;
         // Forces in play before those of the domain cancel them out.
-        let trial = |group: &Group, _: usize| group.stress.trial.clone();
+        let trial = |group: &Group, _: usize| group.carried_on_trial().into_owned();
         let in_play = self.forces_by_body(&internal, &trial);
         let floors = self.floors(increment, task);
         let (scales, has_moved) = self.scales(&in_play, &floors, task);
@@ -143,7 +143,7 @@ impl Newton<'_> {
             let success = group.evaluate(&self.displacement, operator, time, time_increment)?;
             group
                 .kinematics
-                .add_forces(&group.stress.trial, &mut self.force);
+                .add_forces(&group.carried_on_trial(), &mut self.force);
             unreliable = unreliable.or(success
                 .unreliable
                 .map(|(_, why)| format!("group `{}`: {why}", group.name)));

@@ -1,0 +1,18 @@
+//! Ground at rest and under water: weights, pore pressures, the stress before the first phase.
+//!
+//! Stresses of groups are effective. What water adds to them is known from the water table alone, so it
+//! stands on the side of the loads: with total stresses σ' − p δ, equilibrium is
+//!
+//! - ∫ Bᵀ σ' dV = f + ∫ Bᵀ p δ dV (1)
+//!
+//! Weights, pore pressures and the water's pressure on the outline are nodal forces of a state
+//! ([`Loading`]); between two states they change in proportion to the phase's course.
+
+mod column;
+mod initial;
+mod loading;
+
+pub use column::Columns;
+pub(crate) use initial::{InitialStresses, beside_joints};
+pub use loading::Loading;
+pub(crate) use loading::unit_pressure;

@@ -1,0 +1,87 @@
+//! Effective stress before the first phase.
+
+use super::Columns;
+use crate::mesh::Mesh;
+use crate::problem::{InitialStress, Problem};
+use std::collections::HashMap;
+
+/// A point on an interface is taken this far into the element beside it, as a fraction of the way to its
+/// middle, so that it is told which column it stands in.
+const INSIDE: f64 = 1e-9;
+
+/// The stresses before the first phase, at any point of any group.
+pub(crate) struct InitialStresses<'p> {
+    problem: &'p Problem,
+    columns: Option<Columns<'p>>,
+    /// Element on the outside of a joint's face, by the node in the face's middle.
+    beside: HashMap<usize, usize>,
+}
+
+impl<'p> InitialStresses<'p> {
+    pub(crate) fn new(problem: &'p Problem) -> Self {
+        let groups = &problem.groups;
+        let is_at_rest = |stress: &Option<InitialStress>| matches!(stress, Some(InitialStress::AtRest(_)));
+        let columns = groups.iter().any(|group| is_at_rest(&group.initial_stress)).then(|| {
+            Columns::new(&problem.mesh, problem.water.as_ref(), |number| {
+                let group = &groups[number];
+                let wet = group.saturated_unit_weight.unwrap_or(group.unit_weight);
+                group.is_active.then_some([group.unit_weight, wet])
+            })
+        });
+        Self {
+            problem,
+            columns,
+            beside: beside_joints(&problem.mesh),
+        }
+    }
+
+    /// Stress of a solid group at a point, components 11 22 33 12 in global axes, tension positive, kPa.
+    /// `None` if the group has none.
+    pub(crate) fn at(&self, number: usize, at: [f64; 2]) -> Option<[f64; 4]> {
+        let group = &self.problem.groups[number];
+        Some(match group.initial_stress.as_ref()? {
+            InitialStress::Constant(stress) => *stress,
+            InitialStress::Profiles(profiles) => [0, 1, 2, 3].map(|c| profiles[c].at(at[1])),
+            InitialStress::AtRest(at_rest) => {
+                let total = self.columns.as_ref().map_or(0.0, |columns| columns.above(at));
+                let water = self.problem.water.as_ref().filter(|_| group.pore_water);
+                let pore = water.map_or(0.0, |water| water.pressure(at));
+                let vertical = (total + at_rest.surcharge - pore).max(0.0);
+                let horizontal = at_rest.ratio.horizontal(vertical, at[1]);
+                [-horizontal, -vertical, -horizontal, 0.0]
+            }
+        })
+    }
+
+    /// Stress of the ground on the two sides of a joint at a point of it: the mean of the sides that have
+    /// one. `faces`: the nodes in the middle of its two faces.
+    pub(crate) fn beside(&self, faces: [usize; 2], at: [f64; 2]) -> [f64; 4] {
+        let mesh = &self.problem.mesh;
+        let of_side = |face: &usize| {
+            let solid = &mesh.solids[*self.beside.get(face)?];
+            let n = solid.n_corners() as f64;
+            let middle = |c: usize| solid.corners().iter().map(|&i| mesh.nodes[i][c]).sum::<f64>() / n;
+            let inside = [0, 1].map(|c| at[c] + INSIDE * (middle(c) - at[c]));
+            self.at(solid.group, inside)
+        };
+        let sides: Vec<[f64; 4]> = faces.iter().filter_map(of_side).collect();
+        let n = sides.len().max(1) as f64;
+        std::array::from_fn(|c| sides.iter().map(|side| side[c]).sum::<f64>() / n)
+    }
+}
+
+/// Element beside each face of every joint, by the node in the face's middle.
+pub(crate) fn beside_joints(mesh: &Mesh) -> HashMap<usize, usize> {
+    let joints = mesh.joints.iter();
+    let mut beside: HashMap<usize, Option<usize>> =
+        joints.flat_map(|joint| [(joint.minus[2], None), (joint.plus[2], None)]).collect();
+    for (number, solid) in mesh.solids.iter().enumerate() {
+        for [_, _, middle] in solid.edges() {
+            if let Some(of) = beside.get_mut(&middle) {
+                of.get_or_insert(number);
+            }
+        }
+    }
+    let found = beside.into_iter();
+    found.filter_map(|(middle, of)| Some((middle, of?))).collect()
+}

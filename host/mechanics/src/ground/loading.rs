@@ -1,0 +1,367 @@
+//! What acts on a model, and the nodal forces of it.
+
+use crate::element::{depth, gauss, line_shape};
+use crate::group::Group;
+use crate::mesh::Mesh;
+use crate::problem::{Analysis, Formulation, Phase, Problem, Profile, Water};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// What acts on a model at one time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Loading {
+    /// Pressures by line, kPa.
+    pub pressure: BTreeMap<String, Profile>,
+    /// Forces by line, kN or kN/m.
+    pub force: BTreeMap<String, [f64; 2]>,
+    /// Unit weights of every group above and below the water, kN/m³.
+    pub unit_weight: Vec<[f64; 2]>,
+    /// Water table.
+    pub water_level: Option<Profile>,
+    /// Of every group, whether it is there.
+    pub active: Vec<bool>,
+}
+
+impl Loading {
+    /// Before the first phase: weights and water act, pressures and forces do not yet.
+    pub fn before(problem: &Problem) -> Self {
+        let weight = |group: &crate::problem::ElementGroup| {
+            let dry = group.unit_weight;
+            [dry, group.saturated_unit_weight.unwrap_or(dry)]
+        };
+        Self {
+            unit_weight: problem.groups.iter().map(weight).collect(),
+            water_level: problem.water.as_ref().map(|water| water.level.clone()),
+            active: problem.groups.iter().map(|group| group.is_active).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// At the end of a phase that starts here.
+    #[must_use]
+    pub fn changed_by(&self, phase: &Phase) -> Self {
+        let mut changed = self.clone();
+        for &group in &phase.activate {
+            changed.active[group] = true;
+        }
+        for &group in &phase.deactivate {
+            changed.active[group] = false;
+        }
+        for &(group, weight) in &phase.unit_weight {
+            changed.unit_weight[group] = [weight; 2];
+        }
+        if let (Some(level), Some(_)) = (&phase.water_level, &changed.water_level) {
+            changed.water_level = Some(level.clone());
+        }
+        for pressure in &phase.pressure {
+            let (line, value) = (pressure.line.clone(), pressure.value.clone());
+            changed.pressure.insert(line, value);
+        }
+        for force in &phase.force {
+            let total = changed.force.entry(force.line.clone()).or_default();
+            total[0] = force.x.unwrap_or(total[0]);
+            total[1] = force.y.unwrap_or(total[1]);
+        }
+        changed
+    }
+
+    /// What acts a part of the way to another loading. What is there is that of the other.
+    #[must_use]
+    pub fn towards(&self, other: &Self, part: f64) -> Self {
+        let between = |a: f64, b: f64| a + part * (b - a);
+        let pressure = |(line, end): (&String, &Profile)| {
+            let none = Profile::from(0.0);
+            let start = self.pressure.get(line).unwrap_or(&none);
+            (line.clone(), start.towards(end, part))
+        };
+        let force = |(line, end): (&String, &[f64; 2])| {
+            let start = self.force.get(line).copied().unwrap_or_default();
+            (line.clone(), [0, 1].map(|c| between(start[c], end[c])))
+        };
+        let weights = self.unit_weight.iter().zip(&other.unit_weight);
+        Self {
+            pressure: other.pressure.iter().map(pressure).collect(),
+            force: other.force.iter().map(force).collect(),
+            unit_weight: weights
+                .map(|(a, b)| [0, 1].map(|c| between(a[c], b[c])))
+                .collect(),
+            water_level: match (&self.water_level, &other.water_level) {
+                (Some(a), Some(b)) if a != b => Some(a.towards(b, part)),
+                (_, level) => level.clone(),
+            },
+            active: other.active.clone(),
+        }
+    }
+
+    /// The water at this time.
+    pub fn water(&self, problem: &Problem) -> Option<Water> {
+        let unit_weight = problem.water.as_ref()?.unit_weight;
+        let level = self.water_level.clone()?;
+        Some(Water { level, unit_weight })
+    }
+
+    /// Nodal forces, by degree of freedom.
+    pub fn forces(&self, problem: &Problem, groups: &[Group]) -> Vec<f64> {
+        let (mesh, analysis) = (&problem.mesh, problem.analysis);
+        let mut force = vec![0.0; 2 * mesh.nodes.len()];
+        for (line, value) in &self.pressure {
+            let Some(line) = mesh.lines.get(line) else {
+                continue;
+            };
+            let own = if value.is_constant() {
+                let mut unit = unit_pressure(analysis, mesh, &line.edges);
+                let value = value.at(0.0);
+                unit.iter_mut().for_each(|force| *force *= value);
+                unit
+            } else {
+                let kinks = value.points().iter().map(|&[y, _]| y);
+                let kinks: Vec<f64> = kinks.collect();
+                let mut own = vec![0.0; force.len()];
+                for &edge in &line.edges {
+                    let kinks = kinks.iter().map(|&y| move |at: [f64; 2]| at[1] - y);
+                    over_edge(mesh, analysis, edge, kinks, &mut own, |at, inward| {
+                        inward.map(|part| part * value.at(at[1]))
+                    });
+                }
+                own
+            };
+            force.iter_mut().zip(own).for_each(|(force, own)| *force += own);
+        }
+        for (line, total) in &self.force {
+            add_spread(problem, line, *total, &mut force);
+        }
+        let water = self.water(problem);
+        self.add_weights(problem, groups, water.as_ref(), &mut force);
+        if let Some(water) = &water {
+            for (number, group) in groups.iter().enumerate() {
+                if self.active[number] && problem.groups[number].pore_water {
+                    group.add_pore_forces(water, &mut force);
+                }
+            }
+            self.add_outer_water(problem, water, &mut force);
+        }
+        force
+    }
+
+    /// Weights of all solids that are there.
+    fn add_weights(
+        &self,
+        problem: &Problem,
+        groups: &[Group],
+        water: Option<&Water>,
+        force: &mut [f64],
+    ) {
+        for (number, group) in groups.iter().enumerate() {
+            let [dry, wet] = self.unit_weight[number];
+            let is_solid = group.formulation != Formulation::ZeroThickness;
+            if !self.active[number] || !is_solid || (dry == 0.0 && wet == 0.0) {
+                continue;
+            }
+            let solids = problem.mesh.solids.iter().enumerate();
+            let own = solids.filter(|(_, solid)| solid.group == number);
+            let mut cut = Vec::new();
+            for (element, (solid, _)) in own.enumerate() {
+                let nodes = group.kinematics.nodes(element);
+                let height = |node: usize| {
+                    let [x, y] = problem.mesh.nodes[node];
+                    water.map_or(f64::INFINITY, |water| y - water.level.at(x))
+                };
+                let heights = nodes.iter().map(|&node| height(node));
+                let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| {
+                    (a.min(h), b.max(h))
+                });
+                let weight = if high <= 0.0 {
+                    wet
+                } else if low >= 0.0 || dry.to_bits() == wet.to_bits() {
+                    dry
+                } else {
+                    cut.push((element, solid));
+                    continue;
+                };
+                for (node, volume) in nodes.iter().zip(group.kinematics.volumes(element)) {
+                    force[2 * node + 1] -= weight * volume;
+                }
+            }
+            if let Some(water) = water.filter(|_| !cut.is_empty()) {
+                add_cut_weights(problem, group, &cut, [dry, wet], water, force);
+            }
+        }
+    }
+
+    /// The water's pressure on the outline of what is there, but for supported lines.
+    fn add_outer_water(&self, problem: &Problem, water: &Water, force: &mut [f64]) {
+        let mesh = &problem.mesh;
+        let mut sides: HashMap<usize, (usize, (usize, usize))> = HashMap::new();
+        for (number, solid) in mesh.solids.iter().enumerate() {
+            if self.active[solid.group] {
+                for (edge, [_, _, middle]) in solid.edges().enumerate() {
+                    sides.entry(middle).or_insert((0, (number, edge))).0 += 1;
+                }
+            }
+        }
+        let is_there: HashSet<usize> = sides.keys().copied().collect();
+        // Faces of an interface touch each other.
+        for joint in &mesh.joints {
+            if [joint.minus[2], joint.plus[2]].iter().all(|middle| is_there.contains(middle)) {
+                sides.remove(&joint.minus[2]);
+                sides.remove(&joint.plus[2]);
+            }
+        }
+        for support in &problem.supports {
+            let line = mesh.lines.get(&support.line);
+            for &edge in line.iter().flat_map(|line| &line.edges) {
+                sides.remove(&mesh.edge(edge)[2]);
+            }
+        }
+        let mut outline: Vec<(usize, usize)> = sides
+            .into_values()
+            .filter_map(|(count, edge)| (count == 1).then_some(edge))
+            .collect();
+        outline.sort_unstable();
+        for edge in outline {
+            if mesh.edge(edge).iter().all(|&node| water.pressure(mesh.nodes[node]) <= 0.0) {
+                continue;
+            }
+            let surface = std::iter::once(|at: [f64; 2]| at[1] - water.level.at(at[0]));
+            over_edge(mesh, problem.analysis, edge, surface, force, |at, inward| {
+                inward.map(|part| part * water.pressure(at))
+            });
+        }
+    }
+}
+
+/// Weights of elements in which water stands, by number within the group and among the solids: what
+/// balances the vertical stress of the same ground, −σ_22 = γ (level − y) with γ of either side, so that
+/// ground at rest is at rest.
+fn add_cut_weights(
+    problem: &Problem,
+    group: &Group,
+    elements: &[(usize, usize)],
+    [dry, wet]: [f64; 2],
+    water: &Water,
+    force: &mut [f64],
+) {
+    let (mesh, analysis) = (&problem.mesh, problem.analysis);
+    let stress = |at: [f64; 2]| {
+        let depth = water.level.at(at[0]) - at[1];
+        depth * if depth > 0.0 { wet } else { dry }
+    };
+    let kinematics = &group.kinematics;
+    let mut flux = vec![0.0; 4 * kinematics.n_points()];
+    for &(element, solid) in elements {
+        let axes = kinematics.axes(element);
+        for point in kinematics.points_of(element) {
+            let vertical = [0.0, -stress(kinematics.position(point)), 0.0, 0.0];
+            flux[4 * point..4 * point + 4].copy_from_slice(&axes.stress_from_global(vertical));
+        }
+        for edge in 0..mesh.solids[solid].n_corners() {
+            let surface = std::iter::once(|at: [f64; 2]| at[1] - water.level.at(at[0]));
+            over_edge(mesh, analysis, (solid, edge), surface, force, |at, inward| {
+                [0.0, -inward[1] * stress(at)]
+            });
+        }
+    }
+    kinematics.add_forces(&flux, force);
+}
+
+/// Adds a force that is spread evenly over a line; on a point, evenly over its nodes.
+fn add_spread(problem: &Problem, line: &str, total: [f64; 2], force: &mut [f64]) {
+    let (mesh, analysis) = (&problem.mesh, problem.analysis);
+    let Some(line) = mesh.lines.get(line) else {
+        return;
+    };
+    if line.edges.is_empty() {
+        for &node in &line.nodes {
+            for c in 0..2 {
+                force[2 * node + c] += total[c] / line.nodes.len() as f64;
+            }
+        }
+        return;
+    }
+    let none = || std::iter::empty::<fn([f64; 2]) -> f64>();
+    let mut share = vec![0.0; force.len()];
+    for &edge in &line.edges {
+        over_edge(mesh, analysis, edge, none(), &mut share, |_, inward| {
+            [inward[0].hypot(inward[1]), 0.0]
+        });
+    }
+    let area: f64 = share.iter().sum();
+    for node in 0..mesh.nodes.len() {
+        for c in 0..2 {
+            force[2 * node + c] += total[c] * share[2 * node] / area;
+        }
+    }
+}
+
+/// Nodal forces of a unit pressure on a boundary line.
+pub(crate) fn unit_pressure(analysis: Analysis, mesh: &Mesh, edges: &[(usize, usize)]) -> Vec<f64> {
+    let mut force = vec![0.0; 2 * mesh.nodes.len()];
+    let none = || std::iter::empty::<fn([f64; 2]) -> f64>();
+    for &edge in edges {
+        over_edge(mesh, analysis, edge, none(), &mut force, |_, inward| inward);
+    }
+    force
+}
+
+/// Adds the nodal forces of a traction on an edge. `traction` gives it at a place, times the length of
+/// the inward vector it is handed: dS of the edge, into the element. It may have a kink where one of
+/// `kinks` changes its sign.
+fn over_edge<K: Fn([f64; 2]) -> f64>(
+    mesh: &Mesh,
+    analysis: Analysis,
+    edge: (usize, usize),
+    kinks: impl Iterator<Item = K>,
+    force: &mut [f64],
+    traction: impl Fn([f64; 2], [f64; 2]) -> [f64; 2],
+) {
+    let nodes = mesh.edge(edge);
+    let at = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * mesh.nodes[nodes[i]][c]).sum() };
+    let place = |xi: f64| {
+        let (n, _) = line_shape(xi);
+        [at(&n, 0), at(&n, 1)]
+    };
+    let mut ends: Vec<f64> = kinks.filter_map(|kink| root(|xi| kink(place(xi)))).collect();
+    ends.extend([-1.0, 1.0]);
+    ends.sort_unstable_by(f64::total_cmp);
+    for piece in ends.windows(2) {
+        let half = 0.5 * (piece[1] - piece[0]);
+        let (points, weights) = gauss(3);
+        for (&point, weight) in points.iter().zip(weights) {
+            let xi = if ends.len() == 2 {
+                point
+            } else {
+                0.5 * (piece[0] + piece[1]) + half * point
+            };
+            let (n, d) = line_shape(xi);
+            // Edges run counter-clockwise: (dy, −dx) points outward, the pressure inward.
+            let inward = [-at(&d, 1), at(&d, 0)];
+            let weight = half * weight * depth(analysis, at(&n, 0));
+            let traction = traction([at(&n, 0), at(&n, 1)], inward);
+            for i in 0..3 {
+                for c in 0..2 {
+                    force[2 * nodes[i] + c] += weight * n[i] * traction[c];
+                }
+            }
+        }
+    }
+}
+
+/// Where a function changes its sign between −1 and 1.
+fn root(f: impl Fn(f64) -> f64) -> Option<f64> {
+    let (mut low, mut high) = (-1.0, 1.0);
+    let sign = f(low) > 0.0;
+    if (f(high) > 0.0) == sign {
+        return None;
+    }
+    // To the last bit.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if (f(middle) > 0.0) == sign {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let at = 0.5 * (low + high);
+    (at > -1.0 && at < 1.0).then_some(at)
+}

@@ -1,0 +1,169 @@
+//! Water in the pores of a group.
+//!
+//! Its hydrostatic pressure is known beforehand, and acts as a load. Undrained ground adds an excess
+//! pressure u that follows from the volume strain: with compression positive,
+//!
+//! - Δu = −(K_w/n) Δε_v (1)
+//! - K_w/n = 2G (1 + ν_u)/(3 (1 − 2ν_u)) − K' (2)
+//!
+//! where G and K' are those of the law's elastic operator and ν_u is Poisson's ratio of the undrained
+//! ground. The law sees effective stresses σ'; the element carries σ' − u δ, with the tangent
+//! D + (K_w/n) δ δᵀ. Where it drains again, what is left of u goes in proportion to the phase's time.
+
+use super::{Field, Group, PointFailure};
+use crate::problem::{Drainage, Water};
+use law::Operator;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
+/// Pore water that follows the deformation.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Pores {
+    pub(super) drainage: Drainage,
+    /// Excess pressure of every point, compression positive, kPa.
+    pub(super) excess: Field,
+    /// K_w/n of every point, kPa; nothing while it drains.
+    stiffness: Vec<f64>,
+}
+
+impl Group {
+    /// Undrained from now on, or drained again.
+    ///
+    /// # Errors
+    /// The law has no elastic operator.
+    pub fn set_drainage(&mut self, drainage: Drainage, nu_u: f64) -> Result<(), PointFailure> {
+        if drainage == Drainage::Drained {
+            if let Some(pores) = &mut self.pores {
+                pores.drainage = drainage;
+                pores.stiffness = Vec::new();
+            }
+            return Ok(());
+        }
+        let n = self.kinematics.n_points();
+        // Its equations are no longer those of the law alone.
+        if self.tangents_are_constant {
+            self.tangents_are_constant = false;
+            self.tangent = vec![0.0; 16 * n];
+        }
+        let mut operator = vec![0.0; 16 * n];
+        let time = self.moment.step_start;
+        self.run_law(Operator::Elastic, time, 0.0, &mut operator)
+            .map_err(|failure| self.locate(&failure))?;
+        self.forget_trial();
+        let stiffness = operator.chunks_exact(16).map(|d| {
+            let bulk = (0..9).map(|i| d[4 * (i / 3) + i % 3]).sum::<f64>() / 9.0;
+            let undrained = 2.0 * d[15] * (1.0 + nu_u) / (3.0 * (1.0 - 2.0 * nu_u));
+            (undrained - bulk).max(0.0)
+        });
+        let stiffness = stiffness.collect();
+        let excess = match self.pores.take() {
+            Some(pores) => pores.excess,
+            None => Field::new(vec![0.0; n]),
+        };
+        self.pores = Some(Pores {
+            drainage,
+            excess,
+            stiffness,
+        });
+        Ok(())
+    }
+
+    /// Whether pore water follows the deformation, or did.
+    pub fn has_excess(&self) -> bool {
+        self.pores.is_some()
+    }
+
+    /// Excess pore pressure of a point (committed), kPa.
+    pub fn excess_pore_pressure(&self, point: usize) -> f64 {
+        let pores = self.pores.as_ref();
+        pores.map_or(0.0, |pores| pores.excess.committed[point])
+    }
+
+    /// Whether it is undrained now.
+    pub(crate) fn is_undrained(&self) -> bool {
+        let pores = self.pores.as_ref();
+        pores.is_some_and(|pores| pores.drainage == Drainage::Undrained)
+    }
+
+    /// Excess pressures of the trial state: (1), or what draining leaves of them.
+    pub(super) fn follow_pores(&mut self, time: f64, time_increment: f64) {
+        let Some(pores) = &mut self.pores else {
+            return;
+        };
+        pores.excess.begin();
+        let Field { committed, trial } = &mut pores.excess;
+        if pores.drainage == Drainage::Undrained {
+            let strains = self.strain.trial.chunks_exact(4);
+            let strains = strains.zip(self.strain.committed.chunks_exact(4));
+            let volume = |e: &[f64]| e[0] + e[1] + e[2];
+            let points = trial.iter_mut().zip(&*committed).zip(&pores.stiffness);
+            for (((u, u_0), k), (strain, strain_0)) in points.zip(strains) {
+                *u = u_0 - k * (volume(strain) - volume(strain_0));
+            }
+        } else {
+            let since = time - self.moment.step_start;
+            let left = |share: f64| (1.0 - share).max(0.0);
+            let share = if left(since) > 0.0 {
+                left(since + time_increment) / left(since)
+            } else {
+                0.0
+            };
+            for (u, u_0) in trial.iter_mut().zip(&*committed) {
+                *u = share * u_0;
+            }
+        }
+    }
+
+    /// Adds the pore water's stiffness to tangents of the law.
+    pub(super) fn stiffen(&self, tangents: &mut [f64]) {
+        let Some(pores) = self.pores.as_ref().filter(|_| self.is_undrained()) else {
+            return;
+        };
+        for (d, k) in tangents.chunks_exact_mut(16).zip(&pores.stiffness) {
+            for i in 0..9 {
+                d[4 * (i / 3) + i % 3] += k;
+            }
+        }
+    }
+
+    /// Stresses that the elements carry, excess pore pressure included, of the committed state.
+    pub fn carried(&self) -> Cow<'_, [f64]> {
+        self.with_excess(&self.stress.committed, |excess| &excess.committed)
+    }
+
+    /// The same of the trial state.
+    pub fn carried_on_trial(&self) -> Cow<'_, [f64]> {
+        self.with_excess(&self.stress.trial, |excess| &excess.trial)
+    }
+
+    fn with_excess<'s>(
+        &'s self,
+        stress: &'s [f64],
+        of: impl Fn(&Field) -> &Vec<f64>,
+    ) -> Cow<'s, [f64]> {
+        let Some(pores) = &self.pores else {
+            return Cow::Borrowed(stress);
+        };
+        let mut carried = stress.to_vec();
+        for (stress, u) in carried.chunks_exact_mut(4).zip(of(&pores.excess)) {
+            stress[..3].iter_mut().for_each(|component| *component -= u);
+        }
+        Cow::Owned(carried)
+    }
+
+    /// Adds the nodal forces of hydrostatic pore pressures.
+    pub fn add_pore_forces(&self, water: &Water, force: &mut [f64]) {
+        let n = self.kinematics.n_components();
+        let mut flux = vec![0.0; n * self.kinematics.n_points()];
+        let mut is_dry = true;
+        for (point, flux) in flux.chunks_exact_mut(n).enumerate() {
+            let pressure = water.pressure(self.kinematics.position(point));
+            is_dry &= pressure <= 0.0;
+            // Of a traction, the normal component.
+            flux[..if n == 2 { 1 } else { 3 }].fill(pressure);
+        }
+        if !is_dry {
+            self.kinematics.add_forces(&flux, force);
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! What can be seen of a problem without its laws: references, counts, bounds, what is there in which phase.
+
+use super::{
+    Cause, Drainage, ElementGroup, Formulation, InitialStress, Item, Key, Phase, Problem, Ratio, Refusal,
+    constraints,
+};
+use crate::mesh::{Mesh, Solid};
+use crate::settings::Control;
+use std::collections::{HashMap, HashSet};
+
+/// Most increments of a phase.
+const MOST_INCREMENTS: usize = 10_000_000;
+/// A node lies beyond the axis if its radius is less than this fraction of the mesh's longer side below 0.
+const BEYOND_AXIS: f64 = 1e-9;
+
+/// Refuses what refers to nothing, is no number, or changes what is not there.
+///
+/// # Errors
+/// The first part that does not fit.
+pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
+    mesh(problem)?;
+    for (number, group) in problem.groups.iter().enumerate() {
+        check_group(number, group)?;
+    }
+    if let Some(water) = &problem.water {
+        let refuse = |cause| Err(Refusal::new(Item::Water(None), cause));
+        if !(water.unit_weight.is_finite() && water.unit_weight > 0.0) {
+            let what = "the water's `unit_weight`";
+            return refuse(Cause::OutOfBounds(what, water.unit_weight, "a positive number"));
+        }
+        let lowest = problem.mesh.nodes.iter().map(|[_, y]| *y).fold(f64::INFINITY, f64::min);
+        let highest = water.level.values().fold(f64::NEG_INFINITY, f64::max);
+        let later = problem.phases.iter().any(|phase| phase.water_level.is_some());
+        if highest < lowest && !later {
+            return refuse(Cause::WaterBelow(highest, lowest));
+        }
+    }
+    phases(problem)
+}
+
+fn mesh(problem: &Problem) -> Result<(), Refusal> {
+    let mesh = &problem.mesh;
+    let (n, n_groups) = (mesh.nodes.len(), problem.groups.len());
+    let refuse = |cause| Err(Refusal::new(Item::Problem, cause));
+    let of_elements = mesh.solids.iter().map(|solid| solid.group);
+    let of_joints = mesh.joints.iter().map(|joint| joint.group);
+    if let Some(group) = of_elements.chain(of_joints).find(|&group| group >= n_groups) {
+        return refuse(Cause::NoGroup(group));
+    }
+    let solid_nodes = mesh.solids.iter().flat_map(|solid| solid.nodes().iter().copied());
+    let joint_nodes = mesh.joints.iter().flat_map(|joint| joint.minus.into_iter().chain(joint.plus));
+    if solid_nodes.chain(joint_nodes).any(|node| node >= n) {
+        return refuse(Cause::OutOfRange("an element"));
+    }
+    for line in mesh.lines.values() {
+        let has_edge = |&(solid, edge): &(usize, usize)| {
+            mesh.solids.get(solid).is_some_and(|solid| edge < solid.n_corners())
+        };
+        if !line.edges.iter().all(has_edge) || line.nodes.iter().any(|&node| node >= n) {
+            return refuse(Cause::OutOfRange("a line"));
+        }
+    }
+    if mesh.nodes.iter().flatten().any(|at| !at.is_finite()) {
+        return refuse(Cause::NotFinite("a coordinate"));
+    }
+    let is_joint = |group: usize| problem.groups[group].formulation == Formulation::ZeroThickness;
+    let solids = mesh.solids.iter().map(|solid| (solid.group, false));
+    let joints = mesh.joints.iter().map(|joint| (joint.group, true));
+    if let Some((group, _)) = solids.chain(joints).find(|&(group, joint)| is_joint(group) != joint) {
+        let own = &problem.groups[group];
+        let cause = Cause::OtherElements(own.name.clone(), own.formulation);
+        return Err(Refusal::new(Item::Group(group), cause));
+    }
+    if problem.analysis == super::Analysis::Axisymmetric {
+        let least = -BEYOND_AXIS * mesh.longer_side();
+        let beyond = |solid: &&Solid| solid.nodes().iter().any(|&node| mesh.nodes[node][0] < least);
+        if let Some(solid) = mesh.solids.iter().find(beyond) {
+            let cause = Cause::BadShape(problem.groups[solid.group].name.clone());
+            return Err(Refusal::new(Item::Group(solid.group), cause));
+        }
+    }
+    Ok(())
+}
+
+fn check_group(number: usize, group: &ElementGroup) -> Result<(), Refusal> {
+    let refuse = |key, cause| Err(Refusal::new(Item::GroupKey(number, key), cause));
+    let weights = [Some(group.unit_weight), group.saturated_unit_weight];
+    if let Some(weight) = weights.into_iter().flatten().find(|w| !(w.is_finite() && *w >= 0.0)) {
+        let cause = Cause::OutOfBounds("the unit weight", weight, "zero or more");
+        return refuse(Key::UnitWeight, cause);
+    }
+    let is_solid = group.formulation == Formulation::Solid;
+    if group.drainage == Drainage::Undrained {
+        if !is_solid {
+            let cause = Cause::Misplaced(Key::Drainage, group.formulation);
+            return refuse(Key::Drainage, cause);
+        }
+        let nu = group.undrained_poisson_ratio;
+        if !(nu > 0.0 && nu < 0.5) {
+            let what = "`undrained_poisson_ratio`";
+            return refuse(Key::Drainage, Cause::OutOfBounds(what, nu, "more than 0, less than 0.5"));
+        }
+    }
+    match &group.initial_stress {
+        Some(InitialStress::Constant(stress)) if stress.iter().any(|s| !s.is_finite()) => {
+            refuse(Key::InitialStress, Cause::NotFinite("`initial_stress`"))
+        }
+        Some(InitialStress::AtRest(_)) if !is_solid => {
+            let cause = Cause::Misplaced(Key::InitialStress, group.formulation);
+            refuse(Key::InitialStress, cause)
+        }
+        Some(InitialStress::AtRest(at_rest)) => match unlikely(&at_rest.ratio) {
+            Some(cause) => refuse(Key::InitialStress, cause),
+            None if !at_rest.surcharge.is_finite() => {
+                refuse(Key::InitialStress, Cause::NotFinite("`surcharge`"))
+            }
+            None => Ok(()),
+        },
+        _ => Ok(()),
+    }
+}
+
+/// What is out of bounds in an earth pressure at rest.
+fn unlikely(ratio: &Ratio) -> Option<Cause> {
+    let outside = |what, mut values: Box<dyn Iterator<Item = f64> + '_>, least: f64, bounds| {
+        let value = values.find(|value| *value < least);
+        value.map(|value| Cause::OutOfBounds(what, value, bounds))
+    };
+    match ratio {
+        Ratio::K0(k_0) => outside("`k_0`", Box::new(k_0.values()), 0.0, "zero or more"),
+        Ratio::Overconsolidated {
+            friction_angle,
+            ocr,
+            pop,
+            poisson_ratio,
+        } => {
+            let steep = friction_angle.values().find(|phi| *phi >= 90.0);
+            let steep = steep.map(|phi| Cause::OutOfBounds("`friction_angle`", phi, "less than 90"));
+            let nu = *poisson_ratio;
+            let no_ratio = !(0.0..0.5).contains(&nu);
+            steep
+                .or_else(|| outside("`friction_angle`", Box::new(friction_angle.values()), 0.0, "zero or more"))
+                .or_else(|| outside("`ocr`", Box::new(ocr.values()), 1.0, "1 or more"))
+                .or_else(|| outside("`pop`", Box::new(pop.values()), 0.0, "zero or more"))
+                .or_else(|| no_ratio.then_some(Cause::OutOfBounds("`poisson_ratio`", nu, "0 to less than 0.5")))
+        }
+    }
+}
+
+fn phases(problem: &Problem) -> Result<(), Refusal> {
+    if problem.phases.is_empty() {
+        return Err(Refusal::new(Item::Problem, Cause::NoPhase));
+    }
+    let mut active: Vec<bool> = problem.groups.iter().map(|group| group.is_active).collect();
+    let faces = problem.mesh.joints.iter().flat_map(|joint| [joint.minus[2], joint.plus[2]]);
+    let faces: HashSet<usize> = faces.collect();
+    let mut names: Vec<&str> = Vec::new();
+    for (number, phase) in problem.phases.iter().enumerate() {
+        let refuse = |cause| Err(Refusal::new(Item::Phase(number), cause));
+        let name = phase.name.as_str();
+        if name.trim().is_empty() {
+            return refuse(Cause::PhaseWithoutName);
+        }
+        if names.contains(&name) {
+            return refuse(Cause::TwoPhases(name.to_owned()));
+        }
+        names.push(name);
+        if phase.increments == 0 || phase.increments > MOST_INCREMENTS {
+            return refuse(Cause::Increments(phase.increments));
+        }
+        let n = problem.groups.len();
+        let named = phase.materials.iter().map(|(group, _)| group);
+        let named = named.chain(&phase.activate).chain(&phase.deactivate);
+        let named = named.chain(phase.unit_weight.iter().map(|(group, _)| group));
+        let mut named = named.chain(phase.drainage.iter().map(|(group, _)| group));
+        if let Some(group) = named.find(|&&group| group >= n) {
+            return refuse(Cause::NoGroup(*group));
+        }
+        activation(problem, number, phase, &mut active)?;
+        ground(problem, number, phase)?;
+        course(problem, number, phase)?;
+        let there: HashMap<usize, usize> = edges_there(&problem.mesh, &active);
+        pressures(problem, number, phase, &there, &faces)?;
+        forces(problem, number, phase, &there)?;
+        for displacement in &phase.displacement {
+            let values = [displacement.x, displacement.y];
+            if values.into_iter().flatten().any(|value| !value.is_finite()) {
+                return refuse(Cause::NotFinite("a displacement"));
+            }
+        }
+        for (place, line) in phase.rigid.iter().enumerate() {
+            constraints::line(&problem.mesh, line, &Item::Rigid(number, place))?;
+        }
+    }
+    Ok(())
+}
+
+/// Of the middles of edges, how many active elements have them.
+fn edges_there(mesh: &Mesh, active: &[bool]) -> HashMap<usize, usize> {
+    let mut there = HashMap::new();
+    let solids = mesh.solids.iter().filter(|solid| active[solid.group]);
+    for edge in solids.flat_map(Solid::edges) {
+        *there.entry(edge[2]).or_default() += 1;
+    }
+    there
+}
+
+fn activation(
+    problem: &Problem,
+    number: usize,
+    phase: &Phase,
+    active: &mut [bool],
+) -> Result<(), Refusal> {
+    let changes = phase.activate.iter().map(|&group| (group, true));
+    let changes = changes.chain(phase.deactivate.iter().map(|&group| (group, false)));
+    let mut changed = HashSet::new();
+    for (group, is_activated) in changes {
+        let item = Item::Activation {
+            phase: number,
+            group,
+            is_activated,
+        };
+        let name = problem.groups[group].name.clone();
+        if phase.activate.contains(&group) && phase.deactivate.contains(&group) {
+            return Err(Refusal::new(item, Cause::BothWays(name)));
+        }
+        if active[group] == is_activated || !changed.insert(group) {
+            let is_active = is_activated;
+            return Err(Refusal::new(item, Cause::AlreadySo { group: name, is_active }));
+        }
+        active[group] = is_activated;
+    }
+    Ok(())
+}
+
+fn ground(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal> {
+    if phase.water_level.is_some() && problem.water.is_none() {
+        return Err(Refusal::new(Item::Water(Some(number)), Cause::NoWater));
+    }
+    for (place, &(group, weight)) in phase.unit_weight.iter().enumerate() {
+        let refuse = |cause| Err(Refusal::new(Item::UnitWeight(number, place), cause));
+        let formulation = problem.groups[group].formulation;
+        if formulation == Formulation::ZeroThickness {
+            return refuse(Cause::Misplaced(Key::UnitWeight, formulation));
+        }
+        if !(weight.is_finite() && weight >= 0.0) {
+            return refuse(Cause::OutOfBounds("the unit weight", weight, "zero or more"));
+        }
+    }
+    for (place, &(group, _)) in phase.drainage.iter().enumerate() {
+        let formulation = problem.groups[group].formulation;
+        if formulation != Formulation::Solid {
+            let cause = Cause::Misplaced(Key::Drainage, formulation);
+            return Err(Refusal::new(Item::DrainageOf(number, place), cause));
+        }
+    }
+    Ok(())
+}
+
+fn course(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal> {
+    let course = &phase.course;
+    let (Some(first), Some(last)) = (course.first(), course.last()) else {
+        return Ok(());
+    };
+    let refuse = |cause| Err(Refusal::new(Item::Course(number), cause));
+    let rises = course.windows(2).all(|pair| pair[0][0] < pair[1][0]);
+    let is_finite = course.iter().flatten().all(|value| value.is_finite());
+    let starts = first.iter().all(|value| *value == 0.0);
+    if !starts || last[0].to_bits() != 1.0_f64.to_bits() || !rises || !is_finite {
+        return refuse(Cause::BadCourse);
+    }
+    if problem.settings.control == Control::ArcLength {
+        return refuse(Cause::CourseOfArcLength);
+    }
+    Ok(())
+}
+
+fn pressures(
+    problem: &Problem,
+    number: usize,
+    phase: &Phase,
+    there: &HashMap<usize, usize>,
+    faces: &HashSet<usize>,
+) -> Result<(), Refusal> {
+    let mesh = &problem.mesh;
+    let mut lines: Vec<&str> = Vec::new();
+    for (place, input) in phase.pressure.iter().enumerate() {
+        let item = Item::Pressure(number, place);
+        let name = input.line.as_str();
+        let refuse = |cause| Err(Refusal::new(item.clone(), cause));
+        if lines.contains(&name) {
+            return refuse(Cause::TwoPressures(name.to_owned()));
+        }
+        lines.push(name);
+        if input.value.values().any(|value| !value.is_finite()) {
+            return refuse(Cause::NotFinite("the pressure"));
+        }
+        let line = constraints::line(mesh, name, &item)?;
+        let middles = || line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
+        if middles().any(|middle| faces.contains(&middle)) {
+            return refuse(Cause::OnInterface(name.to_owned()));
+        }
+        if line.edges.is_empty() || middles().any(|middle| there.get(&middle).is_some_and(|n| *n > 1)) {
+            return refuse(Cause::NoBoundary(name.to_owned()));
+        }
+        if middles().any(|middle| !there.contains_key(&middle)) {
+            return refuse(Cause::NotThere(name.to_owned()));
+        }
+    }
+    Ok(())
+}
+
+fn forces(
+    problem: &Problem,
+    number: usize,
+    phase: &Phase,
+    there: &HashMap<usize, usize>,
+) -> Result<(), Refusal> {
+    let mesh = &problem.mesh;
+    let mut lines: Vec<&str> = Vec::new();
+    for (place, input) in phase.force.iter().enumerate() {
+        let item = Item::Force(number, place);
+        let name = input.line.as_str();
+        let line = constraints::line(mesh, name, &item)?;
+        let refuse = |cause| Err(Refusal::new(item.clone(), cause));
+        if lines.contains(&name) {
+            return refuse(Cause::TwoForces(name.to_owned()));
+        }
+        lines.push(name);
+        if input.x.is_none() && input.y.is_none() {
+            return refuse(Cause::NoValue(name.to_owned(), problem.analysis));
+        }
+        if [input.x, input.y].into_iter().flatten().any(|value| !value.is_finite()) {
+            return refuse(Cause::NotFinite("the force"));
+        }
+        let middles = line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
+        if middles.into_iter().any(|middle| !there.contains_key(&middle)) {
+            return refuse(Cause::NotThere(name.to_owned()));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! Loads of a phase: what acts at its end, and how it gets there.
+//!
+//! A phase may follow a course: pairs of time and factor on what it changes. Between two of them, a leg,
+//! loads are linear in the time; legs follow one another within the phase.
+
+use super::Simulation;
+use super::state::PhaseCourse;
+use super::ties::Tied;
+use crate::assembly::fold;
+use crate::equilibrium::Loads;
+use crate::error::Error;
+use crate::ground::Loading;
+use crate::problem::{Axis, Phase};
+
+/// A prescribed displacement of a phase: degree of freedom, value at its start and at its end.
+pub(super) type Prescribed = (usize, f64, f64);
+
+/// Times and factors at the start and at the end of a leg of a phase.
+pub(super) fn leg(phase: &Phase, number: usize) -> Option<[[f64; 2]; 2]> {
+    if phase.course.is_empty() {
+        return (number == 0).then_some([[0.0, 0.0], [1.0, 1.0]]);
+    }
+    Some([*phase.course.get(number)?, *phase.course.get(number + 1)?])
+}
+
+impl Simulation {
+    /// Takes over what a phase changes of loads and constraints. Returns its prescribed displacements.
+    ///
+    /// # Errors
+    /// Lines that move alike are prescribed to move differently.
+    pub(super) fn take_loads(&mut self, number: usize) -> Result<Vec<Prescribed>, Error> {
+        let phase = self.problem.phases[number].clone();
+        if phase.reset_displacements {
+            self.displacement.fill(0.0);
+            self.prescribed.values_mut().for_each(|value| *value = 0.0);
+        }
+        for input in &phase.free {
+            for dof in self.dofs(&input.line, &input.components) {
+                self.prescribed.remove(&dof);
+            }
+        }
+        for input in &phase.displacement {
+            for (value, axis) in [(input.x, Axis::X), (input.y, Axis::Y)] {
+                if let Some(value) = value {
+                    for dof in self.dofs(&input.line, &[axis]) {
+                        self.prescribed.insert(dof, value);
+                    }
+                }
+            }
+        }
+        let own = self.prescribed.iter();
+        let own = own.map(|(&dof, &end)| (dof, self.displacement[dof], end));
+        let own: Vec<Prescribed> = own.collect();
+        let Tied { ties, prescribed } = self.tied_in(number, own)?;
+        self.tied = ties;
+        Ok(prescribed)
+    }
+
+    /// Loads on a leg of a phase that starts here.
+    pub(super) fn loads_on(&self, number: usize, course: usize, prescribed: &[Prescribed]) -> Loads {
+        let phase = &self.problem.phases[number];
+        let [[t_0, _], [t_1, factor]] =
+            leg(phase, course).unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
+        let end_of = |start: f64, end: f64| {
+            if factor.to_bits() == 1.0_f64.to_bits() {
+                end
+            } else {
+                start + factor * (end - start)
+            }
+        };
+        let force_end = self.loading_at(factor).forces(&self.problem, &self.groups);
+        let prescribed = prescribed.iter();
+        let mut loads = Loads {
+            force_start: self.force.clone(),
+            force_end,
+            prescribed: prescribed
+                .map(|&(dof, start, end)| (dof, self.displacement[dof], end_of(start, end)))
+                .collect(),
+            leg: [t_0, t_1],
+            ..Loads::default()
+        };
+        fold(&self.tied, &mut loads.force_start);
+        fold(&self.tied, &mut loads.force_end);
+        loads
+    }
+
+    /// What acts when the phase has changed its loads by this factor.
+    pub(super) fn loading_at(&self, factor: f64) -> Loading {
+        let [start, end] = &self.loading;
+        if factor.to_bits() == 1.0_f64.to_bits() {
+            end.clone()
+        } else {
+            start.towards(end, factor)
+        }
+    }
+
+    /// Goes on to the next leg of a phase, if there is one.
+    pub(super) fn next_leg(&self, number: usize, course: &mut PhaseCourse) -> bool {
+        if leg(&self.problem.phases[number], course.leg + 1).is_none() {
+            return false;
+        }
+        course.leg += 1;
+        let next = self.loads_on(number, course.leg, &course.prescribed);
+        let last = std::mem::take(&mut course.loads);
+        course.loads = Loads {
+            out_of_balance: last.out_of_balance,
+            scale: last.scale,
+            largest: last.largest,
+            ..next
+        };
+        // What the last steps did says nothing of a course that may have turned.
+        course.history = super::History::default();
+        true
+    }
+
+    /// Takes note of what a phase ends with.
+    pub(super) fn keep_loads(&mut self, number: usize, prescribed: &[Prescribed]) {
+        let course = &self.problem.phases[number].course;
+        let Some(&[_, factor]) = course.last() else {
+            return;
+        };
+        for &(dof, start, end) in prescribed {
+            if let Some(value) = self.prescribed.get_mut(&dof) {
+                *value = start + factor * (end - start);
+            }
+        }
+        self.loading[1] = self.loading_at(factor);
+    }
+}

@@ -1,0 +1,144 @@
+//! Displacements that are one in a phase: faces of interfaces that are not there, lines that are rigid.
+
+use super::Simulation;
+use super::loads::Prescribed;
+use crate::assembly::Tie;
+use crate::error::Error;
+use crate::problem::{Analysis, Cause, Item, Refusal};
+use std::collections::{BTreeMap, HashMap};
+
+/// A node is on the axis of symmetry within this fraction of the mesh's longer side.
+const ON_AXIS: f64 = 1e-9;
+/// Two prescribed increments that differ by less, as a fraction of the larger, are the same.
+const SAME: f64 = 1e-12;
+
+/// What follows from what.
+pub(super) struct Tied {
+    pub(super) ties: Vec<Tie>,
+    /// Prescribed displacements, with those that follow from them.
+    pub(super) prescribed: Vec<Prescribed>,
+}
+
+impl Simulation {
+    /// Ties of a phase whose own prescribed displacements these are. Where one of some displacements that
+    /// move alike is prescribed, all are.
+    ///
+    /// # Errors
+    /// Two of them are prescribed to move differently.
+    pub(super) fn tied_in(
+        &self,
+        number: usize,
+        mut prescribed: Vec<Prescribed>,
+    ) -> Result<Tied, Error> {
+        let mut alike = Alike::default();
+        for joint in &self.problem.mesh.joints {
+            if !self.groups[joint.group].is_active {
+                for (&minus, &plus) in joint.minus.iter().zip(&joint.plus) {
+                    for c in 0..2 {
+                        alike.join(2 * minus + c, 2 * plus + c);
+                    }
+                }
+            }
+        }
+        let mut held = Vec::new();
+        for line in self.rigid_in(number) {
+            let nodes = self.problem.mesh.lines.get(line).map(|line| &line.nodes[..]);
+            let nodes = nodes.unwrap_or_default();
+            let axis = ON_AXIS * self.problem.mesh.longer_side();
+            let is_on_axis = |&node: &usize| self.problem.mesh.nodes[node][0] <= axis;
+            let reaches_axis =
+                self.problem.analysis == Analysis::Axisymmetric && nodes.iter().any(is_on_axis);
+            for pair in nodes.windows(2) {
+                alike.join(2 * pair[0], 2 * pair[1]);
+                alike.join(2 * pair[0] + 1, 2 * pair[1] + 1);
+            }
+            if reaches_axis {
+                held.extend(nodes.iter().map(|node| 2 * node));
+            }
+        }
+        let own: HashMap<usize, f64> =
+            prescribed.iter().map(|&(dof, start, end)| (dof, end - start)).collect();
+        let layers: HashMap<usize, [(usize, f64); 2]> =
+            self.ties.iter().map(|tie| (tie.dof, tie.masters)).collect();
+        let mut ties = Vec::new();
+        let mut follows: HashMap<usize, usize> = HashMap::new();
+        for members in alike.classes() {
+            let moves = |dof: &usize| {
+                let still = held.contains(dof).then_some(0.0);
+                own.get(dof).copied().or(still)
+            };
+            let given: Vec<f64> = members.iter().filter_map(moves).collect();
+            if let Some(&increment) = given.first() {
+                let differs = |other: &&f64| {
+                    (**other - increment).abs() > SAME * increment.abs().max(other.abs())
+                };
+                if let Some(&other) = given.iter().find(differs) {
+                    let at = self.problem.mesh.nodes[members[0] / 2];
+                    let cause = Cause::MovesAlike(at, [increment, other]);
+                    return Err(Refusal::new(Item::Phase(number), cause).into());
+                }
+                for &dof in members.iter().filter(|dof| !own.contains_key(dof)) {
+                    let start = self.displacement[dof];
+                    prescribed.push((dof, start, start + increment));
+                }
+                continue;
+            }
+            // A node in the middle of a layer follows its faces, and the others follow it.
+            let root = members.iter().copied().find(|dof| layers.contains_key(dof));
+            let root = root.unwrap_or(members[0]);
+            for &dof in members.iter().filter(|&&dof| dof != root) {
+                follows.insert(dof, root);
+                let masters = layers.get(&root).copied();
+                let masters = masters.unwrap_or([(root, 1.0), (root, 0.0)]);
+                ties.push(Tie { dof, masters });
+            }
+        }
+        // Faces of layers that follow others themselves.
+        for tie in &self.ties {
+            let masters = tie.masters.map(|(dof, weight)| (*follows.get(&dof).unwrap_or(&dof), weight));
+            if !follows.contains_key(&tie.dof) {
+                ties.push(Tie { dof: tie.dof, masters });
+            }
+        }
+        prescribed.sort_unstable_by_key(|(dof, ..)| *dof);
+        Ok(Tied { ties, prescribed })
+    }
+
+    /// Lines that are rigid in a phase: those that it or an earlier one names.
+    fn rigid_in(&self, number: usize) -> impl Iterator<Item = &String> {
+        self.problem.phases[..=number].iter().flat_map(|phase| &phase.rigid)
+    }
+}
+
+/// Degrees of freedom that move alike.
+#[derive(Default)]
+struct Alike {
+    root: BTreeMap<usize, usize>,
+}
+
+impl Alike {
+    fn find(&mut self, dof: usize) -> usize {
+        let above = *self.root.entry(dof).or_insert(dof);
+        if above == dof {
+            return dof;
+        }
+        let top = self.find(above);
+        self.root.insert(dof, top);
+        top
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.root.insert(a.max(b), a.min(b));
+    }
+
+    /// Those of more than one, members ascending.
+    fn classes(mut self) -> Vec<Vec<usize>> {
+        let dofs: Vec<usize> = self.root.keys().copied().collect();
+        let mut classes: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for dof in dofs {
+            classes.entry(self.find(dof)).or_default().push(dof);
+        }
+        classes.into_values().filter(|members| members.len() > 1).collect()
+    }
+}
