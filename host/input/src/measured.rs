@@ -33,7 +33,10 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
         path: &path,
         columns,
     };
-    let [x, y] = [table.position("x", &input.x)?, table.position("y", &input.y)?];
+    let [x, y] = [
+        table.position("x", &input.x)?,
+        table.position("y", &input.y)?,
+    ];
     let mut points = Vec::new();
     let mut row = ByteRecord::new();
     loop {
@@ -65,7 +68,10 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
         );
         return Err(at_file(message));
     }
-    if let Some((x, y)) = points.iter().find(|(x, y)| !(x.is_finite() && y.is_finite())) {
+    if let Some((x, y)) = points
+        .iter()
+        .find(|(x, y)| !(x.is_finite() && y.is_finite()))
+    {
         let message = format!("`file`: times its factors a point is ({x}, {y}), no finite number");
         return Err(at_file(message));
     }
@@ -105,7 +111,10 @@ struct Table<'a> {
 impl Table<'_> {
     /// Where the column stands that a key names.
     fn position(&self, key: &str, name: &Spanned<String>) -> Result<usize, Error> {
-        let position = self.columns.iter().position(|column| column == name.get_ref());
+        let position = self
+            .columns
+            .iter()
+            .position(|column| column == name.get_ref());
         position.ok_or_else(|| {
             let message = format!(
                 "`{key}`: {} has no column `{}`",

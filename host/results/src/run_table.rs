@@ -148,9 +148,17 @@ fn written(names: &[String], runs: &[Run]) -> Result<String, Box<dyn std::error:
         let mut row = vec![name.clone(), run.status().to_owned()];
         let of_settings = settings.iter().map(|path| run.settings.get(*path));
         row.extend(of_settings.map(|value| value.cloned().unwrap_or_default()));
-        row.extend(probes.iter().map(|probe| shown(&run.summary["probes"][probe])));
+        row.extend(
+            probes
+                .iter()
+                .map(|probe| shown(&run.summary["probes"][probe])),
+        );
         let pile = &run.summary["pile"];
-        row.extend(resistances.iter().map(|resistance| shown(&pile[resistance])));
+        row.extend(
+            resistances
+                .iter()
+                .map(|resistance| shown(&pile[resistance])),
+        );
         table.write_record(&row)?;
     }
     Ok(String::from_utf8(table.into_inner()?)?)
@@ -191,7 +199,10 @@ mod tests {
             }))
         };
         let reached = json!({ "resistance_davisson": 1234.5, "resistance_chin": null });
-        let runs = [with(2.0, "done", reached), with(3.0, "running", Value::Null)];
+        let runs = [
+            with(2.0, "done", reached),
+            with(3.0, "running", Value::Null),
+        ];
         let names = ["a", "b, c"].map(str::to_owned);
         let expected = "\
             run,status,phase.load.increments,laws.soil.parameters.c,w,n,\

@@ -44,11 +44,7 @@ impl<'i> Setting<'i> {
     ///
     /// # Errors
     /// [`Error::Input`] at the place that does not fit.
-    pub(crate) fn read(
-        source: &Source,
-        range: Range<usize>,
-        text: &'i str,
-    ) -> Result<Self, Error> {
+    pub(crate) fn read(source: &Source, range: Range<usize>, text: &'i str) -> Result<Self, Error> {
         let Some(equals) = equals_sign(text) else {
             let message = format!("`{}` is no setting, expected KEY=VALUE", text.trim_start());
             return Err(source
@@ -63,7 +59,7 @@ impl<'i> Setting<'i> {
                 let message = "one key and one value are expected; --set may be repeated";
                 source.error(range.clone(), message)
             })?,
-            Err(error) => bare_word(source, equals + 1..range.end)
+            Err(error) => bare_word(source, range.start, equals + 1..range.end)
                 .map_err(|refused| refused.unwrap_or_else(|| toml_error(source, &error)))?,
         };
         Ok(Self { range, keys, value })
@@ -103,7 +99,10 @@ impl<'i> Setting<'i> {
         }
         let known: Vec<&str> = table.keys().map(|key| key.get_ref().as_ref()).collect();
         let error = source
-            .error(key.span(), format!("there is no `{}`", self.path(depth + 1)))
+            .error(
+                key.span(),
+                format!("there is no `{}`", self.path(depth + 1)),
+            )
             .hint(suggestion(key.get_ref(), known));
         let mut made = DeTable::new();
         self.put_into(source, &mut made, depth + 1)?;
@@ -258,15 +257,16 @@ fn only_value(table: Spanned<DeTable<'_>>, depth: usize) -> Option<Spanned<DeVal
 }
 
 /// A word without quotes stands for a text. What else starts like one is refused with an error of
-/// its own.
+/// its own. `start` is where the setting starts.
 fn bare_word<'i>(
     source: &Source,
+    start: usize,
     range: Range<usize>,
 ) -> Result<Spanned<DeValue<'i>>, Option<Error>> {
     let text = &source.text()[range.clone()];
     let word = text.trim();
-    let start = range.start + text.len() - text.trim_start().len();
-    let span = start..start + word.len();
+    let at = range.start + text.len() - text.trim_start().len();
+    let span = at..at + word.len();
     if word.is_empty() {
         let error = source.error(span, "there is no value after the `=`");
         return Err(Some(error.into()));
@@ -280,8 +280,146 @@ fn bare_word<'i>(
     }
     let message = format!("`{word}` is no TOML value, and no single word, which stands for a text");
     let hint = format!(
-        "a text needs quotes, and those of the shell around the whole: --set '…={}'",
+        "a text needs quotes, and the whole those of the shell: --set '{}{}'",
+        &source.text()[start..range.start],
         toml::Value::from(word)
     );
     Err(Some(source.error(span, message).hint(hint).into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Source, base};
+    use toml::{Table, Value};
+
+    const FILE: &str = "a = 1\nlist = [1, 2]\n[table]\nb = 2\n\
+                        [[phase]]\nname = \"one\"\nn = 1\n[[phase]]\nname = \"two\"\nn = 2\n";
+
+    fn with(file: &str, settings: &[&str]) -> Result<Vec<Table>, String> {
+        let settings: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
+        let source = Source::new("file.toml", file).with_settings(&settings);
+        match base::read::<Table>(source) {
+            Ok((_, files)) => Ok(files.into_iter().map(|(_, table)| table).collect()),
+            Err(crate::Error::Input(error)) => {
+                let hint = miette::Diagnostic::help(error.as_ref());
+                let hint = hint.map(|hint| format!("; {hint}")).unwrap_or_default();
+                Err(format!("{error}{hint}"))
+            }
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    fn only(setting: &str) -> Table {
+        with(FILE, &[setting]).unwrap().remove(0)
+    }
+
+    #[test]
+    fn a_setting_overrides_the_file() {
+        assert_eq!(only("a=3")["a"], Value::from(3));
+        assert_eq!(
+            only(" table.b = \"x y\" # why")["table"]["b"],
+            Value::from("x y")
+        );
+        assert_eq!(only("table.c.d=1.5")["table"]["c"]["d"], Value::from(1.5));
+        assert_eq!(only("table={ c = 4 }")["table"]["b"], Value::from(2));
+        assert_eq!(only("list=[7]")["list"], Value::from(vec![7]));
+        assert_eq!(only("list.2=7")["list"], Value::from(vec![1, 7]));
+        assert_eq!(only("\"a=b\".c=true")["a=b"]["c"], Value::from(true));
+        // The later one wins.
+        let file = with(FILE, &["a=3", "a=4"]).unwrap().remove(0);
+        assert_eq!(file["a"], Value::from(4));
+    }
+
+    #[test]
+    fn entries_have_positions_and_names() {
+        for key in ["phase.2.n", "phase.two.n"] {
+            let file = only(&format!("{key}=20"));
+            let n = |phase: usize| file["phase"][phase]["n"].as_integer();
+            assert_eq!([n(0), n(1)], [Some(1), Some(20)], "{key}");
+        }
+    }
+
+    #[test]
+    fn a_setting_holds_for_every_variant() {
+        let variants = "[[variant]]\nname = \"v\"\ntable.b = 5\n[[variant]]\nname = \"w\"\n";
+        let file = format!("{FILE}{variants}");
+        let files = with(&file, &["table.b=9"]).unwrap();
+        let values: Vec<_> = files
+            .iter()
+            .map(|file| file["table"]["b"].clone())
+            .collect();
+        assert_eq!(values, [Value::from(9), Value::from(9)]);
+    }
+
+    #[test]
+    fn a_word_without_quotes_is_a_text() {
+        assert_eq!(only("a=arc-length")["a"], Value::from("arc-length"));
+        assert_eq!(only("a= soil_2.v1 ")["a"], Value::from("soil_2.v1"));
+        let refused = with(FILE, &["a=two words"]).unwrap_err();
+        assert_eq!(
+            refused,
+            "`two words` is no TOML value, and no single word, which stands for a text; \
+             a text needs quotes, and the whole those of the shell: --set 'a=\"two words\"'"
+        );
+    }
+
+    #[test]
+    fn paths_that_lead_nowhere_are_refused() {
+        for (setting, says) in [
+            (
+                "phase.3.n=1",
+                "there is no `phase.3`: `phase` has 2 entries; there is: one, two",
+            ),
+            (
+                "phase.twoo.n=1",
+                "there is no `phase.twoo`: `phase` has 2 entries; did you mean `two`? There is: \
+                 one, two",
+            ),
+            (
+                "list.0=1",
+                "there is no `list.0`: `list` has 2 entries; an entry has its position here, \
+                 from 1",
+            ),
+            ("a.b=1", "there is no `a.b`: `a` is the number 1"),
+            (
+                "base=b",
+                "`base` cannot be set; name the file that is based on it",
+            ),
+            (
+                "variant.1.a=1",
+                "`variant` cannot be set; a setting holds for every variant; --variant chooses one",
+            ),
+            (
+                "a=1\nb=2",
+                "one key and one value are expected; --set may be repeated",
+            ),
+            ("a=", "there is no value after the `=`"),
+            (
+                "a",
+                "`a` is no setting, expected KEY=VALUE; such as --set solver.max_iterations=40",
+            ),
+        ] {
+            assert_eq!(with(FILE, &[setting]).unwrap_err(), says, "{setting}");
+        }
+    }
+
+    #[test]
+    fn places_are_those_in_the_setting() {
+        let source = Source::new("file.toml", "a = 1\n");
+        let source = source.with_settings(&["x=1".to_owned(), "yy=2".to_owned()]);
+        let places: Vec<_> = source
+            .settings()
+            .map(|range| source.place(&range))
+            .collect();
+        assert_eq!(places, ["--set:1:1", "--set:1:1"]);
+        let second = source.settings().nth(1).unwrap();
+        assert_eq!(&source.text()[second.clone()], "yy=2");
+        assert_eq!(source.path_at(&second), std::path::Path::new("file.toml"));
+        assert_eq!(source.text_of_files(), "a = 1\n");
+        // What a file is based on stands before it, its settings behind.
+        let source = source.based_on(&Source::new("base.toml", "b = 2\n"));
+        assert_eq!(source.text_of_files(), "b = 2\n\na = 1\n");
+        assert_eq!(source.files().count(), 2);
+        assert_eq!(source.settings().count(), 2);
+    }
 }

@@ -164,8 +164,8 @@ impl Source {
         label: impl Into<String>,
     ) -> InputError {
         let (path, start, text) = self.file(span.start);
-        let is_same_part =
-            error.source_code.name() == path.display().to_string() && error.source_code.inner() == text;
+        let is_same_part = error.source_code.name() == path.display().to_string()
+            && error.source_code.inner() == text;
         if is_same_part {
             let span = span.start - start..span.end.saturating_sub(start).min(text.len());
             error.second = Some((span.into(), label.into()));
