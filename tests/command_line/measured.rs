@@ -40,9 +40,14 @@ fn measured_points_are_drawn_as_markers() {
 fn a_list_and_a_cut_take_measured_points() {
     let place = Place::new();
     place.write("test.csv", "z,s,t\n0.1,1,2\n0.5,2,3\n");
-    let table = |y: &str| format!("{{ file = \"test.csv\", x = \"z\", y = \"{y}\", label = \"{y}\" }}");
+    let table =
+        |y: &str| format!("{{ file = \"test.csv\", x = \"z\", y = \"{y}\", label = \"{y}\" }}");
     let figure = "[[figure]]\nname = \"cut\"\nx = \"y\"\ny = [\"stress_22\"]\npoints = {}\n";
-    let both = format!("{CASE}\n{figure}measured = [{}, {}]\n", table("s"), table("t"));
+    let both = format!(
+        "{CASE}\n{figure}measured = [{}, {}]\n",
+        table("s"),
+        table("t")
+    );
     let outcome = place.run_case(both);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let svg = std::fs::read_to_string(place.path("out").join("cut.svg")).unwrap();
@@ -93,7 +98,11 @@ fn what_cannot_be_drawn_is_refused_at_its_key() {
         let outcome = run(&place, &measured.replacen('^', "", 1));
         assert_eq!(outcome.code, Some(BAD_INPUT), "{measured}");
         for text in [at, says, &format!(":{column}]")] {
-            assert!(outcome.says(text), "{measured}: {text:?}\n{}", outcome.stderr);
+            assert!(
+                outcome.says(text),
+                "{measured}: {text:?}\n{}",
+                outcome.stderr
+            );
         }
         assert!(!place.path("out").exists(), "{measured}");
     }

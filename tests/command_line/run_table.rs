@@ -28,7 +28,11 @@ fn a_row_for_each_run() {
     let place = two_runs();
     let outcome = place.run(&["table", "runs"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let rows: Vec<Vec<&str>> = outcome.stdout.lines().map(|l| l.split(',').collect()).collect();
+    let rows: Vec<Vec<&str>> = outcome
+        .stdout
+        .lines()
+        .map(|l| l.split(',').collect())
+        .collect();
     assert_eq!(
         rows[0],
         [
@@ -52,7 +56,11 @@ fn a_row_for_each_run() {
         for (name, value) in rows[0][4..].iter().zip(&row[4..]) {
             let column = columns.iter().position(|column| column == name).unwrap();
             let (value, expected) = (value.parse::<f64>(), last[column].parse::<f64>());
-            assert_eq!(value.unwrap().to_bits(), expected.unwrap().to_bits(), "{name}");
+            assert_eq!(
+                value.unwrap().to_bits(),
+                expected.unwrap().to_bits(),
+                "{name}"
+            );
         }
     }
     // One of them twice stands there once; a file takes the table.
@@ -62,7 +70,10 @@ fn a_row_for_each_run() {
     assert_eq!(written, outcome.stdout);
     // Of one run nothing differs.
     let one = place.run(&["table", "runs/b"]);
-    assert_eq!(one.stdout.lines().next().unwrap(), "run,status,half,settlement,tau");
+    assert_eq!(
+        one.stdout.lines().next().unwrap(),
+        "run,status,half,settlement,tau"
+    );
 }
 
 #[test]
@@ -90,7 +101,10 @@ fn folders_without_a_run_are_refused() {
     for (folder, says) in [
         ("nowhere", "cannot read nowhere"),
         ("empty", "cannot read empty/summary.json"),
-        ("empty", "there is no run in this folder, nor in those below"),
+        (
+            "empty",
+            "there is no run in this folder, nor in those below",
+        ),
         ("broken", "broken/summary.json:2:"),
         ("broken", "not written by a run"),
         ("other", "other/summary.json has no `status`"),

@@ -18,7 +18,12 @@ fn run(place: &Place, settings: &[&str]) -> Outcome {
 fn refused(setting: &str, at: &str, says: &str) {
     let place = Place::new();
     let outcome = run(&place, &[setting]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{setting}: {}", outcome.stderr);
+    assert_eq!(
+        outcome.code,
+        Some(BAD_INPUT),
+        "{setting}: {}",
+        outcome.stderr
+    );
     for text in [&format!("[--set:{at}]"), says, setting] {
         assert!(
             outcome.says(text),
@@ -48,7 +53,10 @@ fn settings_override_the_file_and_are_recorded() {
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let set = summary(&place, "out");
     assert_eq!(set["set"], Value::from(settings.to_vec()));
-    assert_eq!(set["laws"]["joint (interface_2d)"]["parameters"]["cohesion"], 20.0);
+    assert_eq!(
+        set["laws"]["joint (interface_2d)"]["parameters"]["cohesion"],
+        20.0
+    );
     assert_eq!(set["solver"]["max_iterations"], 40);
     assert_eq!(set["phases"][1]["increments"], 3);
     assert!(!place.path("out").join("profile.csv").exists());
@@ -105,7 +113,7 @@ fn what_does_not_fit_is_said_at_its_place_in_the_setting() {
         (
             "laws.jiont.parameters.cohesion=1",
             "1:6",
-            "there is no `laws.jiont` did you mean `joint`?",
+            "did you mean `joint`? There is: soil, joint",
         ),
         (
             "phase.pusch.increments=1",
@@ -125,7 +133,11 @@ fn what_does_not_fit_is_said_at_its_place_in_the_setting() {
             "1:33",
             "is a decimal point meant? `1.5`",
         ),
-        ("solver.force_tolerance=nan", "1:24", "nan is no finite number"),
+        (
+            "solver.force_tolerance=nan",
+            "1:24",
+            "nan is no finite number",
+        ),
         ("base=other.toml", "1:1", "`base` cannot be set"),
         ("solver.max_iterations", "1:1", "expected KEY=VALUE"),
     ] {
@@ -166,7 +178,15 @@ fn a_run_is_resumed_only_with_its_settings() {
     let outcome = run(&place, &["phase.push.increments=3"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let resumed = |setting: &str| {
-        place.run(&["run", "case.toml", "--out", "out", "--resume", "--set", setting])
+        place.run(&[
+            "run",
+            "case.toml",
+            "--out",
+            "out",
+            "--resume",
+            "--set",
+            setting,
+        ])
     };
     let outcome = resumed("phase.push.increments=3");
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
@@ -189,7 +209,10 @@ fn drivers_and_studies_take_settings() {
         assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
         let rows = std::fs::read_to_string(place.path("rows.csv")).unwrap();
         let (header, last) = (rows.lines().next().unwrap(), rows.lines().last().unwrap());
-        let column = header.split(',').position(|name| name == "traction_t").unwrap();
+        let column = header
+            .split(',')
+            .position(|name| name == "traction_t")
+            .unwrap();
         let value: f64 = last.split(',').nth(column).unwrap().parse().unwrap();
         value.abs()
     };
@@ -200,5 +223,9 @@ fn drivers_and_studies_take_settings() {
     assert!(outcome.says("[--set:1:9]"), "{}", outcome.stderr);
     let outcome = place.run(&["trade-off", "driver.toml", "--set", "parameters.cohesoin=4"]);
     assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(outcome.says("did you mean `cohesion`?"), "{}", outcome.stderr);
+    assert!(
+        outcome.says("did you mean `cohesion`?"),
+        "{}",
+        outcome.stderr
+    );
 }

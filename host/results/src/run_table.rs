@@ -205,10 +205,10 @@ mod tests {
         ];
         let names = ["a", "b, c"].map(str::to_owned);
         let expected = "\
-            run,status,phase.load.increments,laws.soil.parameters.c,w,n,\
+            run,status,phase.load.increments,laws.soil.parameters.c,n,w,\
             pile.resistance_10_percent_diameter,pile.resistance_davisson,pile.resistance_chin\n\
-            a,done,2,2,2.1,,,1234.5,\n\
-            \"b, c\",unfinished,3,3,3.1,,,,\n";
+            a,done,2,2,,2.1,,1234.5,\n\
+            \"b, c\",unfinished,3,3,,3.1,,,\n";
         assert_eq!(written(&names, &runs).unwrap(), expected);
     }
 
