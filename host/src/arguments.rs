@@ -37,6 +37,10 @@ pub(crate) enum Command {
         /// Run only this variant of it.
         #[arg(long)]
         variant: Option<String>,
+        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
+        /// in the file's syntax, such as `solver.max_iterations=40`; may be repeated.
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
         /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
         #[arg(long)]
         out: Option<PathBuf>,
@@ -58,11 +62,15 @@ pub(crate) enum Command {
         /// A driver file, or with `--umat` the `test.inp` of an IncrementalDriver.
         driver: PathBuf,
         /// Read input of the IncrementalDriver, and run it with this Abaqus user subroutine.
-        #[arg(long, value_name = "LIBRARY", conflicts_with = "variant")]
+        #[arg(long, value_name = "LIBRARY", conflicts_with_all = ["variant", "set"])]
         umat: Option<PathBuf>,
         /// Run only this variant of it.
         #[arg(long)]
         variant: Option<String>,
+        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
+        /// in the file's syntax, such as `solver.max_iterations=40`; may be repeated.
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
         /// File for the table; standard output if left out.
         #[arg(long)]
         csv: Option<PathBuf>,
@@ -79,6 +87,15 @@ pub(crate) enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
+    /// Write a table of runs, one row each: the settings that differ, last values of probes.
+    Table {
+        /// Results folders, or folders with results folders below.
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+        /// The table's file; standard output if left out.
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
     /// Measure what accuracy costs: the settings of a case or driver, error against CPU time.
     TradeOff {
         /// A case file, a folder with `case.toml`, or a driver file.
@@ -86,6 +103,10 @@ pub(crate) enum Command {
         /// Study only this variant of it.
         #[arg(long)]
         variant: Option<String>,
+        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
+        /// in the file's syntax, such as `solver.max_iterations=40`; may be repeated.
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
         /// Folder for the results [default: `results/trade_off_NAME`].
         #[arg(long)]
         out: Option<PathBuf>,

@@ -24,6 +24,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         Command::Run {
             case,
             variant,
+            set,
             out,
             resume,
             checkpoint,
@@ -39,7 +40,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             recorded(record.as_deref(), opener, |opener| {
                 run_cases(
                     opener,
-                    &case,
+                    (&case, &set),
                     variant.as_deref(),
                     out.as_deref(),
                     options,
@@ -51,19 +52,33 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             driver,
             umat,
             variant,
+            set,
             csv,
             record,
         } => {
             let stop = stop_on_signals()?;
             recorded(record.as_deref(), opener, |opener| {
-                let (umat, variant) = (umat.as_deref(), variant.as_deref());
-                run_point(opener, &driver, umat, variant, csv.as_deref(), &stop)
+                let which = (variant.as_deref(), set.as_slice());
+                let (umat, csv) = (umat.as_deref(), csv.as_deref());
+                run_point(opener, &driver, umat, which, csv, &stop)
             })
         }
         Command::Report { folders, out } => write_report(&folders, out),
+        Command::Table { folders, out } => {
+            let table = results::run_table::of(&folders)?;
+            match out {
+                None => print(&table),
+                Some(out) => {
+                    std::fs::write(&out, table)
+                        .map_err(|source| text::Error::unwritable(&out, source))?;
+                    print(&format!("table in {}\n", out.display()))
+                }
+            }
+        }
         Command::TradeOff {
             input,
             variant,
+            set,
             out,
             fine,
             max_increments,
@@ -71,6 +86,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         } => {
             let options = trade_off::Options {
                 variant,
+                settings: set,
                 out,
                 fine,
                 most_increments: max_increments,
@@ -227,7 +243,7 @@ fn run_point(
     opener: &Opener,
     driver: &Path,
     umat: Option<&Path>,
-    variant: Option<&str>,
+    which: (Option<&str>, &[String]),
     csv: Option<&Path>,
     stop: &Stop,
 ) -> Result<(), Error> {
@@ -240,7 +256,7 @@ fn run_point(
                 driver.display()
             )))
         }
-        None => runs::point::run_file_until(opener, driver, variant, csv, stop, report),
+        None => runs::point::run_file_until(opener, driver, which, csv, stop, report),
     }
 }
 

@@ -333,6 +333,7 @@ how_to! {
     how_to_make_a_mesh: "mesh",
     how_to_resume: "resume",
     how_to_compare_variants: "compare-variants",
+    how_to_set_from_the_command_line: "set-from-the-command-line",
     how_to_use_a_umat: "use-a-umat",
     how_to_use_an_mfront_behaviour: "use-an-mfront-behaviour",
     how_to_choose_an_integration: "which-integration",

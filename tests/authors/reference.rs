@@ -338,6 +338,11 @@ fn every_example_runs() {
     for (command, name) in runs {
         let place = TempDir::new().unwrap();
         let text = fs::read_to_string(page(name)).unwrap();
+        for table in blocks(&text).iter().filter(|b| b.language == "csv") {
+            let name = table.text.lines().next().unwrap();
+            let name = name.strip_prefix("# ").unwrap();
+            fs::write(place.path().join(name), &table.text).unwrap();
+        }
         let mut ran = 0;
         for (number, block) in blocks(&text)
             .iter()

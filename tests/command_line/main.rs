@@ -7,6 +7,7 @@ mod ended;
 mod isolate;
 mod libraries;
 mod loading;
+mod measured;
 mod mesh;
 mod names;
 mod overflow;
@@ -17,6 +18,8 @@ mod program;
 mod results;
 #[cfg(unix)]
 mod resume;
+mod run_table;
+mod settings;
 mod stopping;
 mod streams;
 mod swapped;

@@ -42,6 +42,7 @@ fn study(input: &Path, interface_stiffness: bool) -> (TempDir, String) {
     let place = TempDir::new().unwrap();
     let options = Options {
         variant: None,
+        settings: Vec::new(),
         out: Some(place.path().to_owned()),
         fine: true,
         most_increments: 1000,

@@ -124,12 +124,12 @@ impl Case {
     /// [`text::Error::Input`] at the probe or figure that does not fit.
     pub fn wanted(&self, simulation: &Simulation) -> Result<Wanted, Error> {
         let probes = probes::resolve(self, simulation)?;
-        figures::check_figures(self, &probes)?;
+        let figures = figures::case_figures(self, &probes)?;
         Ok(Wanted {
             output: self.file.output,
             probes,
             title: self.file.title.clone(),
-            figures: self.file.figures.iter().map(Into::into).collect(),
+            figures,
             follows_path: self.file.solver.control == Control::ArcLength,
         })
     }
@@ -141,6 +141,8 @@ impl Case {
             let path = source.path_at(&range).display().to_string();
             (path, source.text()[range].to_owned())
         });
+        let settings = source.settings();
+        let settings = settings.map(|range| source.text()[range].to_owned());
         let laws_of = |(name, group): (&Spanned<String>, &Spanned<GroupInput>)| {
             let from_phase = file.phases.iter().filter_map(|phase| {
                 let (_, law) = phase.laws.iter().find(|(key, _)| *key == name)?;
@@ -152,8 +154,9 @@ impl Case {
             case: self.name(),
             variant: self.variant.clone(),
             title: file.title.clone(),
-            sha256: hexadecimal_sha256(source.text().as_bytes()),
+            sha256: hexadecimal_sha256(source.text_of_files().as_bytes()),
             files: files.collect(),
+            settings: settings.collect(),
             laws_of_groups: file.groups.iter().map(laws_of).collect(),
             laws: laws.clone(),
             probe_units: probes::units(self, laws),

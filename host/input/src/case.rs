@@ -8,9 +8,11 @@ use law::adapter::{Adapter, Externals, Foreign, Scratch};
 use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Formulation, InPlane, Integration};
 use results::wanted::{Output, Reduce};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, de};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use text::{Named, Source, base};
 use toml::Spanned;
@@ -41,12 +43,20 @@ impl Case {
     /// # Errors
     /// [`text::Error::Unreadable`], or [`text::Error::Input`] at the place that does not fit.
     pub fn load(path: &Path) -> Result<Vec<Self>, Error> {
+        Self::load_with(path, &[])
+    }
+
+    /// As [`Case::load`], with settings over what the file says, `KEY=VALUE`, in every variant.
+    ///
+    /// # Errors
+    /// As [`Case::load`]; [`text::Error::Input`] at the place in a setting.
+    pub fn load_with(path: &Path, settings: &[String]) -> Result<Vec<Self>, Error> {
         let path = if path.is_dir() {
             path.join("case.toml")
         } else {
             path.to_owned()
         };
-        Self::of(Source::read(&path)?)
+        Self::of(Source::read(&path)?.with_settings(settings))
     }
 
     /// Takes the text of a case file.
@@ -532,6 +542,8 @@ pub struct FigureInput {
     pub phase: Option<Spanned<String>>,
     /// A cut: the integration points in it instead of probes.
     pub points: Option<CutInput>,
+    /// Measured points, drawn as markers.
+    pub measured: Option<MeasuredTables>,
 }
 
 /// Integration points inside extents (ends excluded), at chosen increments.
@@ -554,6 +566,74 @@ pub struct CutInput {
     /// Factor of what stands along the vertical axis.
     #[serde(default = "one")]
     pub scale: f64,
+}
+
+/// Measured points of a figure: one table of them, or several.
+#[derive(Clone, Debug)]
+pub struct MeasuredTables(pub Vec<MeasuredInput>);
+
+/// Points from two columns of a file of comma-separated values.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredInput {
+    /// The file, relative to the case file. Its first line names the columns; `,`, `;` or a tab
+    /// between them; lines that start with `#` and rows without a value are passed over.
+    #[schemars(with = "PathBuf")]
+    pub file: Spanned<PathBuf>,
+    /// Column of what stands along the horizontal axis.
+    #[schemars(with = "String")]
+    pub x: Spanned<String>,
+    /// Column of what stands along the vertical axis.
+    #[schemars(with = "String")]
+    pub y: Spanned<String>,
+    /// Name in the legend.
+    #[serde(default = "measured")]
+    pub label: String,
+    /// Factor of the horizontal values.
+    #[serde(default = "one")]
+    pub x_scale: f64,
+    /// Factor of the vertical values.
+    #[serde(default = "one")]
+    pub y_scale: f64,
+}
+
+fn measured() -> String {
+    "measured".to_owned()
+}
+
+impl<'de> Deserialize<'de> for MeasuredTables {
+    fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
+        struct OneOrSeveral;
+        impl<'de> de::Visitor<'de> for OneOrSeveral {
+            type Value = MeasuredTables;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table such as { file = \"test.csv\", x = \"w\", y = \"load\" }, or a list of them")
+            }
+
+            fn visit_map<M: de::MapAccess<'de>>(self, map: M) -> Result<Self::Value, M::Error> {
+                let table = de::value::MapAccessDeserializer::new(map);
+                Ok(MeasuredTables(vec![MeasuredInput::deserialize(table)?]))
+            }
+
+            fn visit_seq<S: de::SeqAccess<'de>>(self, tables: S) -> Result<Self::Value, S::Error> {
+                let tables = de::value::SeqAccessDeserializer::new(tables);
+                Ok(MeasuredTables(Vec::deserialize(tables)?))
+            }
+        }
+        input.deserialize_any(OneOrSeveral)
+    }
+}
+
+impl JsonSchema for MeasuredTables {
+    fn schema_name() -> Cow<'static, str> {
+        "MeasuredTables".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let one = generator.subschema_for::<MeasuredInput>();
+        json_schema!({ "anyOf": [one, { "type": "array", "items": one }] })
+    }
 }
 
 /// A relative error that can be aimed at.

@@ -6,7 +6,7 @@ mod path;
 
 use crate::Error;
 use crate::case::FigureInput;
-use crate::figures::check_table_figures;
+use crate::figures::table_figures;
 use crate::material::{self, ForeignKeys, ParameterTable, ParameterValue, build_law, find_law};
 use crate::schema;
 use indexmap::IndexMap;
@@ -15,6 +15,7 @@ use law::{BuiltLaw, Opener, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
 use results::point_figure::drawable;
+use results::wanted::Figure;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -143,7 +144,7 @@ struct ControlTable {
 pub struct Driver {
     point: point::Driver,
     title: String,
-    figures: Vec<FigureInput>,
+    figures: Vec<Figure>,
     source: Source,
     place_of_initial: Range<usize>,
     /// What the file says, if it is a driver file.
@@ -158,15 +159,20 @@ impl Driver {
     /// # Errors
     /// The file cannot be read, and those of [`Driver::from_source`].
     pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
-        Self::read_with(&Opener::default(), path)
+        Self::read_with(&Opener::default(), path, &[])
     }
 
-    /// As [`Driver::read`]; the law's library is opened with this.
+    /// As [`Driver::read`], with settings over what the file says, `KEY=VALUE`, in every variant; the
+    /// law's library is opened with this.
     ///
     /// # Errors
-    /// As [`Driver::read`].
-    pub fn read_with(opener: &Opener, path: &Path) -> Result<Vec<Self>, Error> {
-        Self::build_all(opener, Source::read(path)?, true)
+    /// As [`Driver::read`]; at the place in a setting.
+    pub fn read_with(
+        opener: &Opener,
+        path: &Path,
+        settings: &[String],
+    ) -> Result<Vec<Self>, Error> {
+        Self::build_all(opener, Source::read(path)?.with_settings(settings), true)
     }
 
     /// As [`Driver::read_with`], whatever the lock beside the file says.
@@ -254,11 +260,11 @@ impl Driver {
         point.set_variant(variant);
         let names = drawable(&point);
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        check_table_figures(source, &file.figures, &names)?;
+        let figures = table_figures(source, &file.figures, &names)?;
         Ok(Self {
             point,
             title: file.title.clone(),
-            figures: file.figures.clone(),
+            figures,
             source: source.clone(),
             place_of_initial,
             file: Some(file),
@@ -310,7 +316,7 @@ impl Driver {
     }
 
     /// Curves of its columns.
-    pub fn figures(&self) -> &[FigureInput] {
+    pub fn figures(&self) -> &[Figure] {
         &self.figures
     }
 

@@ -1,7 +1,7 @@
 //! Figures as files ask for them.
 
-use crate::Error;
 use crate::case::{Case, CutInput, FigureInput};
+use crate::{Error, measured};
 use results::probe::Probes;
 use results::wanted::{Cut, Figure};
 use text::{Source, suggestion};
@@ -18,11 +18,12 @@ const CUT_QUANTITIES: [&str; 7] = [
     "k_0",
 ];
 
-/// Refuses figures whose probes or phase do not exist, or two with one name.
+/// The figures of a case, with the points measured for them.
 ///
 /// # Errors
-/// [`text::Error::Input`] at the name.
-pub fn check_figures(case: &Case, probes: &Probes) -> Result<(), Error> {
+/// [`text::Error::Input`] at the name of a probe or phase that does not exist, of a second figure of
+/// one name, or at what cannot be used of measured points.
+pub fn case_figures(case: &Case, probes: &Probes) -> Result<Vec<Figure>, Error> {
     let source = &case.source;
     let names: Vec<&str> = probes.names().collect();
     let phases: Vec<&str> = case
@@ -66,18 +67,20 @@ pub fn check_figures(case: &Case, probes: &Probes) -> Result<(), Error> {
                 .into());
         }
     }
-    Ok(())
+    let figures = case.file.figures.iter();
+    figures.map(|figure| wanted(source, figure)).collect()
 }
 
-/// Refuses figures of a table whose columns do not exist, or two with one name.
+/// The figures of a table, with the points measured for them.
 ///
 /// # Errors
-/// [`text::Error::Input`] at the name.
-pub fn check_table_figures(
+/// [`text::Error::Input`] at the name of a column that does not exist, of a second figure of one
+/// name, or at what cannot be used of measured points.
+pub fn table_figures(
     source: &Source,
     figures: &[FigureInput],
     columns: &[&str],
-) -> Result<(), Error> {
+) -> Result<Vec<Figure>, Error> {
     check_names(source, figures)?;
     for figure in figures {
         check_columns(source, figure, "column", columns)?;
@@ -90,7 +93,8 @@ pub fn check_table_figures(
             return Err(source.error(figure.name.span(), message).into());
         }
     }
-    Ok(())
+    let figures = figures.iter();
+    figures.map(|figure| wanted(source, figure)).collect()
 }
 
 fn check_names(source: &Source, figures: &[FigureInput]) -> Result<(), Error> {
@@ -129,19 +133,21 @@ fn check_columns(
     Ok(())
 }
 
-impl From<&FigureInput> for Figure {
-    fn from(input: &FigureInput) -> Self {
-        Self {
-            name: input.name.get_ref().clone(),
-            title: input.title.clone(),
-            x: input.x.get_ref().clone(),
-            x_label: input.x_label.clone(),
-            y: input.y.iter().map(|y| y.get_ref().clone()).collect(),
-            y_label: input.y_label.clone(),
-            phase: input.phase.as_ref().map(|phase| phase.get_ref().clone()),
-            points: input.points.as_ref().map(Cut::from),
-        }
-    }
+/// A figure as plain values, with the points measured for it.
+fn wanted(source: &Source, input: &FigureInput) -> Result<Figure, Error> {
+    let tables = input.measured.iter().flat_map(|tables| &tables.0);
+    let measured = tables.map(|table| measured::read(source, table));
+    Ok(Figure {
+        name: input.name.get_ref().clone(),
+        title: input.title.clone(),
+        x: input.x.get_ref().clone(),
+        x_label: input.x_label.clone(),
+        y: input.y.iter().map(|y| y.get_ref().clone()).collect(),
+        y_label: input.y_label.clone(),
+        phase: input.phase.as_ref().map(|phase| phase.get_ref().clone()),
+        points: input.points.as_ref().map(Cut::from),
+        measured: measured.collect::<Result<_, _>>()?,
+    })
 }
 
 impl From<&CutInput> for Cut {

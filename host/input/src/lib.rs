@@ -10,6 +10,7 @@ pub mod grid;
 pub mod incremental_driver;
 pub mod lock;
 pub mod material;
+mod measured;
 pub mod probes;
 pub mod schema;
 

@@ -120,8 +120,8 @@ impl<'c> Checkpoint<'c> {
         let checkpoint = decode(&bytes).ok_or_else(|| refused(broken))?;
         if checkpoint.identity != identity {
             return Err(refused(
-                "it belongs to another case, another version of the program, or other libraries or \
-                 sidecars",
+                "it belongs to another case or other settings, another version of the program, or \
+                 other libraries or sidecars",
             ));
         }
         Ok(Some(checkpoint))

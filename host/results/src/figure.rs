@@ -1,6 +1,6 @@
-//! Curves of probes, or of stresses along a cut, as SVG.
+//! Curves of probes, or of stresses along a cut, and measured points beside them, as SVG.
 
-use crate::wanted::{Cut, Figure};
+use crate::wanted::{Cut, Figure, Measured};
 use mechanics::Place;
 use mechanics::group::Group;
 use plotters::prelude::*;
@@ -11,6 +11,8 @@ use text::write::replace;
 
 /// Size of a figure in points.
 const SIZE: (u32, u32) = (640, 420);
+/// Radius of the marker of a measured point, in points.
+const MARKER: i32 = 3;
 /// Colours that stay apart for most eyes and in grey (Okabe & Ito), then some more.
 pub const COLOURS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
@@ -229,15 +231,15 @@ fn draw_file(folder: &Path, figure: &Figure, title: &str, curves: &[Curve]) -> R
         x: figure.x_label.clone().unwrap_or_else(|| figure.x.clone()),
         y: figure.y_label.clone().unwrap_or_default(),
     };
-    let text = svg(&labels, curves)
+    let text = svg(&labels, curves, &figure.measured)
         .map_err(|error| Error::Internal(format!("figure {}: {error}", path.display())))?;
     replace(&path, text)
 }
 
-/// Curves as a text in SVG.
-fn svg(labels: &Labels, curves: &[Curve]) -> Result<String, String> {
+/// Curves and measured points as a text in SVG.
+fn svg(labels: &Labels, curves: &[Curve], measured: &[Measured]) -> Result<String, String> {
     let mut text = String::new();
-    draw(&mut text, labels, curves).map_err(|error| error.to_string())?;
+    draw(&mut text, labels, curves, measured).map_err(|error| error.to_string())?;
     Ok(text)
 }
 
@@ -245,14 +247,23 @@ fn draw(
     text: &mut String,
     labels: &Labels,
     curves: &[Curve],
+    measured: &[Measured],
 ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
-    let points = || curves.iter().flat_map(|curve| &curve.points);
+    let points = || {
+        let drawn = curves.iter().flat_map(|curve| &curve.points);
+        drawn.chain(measured.iter().flat_map(|measured| &measured.points))
+    };
+    let names = || {
+        let drawn = curves.iter().map(|curve| curve.name.as_str());
+        drawn.chain(measured.iter().map(|measured| measured.label.as_str()))
+    };
+    let entries = names().count();
     let x = range(points().map(|p| p.0), 0.0);
     let y = range(points().map(|p| p.1), 0.05);
-    let longest = curves.iter().map(|curve| curve.name.chars().count()).max();
-    let legend = [42 + 7 * longest.unwrap_or(0), 16 + 17 * curves.len()];
-    let corner = empty_corner(curves, &x, &y, legend);
-    let beside = curves.len() > 1 && corner.is_none();
+    let longest = names().map(|name| name.chars().count()).max();
+    let legend = [42 + 7 * longest.unwrap_or(0), 16 + 17 * entries];
+    let corner = empty_corner(curves, measured, [&x, &y], legend);
+    let beside = entries > 1 && corner.is_none();
     let width = SIZE.0 + if beside { legend[0] as u32 } else { 0 };
     let area = SVGBackend::with_string(text, (width, SIZE.1)).into_drawing_area();
     area.fill(&WHITE)?;
@@ -272,24 +283,37 @@ fn draw(
         .axis_desc_style(("sans-serif", 14))
         .label_style(("sans-serif", 12))
         .draw()?;
-    let colours = COLOURS.into_iter().cycle();
-    for (number, (curve, colour)) in (0..).zip(curves.iter().zip(colours)) {
+    let colours = || COLOURS.into_iter().cycle();
+    // Where an entry of a legend beside the figure stands.
+    let entry = |number: usize| 40 + 17 * number as i32;
+    let name_beside = |name: &str, y| right.draw(&Text::new(name, (24, y - 6), ("sans-serif", 12)));
+    for (number, (curve, colour)) in (0..).zip(curves.iter().zip(colours())) {
         let style = colour.stroke_width(2);
         chart
             .draw_series(LineSeries::new(curve.points.iter().copied(), style))?
             .label(&curve.name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
         if beside {
-            let y = 40 + 17 * number;
+            let y = entry(number);
             right.draw(&PathElement::new([(0, y), (18, y)], style))?;
-            right.draw(&Text::new(
-                curve.name.as_str(),
-                (24, y - 6),
-                ("sans-serif", 12),
-            ))?;
+            name_beside(&curve.name, y)?;
         }
     }
-    if let Some(corner) = corner.filter(|_| curves.len() > 1) {
+    let colours = colours().skip(curves.len());
+    for (number, (measured, colour)) in (curves.len()..).zip(measured.iter().zip(colours)) {
+        let style = colour.stroke_width(1);
+        let markers = measured.points.iter();
+        chart
+            .draw_series(markers.map(|&point| Circle::new(point, MARKER, style)))?
+            .label(&measured.label)
+            .legend(move |(x, y)| Circle::new((x + 9, y), MARKER, style));
+        if beside {
+            let y = entry(number);
+            right.draw(&Circle::new((9, y), MARKER, style))?;
+            name_beside(&measured.label, y)?;
+        }
+    }
+    if let Some(corner) = corner.filter(|_| entries > 1) {
         chart
             .configure_series_labels()
             .background_style(WHITE.mix(0.85))
@@ -301,11 +325,11 @@ fn draw(
     area.present()
 }
 
-/// A corner where a legend of this size, in points, covers no curve.
+/// A corner where a legend of this size, in points, covers no curve and no measured point.
 fn empty_corner(
     curves: &[Curve],
-    x: &std::ops::Range<f64>,
-    y: &std::ops::Range<f64>,
+    measured: &[Measured],
+    [x, y]: [&std::ops::Range<f64>; 2],
     legend: [usize; 2],
 ) -> Option<SeriesLabelPosition> {
     // Parts of the plot, which is what labels and margins leave of the figure.
@@ -321,12 +345,14 @@ fn empty_corner(
             );
             u < width && v < height
         };
-        curves.iter().flat_map(|c| c.points.windows(2)).any(|ends| {
+        let mut markers = measured.iter().flat_map(|measured| &measured.points);
+        let of_curves = curves.iter().flat_map(|c| c.points.windows(2)).any(|ends| {
             let [(u0, v0), (u1, v1)] = [ends[0], ends[1]];
             (0..=20)
                 .map(|k| f64::from(k) / 20.0)
                 .any(|s| inside(u0 + s * (u1 - u0), v0 + s * (v1 - v0)))
-        })
+        });
+        of_curves || markers.any(|&(u, v)| inside(u, v))
     };
     if !covered(true, false) {
         Some(SeriesLabelPosition::LowerRight)

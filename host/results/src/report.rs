@@ -21,6 +21,7 @@ pub use page::STYLE;
 use text::Error;
 use text::write::replace;
 
+use crate::record;
 use budget::Budget;
 use results::Run;
 use std::path::{Path, PathBuf};
@@ -50,11 +51,11 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
     if folders.is_empty() {
         return Err(Error::Usage("name at least one results folder".to_owned()));
     }
-    let mut runs = folders
-        .iter()
-        .map(|folder| Run::read(folder, &Budget::of(folders.len())))
+    let budget = Budget::of(folders.len());
+    let named = record::names(folders).into_iter().zip(folders);
+    let runs = named
+        .map(|(name, folder)| Run::read(&name, folder, &budget))
         .collect::<Result<Vec<_>, _>>()?;
-    results::tell_apart(&mut runs);
     let is_ours = out.is_dir() || out == default_path(folders);
     let out = if out.is_dir() {
         out.join(FILE)

@@ -1,6 +1,6 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
-use crate::wanted::{Figure, Wanted};
+use crate::wanted::{Figure, Measured, Wanted};
 use indexmap::IndexMap;
 use law::BuiltLaw;
 use mechanics::group::Group;
@@ -28,6 +28,8 @@ pub struct About {
     pub sha256: String,
     /// Those files: path and text, the case itself last.
     pub files: Vec<(String, String)>,
+    /// Settings of the command line, `KEY=VALUE`, in the order given.
+    pub settings: Vec<String>,
     /// Of every group the name of its law, and those of the laws that phases give it, by phase.
     pub laws_of_groups: Vec<LawsOfGroup>,
     /// All laws used, by name and hypothesis.
@@ -110,6 +112,7 @@ impl Summary {
         say("case_sha256", json!(about.sha256));
         let file = |(path, text): &(String, String)| json!({ "path": path, "text": text });
         say("case_files", about.files.iter().map(file).collect());
+        say("set", json!(about.settings));
         say("analysis", json!(problem.analysis.name()));
         say("groups", groups(about, simulation));
         say("solver", solver(&problem.settings));
@@ -342,6 +345,12 @@ fn solver(solver: &Settings) -> Value {
     })
 }
 
+/// Measured points by coordinate.
+fn measured(measured: &Measured) -> Value {
+    let (x, y): (Vec<f64>, Vec<f64>) = measured.points.iter().copied().unzip();
+    json!({ "label": measured.label, "x": x, "y": y })
+}
+
 /// Figures of probes; those of cuts have nothing in `history.csv`.
 fn figures(figures: &[Figure]) -> Value {
     let figure = |figure: &Figure| {
@@ -353,6 +362,7 @@ fn figures(figures: &[Figure]) -> Value {
             "y": figure.y,
             "y_label": figure.y_label,
             "phase": figure.phase,
+            "measured": figure.measured.iter().map(measured).collect::<Vec<_>>(),
         })
     };
     let of_probes = figures.iter().filter(|f| f.points.is_none());

@@ -38,6 +38,17 @@ pub struct Figure {
     pub phase: Option<String>,
     /// The integration points of a cut instead of columns.
     pub points: Option<Cut>,
+    /// Measured points, drawn as markers.
+    pub measured: Vec<Measured>,
+}
+
+/// Measured points with their name.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// Name, for the legend.
+    pub label: String,
+    /// Points in the order of their file.
+    pub points: Vec<(f64, f64)>,
 }
 
 /// Integration points inside extents (ends excluded), at chosen increments.

@@ -10,7 +10,6 @@ use point::Course;
 use results::figure::Figures;
 use results::point_figure::{draw_row, drawable};
 use results::point_table::Table;
-use results::wanted::Figure;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Write};
@@ -124,14 +123,15 @@ pub fn run_file_variants(
     run_file_until(
         &Opener::default(),
         path,
-        variant,
+        (variant, &[]),
         csv,
         &Stop::never(),
         report,
     )
 }
 
-/// As [`run_file_variants`], to be stopped on its way.
+/// As [`run_file_variants`], to be stopped on its way, and with settings over what the file says,
+/// `KEY=VALUE`.
 ///
 /// # Errors
 /// As [`run_file_variants`]; also that it was stopped, after the rows found until then have been
@@ -139,12 +139,12 @@ pub fn run_file_variants(
 pub fn run_file_until(
     opener: &Opener,
     path: &Path,
-    variant: Option<&str>,
+    (variant, settings): (Option<&str>, &[String]),
     csv: Option<&Path>,
     stop: &Stop,
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    let mut drivers = Driver::read_with(opener, path)?;
+    let mut drivers = Driver::read_with(opener, path, settings)?;
     for driver in &mut drivers {
         driver.point_mut().stop_on(stop);
     }
@@ -335,8 +335,7 @@ pub fn write_csv(driver: &Driver, out: impl Write, name: &Path) -> Result<PointR
 
 /// The figures of a driver, still without curves.
 fn empty_figures(driver: &Driver) -> Figures {
-    let wanted: Vec<Figure> = driver.figures().iter().map(Figure::from).collect();
-    Figures::new(driver.title(), &wanted, drawable(driver.point()))
+    Figures::new(driver.title(), driver.figures(), drawable(driver.point()))
 }
 
 /// Why a table ends early.

@@ -37,6 +37,8 @@ use trial::Scratch;
 pub struct Options {
     /// Only this variant.
     pub variant: Option<String>,
+    /// Settings over what the file says, `KEY=VALUE`.
+    pub settings: Vec<String>,
     /// Folder of the results; `results/trade_off_<name>` if left out.
     pub out: Option<PathBuf>,
     /// Divide meshes by 4 too.
@@ -89,7 +91,7 @@ fn run_drivers(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
-    let mut drivers = Driver::read_with(&options.opener, path)?;
+    let mut drivers = Driver::read_with(&options.opener, path, &options.settings)?;
     let stop = &options.stop;
     for driver in &mut drivers {
         driver.point_mut().stop_on(stop);
@@ -100,7 +102,7 @@ fn run_drivers(
     keep(&mut drivers, options.variant.as_deref(), name)?;
     let folder = options.folder(&stem);
     for driver in &drivers {
-        let name = full_name(&stem, driver.point().variant());
+        let name = options.full_name(&stem, driver.point().variant());
         let study = driver_study::study(driver, &name, options.most_increments, stop, say)?;
         finish(
             &study,
@@ -117,7 +119,7 @@ fn run_cases(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
-    let cases = Case::load(path)?.into_iter();
+    let cases = Case::load_with(path, &options.settings)?.into_iter();
     let mut cases: Vec<Case> = cases.map(|case| case.opened_by(&options.opener)).collect();
     keep(&mut cases, options.variant.as_deref(), |c| {
         c.variant.clone()
@@ -125,7 +127,7 @@ fn run_cases(
     cases.iter().try_for_each(crate::run::check)?;
     let folder = options.folder(&cases.first().map(Case::name).unwrap_or_default());
     for case in &cases {
-        let name = full_name(&case.name(), case.variant.as_deref());
+        let name = options.full_name(&case.name(), case.variant.as_deref());
         let place = options.place(&folder, case.variant.as_deref());
         if options.interface_stiffness {
             stiffness::run(case, &name, (&place, &options.stop), show, say)?;
@@ -140,14 +142,14 @@ fn run_cases(
     Ok(())
 }
 
-fn full_name(name: &str, variant: Option<&str>) -> String {
-    match variant {
-        Some(variant) => format!("{name}, {variant}"),
-        None => name.to_owned(),
-    }
-}
-
 impl Options {
+    /// What a study is called: the file, the variant and the settings.
+    fn full_name(&self, name: &str, variant: Option<&str>) -> String {
+        let settings = self.settings.iter().map(String::as_str);
+        let parts = std::iter::once(name).chain(variant).chain(settings);
+        parts.collect::<Vec<_>>().join(", ")
+    }
+
     fn folder(&self, name: &str) -> PathBuf {
         let default = || Path::new("results").join(format!("trade_off_{name}"));
         self.out.clone().unwrap_or_else(default)

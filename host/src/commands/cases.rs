@@ -16,13 +16,13 @@ use std::path::{Path, PathBuf};
 /// variant that fails does not stop the others; the last failure is the outcome.
 pub(super) fn run_cases(
     opener: &Opener,
-    path: &Path,
+    (path, settings): (&Path, &[String]),
     variant: Option<&str>,
     out: Option<&Path>,
     options: Options,
     stop: &Stop,
 ) -> Result<(), Error> {
-    let cases = Case::load(path)?.into_iter();
+    let cases = Case::load_with(path, settings)?.into_iter();
     let mut cases: Vec<Case> = cases.map(|case| case.opened_by(opener)).collect();
     variants::keep(&mut cases, variant, |case| case.variant.clone())?;
     if opener.record().is_some() {

@@ -2,9 +2,11 @@
 //!
 //! The file's keys override those of its base: tables are merged key by key, entries of arrays
 //! that have a `name` (such as phases) are merged by name, everything else replaces. Each entry of
-//! `[[variant]]` overrides the file in the same way, which then stands for as many files.
+//! `[[variant]]` overrides the file in the same way, which then stands for as many files. Settings
+//! of the command line come last: they override all of it, in every variant.
 
-use crate::read::{deserialize, toml_error};
+use crate::read::{deserialize_or, toml_error};
+use crate::setting::Setting;
 use crate::{Error, Source};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
@@ -74,6 +76,15 @@ pub fn read_kind<T: DeserializeOwned>(
 /// [`Error::Input`] at the place that does not fit; [`Error::Unreadable`].
 pub fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Variants<T>), Error> {
     let source = with_bases(source, LONGEST_CHAIN)?;
+    let files = merged(&source)?;
+    Ok((source, files))
+}
+
+/// Reads a file that stands behind those that it is based on.
+///
+/// # Errors
+/// [`Error::Input`] at the place that does not fit.
+pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error> {
     // Blank lines instead of the files before each one keep spans counting from the start.
     let texts: Vec<String> = source
         .files()
@@ -81,17 +92,25 @@ pub fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Variants<T>)
         .collect();
     let mut merged: Option<Spanned<DeTable<'_>>> = None;
     for text in &texts {
-        let mut table = DeTable::parse(text).map_err(|error| toml_error(&source, &error))?;
+        let mut table = DeTable::parse(text).map_err(|error| toml_error(source, &error))?;
         table.get_mut().remove("base");
         match &mut merged {
             None => merged = Some(table),
             Some(merged) => merge(merged.get_mut(), table.into_inner()),
         }
     }
+    let texts = source.settings().map(|range| {
+        let text = " ".repeat(range.start) + &source.text()[range.clone()];
+        (range, text)
+    });
+    let texts: Vec<_> = texts.collect();
+    let settings = texts
+        .iter()
+        .map(|(range, text)| Setting::read(source, range.clone(), text))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut merged = merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))?;
     let Some(variants) = merged.get_mut().remove("variant") else {
-        let file = deserialize(&source, merged)?;
-        return Ok((source, vec![(None, file)]));
+        return Ok(vec![(None, with_settings(source, merged, &settings)?)]);
     };
     let span = variants.span();
     let DeValue::Array(variants) = variants.into_inner() else {
@@ -126,14 +145,30 @@ pub fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Variants<T>)
         over.remove("name");
         let mut table = merged.clone();
         merge(table.get_mut(), over);
-        files.push((Some(name), deserialize(&source, table)?));
+        files.push((Some(name), with_settings(source, table, &settings)?));
     }
-    Ok((source, files))
+    Ok(files)
+}
+
+/// The contents of a file with settings over it.
+fn with_settings<'i, T: DeserializeOwned>(
+    source: &Source,
+    mut table: Spanned<DeTable<'i>>,
+    settings: &[Setting<'i>],
+) -> Result<T, Error> {
+    let mut made = Vec::new();
+    for setting in settings {
+        made.extend(setting.apply(source, table.get_mut())?);
+    }
+    deserialize_or(source, table, |error| {
+        made.iter().find_map(|made| made.instead_of(error))
+    })
 }
 
 /// The file after its base, that after its own, and so on.
 fn with_bases(source: Source, chain: usize) -> Result<Source, Error> {
-    let table = DeTable::parse(source.text()).map_err(|error| toml_error(&source, &error))?;
+    let table =
+        DeTable::parse(source.text_of_files()).map_err(|error| toml_error(&source, &error))?;
     let Some((_, base)) = table
         .get_ref()
         .iter()
@@ -177,7 +212,8 @@ fn merge<'i>(under: &mut DeTable<'i>, over: DeTable<'i>) {
     }
 }
 
-fn merge_value<'i>(below: &mut Spanned<DeValue<'i>>, value: Spanned<DeValue<'i>>) {
+/// Puts a value over another: what is no table and no list of named entries replaces it.
+pub(crate) fn merge_value<'i>(below: &mut Spanned<DeValue<'i>>, value: Spanned<DeValue<'i>>) {
     let span = value.span();
     match (below.get_mut(), value.into_inner()) {
         (DeValue::Table(below), DeValue::Table(value)) => merge(below, value),
@@ -204,7 +240,7 @@ fn merge_value<'i>(below: &mut Spanned<DeValue<'i>>, value: Spanned<DeValue<'i>>
 }
 
 /// The `name` of an entry of an array of tables.
-fn name(entry: &Spanned<DeValue<'_>>) -> Option<String> {
+pub(crate) fn name(entry: &Spanned<DeValue<'_>>) -> Option<String> {
     match entry.get_ref() {
         DeValue::Table(table) => match table.get("name")?.get_ref() {
             DeValue::String(name) => Some(name.to_string()),

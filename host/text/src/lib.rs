@@ -8,6 +8,7 @@ pub mod base;
 mod error;
 pub mod file;
 mod read;
+mod setting;
 mod source;
 mod suggest;
 mod wording;
@@ -15,5 +16,6 @@ pub mod write;
 
 pub use error::{Error, add_hint};
 pub use read::{Named, deserialize, parse, toml_error};
+pub use setting::key;
 pub use source::{InputError, Source};
 pub use suggest::{nearest, suggestion};

@@ -25,13 +25,23 @@ pub fn deserialize<T: DeserializeOwned>(
     source: &Source,
     table: Spanned<DeTable<'_>>,
 ) -> Result<T, Error> {
+    deserialize_or(source, table, |_| None)
+}
+
+/// As [`deserialize`]; `explain` may know better what an error comes from.
+pub(crate) fn deserialize_or<T: DeserializeOwned>(
+    source: &Source,
+    table: Spanned<DeTable<'_>>,
+    explain: impl Fn(&toml::de::Error) -> Option<Error>,
+) -> Result<T, Error> {
     for (key, value) in table.get_ref() {
         refuse_infinite(source, key.get_ref(), value)?;
     }
     let again = (source.text().len() <= MOST_COPIED).then(|| table.clone());
     T::deserialize(toml::Deserializer::from(table)).map_err(|error| {
-        let choices = again.and_then(|table| choice_error::<T>(source, table, &error));
-        choices.unwrap_or_else(|| toml_error(source, &error))
+        let choices = || again.and_then(|table| choice_error::<T>(source, table, &error));
+        let better = explain(&error).or_else(choices);
+        better.unwrap_or_else(|| toml_error(source, &error))
     })
 }
 

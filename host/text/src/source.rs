@@ -16,9 +16,14 @@ use thiserror::Error;
 pub struct Source {
     path: PathBuf,
     text: Arc<str>,
-    /// Where each file starts in the text, in order.
+    /// Where each file starts in the text, in order, and behind the files each setting.
     files: Vec<(usize, PathBuf)>,
+    /// How many of these are settings.
+    n_settings: usize,
 }
+
+/// What a setting of the command line is called where a file has its name.
+const SETTING: &str = "--set";
 
 impl Source {
     /// Reads a file.
@@ -42,6 +47,25 @@ impl Source {
             files: vec![(0, path.clone())],
             path,
             text: text.into(),
+            n_settings: 0,
+        }
+    }
+
+    /// This file with settings of the command line behind it, `KEY=VALUE`, which override it.
+    #[must_use]
+    pub fn with_settings(self, settings: &[String]) -> Self {
+        let mut text = self.text.to_string();
+        let mut files = self.files;
+        for setting in settings {
+            text.push('\n');
+            files.push((text.len(), SETTING.into()));
+            text += setting;
+        }
+        Self {
+            path: self.path,
+            text: text.into(),
+            files,
+            n_settings: self.n_settings + settings.len(),
         }
     }
 
@@ -57,6 +81,7 @@ impl Source {
             path: self.path.clone(),
             text: format!("{}\n{}", base.text, self.text).into(),
             files: base.files.iter().cloned().chain(own).collect(),
+            n_settings: self.n_settings,
         }
     }
 
@@ -65,13 +90,29 @@ impl Source {
         &self.path
     }
 
-    /// Text of the file, after those it is based on.
+    /// Text of the file, after those it is based on and before the settings.
     pub fn text(&self) -> &str {
         &self.text
     }
 
+    /// The same without the settings.
+    pub fn text_of_files(&self) -> &str {
+        let end = self.files().last().map_or(0, |range| range.end);
+        &self.text[..end]
+    }
+
     /// Where the files stand in the text.
     pub fn files(&self) -> impl Iterator<Item = Range<usize>> {
+        self.parts().take(self.files.len() - self.n_settings)
+    }
+
+    /// Where the settings stand in the text.
+    pub fn settings(&self) -> impl Iterator<Item = Range<usize>> {
+        self.parts().skip(self.files.len() - self.n_settings)
+    }
+
+    /// Where files and settings stand in the text.
+    fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         (0..self.files.len()).map(|number| {
             let end = self
                 .files
@@ -88,13 +129,17 @@ impl Source {
             .iter()
             .rposition(|(start, _)| *start <= at)
             .unwrap_or(0);
-        let range = self.files().nth(number).unwrap_or_default();
+        let range = self.parts().nth(number).unwrap_or_default();
         (&self.files[number].1, range.start, &self.text[range])
     }
 
-    /// The file a span lies in.
+    /// The file that paths written at a span are relative to: the one that it lies in, and of a
+    /// setting the one that this overrides.
     pub fn path_at(&self, span: &Range<usize>) -> &Path {
-        self.file(span.start).0
+        match self.file(span.start).0 {
+            setting if setting == Path::new(SETTING) => &self.path,
+            file => file,
+        }
     }
 
     /// File, line and column (from 1) of the start of a span.
@@ -119,7 +164,9 @@ impl Source {
         label: impl Into<String>,
     ) -> InputError {
         let (path, start, text) = self.file(span.start);
-        if error.source_code.name() == path.display().to_string() {
+        let is_same_part = error.source_code.name() == path.display().to_string()
+            && error.source_code.inner() == text;
+        if is_same_part {
             let span = span.start - start..span.end.saturating_sub(start).min(text.len());
             error.second = Some((span.into(), label.into()));
         }

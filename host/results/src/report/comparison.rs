@@ -1,7 +1,8 @@
 //! Runs side by side: settings and final values.
 
-use super::results::{Run, entries, list, text};
+use super::results::Run;
 use super::short::display;
+use crate::record::{self, RunSetting, text};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -90,11 +91,14 @@ pub(super) struct FinalValue {
 
 /// Settings of all runs, in the order in which they first appear.
 pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
-    let all: Vec<_> = runs.iter().map(|run| settings_of(&run.summary)).collect();
+    let of_runs = runs.iter().map(|run| record::settings(&run.summary));
+    let all: Vec<Vec<RunSetting>> = of_runs.collect();
     let mut settings: Vec<Setting> = Vec::new();
     for (number, of_run) in all.into_iter().enumerate() {
         let mut after = None;
-        for (section, name, value, number_of_run) in of_run {
+        for of_run in of_run {
+            let (value, number_of_run) = (shown(&of_run), of_run.value.as_f64());
+            let RunSetting { section, name, .. } = of_run;
             let found = settings
                 .iter()
                 .position(|s| s.section == section && s.name == name);
@@ -125,64 +129,18 @@ pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
     settings
 }
 
-/// Section, name and value of the settings of a run; the value as a number too if it is one.
-fn settings_of(summary: &Value) -> Vec<(String, String, String, Option<f64>)> {
-    let mut settings = Vec::new();
-    let mut add = |section: &str, name: &str, value: &Value, unit: &str| {
-        let number = value.as_f64();
-        let value = match value {
-            Value::Null => return,
-            Value::String(text) => text.clone(),
-            Value::Number(number) => number.as_f64().map(display).unwrap_or_default(),
-            other => other.to_string(),
-        };
-        let separator = if unit.is_empty() || unit == "-" {
-            ""
-        } else {
-            " "
-        };
-        let unit = if unit == "-" { "" } else { unit };
-        let value = format!("{value}{separator}{unit}");
-        settings.push((section.to_owned(), name.to_owned(), value, number));
+/// A setting of a run as the page shows it.
+fn shown(setting: &RunSetting) -> String {
+    let RunSetting { value, unit, .. } = setting;
+    let value = match value {
+        Value::String(text) => text.clone(),
+        Value::Number(number) => number.as_f64().map(display).unwrap_or_default(),
+        other => other.to_string(),
     };
-    add("program", "version", &summary["program"], "");
-    add("model", "analysis", &summary["analysis"], "");
-    add("model", "nodes", &summary["mesh"]["nodes"], "");
-    add("model", "elements", &summary["mesh"]["elements"], "");
-    for group in list(&summary["groups"]) {
-        let section = format!("group {}", text(&group["name"]));
-        for key in ["formulation", "elements", "points_per_element", "law"] {
-            add(&section, &key.replace('_', " "), &group[key], "");
-        }
-        for (phase, law) in entries(&group["laws_from_phase"]) {
-            add(&section, &format!("law from phase {phase}"), law, "");
-        }
+    match unit.as_str() {
+        "" | "-" => value,
+        unit => format!("{value} {unit}"),
     }
-    for (name, law) in entries(&summary["laws"]) {
-        let section = format!("law {name}");
-        add(&section, "law", &law["law"], "");
-        add(&section, "version", &law["version"], "");
-        for (id, value) in entries(&law["parameters"]) {
-            let described = list(&law["described_parameters"]).find(|p| text(&p["id"]) == id);
-            let unit = described.map_or("", |p| text(&p["unit"]));
-            match described.map(|p| &p["choice"]) {
-                Some(Value::String(choice)) => add(&section, id, &Value::from(choice.as_str()), ""),
-                _ => add(&section, id, value, unit),
-            }
-        }
-        let digest = text(&law["sha256"]);
-        let short = digest.get(..12).unwrap_or(digest);
-        add(&section, "library, SHA-256", &Value::from(short), "");
-    }
-    for phase in list(&summary["phases"]) {
-        let section = format!("phase {}", text(&phase["name"]));
-        add(&section, "equations", &phase["equations"], "");
-        add(&section, "increments done", &phase["increments"], "");
-    }
-    for (name, value) in entries(&summary["solver"]) {
-        add("solver", &name.replace('_', " "), value, "");
-    }
-    settings
 }
 
 /// Final values of all probes of all runs.

@@ -5,8 +5,9 @@ use super::comparison::{final_values, settings, subject, varied};
 use super::fields::Fields;
 use super::log::Log;
 use super::profile::Profile;
-use super::results::{Ending, History, Run, entries, list, text};
+use super::results::{Ending, History, Run};
 use super::short::display;
+use crate::record::{entries, list, text};
 use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
 use serde::Serialize;
@@ -54,7 +55,7 @@ struct Drawn<'a> {
     name: &'a str,
     axisymmetric: bool,
     history: &'a History,
-    figures: &'a Value,
+    figures: Value,
     profile: Option<&'a Profile>,
     fields: Option<&'a Fields>,
     log: &'a Log,
@@ -65,7 +66,7 @@ struct Drawn<'a> {
 /// The text of the page, for a file in `folder`.
 pub(super) fn render(runs: &[Run], folder: &Path) -> Result<String, Error> {
     let internal = |why: String| Error::Internal(format!("report: {why}"));
-    let drawn: Vec<Drawn<'_>> = runs.iter().map(drawn).collect();
+    let drawn: Vec<Drawn<'_>> = runs.iter().zip(figures(runs)).map(drawn).collect();
     let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
     let page = page(runs, folder, &data).map_err(|error| internal(error.to_string()))?;
     let mut environment = Environment::new();
@@ -147,12 +148,32 @@ fn common_notes(runs: &[Run]) -> Vec<String> {
     lines
 }
 
-fn drawn(run: &Run) -> Drawn<'_> {
+/// The figures of every run. Points that were measured for several runs are there once.
+fn figures(runs: &[Run]) -> Vec<Value> {
+    let mut seen: Vec<(&str, &Value)> = Vec::new();
+    let mut all = Vec::new();
+    for run in runs {
+        let mut figures = run.summary["figures"].clone();
+        let own = figures.as_array_mut().into_iter().flatten();
+        for (figure, written) in own.zip(list(&run.summary["figures"])) {
+            let measured = (text(&written["name"]), &written["measured"]);
+            if seen.contains(&measured) {
+                figure["measured"] = Value::Null;
+            } else {
+                seen.push(measured);
+            }
+        }
+        all.push(figures);
+    }
+    all
+}
+
+fn drawn((run, figures): (&Run, Value)) -> Drawn<'_> {
     Drawn {
         name: &run.name,
         axisymmetric: text(&run.summary["analysis"]) == "axisymmetric",
         history: &run.history,
-        figures: &run.summary["figures"],
+        figures,
         profile: run.profile.as_ref(),
         fields: run.fields.as_ref(),
         log: &run.log,
@@ -218,6 +239,7 @@ fn facts(summary: &Value) -> Vec<String> {
         "" => (),
         analysis => facts.push(analysis.replace('_', " ")),
     }
+    facts.extend(list(&summary["set"]).map(|set| format!("set {}", text(set))));
     let count = |value: &Value, what: &str| value.as_u64().map(|n| format!("{n} {what}"));
     facts.extend(count(&summary["mesh"]["nodes"], "nodes"));
     facts.extend(count(&summary["mesh"]["elements"], "elements"));

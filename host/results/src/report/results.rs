@@ -6,6 +6,7 @@ use super::log::Log;
 use super::profile::Profile;
 use super::short::{Short, extremes, thinned};
 use super::table::Table;
+use crate::record::{entries, list, text};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
@@ -202,11 +203,11 @@ fn shown_rows(columns: &[Vec<f64>], n: usize, most: usize, ends: &[usize]) -> Ve
 }
 
 impl Run {
-    /// Reads a folder.
+    /// Reads a folder, which the page calls so.
     ///
     /// # Errors
     /// As [`super::write`].
-    pub(super) fn read(folder: &Path, budget: &Budget) -> Result<Self, Error> {
+    pub(super) fn read(name: &str, folder: &Path, budget: &Budget) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let history = History::read(&folder.join("history.csv"), budget, &mut notes)?;
         let summary = summary(folder, &mut notes);
@@ -230,12 +231,8 @@ impl Run {
             fields.label(&groups, |time| history.times.label(time));
         }
         let log = Log::read(&folder.join("log.jsonl"), budget, &mut notes);
-        let name = std::path::absolute(folder)
-            .ok()
-            .and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
-            .unwrap_or_else(|| folder.display().to_string());
         Ok(Self {
-            name,
+            name: name.to_owned(),
             folder: folder.to_owned(),
             summary,
             history,
@@ -322,21 +319,6 @@ impl Run {
     }
 }
 
-/// Lengthens the names of runs whose folders are called alike by the folders they lie in.
-pub(super) fn tell_apart(runs: &mut [Run]) {
-    for longer in 2..8 {
-        let alike: Vec<bool> = runs
-            .iter()
-            .map(|run| runs.iter().filter(|other| other.name == run.name).count() > 1)
-            .collect();
-        for (run, _) in runs.iter_mut().zip(alike).filter(|(_, alike)| *alike) {
-            let path = std::path::absolute(&run.folder).unwrap_or_default();
-            let parts: Vec<_> = path.iter().map(std::ffi::OsStr::to_string_lossy).collect();
-            run.name = parts[parts.len().saturating_sub(longer)..].join("/");
-        }
-    }
-}
-
 fn summary(folder: &Path, notes: &mut Vec<String>) -> Value {
     let text = match std::fs::read_to_string(folder.join("summary.json")) {
         Ok(text) => text,
@@ -350,20 +332,4 @@ fn summary(folder: &Path, notes: &mut Vec<String>) -> Value {
         notes.push(format!("summary.json: {error}"));
         Value::Null
     })
-}
-
-/// A text, empty if there is none.
-pub(super) fn text(value: &Value) -> &str {
-    value.as_str().unwrap_or_default()
-}
-
-/// Entries of an array, none if it is no array.
-pub(super) fn list(value: &Value) -> impl Iterator<Item = &Value> {
-    value.as_array().into_iter().flatten()
-}
-
-/// Entries of an object, none if it is no object.
-pub(super) fn entries(value: &Value) -> impl Iterator<Item = (&str, &Value)> {
-    let entries = value.as_object().into_iter().flatten();
-    entries.map(|(key, value)| (key.as_str(), value))
 }

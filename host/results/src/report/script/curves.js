@@ -44,12 +44,22 @@ function curves(x, ys, phase) {
   return series;
 }
 
+/** What makes figures of several cases the same. */
+const figureKey = figure => JSON.stringify([figure.name, figure.x, figure.y, figure.phase]);
+
+/** Points that were measured for a figure of any run, as markers; `n` colours are taken. */
+function measured(figure, n) {
+  const same = [].concat(...runs.map(run => (run.figures || []).filter(other => figureKey(other) === figureKey(figure))));
+  const all = [].concat(...same.map(other => other.measured || []));
+  return all.map(({ label, x, y }, k) => ({ name: label, x, y, colour: n + k, line: false, points: true, radius: 3, tip: () => 'measured' }));
+}
+
 /** Figures of all cases; those of the same name and probes once. */
 function allFigures() {
   const figures = new Map();
   for (const run of runs) {
     for (const figure of run.figures || []) {
-      const key = JSON.stringify([figure.name, figure.x, figure.y, figure.phase]);
+      const key = figureKey(figure);
       if (!figures.has(key)) figures.set(key, figure);
     }
   }
@@ -70,7 +80,7 @@ part(() => {
     const fill = () => chart.set({
       x: { label: figure.x_label || withUnit(figure.x, unitOf(figure.x)) },
       y: { label: figure.y_label || withUnit(figure.y.join(', '), commonUnit(figure.y)) },
-      series: curves(figure.x, figure.y, figure.phase),
+      series: [...curves(figure.x, figure.y, figure.phase), ...measured(figure, isComparison ? runs.length : figure.y.length)],
       keepLegend: !isMany,
     });
     fill();

@@ -1,0 +1,160 @@
+//! Measured points of figures: two columns of a file of comma-separated values.
+
+use crate::Error;
+use crate::case::MeasuredInput;
+use csv::{ByteRecord, Reader, ReaderBuilder};
+use results::wanted::Measured;
+use std::path::Path;
+use text::file::read_text;
+use text::{Source, suggestion};
+use toml::Spanned;
+
+/// Most points of a table: a figure and the page of a report hold all of them.
+const MOST_POINTS: usize = 20_000;
+
+/// Reads the points of a table.
+///
+/// # Errors
+/// [`text::Error::Input`] at the key that does not fit: the file cannot be read, a column is not
+/// there, a cell is no number, there are no points or too many.
+pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, Error> {
+    let case = source.path_at(&input.file.span());
+    let path = case
+        .parent()
+        .unwrap_or(Path::new(""))
+        .join(input.file.get_ref());
+    let at_file = |message: String| Error::from(source.error(input.file.span(), message));
+    let bytes = read_text(&path)
+        .map_err(|why| at_file(format!("`file`: cannot read {}: {why}", path.display())))?;
+    let (mut reader, columns) = begin(&bytes)
+        .map_err(|why| at_file(format!("`file`: cannot read {}: {why}", path.display())))?;
+    let table = Table {
+        source,
+        path: &path,
+        columns,
+    };
+    let [x, y] = [
+        table.position("x", &input.x)?,
+        table.position("y", &input.y)?,
+    ];
+    let mut points = Vec::new();
+    let mut row = ByteRecord::new();
+    loop {
+        let is_row = reader.read_byte_record(&mut row);
+        if !is_row.map_err(|why| at_file(format!("`file`: {}: {why}", path.display())))? {
+            break;
+        }
+        let values = (
+            table.number(&row, x, &input.x)?,
+            table.number(&row, y, &input.y)?,
+        );
+        if let (Some(x), Some(y)) = values {
+            points.push((input.x_scale * x, input.y_scale * y));
+        }
+        if points.len() > MOST_POINTS {
+            let message = format!(
+                "`file`: {} has more than {MOST_POINTS} points, the most that a figure takes",
+                path.display()
+            );
+            return Err(at_file(message));
+        }
+    }
+    if points.is_empty() {
+        let message = format!(
+            "`file`: {} has no row with `{}` and `{}`",
+            path.display(),
+            input.x.get_ref(),
+            input.y.get_ref()
+        );
+        return Err(at_file(message));
+    }
+    if let Some((x, y)) = points
+        .iter()
+        .find(|(x, y)| !(x.is_finite() && y.is_finite()))
+    {
+        let message = format!("`file`: times its factors a point is ({x}, {y}), no finite number");
+        return Err(at_file(message));
+    }
+    Ok(Measured {
+        label: input.label.clone(),
+        points,
+    })
+}
+
+/// The rows of a table, and the names of its columns. The first line that is no remark tells what
+/// stands between columns.
+fn begin(bytes: &[u8]) -> csv::Result<(Reader<&[u8]>, Vec<String>)> {
+    let mut lines = bytes.split(|&byte| byte == b'\n');
+    let header = lines.find(|line| !line.trim_ascii().is_empty() && !line.starts_with(b"#"));
+    let header = header.unwrap_or_default();
+    let separators = [b'\t', b';'];
+    let separator = separators.into_iter().find(|s| header.contains(s));
+    let mut reader = ReaderBuilder::new()
+        .delimiter(separator.unwrap_or(b','))
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .from_reader(bytes);
+    let columns = reader.byte_headers()?.iter();
+    let columns = columns.map(|name| String::from_utf8_lossy(name).into_owned());
+    let columns = columns.collect();
+    Ok((reader, columns))
+}
+
+/// A table while it is read.
+struct Table<'a> {
+    source: &'a Source,
+    path: &'a Path,
+    columns: Vec<String>,
+}
+
+impl Table<'_> {
+    /// Where the column stands that a key names.
+    fn position(&self, key: &str, name: &Spanned<String>) -> Result<usize, Error> {
+        let position = self
+            .columns
+            .iter()
+            .position(|column| column == name.get_ref());
+        position.ok_or_else(|| {
+            let message = format!(
+                "`{key}`: {} has no column `{}`",
+                self.path.display(),
+                name.get_ref()
+            );
+            let known = self.columns.iter().map(String::as_str);
+            let error = self.source.error(name.span(), message);
+            error.hint(suggestion(name.get_ref(), known)).into()
+        })
+    }
+
+    /// The number in a cell; `None` if it is empty.
+    fn number(
+        &self,
+        row: &ByteRecord,
+        column: usize,
+        name: &Spanned<String>,
+    ) -> Result<Option<f64>, Error> {
+        let cell = String::from_utf8_lossy(row.get(column).unwrap_or_default());
+        if cell.is_empty() {
+            return Ok(None);
+        }
+        match cell.parse() {
+            Ok(value) if f64::is_finite(value) => Ok(Some(value)),
+            _ => {
+                let message = format!(
+                    "{}, line {}: `{cell}` in column `{}` is no number",
+                    self.path.display(),
+                    row.position().map_or(0, csv::Position::line),
+                    name.get_ref()
+                );
+                let error = self.source.error(name.span(), message);
+                Err(match cell.replacen(',', ".", 1) {
+                    point if point != cell && point.parse::<f64>().is_ok() => error
+                        .hint(format!("is a decimal point meant? `{point}`, not `{cell}`"))
+                        .into(),
+                    _ => error.into(),
+                })
+            }
+        }
+    }
+}

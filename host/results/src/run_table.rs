@@ -1,0 +1,230 @@
+//! A table of runs, one row each: how they ended, the settings in which they differ, and the last
+//! values of their probes.
+
+use crate::record::{entries, names, settings, settings_of_files, text};
+use indexmap::{IndexMap, IndexSet};
+use serde_json::Value;
+use std::io;
+use std::path::{Path, PathBuf};
+use text::{Error, Source};
+
+/// The file that makes a folder one of results.
+const SUMMARY: &str = "summary.json";
+/// What the record of a pile may have, `pile.` before it in the table.
+const RESISTANCES: [&str; 3] = [
+    "resistance_10_percent_diameter",
+    "resistance_davisson",
+    "resistance_chin",
+];
+
+/// A run, read back.
+struct Run {
+    summary: Value,
+    /// Its settings, as texts, by dotted path.
+    settings: IndexMap<String, String>,
+}
+
+/// The table of all runs in some folders, as comma-separated values. A folder is that of a run, or
+/// has folders of runs below.
+///
+/// # Errors
+/// [`Error::Unreadable`] if there is no run in a folder; [`Error::Input`] if its summary is not one
+/// that a run has written.
+pub fn of(folders: &[PathBuf]) -> Result<String, Error> {
+    let mut found = Vec::new();
+    for folder in folders {
+        let before = found.len();
+        find(folder, &mut found)?;
+        if found.len() == before {
+            let why = "there is no run in this folder, nor in those below";
+            let why = io::Error::new(io::ErrorKind::NotFound, why);
+            return Err(unreadable(&folder.join(SUMMARY), why));
+        }
+    }
+    let mut seen = IndexSet::new();
+    found.retain(|folder| seen.insert(folder.canonicalize().unwrap_or_else(|_| folder.clone())));
+    let runs = found.iter().map(|folder| Run::read(folder));
+    let runs = runs.collect::<Result<Vec<Run>, _>>()?;
+    written(&names(&found), &runs)
+        .map_err(|error| Error::Internal(format!("the table of runs: {error}")))
+}
+
+fn unreadable(path: &Path, source: io::Error) -> Error {
+    Error::Unreadable {
+        path: path.to_owned(),
+        source,
+    }
+}
+
+/// The folders of runs at or below this one, in the order of their names.
+fn find(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Error> {
+    if folder.join(SUMMARY).exists() {
+        found.push(folder.to_owned());
+        return Ok(());
+    }
+    let wrong = |why| unreadable(folder, why);
+    let mut below = Vec::new();
+    for entry in folder.read_dir().map_err(wrong)? {
+        let entry = entry.map_err(wrong)?;
+        // A link may lead back up; what begins with a dot is of a study under way.
+        let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
+        if entry.file_type().map_err(wrong)?.is_dir() && !is_hidden {
+            below.push(entry.path());
+        }
+    }
+    below.sort();
+    below.iter().try_for_each(|folder| find(folder, found))
+}
+
+impl Run {
+    fn read(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(SUMMARY);
+        let text = std::fs::read_to_string(&path).map_err(|why| unreadable(&path, why))?;
+        let summary: Value = serde_json::from_str(&text).map_err(|error| {
+            let lines = text.split_inclusive('\n').take(error.line().max(1) - 1);
+            let at = lines.map(str::len).sum::<usize>() + error.column().max(1) - 1;
+            let at = (0..=at.min(text.len())).rfind(|&at| text.is_char_boundary(at));
+            let at = at.unwrap_or(0);
+            let message = format!("not written by a run: {error}");
+            Source::new(&path, text.as_str()).error(at..at, message)
+        })?;
+        if !summary["status"].is_string() {
+            let source = Source::new(&path, "");
+            let message = format!("not written by a run: {} has no `status`", path.display());
+            return Err(source.error(0..0, message).into());
+        }
+        Ok(Self::of(summary))
+    }
+
+    fn of(summary: Value) -> Self {
+        // What a run was computed with counts more than what its file says of it.
+        let of_files = settings_of_files(&summary).into_iter();
+        let of_run = settings(&summary).into_iter();
+        let of_run = of_run.filter_map(|setting| Some((setting.path?, setting.value)));
+        let settings = of_files.chain(of_run).map(|(path, v)| (path, shown(&v)));
+        Self {
+            settings: settings.collect(),
+            summary,
+        }
+    }
+
+    /// How it ended.
+    fn status(&self) -> &str {
+        match text(&self.summary["status"]) {
+            "running" => "unfinished",
+            status => status,
+        }
+    }
+}
+
+/// The paths of settings in which runs differ, in the order in which they first appear.
+fn differing(runs: &[Run]) -> Vec<&str> {
+    let paths: IndexSet<&str> = runs
+        .iter()
+        .flat_map(|run| run.settings.keys().map(String::as_str))
+        .collect();
+    let differs = |path: &&str| {
+        let mut values = runs.iter().map(|run| run.settings.get(*path));
+        let first = values.next().flatten();
+        values.any(|value| value != first)
+    };
+    paths.into_iter().filter(differs).collect()
+}
+
+fn written(names: &[String], runs: &[Run]) -> Result<String, Box<dyn std::error::Error>> {
+    let settings = differing(runs);
+    let probes: IndexSet<&str> = runs
+        .iter()
+        .flat_map(|run| entries(&run.summary["probes"]).map(|(name, _)| name))
+        .collect();
+    let has_pile = runs.iter().any(|run| run.summary["pile"].is_object());
+    let resistances = if has_pile { &RESISTANCES[..] } else { &[] };
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let mut header: Vec<String> = ["run", "status"].map(str::to_owned).to_vec();
+    header.extend(settings.iter().chain(&probes).map(ToString::to_string));
+    header.extend(resistances.iter().map(|name| format!("pile.{name}")));
+    table.write_record(&header)?;
+    for (name, run) in names.iter().zip(runs) {
+        let mut row = vec![name.clone(), run.status().to_owned()];
+        let of_settings = settings.iter().map(|path| run.settings.get(*path));
+        row.extend(of_settings.map(|value| value.cloned().unwrap_or_default()));
+        row.extend(
+            probes
+                .iter()
+                .map(|probe| shown(&run.summary["probes"][probe])),
+        );
+        let pile = &run.summary["pile"];
+        row.extend(
+            resistances
+                .iter()
+                .map(|resistance| shown(&pile[resistance])),
+        );
+        table.write_record(&row)?;
+    }
+    Ok(String::from_utf8(table.into_inner()?)?)
+}
+
+/// A value in a cell; nothing, where there is none. A number has all its digits.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        Value::Number(number) => match number.as_f64() {
+            Some(value) if value == 0.0 || (1e-4..1e7).contains(&value.abs()) => value.to_string(),
+            Some(value) => format!("{value:e}"),
+            None => number.to_string(),
+        },
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_row_has_what_differs_and_what_came_out() {
+        let with = |c: f64, status: &str, pile: Value| {
+            Run::of(json!({
+                "status": status,
+                "case_files": [{
+                    "path": "case.toml",
+                    "text": "[[phase]]\nname = \"load\"\nincrements = 2\n",
+                }],
+                "set": [format!("phase.1.increments={c}")],
+                "laws": { "soil (solid_2d)": { "law": "l", "parameters": { "c": c, "d": 1.0 } } },
+                "probes": { "w": 0.1 + c, "n": null },
+                "pile": pile,
+            }))
+        };
+        let reached = json!({ "resistance_davisson": 1234.5, "resistance_chin": null });
+        let runs = [
+            with(2.0, "done", reached),
+            with(3.0, "running", Value::Null),
+        ];
+        let names = ["a", "b, c"].map(str::to_owned);
+        let expected = "\
+            run,status,phase.load.increments,laws.soil.parameters.c,n,w,\
+            pile.resistance_10_percent_diameter,pile.resistance_davisson,pile.resistance_chin\n\
+            a,done,2,2,,2.1,,1234.5,\n\
+            \"b, c\",unfinished,3,3,,3.1,,,\n";
+        assert_eq!(written(&names, &runs).unwrap(), expected);
+    }
+
+    #[test]
+    fn runs_alike_have_no_settings() {
+        let alike = || Run::of(json!({ "status": "done", "analysis": "axisymmetric" }));
+        let names = ["a", "b"].map(str::to_owned);
+        let table = written(&names, &[alike(), alike()]).unwrap();
+        assert_eq!(table, "run,status\na,done\nb,done\n");
+    }
+
+    #[test]
+    fn numbers_have_all_their_digits() {
+        assert_eq!(shown(&json!(1.0 / 3.0)), "0.3333333333333333");
+        assert_eq!(shown(&json!(2.1e8)), "2.1e8");
+        assert_eq!(shown(&json!(20)), "20");
+        assert_eq!(shown(&json!([1, 2])), "[1,2]");
+    }
+}

@@ -1,0 +1,425 @@
+//! Settings of the command line: `KEY=VALUE` over what a file says, in the file's own syntax.
+//!
+//! The key is the dotted path of the file. An entry of an array has its position there, from 1, or
+//! its `name` if it has one: `phase.2.increments=80`, `phase.loading.increments=80`.
+
+use crate::base::{merge_value, name};
+use crate::read::toml_error;
+use crate::wording::value_in_words;
+use crate::{Error, InputError, Source, suggestion};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
+
+/// A setting that was read.
+#[derive(Debug)]
+pub(crate) struct Setting<'i> {
+    /// Where it stands.
+    range: Range<usize>,
+    keys: Vec<Spanned<DeString<'i>>>,
+    value: Spanned<DeValue<'i>>,
+}
+
+/// A table that a setting has made on its way, since the file has none there.
+#[derive(Debug)]
+pub(crate) struct Made {
+    /// Where the setting stands.
+    range: Range<usize>,
+    /// What to say if it is not complete: the setting was rather meant for one that is there.
+    error: InputError,
+}
+
+impl Made {
+    /// What to say instead of an error about what the table lacks.
+    pub(crate) fn instead_of(&self, error: &toml::de::Error) -> Option<Error> {
+        let is_here = self.range.contains(&error.span()?.start);
+        let lacks = error.message().trim().starts_with("missing field ");
+        (is_here && lacks).then(|| self.error.clone().into())
+    }
+}
+
+impl<'i> Setting<'i> {
+    /// Reads the setting that stands here in a source. `text` is the setting, with blanks before it
+    /// so that its spans count in the source.
+    ///
+    /// # Errors
+    /// [`Error::Input`] at the place that does not fit.
+    pub(crate) fn read(source: &Source, range: Range<usize>, text: &'i str) -> Result<Self, Error> {
+        let Some(equals) = equals_sign(text) else {
+            let message = format!("`{}` is no setting, expected KEY=VALUE", text.trim_start());
+            return Err(source
+                .error(range, message)
+                .hint("such as --set solver.max_iterations=40")
+                .into());
+        };
+        let keys = keys(source, &text[..equals])?;
+        refuse_keys_of_files(source, &keys)?;
+        let value = match DeTable::parse(text) {
+            Ok(table) => only_value(table, keys.len()).ok_or_else(|| {
+                let message = "one key and one value are expected; --set may be repeated";
+                source.error(range.clone(), message)
+            })?,
+            Err(error) => bare_word(source, range.start, equals + 1..range.end)
+                .map_err(|refused| refused.unwrap_or_else(|| toml_error(source, &error)))?,
+        };
+        Ok(Self { range, keys, value })
+    }
+
+    /// Puts the setting over what a file says. Returns a table that it had to make, if it did.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the path leads nowhere.
+    pub(crate) fn apply(
+        &self,
+        source: &Source,
+        file: &mut DeTable<'i>,
+    ) -> Result<Option<Made>, Error> {
+        self.put_into(source, file, 0)
+    }
+
+    /// Puts it into a table that so many of its keys lead to.
+    fn put_into(
+        &self,
+        source: &Source,
+        table: &mut DeTable<'i>,
+        depth: usize,
+    ) -> Result<Option<Made>, Error> {
+        let key = &self.keys[depth];
+        let is_last = depth + 1 == self.keys.len();
+        if let Some(below) = table.get_mut(key.get_ref().as_ref()) {
+            if is_last {
+                merge_value(below, self.value.clone());
+                return Ok(None);
+            }
+            return self.put_below(source, below, depth + 1);
+        }
+        if is_last {
+            table.insert(key.clone(), self.value.clone());
+            return Ok(None);
+        }
+        let known: Vec<&str> = table.keys().map(|key| key.get_ref().as_ref()).collect();
+        let error = source
+            .error(
+                key.span(),
+                format!("there is no `{}`", self.path(depth + 1)),
+            )
+            .hint(suggestion(key.get_ref(), known));
+        let mut made = DeTable::new();
+        self.put_into(source, &mut made, depth + 1)?;
+        let span = key.span().start..self.range.end;
+        table.insert(key.clone(), Spanned::new(span, DeValue::Table(made)));
+        Ok(Some(Made {
+            range: self.range.clone(),
+            error,
+        }))
+    }
+
+    /// Puts it below a value that so many of its keys lead to.
+    fn put_below(
+        &self,
+        source: &Source,
+        value: &mut Spanned<DeValue<'i>>,
+        depth: usize,
+    ) -> Result<Option<Made>, Error> {
+        let key = &self.keys[depth];
+        match value.get_mut() {
+            DeValue::Table(table) => self.put_into(source, table, depth),
+            DeValue::Array(entries) => {
+                let position = position(entries.iter().map(name), key.get_ref());
+                let names: Vec<String> = entries.iter().filter_map(name).collect();
+                let n = entries.len();
+                let Some(entry) = position.and_then(|position| entries.get_mut(position)) else {
+                    return Err(self.no_entry(source, depth, n, &names));
+                };
+                if depth + 1 == self.keys.len() {
+                    merge_value(entry, self.value.clone());
+                    return Ok(None);
+                }
+                self.put_below(source, entry, depth + 1)
+            }
+            other => {
+                let message = format!(
+                    "there is no `{}`: `{}` is {}",
+                    self.path(depth + 1),
+                    self.path(depth),
+                    value_in_words(other)
+                );
+                Err(source.error(key.span(), message).into())
+            }
+        }
+    }
+
+    /// The error of a key that leads to none of the `n` entries of a list.
+    fn no_entry(&self, source: &Source, depth: usize, n: usize, names: &[String]) -> Error {
+        let key = &self.keys[depth];
+        let message = format!(
+            "there is no `{}`: `{}` has {n} {}",
+            self.path(depth + 1),
+            self.path(depth),
+            if n == 1 { "entry" } else { "entries" }
+        );
+        let error = source.error(key.span(), message);
+        if names.is_empty() {
+            let hint = "an entry has its position here, from 1";
+            return error.hint(hint).into();
+        }
+        let names = names.iter().map(String::as_str).collect::<Vec<_>>();
+        error.hint(suggestion(key.get_ref(), names)).into()
+    }
+
+    /// The first of its keys as they are written.
+    fn path(&self, n: usize) -> String {
+        let keys: Vec<String> = self.keys[..n].iter().map(|k| key(k.get_ref())).collect();
+        keys.join(".")
+    }
+}
+
+/// A key as it is written in a dotted path: in quotes where it has to be.
+pub fn key(name: &str) -> String {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !name.is_empty() && name.chars().all(is_part) {
+        return name.to_owned();
+    }
+    toml::Value::from(name).to_string()
+}
+
+/// The entry of an array that a key stands for: its position from 1, or its name.
+fn position(mut names: impl ExactSizeIterator<Item = Option<String>>, key: &str) -> Option<usize> {
+    match key.parse::<usize>() {
+        Ok(number) if (1..=names.len()).contains(&number) => Some(number - 1),
+        _ => names.position(|name| name.as_deref() == Some(key)),
+    }
+}
+
+/// Where the key ends: the first equals sign outside quotes.
+fn equals_sign(text: &str) -> Option<usize> {
+    let mut quote = None;
+    for (at, c) in text.char_indices() {
+        match (quote, c) {
+            (None, '=') => return Some(at),
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(open), c) if open == c => quote = None,
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The keys of a dotted path.
+fn keys<'i>(source: &Source, path: &str) -> Result<Vec<Spanned<DeString<'i>>>, Error> {
+    let text = format!("{path}=0");
+    let table = DeTable::parse(&text).map_err(|error| toml_error(source, &error))?;
+    let mut keys = Vec::new();
+    let mut below = Some(table.get_ref());
+    while let Some(table) = below {
+        below = None;
+        for (key, value) in table {
+            let name = DeString::from(key.get_ref().to_string());
+            keys.push(Spanned::new(key.span(), name));
+            if let DeValue::Table(table) = value.get_ref() {
+                below = Some(table);
+            }
+        }
+    }
+    Ok(keys)
+}
+
+/// Refuses what is no setting of a case but says what the file stands for.
+fn refuse_keys_of_files(source: &Source, keys: &[Spanned<DeString<'_>>]) -> Result<(), Error> {
+    let Some(first) = keys.first() else {
+        return Ok(());
+    };
+    let hint = match first.get_ref().as_ref() {
+        "base" => "name the file that is based on it",
+        "variant" => "a setting holds for every variant; --variant chooses one",
+        _ => return Ok(()),
+    };
+    let message = format!("`{}` cannot be set", first.get_ref());
+    Err(source.error(first.span(), message).hint(hint).into())
+}
+
+/// The value of a table that has only this one, so many keys deep.
+fn only_value(table: Spanned<DeTable<'_>>, depth: usize) -> Option<Spanned<DeValue<'_>>> {
+    let span = table.span();
+    let mut value = Spanned::new(span, DeValue::Table(table.into_inner()));
+    for _ in 0..depth {
+        let DeValue::Table(table) = value.into_inner() else {
+            return None;
+        };
+        let mut entries = table.into_iter();
+        let (_, only) = entries.next()?;
+        if entries.next().is_some() {
+            return None;
+        }
+        value = only;
+    }
+    Some(value)
+}
+
+/// A word without quotes stands for a text. What else starts like one is refused with an error of
+/// its own. `start` is where the setting starts.
+fn bare_word<'i>(
+    source: &Source,
+    start: usize,
+    range: Range<usize>,
+) -> Result<Spanned<DeValue<'i>>, Option<Error>> {
+    let text = &source.text()[range.clone()];
+    let word = text.trim();
+    let at = range.start + text.len() - text.trim_start().len();
+    let span = at..at + word.len();
+    if word.is_empty() {
+        let error = source.error(span, "there is no value after the `=`");
+        return Err(Some(error.into()));
+    }
+    if !word.starts_with(|c: char| c.is_alphabetic()) {
+        return Err(None);
+    }
+    let is_part = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    if word.chars().all(is_part) {
+        return Ok(Spanned::new(span, DeValue::String(word.to_owned().into())));
+    }
+    let message = format!("`{word}` is no TOML value, and no single word, which stands for a text");
+    let hint = format!(
+        "a text needs quotes, and the whole those of the shell: --set '{}{}'",
+        &source.text()[start..range.start],
+        toml::Value::from(word)
+    );
+    Err(Some(source.error(span, message).hint(hint).into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Source, base};
+    use toml::{Table, Value};
+
+    const FILE: &str = "a = 1\nlist = [1, 2]\n[table]\nb = 2\n\
+                        [[phase]]\nname = \"one\"\nn = 1\n[[phase]]\nname = \"two\"\nn = 2\n";
+
+    fn with(file: &str, settings: &[&str]) -> Result<Vec<Table>, String> {
+        let settings: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
+        let source = Source::new("file.toml", file).with_settings(&settings);
+        match base::read::<Table>(source) {
+            Ok((_, files)) => Ok(files.into_iter().map(|(_, table)| table).collect()),
+            Err(crate::Error::Input(error)) => {
+                let hint = miette::Diagnostic::help(error.as_ref());
+                let hint = hint.map(|hint| format!("; {hint}")).unwrap_or_default();
+                Err(format!("{error}{hint}"))
+            }
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    fn only(setting: &str) -> Table {
+        with(FILE, &[setting]).unwrap().remove(0)
+    }
+
+    #[test]
+    fn a_setting_overrides_the_file() {
+        assert_eq!(only("a=3")["a"], Value::from(3));
+        assert_eq!(
+            only(" table.b = \"x y\" # why")["table"]["b"],
+            Value::from("x y")
+        );
+        assert_eq!(only("table.c.d=1.5")["table"]["c"]["d"], Value::from(1.5));
+        assert_eq!(only("table={ c = 4 }")["table"]["b"], Value::from(2));
+        assert_eq!(only("list=[7]")["list"], Value::from(vec![7]));
+        assert_eq!(only("list.2=7")["list"], Value::from(vec![1, 7]));
+        assert_eq!(only("\"a=b\".c=true")["a=b"]["c"], Value::from(true));
+        // The later one wins.
+        let file = with(FILE, &["a=3", "a=4"]).unwrap().remove(0);
+        assert_eq!(file["a"], Value::from(4));
+    }
+
+    #[test]
+    fn entries_have_positions_and_names() {
+        for key in ["phase.2.n", "phase.two.n"] {
+            let file = only(&format!("{key}=20"));
+            let n = |phase: usize| file["phase"][phase]["n"].as_integer();
+            assert_eq!([n(0), n(1)], [Some(1), Some(20)], "{key}");
+        }
+    }
+
+    #[test]
+    fn a_setting_holds_for_every_variant() {
+        let variants = "[[variant]]\nname = \"v\"\ntable.b = 5\n[[variant]]\nname = \"w\"\n";
+        let file = format!("{FILE}{variants}");
+        let files = with(&file, &["table.b=9"]).unwrap();
+        let values: Vec<_> = files
+            .iter()
+            .map(|file| file["table"]["b"].clone())
+            .collect();
+        assert_eq!(values, [Value::from(9), Value::from(9)]);
+    }
+
+    #[test]
+    fn a_word_without_quotes_is_a_text() {
+        assert_eq!(only("a=arc-length")["a"], Value::from("arc-length"));
+        assert_eq!(only("a= soil_2.v1 ")["a"], Value::from("soil_2.v1"));
+        let refused = with(FILE, &["a=two words"]).unwrap_err();
+        assert_eq!(
+            refused,
+            "`two words` is no TOML value, and no single word, which stands for a text; \
+             a text needs quotes, and the whole those of the shell: --set 'a=\"two words\"'"
+        );
+    }
+
+    #[test]
+    fn paths_that_lead_nowhere_are_refused() {
+        for (setting, says) in [
+            (
+                "phase.3.n=1",
+                "there is no `phase.3`: `phase` has 2 entries; there is: one, two",
+            ),
+            (
+                "phase.twoo.n=1",
+                "there is no `phase.twoo`: `phase` has 2 entries; did you mean `two`? There is: \
+                 one, two",
+            ),
+            (
+                "list.0=1",
+                "there is no `list.0`: `list` has 2 entries; an entry has its position here, \
+                 from 1",
+            ),
+            ("a.b=1", "there is no `a.b`: `a` is the number 1"),
+            (
+                "base=b",
+                "`base` cannot be set; name the file that is based on it",
+            ),
+            (
+                "variant.1.a=1",
+                "`variant` cannot be set; a setting holds for every variant; --variant chooses one",
+            ),
+            (
+                "a=1\nb=2",
+                "one key and one value are expected; --set may be repeated",
+            ),
+            ("a=", "there is no value after the `=`"),
+            (
+                "a",
+                "`a` is no setting, expected KEY=VALUE; such as --set solver.max_iterations=40",
+            ),
+        ] {
+            assert_eq!(with(FILE, &[setting]).unwrap_err(), says, "{setting}");
+        }
+    }
+
+    #[test]
+    fn places_are_those_in_the_setting() {
+        let source = Source::new("file.toml", "a = 1\n");
+        let source = source.with_settings(&["x=1".to_owned(), "yy=2".to_owned()]);
+        let places: Vec<_> = source
+            .settings()
+            .map(|range| source.place(&range))
+            .collect();
+        assert_eq!(places, ["--set:1:1", "--set:1:1"]);
+        let second = source.settings().nth(1).unwrap();
+        assert_eq!(&source.text()[second.clone()], "yy=2");
+        assert_eq!(source.path_at(&second), std::path::Path::new("file.toml"));
+        assert_eq!(source.text_of_files(), "a = 1\n");
+        // What a file is based on stands before it, its settings behind.
+        let source = source.based_on(&Source::new("base.toml", "b = 2\n"));
+        assert_eq!(source.text_of_files(), "b = 2\n\na = 1\n");
+        assert_eq!(source.files().count(), 2);
+        assert_eq!(source.settings().count(), 2);
+    }
+}
