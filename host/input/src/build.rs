@@ -1,8 +1,9 @@
 //! From a case file to a problem in memory and the results that are wanted of it; and back: which place
 //! of the file an error of the problem is about.
 
-use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput, StressInput};
-use crate::material::{find_law, place_failure, try_law};
+use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
+use crate::ground::{ProfileInput, level};
+use crate::material::{ParameterValue, find_law, place_failure, try_law};
 use crate::{Error, figures, grid, probes};
 use abi::Hypothesis;
 use abi::status::Outcome;
@@ -10,8 +11,9 @@ use indexmap::IndexMap;
 use law::{BuildCause, BuiltLaw, LoadedLaw, Pins, SearchPath, hexadecimal_sha256};
 use mechanics::group::PointFailure;
 use mechanics::mesh::{Line, Mesh};
+use mechanics::problem::Profile;
 use mechanics::problem::{
-    Axis, Cause, Displacement, ElementGroup, Formulation, Free, Item, Key, Material, Phase,
+    Axis, Cause, Displacement, ElementGroup, Force, Formulation, Free, Item, Key, Material, Phase,
     Pressure, Problem, Refusal, Support,
 };
 use mechanics::settings::Control;
@@ -69,7 +71,8 @@ impl Case {
             laws: IndexMap::new(),
         };
         refuse_unknown_groups(source, file)?;
-        let mut phases: Vec<Phase> = file.phases.iter().map(phase).collect();
+        let phases = file.phases.iter().map(|input| phase(source, file, input));
+        let mut phases = phases.collect::<Result<Vec<Phase>, Error>>()?;
         let mut groups = Vec::new();
         for (number, (name, group)) in file.groups.iter().enumerate() {
             let input = group.get_ref();
@@ -98,7 +101,16 @@ impl Case {
                 integration: input.integration.as_ref().map(|i| *i.get_ref()),
                 normal: input.normal.as_ref().map(|n| (*n.get_ref()).into()),
                 in_plane: input.in_plane.as_ref().map(|i| *i.get_ref()),
-                initial_stress: input.initial_stress.as_ref().map(|s| stress(*s.get_ref())),
+                initial_stress: match &input.initial_stress {
+                    Some(stress) => Some(stress.get_ref().read(source, stress.span())?),
+                    None => None,
+                },
+                unit_weight: input.unit_weight.as_ref().map_or(0.0, |weight| *weight.get_ref()),
+                saturated_unit_weight: input.saturated_unit_weight.as_ref().map(|w| *w.get_ref()),
+                pore_water: input.pore_water.unwrap_or(true),
+                is_active: input.active.unwrap_or(true),
+                drainage: input.drainage.as_ref().map_or_else(Default::default, |d| *d.get_ref()),
+                undrained_poisson_ratio: input.undrained_poisson_ratio.unwrap_or(0.495),
             });
         }
         let supports = file.supports.iter().map(|support| Support {
@@ -110,6 +122,7 @@ impl Case {
                 analysis: file.analysis,
                 mesh,
                 groups,
+                water: file.water.as_ref().map(|water| water.get_ref().read(source)).transpose()?,
                 supports: supports.collect(),
                 phases,
                 settings: file.solver,
@@ -166,7 +179,7 @@ impl Case {
 
     /// What is plausible in the case but seldom meant, beside what its problem is warned of.
     pub fn warnings(&self, simulation: &Simulation) -> Vec<String> {
-        probes::reactions(self, &simulation.problem().mesh)
+        probes::reactions(self, simulation.problem())
     }
 
     /// An error of the case's problem or simulation, at its place in the file where it has one.
@@ -210,6 +223,8 @@ impl Case {
                     Key::Normal => group.normal.as_ref().map(Spanned::span),
                     Key::InPlane => group.in_plane.as_ref().map(Spanned::span),
                     Key::InitialStress => group.initial_stress.as_ref().map(Spanned::span),
+                    Key::UnitWeight => group.unit_weight.as_ref().map(Spanned::span),
+                    Key::Drainage => group.drainage.as_ref().map(Spanned::span),
                 };
                 span.or_else(|| Some(name.span()))
             }),
@@ -242,6 +257,45 @@ impl Case {
                 let input = phase.pressure.get(*number)?;
                 Some(input.line.span())
             }),
+            Item::Force(phase, number) => file.phases.get(*phase).and_then(|phase| {
+                let input = phase.force.get(*number)?;
+                Some(input.line.span())
+            }),
+            Item::Rigid(phase, number) => file
+                .phases
+                .get(*phase)
+                .and_then(|phase| Some(phase.rigid.get(*number)?.span())),
+            Item::Course(phase) => file
+                .phases
+                .get(*phase)
+                .and_then(|phase| Some(phase.course.as_ref()?.span())),
+            Item::Activation {
+                phase,
+                group: of,
+                is_activated,
+            } => file.phases.get(*phase).and_then(|phase| {
+                let names = if *is_activated {
+                    &phase.activate
+                } else {
+                    &phase.deactivate
+                };
+                let (name, _) = group(*of)?;
+                let mut same = names.iter().filter(|other| other.get_ref() == name.get_ref());
+                same.next_back().map(Spanned::span)
+            }),
+            Item::UnitWeight(phase, number) => file.phases.get(*phase).and_then(|phase| {
+                let (_, weight) = phase.unit_weight.get_index(*number)?;
+                Some(weight.span())
+            }),
+            Item::DrainageOf(phase, number) => file.phases.get(*phase).and_then(|phase| {
+                let (_, drainage) = phase.drainage.get_index(*number)?;
+                Some(drainage.span())
+            }),
+            Item::Water(None) => file.water.as_ref().map(|water| water.get_ref().level.span()),
+            Item::Water(Some(phase)) => file
+                .phases
+                .get(*phase)
+                .and_then(|phase| Some(phase.water.as_ref()?.get_ref().level.span())),
         };
         found.unwrap_or(0..0)
     }
@@ -263,10 +317,15 @@ impl Case {
     }
 }
 
-/// Groups whose laws phases swap must be there.
+/// Groups that phases name must be there.
 fn refuse_unknown_groups(source: &Source, file: &CaseFile) -> Result<(), Error> {
     let names = || file.groups.keys().map(|key| key.get_ref().as_str());
-    for group in file.phases.iter().flat_map(|phase| phase.laws.keys()) {
+    let named = file.phases.iter().flat_map(|phase| {
+        let lists = phase.activate.iter().chain(&phase.deactivate);
+        let tables = phase.laws.keys().chain(phase.unit_weight.keys());
+        lists.chain(tables).chain(phase.drainage.keys())
+    });
+    for group in named {
         if !names().any(|name| name == group.get_ref()) {
             let message = format!("there is no group `{}`", group.get_ref());
             return Err(source
@@ -279,10 +338,17 @@ fn refuse_unknown_groups(source: &Source, file: &CaseFile) -> Result<(), Error> 
 }
 
 /// A phase without its laws.
-fn phase(input: &PhaseInput) -> Phase {
+fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, Error> {
     let axes = |axes: &[crate::case::Axis]| -> Vec<Axis> {
         axes.iter().map(|&axis| axis.into()).collect()
     };
+    // Unknown names were refused.
+    let number = |name: &Spanned<String>| {
+        file.groups
+            .keys()
+            .position(|key| key.get_ref() == name.get_ref())
+    };
+    let numbers = |names: &[Spanned<String>]| names.iter().filter_map(number).collect();
     let displacement = input.displacement.iter().map(|input| Displacement {
         line: input.line.get_ref().clone(),
         x: input.x,
@@ -292,24 +358,50 @@ fn phase(input: &PhaseInput) -> Phase {
         line: input.line.get_ref().clone(),
         components: axes(&input.components),
     });
-    let pressure = input.pressure.iter().map(|input| Pressure {
-        line: input.line.get_ref().clone(),
-        value: input.value,
+    let pressure = input.pressure.iter().map(|input| {
+        Ok(Pressure {
+            line: input.line.get_ref().clone(),
+            value: input.value.get_ref().read(source, input.value.span())?,
+        })
     });
-    Phase {
+    let force = input.force.iter().map(|input| Force {
+        line: input.line.get_ref().clone(),
+        x: input.x,
+        y: input.y,
+    });
+    let weights = input.unit_weight.iter();
+    let drainage = input.drainage.iter();
+    let course = input.course.as_ref();
+    let water = input.water.as_ref();
+    Ok(Phase {
         name: input.name.get_ref().clone(),
         increments: *input.increments.get_ref(),
         materials: Vec::new(),
+        activate: numbers(&input.activate),
+        deactivate: numbers(&input.deactivate),
+        unit_weight: weights
+            .filter_map(|(name, weight)| Some((number(name)?, *weight.get_ref())))
+            .collect(),
+        water_level: water
+            .map(|water| level(source, &water.get_ref().level))
+            .transpose()?,
+        drainage: drainage
+            .filter_map(|(name, drainage)| Some((number(name)?, *drainage.get_ref())))
+            .collect(),
+        rigid: input.rigid.iter().map(|line| line.get_ref().clone()).collect(),
+        course: match course {
+            Some(course) if course.get_ref().is_empty() => {
+                let message = "`course` is empty; left out, a phase's loads rise straight";
+                return Err(source.error(course.span(), message).into());
+            }
+            course => course.map(|course| course.get_ref().clone()).unwrap_or_default(),
+        },
+        force: force.collect(),
         reset_displacements: input.reset_displacements,
         displacement: displacement.collect(),
         free: free.collect(),
-        pressure: pressure.collect(),
-    }
-}
-
-/// Components 11 22 33 12.
-fn stress(s: StressInput) -> [f64; 4] {
-    [s.s11, s.s22, s.s33, s.s12]
+        pressure: pressure.collect::<Result<_, Error>>()?,
+    })
 }
 
 /// Laws built so far; each once for every hypothesis.
@@ -374,6 +466,7 @@ impl<'a> LawShelf<'a> {
             built
         };
         let mut material = Material::new(name.get_ref(), built);
+        material.varying = self.varying(entry, hypothesis)?;
         for (variable, value) in &entry.initial {
             if !value.get_ref().is_finite() {
                 let message = "expected a finite number";
@@ -395,6 +488,36 @@ impl<'a> LawShelf<'a> {
                 })?;
         }
         Ok(material)
+    }
+
+    /// Parameters of a law that vary with the height; every value is held against its bounds.
+    fn varying(
+        &self,
+        entry: &LawInput,
+        hypothesis: Hypothesis,
+    ) -> Result<Vec<(String, Profile)>, Error> {
+        let mut varying = Vec::new();
+        for (id, value) in &entry.parameters {
+            if let ParameterValue::Varying(over) = value.get_ref() {
+                let profile = ProfileInput::Over(over.clone()).read(self.source, value.span())?;
+                varying.push((id.get_ref().clone(), profile));
+            }
+        }
+        let most = varying.iter().map(|(_, profile)| profile.points().len()).max();
+        for point in 1..most.unwrap_or(0) {
+            let mut parameters = entry.parameters.clone();
+            for value in parameters.values_mut() {
+                if let ParameterValue::Varying(over) = value.get_mut() {
+                    let last = over.z.len() - 1;
+                    over.z = vec![over.z[point.min(last)]];
+                }
+            }
+            let loaded = self.loaded(entry)?;
+            try_law(&loaded, hypothesis, &parameters).map_err(|failure| {
+                place_failure(self.source, &entry.law, &entry.parameters, &failure)
+            })?;
+        }
+        Ok(varying)
     }
 
     /// Adds what the group expects to an error about the law's hypothesis.

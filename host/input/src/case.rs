@@ -1,12 +1,13 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
+use crate::ground::{ProfileInput, StressInput, WaterChange, WaterInput};
 use crate::material::{ForeignKeys, ParameterTable, ParameterValue};
 use crate::{Error, schema};
 use law::Opener;
 use law::adapter::{Adapter, Externals, Foreign, Scratch};
 use mechanics::Settings;
-use mechanics::problem::{self, Analysis, Formulation, InPlane, Integration};
+use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integration};
 use results::wanted::{Output, Reduce};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, de};
@@ -150,6 +151,9 @@ pub struct CaseFile {
     /// Element groups, by a name that regions refer to.
     #[schemars(with = "BTreeMap<String, GroupInput>")]
     pub groups: Named<GroupInput>,
+    /// Ground water; none if left out.
+    #[schemars(with = "Option<WaterInput>")]
+    pub water: Option<Spanned<WaterInput>>,
     /// Displacements held at zero throughout.
     #[serde(default)]
     pub supports: Vec<SupportInput>,
@@ -366,9 +370,24 @@ pub struct GroupInput {
     /// Thin layer with an interface law: elasticity along the layer.
     #[schemars(with = "Option<InPlane>")]
     pub in_plane: Option<Spanned<InPlane>>,
-    /// Stress before the first phase, components 11 22 33 12, tension positive.
+    /// Effective stress before the first phase, tension positive: components, or earth pressure at rest.
     #[schemars(with = "Option<StressInput>")]
     pub initial_stress: Option<Spanned<StressInput>>,
+    /// Weight of the ground above the water, kN/m³; 0 if left out.
+    #[schemars(with = "Option<f64>")]
+    pub unit_weight: Option<Spanned<f64>>,
+    /// Weight of the ground below the water, kN/m³; `unit_weight` if left out.
+    #[schemars(with = "Option<f64>")]
+    pub saturated_unit_weight: Option<Spanned<f64>>,
+    /// Water fills the pores below the water table, and laws see effective stresses; true if left out.
+    pub pore_water: Option<bool>,
+    /// It is there from the start; true if left out. Phases activate and deactivate.
+    pub active: Option<bool>,
+    /// Whether pore water leaves freely; `drained` if left out.
+    #[schemars(with = "Option<Drainage>")]
+    pub drainage: Option<Spanned<Drainage>>,
+    /// Undrained: Poisson's ratio with the pore water; 0.495 if left out.
+    pub undrained_poisson_ratio: Option<f64>,
 }
 
 /// A coordinate direction.
@@ -391,24 +410,6 @@ impl From<Axis> for problem::Axis {
             Axis::Y => Self::Y,
         }
     }
-}
-
-/// A stress, tension positive.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct StressInput {
-    /// Along x (r).
-    #[serde(rename = "11")]
-    pub s11: f64,
-    /// Along y (z).
-    #[serde(rename = "22")]
-    pub s22: f64,
-    /// Out of plane (hoop).
-    #[serde(rename = "33")]
-    pub s33: f64,
-    /// Shear.
-    #[serde(rename = "12")]
-    pub s12: f64,
 }
 
 /// Displacements of a line held at zero.
@@ -436,6 +437,39 @@ pub struct PhaseInput {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, String>")]
     pub laws: Named<String>,
+    /// Groups that are there from this phase on: solids free of stress, interfaces with the stress
+    /// beside them.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub activate: Vec<Spanned<String>>,
+    /// Groups that are gone from this phase on; what they carried is released in its course.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub deactivate: Vec<Spanned<String>>,
+    /// Unit weights of groups at the end of the phase, above and below the water, kN/m³.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub unit_weight: Named<f64>,
+    /// Water table at the end of the phase.
+    #[schemars(with = "Option<WaterChange>")]
+    pub water: Option<Spanned<WaterChange>>,
+    /// Whether pore water of groups leaves freely from this phase on. Pressure that is left goes in the
+    /// phase's course.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, Drainage>")]
+    pub drainage: Named<Drainage>,
+    /// Lines whose nodes move alike from this phase on, without turning; where a line reaches the axis of
+    /// symmetry, not radially.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub rigid: Vec<Spanned<String>>,
+    /// Pairs of time (0 to 1) and factor on what this phase changes of loads and displacements; straight
+    /// from 0 to 1 if left out.
+    #[schemars(with = "Option<Vec<[f64; 2]>>")]
+    pub course: Option<Spanned<Vec<[f64; 2]>>>,
+    /// Forces, as totals at the end of the phase.
+    #[serde(default)]
+    pub force: Vec<ForceInput>,
     /// Displacements are counted from the start of this phase.
     #[serde(default)]
     pub reset_displacements: bool,
@@ -484,8 +518,25 @@ pub struct PressureInput {
     /// The line.
     #[schemars(with = "String")]
     pub line: Spanned<String>,
-    /// Towards the body positive.
-    pub value: f64,
+    /// Towards the body positive; a number, or values over the height.
+    #[schemars(with = "ProfileInput")]
+    pub value: Spanned<ProfileInput>,
+}
+
+/// A force on a line, spread evenly over it: kN over the whole turn, in plane strain kN/m.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(transform = schema::radius_and_axis)]
+#[serde(deny_unknown_fields)]
+pub struct ForceInput {
+    /// The line.
+    #[schemars(with = "String")]
+    pub line: Spanned<String>,
+    /// In x (r).
+    #[serde(alias = "r")]
+    pub x: Option<f64>,
+    /// In y (z).
+    #[serde(alias = "z")]
+    pub y: Option<f64>,
 }
 
 /// A quantity written for every increment.

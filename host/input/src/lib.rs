@@ -7,6 +7,7 @@ pub mod driver;
 mod error;
 pub mod figures;
 pub mod grid;
+pub mod ground;
 pub mod incremental_driver;
 pub mod lock;
 pub mod material;

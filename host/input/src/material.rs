@@ -1,6 +1,7 @@
 //! Laws as files name them: where their libraries are, and what their parameters are.
 
 use crate::Error;
+use crate::ground::Over;
 use abi::Hypothesis;
 use law::adapter::{Adapter, Externals, Foreign, Scratch};
 use law::{BuildCause, BuildFailure, BuiltLaw, LoadedLaw, SearchPath, Value};
@@ -12,7 +13,11 @@ use toml::Spanned;
 
 /// The value of a parameter as written in a file.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
-#[serde(untagged, expecting = "expected a number, or a text in quotes")]
+#[serde(
+    untagged,
+    expecting = "expected a number, a text in quotes, or in a case values over the height such as \
+                 `{ z = [[-10.0, 5.0], [0.0, 1.0]] }`"
+)]
 pub enum ParameterValue {
     /// A number.
     Number(f64),
@@ -20,6 +25,8 @@ pub enum ParameterValue {
     Integer(i64),
     /// The label of a choice.
     Label(String),
+    /// In a case: values over the height; each element takes that at its centre.
+    Varying(Over),
 }
 
 /// Parameters of a law as written in a file.
@@ -49,6 +56,11 @@ pub fn build_law(
     hypothesis: Hypothesis,
     parameters: &ParameterTable,
 ) -> Result<BuiltLaw, Error> {
+    let varies = |value: &&Spanned<ParameterValue>| matches!(value.get_ref(), ParameterValue::Varying(_));
+    if let Some(value) = parameters.values().find(varies) {
+        let message = "one point has no height for a parameter to vary with";
+        return Err(source.error(value.span(), message).into());
+    }
     try_law(loaded, hypothesis, parameters)
         .map_err(|failure| place_failure(source, id, parameters, &failure))
 }
@@ -98,6 +110,8 @@ impl From<&ParameterValue> for Value {
             ParameterValue::Number(number) => Self::Number(*number),
             ParameterValue::Integer(number) => Self::Number(*number as f64),
             ParameterValue::Label(label) => Self::Label(label.clone()),
+            // Stands for all of them where one law is looked at.
+            ParameterValue::Varying(over) => Self::Number(over.z.first().map_or(0.0, |p| p[1])),
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::Error;
 use crate::build::{Laws, line};
-use crate::case::{Case, PhaseInput, ProbeInput};
+use crate::case::{Case, ProbeInput};
 use mechanics::group::Group;
 use mechanics::mesh::Mesh;
-use mechanics::model::unit_pressure;
+use mechanics::Problem;
+use mechanics::ground::pressure_on;
 use mechanics::problem::Formulation;
 use mechanics::settings::Control;
 use mechanics::{Place, Simulation};
@@ -393,7 +394,8 @@ impl Resolver<'_> {
 
 /// Probes of the reaction of a line that is also under pressure: the reaction is what the support
 /// adds to it.
-pub(crate) fn reactions(case: &Case, mesh: &Mesh) -> Vec<String> {
+pub(crate) fn reactions(case: &Case, problem: &Problem) -> Vec<String> {
+    let mesh = &problem.mesh;
     let middles = |line: &str| -> HashSet<[u64; 2]> {
         let edges = mesh.lines.get(line).map_or(&[][..], |line| &line.edges);
         let middle = |&edge: &(usize, usize)| mesh.nodes[mesh.edge(edge)[2]].map(f64::to_bits);
@@ -413,25 +415,22 @@ pub(crate) fn reactions(case: &Case, mesh: &Mesh) -> Vec<String> {
         };
         let read = middles(line.get_ref());
         // The largest share of a pressure, with its phase and line.
-        let mut largest: Option<(f64, &PhaseInput, &str)> = None;
-        for phase in &case.file.phases {
+        let mut largest: Option<(f64, &str, &str)> = None;
+        for phase in &problem.phases {
             for pressure in &phase.pressure {
-                let under = pressure.line.get_ref().as_str();
+                let under = pressure.line.as_str();
                 let edges = mesh.lines.get(under).map_or(&[][..], |line| &line.edges);
                 let shared = edges.iter().copied().filter(|&edge| {
                     read.contains(&mesh.nodes[mesh.edge(edge)[2]].map(f64::to_bits))
                 });
                 let shared: Vec<(usize, usize)> = shared.collect();
-                if shared.is_empty() || pressure.value == 0.0 {
-                    continue;
-                }
-                let force = unit_pressure(case.file.analysis, mesh, &shared);
+                let force = pressure_on(problem.analysis, mesh, &shared, &pressure.value);
                 let sum = |c: usize| force.iter().skip(c).step_by(2).sum::<f64>();
                 let size: f64 = force.iter().map(|f| f.abs()).sum();
-                let share = pressure.value * sum(component);
+                let share = sum(component);
                 let is_more = largest.is_none_or(|(other, _, _)| share.abs() > other.abs());
                 if sum(component).abs() > NOTHING * size && is_more {
-                    largest = Some((share, phase, under));
+                    largest = Some((share, &phase.name, under));
                 }
             }
         }
@@ -444,7 +443,7 @@ pub(crate) fn reactions(case: &Case, mesh: &Mesh) -> Vec<String> {
                 name.get_ref(),
                 quantity.get_ref(),
                 line.get_ref(),
-                phase.name.get_ref(),
+                phase,
             ));
         }
     }

@@ -14,5 +14,5 @@ mod loading;
 
 pub use column::Columns;
 pub(crate) use initial::{InitialStresses, beside_joints};
-pub use loading::Loading;
+pub use loading::{Loading, pressure_on};
 pub(crate) use loading::unit_pressure;

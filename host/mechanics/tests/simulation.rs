@@ -116,7 +116,7 @@ fn sliding(mesh: fn(Mesh) -> Mesh, friction_angle: f64) -> Problem {
     let mut press = Phase::new("press", 2);
     press.pressure = vec![Pressure {
         line: "top".to_owned(),
-        value: 100.0,
+        value: 100.0.into(),
     }];
     press.displacement = vec![moved("top", Some(0.0), None)];
     let mut push = Phase::new("push", 8);

@@ -108,23 +108,7 @@ impl Loading {
             let Some(line) = mesh.lines.get(line) else {
                 continue;
             };
-            let own = if value.is_constant() {
-                let mut unit = unit_pressure(analysis, mesh, &line.edges);
-                let value = value.at(0.0);
-                unit.iter_mut().for_each(|force| *force *= value);
-                unit
-            } else {
-                let kinks = value.points().iter().map(|&[y, _]| y);
-                let kinks: Vec<f64> = kinks.collect();
-                let mut own = vec![0.0; force.len()];
-                for &edge in &line.edges {
-                    let kinks = kinks.iter().map(|&y| move |at: [f64; 2]| at[1] - y);
-                    over_edge(mesh, analysis, edge, kinks, &mut own, |at, inward| {
-                        inward.map(|part| part * value.at(at[1]))
-                    });
-                }
-                own
-            };
+            let own = pressure_on(analysis, mesh, &line.edges, value);
             force.iter_mut().zip(own).for_each(|(force, own)| *force += own);
         }
         for (line, total) in &self.force {
@@ -291,6 +275,30 @@ fn add_spread(problem: &Problem, line: &str, total: [f64; 2], force: &mut [f64])
             force[2 * node + c] += total[c] * share[2 * node] / area;
         }
     }
+}
+
+/// Nodal forces of a pressure on edges.
+pub fn pressure_on(
+    analysis: Analysis,
+    mesh: &Mesh,
+    edges: &[(usize, usize)],
+    value: &Profile,
+) -> Vec<f64> {
+    if value.is_constant() {
+        let mut unit = unit_pressure(analysis, mesh, edges);
+        let value = value.at(0.0);
+        unit.iter_mut().for_each(|force| *force *= value);
+        return unit;
+    }
+    let kinks: Vec<f64> = value.points().iter().map(|&[y, _]| y).collect();
+    let mut own = vec![0.0; 2 * mesh.nodes.len()];
+    for &edge in edges {
+        let kinks = kinks.iter().map(|&y| move |at: [f64; 2]| at[1] - y);
+        over_edge(mesh, analysis, edge, kinks, &mut own, |at, inward| {
+            inward.map(|part| part * value.at(at[1]))
+        });
+    }
+    own
 }
 
 /// Nodal forces of a unit pressure on a boundary line.

@@ -52,8 +52,6 @@ pub enum Item {
     DrainageOf(usize, usize),
     /// The water, or what a phase makes of it.
     Water(Option<usize>),
-    /// A parameter of a material that varies, by names.
-    Varying(String, String),
 }
 
 /// What is said of a group.
@@ -252,10 +250,6 @@ pub enum Cause {
         /// What the law makes of them.
         returned: [f64; 2],
     },
-    /// A law's elasticity does not suit undrained ground.
-    Undrained(String),
-    /// A value of a parameter that varies does not fit.
-    Varies(String),
     /// A joint in a group that is not one of zero-thickness elements, or a solid in one that is.
     OtherElements(String, Formulation),
     /// An element or a line refers to what there is not.
@@ -449,8 +443,6 @@ impl fmt::Display for Cause {
                  `{material}`: at ({x:.4}, {y:.4}) horizontal {h:.4}, vertical {v:.4} kPa, where the \
                  law returns {r_h:.4} and {r_v:.4}"
             ),
-            Self::Undrained(why) => write!(f, "undrained ground: {why}"),
-            Self::Varies(why) => write!(f, "{why}"),
             Self::OtherElements(group, formulation) => write!(
                 f,
                 "group `{group}` has elements that are not of its formulation `{}`",

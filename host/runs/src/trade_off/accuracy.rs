@@ -97,6 +97,7 @@ fn parameters((law, values, _): &(String, Vec<(String, ParameterValue)>, String)
             ParameterValue::Number(number) => number.to_string(),
             ParameterValue::Integer(number) => number.to_string(),
             ParameterValue::Label(label) => format!("{label:?}"),
+            ParameterValue::Varying(over) => format!("{:?}", over.z),
         };
         format!("{law}.{id} = {value}")
     };

@@ -1,0 +1,215 @@
+//! Ground in a case file: profiles over the height, water, stress before the first phase.
+
+use crate::Error;
+use mechanics::problem::{AtRest, InitialStress, Profile, Ratio, Water};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::ops::Range;
+use text::Source;
+use toml::Spanned;
+
+/// A value, or values over the height.
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or values over the height such as `{ z = [[-10.0, 5.0], [0.0, 1.0]] }`"
+)]
+pub enum ProfileInput {
+    /// The same everywhere.
+    Number(f64),
+    /// Points (height, value), height rising: linear between, constant beyond.
+    Points(Vec<[f64; 2]>),
+    /// The same under the name of the height.
+    Over(Over),
+}
+
+/// Values over the height.
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Over {
+    /// Points (height, value), height rising: linear between, constant beyond.
+    #[serde(alias = "y")]
+    pub z: Vec<[f64; 2]>,
+}
+
+impl ProfileInput {
+    /// The profile it stands for.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] where heights do not rise, or a number is none.
+    pub(crate) fn read(&self, source: &Source, at: Range<usize>) -> Result<Profile, Error> {
+        let points = match self {
+            Self::Number(value) => vec![[0.0, *value]],
+            Self::Points(points) | Self::Over(Over { z: points }) => points.clone(),
+        };
+        Profile::new(points).ok_or_else(|| {
+            let message = "a profile needs points [height, value] of finite numbers, height rising";
+            source.error(at, message).into()
+        })
+    }
+}
+
+/// Ground water.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WaterInput {
+    /// Level of the water table, or points (x, level) from left to right.
+    #[schemars(with = "LevelInput")]
+    pub level: Spanned<LevelInput>,
+    /// Unit weight of the water, kN/m³.
+    #[serde(default = "of_water")]
+    pub unit_weight: f64,
+}
+
+/// The water table of a phase.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WaterChange {
+    /// Level of the water table at the end of the phase, or points (x, level) from left to right.
+    #[schemars(with = "LevelInput")]
+    pub level: Spanned<LevelInput>,
+}
+
+/// Level of a water table.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a level, or points `[[x, z], …]` from left to right"
+)]
+pub enum LevelInput {
+    /// The same everywhere.
+    Level(f64),
+    /// Points (x, level), x rising: linear between, constant beyond.
+    Points(Vec<[f64; 2]>),
+}
+
+fn of_water() -> f64 {
+    9.81
+}
+
+/// The profile of a level over x.
+pub(crate) fn level(source: &Source, level: &Spanned<LevelInput>) -> Result<Profile, Error> {
+    let points = match level.get_ref() {
+        LevelInput::Level(level) => vec![[0.0, *level]],
+        LevelInput::Points(points) => points.clone(),
+    };
+    Profile::new(points).ok_or_else(|| {
+        let message = "a water table needs points [x, z] of finite numbers, from left to right";
+        source.error(level.span(), message).into()
+    })
+}
+
+impl WaterInput {
+    /// The water it stands for.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] where the level is none.
+    pub(crate) fn read(&self, source: &Source) -> Result<Water, Error> {
+        Ok(Water {
+            level: level(source, &self.level)?,
+            unit_weight: self.unit_weight,
+        })
+    }
+}
+
+/// Effective stress before the first phase, tension positive, kPa: components, constant or over the
+/// height; or earth pressure at rest under the weight of the ground, by `k_0` or by `friction_angle`.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct StressInput {
+    /// Along x (r).
+    #[serde(rename = "stress_11", alias = "11")]
+    #[schemars(with = "Option<ProfileInput>")]
+    pub s11: Option<Spanned<ProfileInput>>,
+    /// Along y (z).
+    #[serde(rename = "stress_22", alias = "22")]
+    #[schemars(with = "Option<ProfileInput>")]
+    pub s22: Option<Spanned<ProfileInput>>,
+    /// Out of plane (hoop).
+    #[serde(rename = "stress_33", alias = "33")]
+    #[schemars(with = "Option<ProfileInput>")]
+    pub s33: Option<Spanned<ProfileInput>>,
+    /// Shear.
+    #[serde(rename = "stress_12", alias = "12")]
+    #[schemars(with = "Option<ProfileInput>")]
+    pub s12: Option<Spanned<ProfileInput>>,
+    /// At rest: what the horizontal effective stress is of the vertical one.
+    #[schemars(with = "Option<ProfileInput>")]
+    pub k_0: Option<Spanned<ProfileInput>>,
+    /// At rest: angle of friction in degrees, of which `k_0` of normally consolidated ground follows.
+    #[schemars(with = "Option<ProfileInput>")]
+    pub friction_angle: Option<Spanned<ProfileInput>>,
+    /// At rest: overconsolidation ratio; 1 if left out.
+    #[schemars(with = "Option<ProfileInput>")]
+    pub ocr: Option<Spanned<ProfileInput>>,
+    /// At rest: pre-overburden pressure, kPa; 0 if left out.
+    #[schemars(with = "Option<ProfileInput>")]
+    pub pop: Option<Spanned<ProfileInput>>,
+    /// At rest: Poisson's ratio of unloading; needed where `ocr` or `pop` is given.
+    pub poisson_ratio: Option<f64>,
+    /// At rest: added to the vertical effective stress, kPa.
+    pub surcharge: Option<f64>,
+}
+
+impl StressInput {
+    /// The stress it stands for; `at`: where it is written.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] where keys do not go together, or a profile is none.
+    pub(crate) fn read(&self, source: &Source, at: Range<usize>) -> Result<InitialStress, Error> {
+        let components = [&self.s11, &self.s22, &self.s33, &self.s12];
+        let profile = |input: &Spanned<ProfileInput>| input.get_ref().read(source, input.span());
+        let optional = |input: &Option<Spanned<ProfileInput>>| input.as_ref().map(profile).transpose();
+        let wrong = |at: Range<usize>, why: &str| Err(source.error(at, why).into());
+        let is_at_rest = self.k_0.is_some() || self.friction_angle.is_some();
+        if !is_at_rest {
+            let alone = [("ocr", &self.ocr), ("pop", &self.pop)];
+            if let Some((key, input)) = alone.into_iter().find_map(|(k, i)| Some((k, i.as_ref()?))) {
+                return wrong(input.span(), &format!("`{key}` needs a `friction_angle`"));
+            }
+            if self.surcharge.is_some() || self.poisson_ratio.is_some() {
+                return wrong(at, "`surcharge` and `poisson_ratio` go with `k_0` or `friction_angle`");
+            }
+            let profiles = components.map(optional);
+            let [s11, s22, s33, s12] = profiles;
+            let profiles = [s11?, s22?, s33?, s12?].map(|p| p.unwrap_or_else(|| 0.0.into()));
+            return Ok(if profiles.iter().all(Profile::is_constant) {
+                InitialStress::Constant(profiles.map(|profile| profile.at(0.0)))
+            } else {
+                InitialStress::Profiles(Box::new(profiles))
+            });
+        }
+        if let Some(given) = components.into_iter().flatten().next() {
+            return wrong(given.span(), "components do not go with earth pressure at rest");
+        }
+        let ratio = match (&self.k_0, &self.friction_angle) {
+            (Some(_), Some(angle)) => {
+                return wrong(angle.span(), "give `k_0` or `friction_angle`, not both");
+            }
+            (Some(k_0), None) => {
+                let others = [&self.ocr, &self.pop].into_iter().flatten().next();
+                if let Some(other) = others {
+                    return wrong(other.span(), "`ocr` and `pop` go with `friction_angle`, not with `k_0`");
+                }
+                Ratio::K0(profile(k_0)?)
+            }
+            (None, Some(angle)) => {
+                let unloads = self.ocr.is_some() || self.pop.is_some();
+                if unloads && self.poisson_ratio.is_none() {
+                    return wrong(at, "`ocr` and `pop` need a `poisson_ratio` of unloading");
+                }
+                Ratio::Overconsolidated {
+                    friction_angle: profile(angle)?,
+                    ocr: optional(&self.ocr)?.unwrap_or_else(|| 1.0.into()),
+                    pop: optional(&self.pop)?.unwrap_or_else(|| 0.0.into()),
+                    poisson_ratio: self.poisson_ratio.unwrap_or(0.0),
+                }
+            }
+            (None, None) => Ratio::K0(1.0.into()),
+        };
+        Ok(InitialStress::AtRest(AtRest {
+            ratio,
+            surcharge: self.surcharge.unwrap_or(0.0),
+        }))
+    }
+}
