@@ -6,10 +6,12 @@ pub mod case;
 pub mod driver;
 mod error;
 pub mod figures;
-pub mod grid;
+mod gmsh;
+mod grid;
 pub mod incremental_driver;
 pub mod lock;
 pub mod material;
+pub mod mesh;
 pub mod probes;
 pub mod schema;
 

@@ -149,7 +149,11 @@ fn area_groups_and_lines_stay() {
             // The quadrature's error goes down with the sixth power of the size.
             let quadrature = f64::max(1e-14, 1e-3 / 64.0_f64.powi(n));
             length_is("between", parabola(1.0, bulge), quadrature);
-            length_is("long", parabola(2.0_f64.sqrt(), bulge * 2.0_f64.sqrt()), quadrature);
+            length_is(
+                "long",
+                parabola(2.0_f64.sqrt(), bulge * 2.0_f64.sqrt()),
+                quadrature,
+            );
             assert_eq!(fine.lines["tip"], coarse.lines["tip"]);
             assert_eq!(fine.nodes[4], [2.0, 0.0]);
         }
@@ -173,7 +177,9 @@ fn a_grid_becomes_the_finer_grid() {
     let places = |mesh: &Mesh| {
         let elements = mesh.solids.iter().map(|solid| {
             let nodes = solid.nodes().iter();
-            let mut nodes: Vec<_> = nodes.map(|&node| mesh.nodes[node].map(f64::to_bits)).collect();
+            let mut nodes: Vec<_> = nodes
+                .map(|&node| mesh.nodes[node].map(f64::to_bits))
+                .collect();
             nodes.sort_unstable();
             nodes
         });
@@ -182,9 +188,11 @@ fn a_grid_becomes_the_finer_grid() {
         elements
     };
     let coarse = Mesh::grid(&[0.0, 1.0, 4.0], &[-2.0, 0.0], |column, _| column);
-    let fine = Mesh::grid(&[0.0, 0.5, 1.0, 2.5, 4.0], &[-2.0, -1.0, 0.0], |column, _| {
-        column / 2
-    });
+    let fine = Mesh::grid(
+        &[0.0, 0.5, 1.0, 2.5, 4.0],
+        &[-2.0, -1.0, 0.0],
+        |column, _| column / 2,
+    );
     let refined = coarse.refined();
     check_conformity(&refined);
     assert_eq!(places(&refined), places(&fine));
