@@ -338,6 +338,10 @@ fn every_example_runs() {
     for (command, name) in runs {
         let place = TempDir::new().unwrap();
         let text = fs::read_to_string(page(name)).unwrap();
+        for mesh in blocks(&text).iter().filter(|b| b.language == "msh") {
+            let name = mesh.text.lines().next().unwrap().strip_prefix("# ");
+            fs::write(place.path().join(name.unwrap()), &mesh.text).unwrap();
+        }
         let mut ran = 0;
         for (number, block) in blocks(&text)
             .iter()
