@@ -282,7 +282,11 @@ fn settlement(lines: &[&str]) -> Vec<f64> {
 fn joints_may_end_on_one_another() {
     let one = settlement(&["middle", "stub"]);
     let without = settlement(&["middle"]);
-    assert!(one.iter().zip(&without).any(|(a, b)| (a / b - 1.0).abs() > 1e-6));
+    assert!(
+        one.iter()
+            .zip(&without)
+            .any(|(a, b)| (a / b - 1.0).abs() > 1e-6)
+    );
     for lines in [
         &["stub", "middle"][..],
         &["stub", "west", "centre", "east"],

@@ -62,8 +62,13 @@ pub fn build(source: &Source, file: &CaseFile) -> Result<Built, Error> {
             Built { mesh, file: None }
         }
         _ => {
-            let span = grid_key(&file.mesh).map_or(0..0, |(_, span)| span);
-            let message = "the mesh needs `columns` and `rows` of a grid, or a `file`";
+            let place = grid_key(&file.mesh);
+            let message = match (columns, rows) {
+                (Some(_), None) => "missing key `rows`",
+                (None, Some(_)) => "missing key `columns`",
+                _ => "the mesh needs `columns` and `rows` of a grid, or a `file`",
+            };
+            let span = place.map_or(0..0, |(_, span)| span);
             return Err(source.error(span, message).into());
         }
     };

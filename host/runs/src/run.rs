@@ -101,8 +101,8 @@ pub fn run_reusing(
         mesh_file,
         notes,
     } = case.pose()?;
-    let reuse = std::mem::take(reuse);
-    let mut simulation = Simulation::reusing(problem, reuse).map_err(|error| case.place(error))?;
+    let mut simulation =
+        Simulation::reusing(problem, std::mem::take(reuse)).map_err(|error| case.place(error))?;
     let wanted = case.wanted(&simulation)?;
     let about = case.about(&laws, mesh_file.as_ref());
     let identity = identity(case, &laws, mesh_file.as_ref());
