@@ -350,3 +350,108 @@ fn joints_may_cross() {
         }
     }
 }
+
+/// Two blocks of 1 m by 0.5 m, the upper one in a hollow of this depth, as Gmsh writes them.
+fn blocks(depth: f64) -> String {
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n5\n1 1 \"bottom\"\n1 2 \"between\"\n\
+         1 3 \"top\"\n2 4 \"soil\"\n0 5 \"corner\"\n$EndPhysicalNames\n$Nodes\n13\n1 0 0 0\n\
+         2 1 0 0\n3 1 0.5 0\n4 0 0.5 0\n5 1 1 0\n6 0 1 0\n7 0.5 0 0\n8 1 0.25 0\n9 0.5 {} 0\n\
+         10 0 0.25 0\n11 1 0.75 0\n12 0.5 1 0\n13 0 0.75 0\n$EndNodes\n$Elements\n6\n\
+         1 8 2 1 1 1 2 7\n2 8 2 2 2 3 4 9\n3 8 2 3 3 6 5 12\n4 16 2 4 1 1 2 3 4 7 8 9 10\n\
+         5 16 2 4 2 4 3 5 6 9 11 12 13\n6 15 2 5 2 2\n$EndElements\n",
+        0.5 - depth
+    )
+}
+
+/// Blocks with a joint between them, pressed and pushed.
+fn two_blocks(mesh: &str) -> String {
+    format!(
+        "analysis = \"plane_strain\"\n{mesh}\n\
+         [laws.soil]\nlaw = \"elastic\"\n\
+         parameters = {{ young_modulus = 1e4, poisson_ratio = 0.3 }}\n\
+         [laws.joint]\nlaw = \"coulomb_joint\"\n[laws.joint.parameters]\n\
+         normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
+         dilatancy_angle = 5.0\n\
+         [groups]\nsoil = {{ formulation = \"solid\", law = \"soil\" }}\n\
+         joint = {{ formulation = \"zero_thickness\", law = \"joint\", line = \"between\" }}\n\
+         [[supports]]\nline = \"bottom\"\nfixed = [\"x\", \"y\"]\n\
+         [[phase]]\nname = \"press\"\nincrements = 2\n\
+         pressure = [{{ line = \"top\", value = 10.0 }}]\n\
+         [[phase]]\nname = \"push\"\nincrements = 4\n\
+         displacement = [{{ line = \"top\", x = 2e-3 }}]\n\
+         [probes]\n\
+         settlement = {{ line = \"top\", quantity = \"displacement_y\" }}\n\
+         push = {{ line = \"top\", quantity = \"reaction_x\" }}\n\
+         tau = {{ group = \"joint\", quantity = \"traction_t\", reduce = \"integral\" }}\n"
+    )
+}
+
+/// A mesh from a file gives what the same grid gives; names that the case does not use are told once.
+#[test]
+fn a_mesh_from_a_file_is_that_of_the_grid() {
+    const GRID: &str = "mesh.columns = [{ n = 1, to = 1.0 }]\nmesh.rows = [{ n = 2, to = 1.0 }]\n\
+        mesh.region = [{ group = \"soil\" }]\nmesh.lines = { bottom = { y = 0.0 }, \
+        between = { y = 0.5 }, top = { y = 1.0 } }";
+    let place = Place::new();
+    let history = |mesh: &str| {
+        let outcome = place.run_case(two_blocks(mesh));
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let columns = ["settlement", "push", "tau"];
+        let values = columns.map(|c| tests::case::column(&place.path("out/history.csv"), c));
+        (values.concat(), outcome.stderr)
+    };
+    place.write("blocks.msh", blocks(0.0));
+    let (grid, _) = history(GRID);
+    let (file, said) = history("mesh.file = \"blocks.msh\"");
+    for (file, grid) in file.iter().zip(&grid) {
+        approx::assert_relative_eq!(file, grid, max_relative = 1e-12);
+    }
+    let unused = "blocks.msh: physical curves and points that the case does not use: `corner`";
+    assert_eq!(said.matches("the case does not use").count(), 1, "{said}");
+    assert!(said.replace('\n', " ").contains(unused), "{said}");
+    // With the ends of lines that Windows writes.
+    place.write("blocks.msh", blocks(0.0).replace('\n', "\r\n"));
+    let (again, _) = history("mesh = { file = \"blocks.msh\", scale = 1.0 }");
+    assert_eq!(again, file);
+    // In a hollow the joint resists more.
+    place.write("blocks.msh", blocks(0.1));
+    let (hollow, _) = history("mesh.file = \"blocks.msh\"");
+    let last = grid.len() * 2 / 3 - 1;
+    assert!(
+        hollow[last].abs() > 1.01 * grid[last].abs(),
+        "{hollow:?} {grid:?}"
+    );
+}
+
+/// What is wrong with a mesh's file is told with its line, and the exit code is that of bad input.
+#[test]
+fn refuses_mesh_files_that_are_wrong() {
+    let place = Place::new();
+    for (old, new, says) in [
+        (
+            "8 1 0.25 0",
+            "8 1 0.25 0.1",
+            "line 22: node 8 is at z = 0.1",
+        ),
+        (
+            "5 16 2 4 2",
+            "5 3 2 4 2",
+            "line 35: an element of type 3 is a quad of 4 nodes",
+        ),
+        ("$EndNodes", "$EndKnots", "line 28: expected `$EndNodes`"),
+    ] {
+        assert_eq!(blocks(0.0).matches(old).count(), 1, "{old}");
+        place.write("blocks.msh", blocks(0.0).replace(old, new));
+        let outcome = place.run_case(two_blocks("mesh.file = \"blocks.msh\""));
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(
+            outcome.says(says) && outcome.says("cannot read blocks.msh"),
+            "{}",
+            outcome.stderr
+        );
+    }
+    let outcome = place.run_case(two_blocks("mesh.file = \"none.msh\""));
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("cannot read none.msh"), "{}", outcome.stderr);
+}

@@ -91,6 +91,24 @@ fn unreadable(path: &Path, source: io::Error) -> text::Error {
     }
 }
 
+/// The whole mesh of a file in plane strain: every physical surface is a group, in their order.
+///
+/// # Errors
+/// What is wrong with the file, and where.
+pub fn whole(bytes: &[u8]) -> Result<Mesh, String> {
+    let contents = Contents::read(bytes)?;
+    let [points, curves, surfaces] = counts(&contents);
+    let names = |counts: &'_ Counts| counts.keys().cloned().collect::<Vec<_>>();
+    let (surfaces, lines) = (names(&surfaces), [names(&curves), names(&points)].concat());
+    let wanted = Wanted {
+        groups: surfaces.iter().map(String::as_str).zip(0..).collect(),
+        lines: lines.iter().map(String::as_str).collect(),
+        analysis: Analysis::PlaneStrain,
+        scale: 1.0,
+    };
+    assemble::assemble(&contents, &wanted).map(|(mesh, _)| mesh)
+}
+
 /// What the case takes from the file, which must be there.
 fn wanted<'c>(
     source: &Source,

@@ -6,7 +6,7 @@ pub mod case;
 pub mod driver;
 mod error;
 pub mod figures;
-mod gmsh;
+pub mod gmsh;
 mod grid;
 pub mod incremental_driver;
 pub mod lock;

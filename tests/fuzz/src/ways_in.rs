@@ -42,6 +42,14 @@ pub(crate) fn mesh(case: &Case) -> Result<Mesh, Error> {
     Ok(input::mesh::build(&case.source, &case.file)?.mesh)
 }
 
+/// A mesh file of Gmsh.
+///
+/// # Errors
+/// What is wrong with it.
+pub(crate) fn mesh_file(bytes: &[u8]) -> Result<Mesh, String> {
+    input::gmsh::whole(bytes)
+}
+
 /// A driver file with all its variants.
 ///
 /// # Errors
