@@ -9,6 +9,9 @@ use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::Analysis;
 use std::collections::{HashMap, HashSet};
 
+/// Nodes of a mesh, and their numbers by those of the file.
+type Numbered = (Vec<[f64; 2]>, HashMap<usize, usize>);
+
 /// Largest coordinate, m.
 const FARTHEST: f64 = 1e9;
 /// Lengths within this fraction of the mesh's size are none.
@@ -82,7 +85,7 @@ impl Assembly<'_> {
     fn take_elements(&mut self) -> Result<(), Fault> {
         let contents = self.contents;
         let mut group_of_set: HashMap<(u8, usize), Vec<usize>> = HashMap::new();
-        for element in contents.elements.iter().filter(|e| is_surface(e)) {
+        for element in contents.elements.iter().filter(|e| e.kind.dimension() == 2) {
             let groups = group_of_set
                 .entry(Contents::set_of(element))
                 .or_insert_with(|| {
@@ -139,7 +142,7 @@ impl Assembly<'_> {
     fn leave_out(&mut self) -> Result<(), Fault> {
         let contents = self.contents;
         let mut left: IndexMap<(u8, usize), (&Element, usize)> = IndexMap::new();
-        for element in contents.elements.iter().filter(|e| is_surface(e)) {
+        for element in contents.elements.iter().filter(|e| e.kind.dimension() == 2) {
             let nodes = contents.nodes_of(element)?;
             let mut key = nodes;
             key.sort_unstable();
@@ -182,7 +185,7 @@ impl Assembly<'_> {
     }
 
     /// The nodes of the mesh, and their numbers by those of the file.
-    fn nodes(&mut self) -> Result<(Vec<[f64; 2]>, HashMap<usize, usize>), Fault> {
+    fn nodes(&mut self) -> Result<Numbered, Fault> {
         let Self {
             contents, wanted, ..
         } = *self;
@@ -402,12 +405,12 @@ impl Assembly<'_> {
     fn note_cracks(&mut self, mesh: &Mesh) {
         let size = mesh.longer_side();
         let grain = if size > 0.0 { NOTHING * size } else { 1.0 };
-        let mut at = HashMap::new();
+        let mut known = HashSet::new();
         let mut twins = 0;
         let mut first = None;
         for node in &mesh.nodes {
             let key = node.map(|c| (c / grain).round() as i64);
-            if at.insert(key, ()).is_some() {
+            if !known.insert(key) {
                 twins += 1;
                 first.get_or_insert(*node);
             }
@@ -420,10 +423,6 @@ impl Assembly<'_> {
             ));
         }
     }
-}
-
-fn is_surface(element: &&Element) -> bool {
-    element.kind.dimension() == 2
 }
 
 /// `1 node is`, `2 nodes are`.

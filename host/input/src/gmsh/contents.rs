@@ -50,7 +50,7 @@ enum Version {
 /// Sets of physical groups, by what refers to them.
 #[derive(Debug, Default)]
 struct Sets {
-    sets: Vec<Vec<i64>>,
+    all: Vec<Vec<i64>>,
     /// Format 4.1: by dimension and number of the part of the geometry.
     of_entity: HashMap<(i64, i64), usize>,
     has_entities: bool,
@@ -122,7 +122,7 @@ impl<'a> Contents<'a> {
             read.push(name);
         }
         let mut contents = reader.contents;
-        contents.sets = reader.sets.sets;
+        contents.sets = reader.sets.all;
         for wanted in ["Nodes", "Elements"] {
             if !read.iter().any(|name| name == wanted) {
                 let at = contents.cursor.at();
@@ -291,8 +291,8 @@ impl Reader<'_> {
                         cursor.integer("a bounding entity")?;
                     }
                 }
-                let set = self.sets.sets.len();
-                self.sets.sets.push(groups);
+                let set = self.sets.all.len();
+                self.sets.all.push(groups);
                 let key = (dimension as i64, number);
                 if self.sets.of_entity.insert(key, set).is_some() {
                     let message = format!("entity {number} of dimension {dimension} comes twice");
@@ -532,7 +532,7 @@ impl Reader<'_> {
         for node in &mut nodes[..kind.n_nodes()] {
             *node = self.natural("a node of an element")?;
         }
-        let sets = &mut self.sets.sets;
+        let sets = &mut self.sets.all;
         let set = *self.sets.of_group.entry(group).or_insert_with(|| {
             sets.push(if group == 0 { Vec::new() } else { vec![group] });
             sets.len() - 1
