@@ -567,7 +567,7 @@ impl GroupBuilder<'_> {
         let mut stress = Vec::with_capacity(kinematics.n_components() * kinematics.n_points());
         for point in 0..kinematics.n_points() {
             let element = point / kinematics.points_per_element();
-            let axes = kinematics.axes(element);
+            let axes = kinematics.axes_at(point);
             if kinematics.n_components() == 4 {
                 stress.extend(axes.stress_from_global(given.unwrap_or_default()));
             } else {
