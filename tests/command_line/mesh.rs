@@ -255,66 +255,52 @@ const ROW: &str = "[mesh.lines]\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
     centre = { y = 0.5, x = [1.0, 1.01] }\neast = { y = 0.5, x = [1.01, 2.0] }\n\
     stub = { x = 1.01, y = [0.5, 1.0] }";
 
-/// A line that ends on one of three that go on from one another: the one it ends on is marked,
-/// whichever stands first.
+/// The case with joints along these of its lines, in this order, and what its top settles.
+fn settlement(lines: &[&str]) -> Vec<f64> {
+    let group = |line: &&str| {
+        format!(
+            "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
+             law = \"joint\"\n"
+        )
+    };
+    let more: String = lines[1..].iter().map(group).collect();
+    let text = edited(JOINT)
+        .replace("[mesh.lines]", ROW)
+        .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", lines[0]))
+        .replace("[[supports]]", &format!("{more}\n[[supports]]"))
+        .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
+        .replace("\"traction_t\"", "\"stress_12\"");
+    let place = Place::new();
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    tests::case::column(&place.path("out/history.csv"), "settlement")
+}
+
+/// A line that ends on one of three that go on from one another, before or after it: the bodies
+/// come apart in the same way whatever the order of the groups.
 #[test]
-fn marks_the_line_that_another_one_ends_on() {
-    const GROUPS: &str = "[groups.a]\nformulation = \"zero_thickness\"\nline = \"west\"\nlaw = \"joint\"\n\
-        [groups.b]\nformulation = \"zero_thickness\"\nline = ^\"centre\"\nlaw = \"joint\"\n\
-        [groups.c]\nformulation = \"zero_thickness\"\nline = \"east\"\nlaw = \"joint\"\n\n[[supports]]";
-    const STUB: &str = "[groups.b]\nformulation = \"zero_thickness\"\nline = \"centre\"\nlaw = \"joint\"\n\
-        [groups.c]\nformulation = \"zero_thickness\"\nline = ^\"stub\"\nlaw = \"joint\"\n\n[[supports]]";
-    refuses_joints(&[
-        (
-            "the end stands before",
-            &[
-                ("line = \"middle\"\n", "line = \"stub\"\n"),
-                ("[mesh.lines]", ROW),
-                ("[[supports]]", GROUPS),
-            ],
-            &[
-                "group `b`: the line meets the line of the `zero_thickness` group `layer` at \
-                 (1.01, 0.5)",
-            ],
-        ),
-        (
-            "the end stands behind",
-            &[
-                ("line = \"middle\"\n", "line = \"west\"\n"),
-                ("[mesh.lines]", ROW),
-                ("[[supports]]", STUB),
-            ],
-            &[
-                "group `c`: the line meets the line of the `zero_thickness` group `b` at \
-                 (1.01, 0.5)",
-            ],
-        ),
-    ]);
+fn joints_may_end_on_one_another() {
+    let one = settlement(&["middle", "stub"]);
+    let without = settlement(&["middle"]);
+    assert!(
+        one.iter()
+            .zip(&without)
+            .any(|(a, b)| (a / b - 1.0).abs() > 1e-6)
+    );
+    for lines in [
+        &["stub", "middle"][..],
+        &["stub", "west", "centre", "east"],
+        &["west", "centre", "stub", "east"],
+    ] {
+        for (other, one) in settlement(lines).iter().zip(&one) {
+            approx::assert_relative_eq!(other, one, max_relative = 1e-6);
+        }
+    }
 }
 
 /// The joint of the case in one group, and in three that go on from one another: the same answer.
 #[test]
 fn joints_may_go_on_from_one_another() {
-    let settlement = |parts: &[&str]| {
-        let mut more = String::new();
-        for line in &parts[1..] {
-            let group = format!(
-                "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
-                 law = \"joint\"\n"
-            );
-            more += &group;
-        }
-        let text = edited(JOINT)
-            .replace("[mesh.lines]", ROW)
-            .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", parts[0]))
-            .replace("[[supports]]", &format!("{more}\n[[supports]]"))
-            .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
-            .replace("\"traction_t\"", "\"stress_12\"");
-        let place = Place::new();
-        let outcome = place.run_case(text);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-        tests::case::column(&place.path("out/history.csv"), "settlement")
-    };
     let one = settlement(&["middle"]);
     for parts in [["west", "centre", "east"], ["centre", "east", "west"]] {
         for (parts, one) in settlement(&parts).iter().zip(&one) {
@@ -362,5 +348,141 @@ fn joints_may_cross() {
         for (one, other) in one.iter().zip(&settlement(other)) {
             approx::assert_relative_eq!(one, other, max_relative = 1e-6);
         }
+    }
+}
+
+/// Two blocks of 1 m by 0.5 m, the upper one in a hollow of this depth, as Gmsh writes them.
+fn blocks(depth: f64) -> String {
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n5\n1 1 \"bottom\"\n1 2 \"between\"\n\
+         1 3 \"top\"\n2 4 \"soil\"\n0 5 \"corner\"\n$EndPhysicalNames\n$Nodes\n13\n1 0 0 0\n\
+         2 1 0 0\n3 1 0.5 0\n4 0 0.5 0\n5 1 1 0\n6 0 1 0\n7 0.5 0 0\n8 1 0.25 0\n9 0.5 {} 0\n\
+         10 0 0.25 0\n11 1 0.75 0\n12 0.5 1 0\n13 0 0.75 0\n$EndNodes\n$Elements\n6\n\
+         1 8 2 1 1 1 2 7\n2 8 2 2 2 3 4 9\n3 8 2 3 3 6 5 12\n4 16 2 4 1 1 2 3 4 7 8 9 10\n\
+         5 16 2 4 2 4 3 5 6 9 11 12 13\n6 15 2 5 2 2\n$EndElements\n",
+        0.5 - depth
+    )
+}
+
+/// Blocks with a joint between them, pressed and pushed.
+fn two_blocks(mesh: &str) -> String {
+    format!(
+        "analysis = \"plane_strain\"\n{mesh}\n\
+         [laws.soil]\nlaw = \"elastic\"\n\
+         parameters = {{ young_modulus = 1e4, poisson_ratio = 0.3 }}\n\
+         [laws.joint]\nlaw = \"coulomb_joint\"\n[laws.joint.parameters]\n\
+         normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
+         dilatancy_angle = 5.0\n\
+         [groups]\nsoil = {{ formulation = \"solid\", law = \"soil\" }}\n\
+         joint = {{ formulation = \"zero_thickness\", law = \"joint\", line = \"between\" }}\n\
+         [[supports]]\nline = \"bottom\"\nfixed = [\"x\", \"y\"]\n\
+         [[phase]]\nname = \"press\"\nincrements = 2\n\
+         pressure = [{{ line = \"top\", value = 10.0 }}]\n\
+         [[phase]]\nname = \"push\"\nincrements = 4\n\
+         displacement = [{{ line = \"top\", x = 2e-3 }}]\n\
+         [probes]\n\
+         settlement = {{ line = \"top\", quantity = \"displacement_y\" }}\n\
+         push = {{ line = \"top\", quantity = \"reaction_x\" }}\n\
+         tau = {{ group = \"joint\", quantity = \"traction_t\", reduce = \"integral\" }}\n"
+    )
+}
+
+/// A mesh from a file gives what the same grid gives; names that the case does not use are told once.
+#[test]
+fn a_mesh_from_a_file_is_that_of_the_grid() {
+    const GRID: &str = "mesh.columns = [{ n = 1, to = 1.0 }]\nmesh.rows = [{ n = 2, to = 1.0 }]\n\
+        mesh.region = [{ group = \"soil\" }]\nmesh.lines = { bottom = { y = 0.0 }, \
+        between = { y = 0.5 }, top = { y = 1.0 } }";
+    let place = Place::new();
+    let history = |mesh: &str| {
+        let outcome = place.run_case(two_blocks(mesh));
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let columns = ["settlement", "push", "tau"];
+        let values = columns.map(|c| tests::case::column(&place.path("out/history.csv"), c));
+        (values.concat(), outcome.stderr)
+    };
+    place.write("blocks.msh", blocks(0.0));
+    let (grid, _) = history(GRID);
+    let (file, said) = history("mesh.file = \"blocks.msh\"");
+    for (file, grid) in file.iter().zip(&grid) {
+        approx::assert_relative_eq!(file, grid, epsilon = 1e-13, max_relative = 1e-11);
+    }
+    let unused = "blocks.msh: physical curves and points that the case does not use: `corner`";
+    assert_eq!(said.matches("the case does not use").count(), 1, "{said}");
+    assert!(said.replace('\n', " ").contains(unused), "{said}");
+    // With the ends of lines that Windows writes.
+    place.write("blocks.msh", blocks(0.0).replace('\n', "\r\n"));
+    let (again, _) = history("mesh = { file = \"blocks.msh\", scale = 1.0 }");
+    assert_eq!(again, file);
+    // The joint follows its curve.
+    place.write("blocks.msh", blocks(0.01));
+    let (hollow, _) = history("mesh.file = \"blocks.msh\"");
+    assert!((hollow[0] / grid[0] - 1.0).abs() > 1e-5, "{hollow:?}");
+}
+
+/// What is wrong with a mesh's file is told with its line, and the exit code is that of bad input.
+#[test]
+fn refuses_mesh_files_that_are_wrong() {
+    let place = Place::new();
+    for (old, new, says) in [
+        (
+            "8 1 0.25 0",
+            "8 1 0.25 0.1",
+            "line 21: node 8 is at z = 0.1",
+        ),
+        (
+            "5 16 2 4 2",
+            "5 3 2 4 2",
+            "line 34: an element of type 3 is a quad of 4 nodes",
+        ),
+        ("$EndNodes", "$EndKnots", "line 27: expected `$EndNodes`"),
+    ] {
+        assert_eq!(blocks(0.0).matches(old).count(), 1, "{old}");
+        place.write("blocks.msh", blocks(0.0).replace(old, new));
+        let outcome = place.run_case(two_blocks("mesh.file = \"blocks.msh\""));
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(
+            outcome.says(says) && outcome.says("cannot read blocks.msh"),
+            "{}",
+            outcome.stderr
+        );
+    }
+    let outcome = place.run_case(two_blocks("mesh.file = \"none.msh\""));
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("cannot read none.msh"), "{}", outcome.stderr);
+}
+
+/// Blocks under a uniform stress: nothing moves, whatever the course of the joint between them.
+#[test]
+fn a_uniform_stress_passes_a_curved_joint() {
+    let place = Place::new();
+    place.write("blocks.msh", blocks(0.1));
+    let initial = "initial_stress = { 11 = -10.0, 22 = -10.0, 33 = -10.0 }";
+    let case = two_blocks("mesh.file = \"blocks.msh\"")
+        .replace("law = \"soil\" }", &format!("law = \"soil\", {initial} }}"))
+        .replace(
+            "[[supports]]",
+            "[[supports]]\nline = \"left\"\nfixed = [\"x\"]\n[[supports]]\nline = \"right\"\n\
+             fixed = [\"x\"]\n[[supports]]",
+        );
+    // What the other tests push sideways is held here.
+    let end = case.find("[[phase]]\nname = \"push\"").unwrap();
+    let case = case[..end].to_owned()
+        + "[probes]\nmoves = { line = \"between\", quantity = \"displacement_y\", \
+           reduce = \"min\" }\n";
+    let sides = "6 15 2 5 2 2\n7 8 2 6 1 2 3 8\n8 8 2 6 1 3 5 11\n9 8 2 7 1 1 4 10\n\
+                 10 8 2 7 1 4 6 13\n";
+    let mesh = blocks(0.1)
+        .replace(
+            "$PhysicalNames\n5\n",
+            "$PhysicalNames\n7\n1 6 \"right\"\n1 7 \"left\"\n",
+        )
+        .replace("$Elements\n6\n", "$Elements\n10\n")
+        .replace("6 15 2 5 2 2\n", sides);
+    place.write("blocks.msh", mesh);
+    let outcome = place.run_case(case);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for moves in tests::case::column(&place.path("out/history.csv"), "moves") {
+        approx::assert_relative_eq!(moves, 0.0, epsilon = 1e-15);
     }
 }

@@ -324,7 +324,10 @@ fn names_missing_keys() {
             ),
             (
                 "mesh",
-                &[("rows = [{ n = 2, to = 1.0 }]", ""), ("[mesh]", "^[mesh]")],
+                &[
+                    ("rows = [{ n = 2, to = 1.0 }]", ""),
+                    ("columns = [", "columns = ^["),
+                ],
                 &["missing key `rows`"],
             ),
             (

@@ -10,7 +10,7 @@
 set -eu
 cd "$(dirname "$0")/../.."
 seconds=${1:-5}
-targets=${2:-case driver incremental lock sidecar capsule description library}
+targets=${2:-case driver incremental mesh lock sidecar capsule description library}
 if [ $# -gt 2 ]; then shift 2; else set --; fi
 folder=target/fuzz
 mkdir -p $folder/bin $folder/findings

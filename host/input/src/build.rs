@@ -4,7 +4,8 @@
 use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
 use crate::ground::{ProfileInput, level};
 use crate::material::{ParameterValue, find_law, place_failure, try_law};
-use crate::{Error, figures, grid, probes};
+use crate::mesh::{self, Built, MeshFile};
+use crate::{Error, figures, probes};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -34,6 +35,10 @@ pub struct Posed {
     pub problem: Problem,
     /// All laws used.
     pub laws: Laws,
+    /// The file of its mesh, if it has one.
+    pub mesh_file: Option<MeshFile>,
+    /// What the user should know of how the problem was read.
+    pub notes: Vec<String>,
 }
 
 /// The line of this name.
@@ -60,7 +65,10 @@ impl Case {
     /// [`text::Error::Input`] at the place that does not fit; [`law::Error::Library`].
     pub fn pose(&self) -> Result<Posed, Error> {
         let Self { source, file, .. } = self;
-        let mesh = grid::build(source, file)?;
+        let Built {
+            mesh,
+            file: mesh_file,
+        } = mesh::build(source, file)?;
         let pins = file.laws.values().map(Spanned::get_ref);
         let pins = Pins::of(source, pins.map(|law| (&law.law, law.sha256.as_ref())))?;
         let search = SearchPath::of(&self.opener, &self.law_folders()?).pinned(pins);
@@ -128,6 +136,11 @@ impl Case {
                 settings: file.solver,
             },
             laws: shelf.laws,
+            notes: mesh_file
+                .iter()
+                .flat_map(|file| file.notes.clone())
+                .collect(),
+            mesh_file,
         })
     }
 
@@ -148,7 +161,7 @@ impl Case {
     }
 
     /// What the record of a run says of the case.
-    pub fn about(&self, laws: &Laws) -> About {
+    pub fn about(&self, laws: &Laws, mesh_file: Option<&MeshFile>) -> About {
         let Self { source, file, .. } = self;
         let files = source.files().map(|range| {
             let path = source.path_at(&range).display().to_string();
@@ -170,6 +183,7 @@ impl Case {
             sha256: hexadecimal_sha256(source.text_of_files().as_bytes()),
             files: files.collect(),
             settings: settings.collect(),
+            mesh_file: mesh_file.map(|file| (file.path.clone(), file.sha256.clone())),
             laws_of_groups: file.groups.iter().map(laws_of).collect(),
             laws: laws.clone(),
             probe_units: probes::units(self, laws),

@@ -183,6 +183,32 @@ pub struct CaseFile {
     pub chosen: Option<Chosen>,
 }
 
+impl CaseFile {
+    /// Names of lines or points, wherever the file has one. Every key that takes the name of a line
+    /// belongs here: a mesh file is asked for these.
+    pub fn line_names(&self) -> impl Iterator<Item = &Spanned<String>> {
+        let groups = self.groups.values().map(Spanned::get_ref);
+        let probes = self.probes.values().map(Spanned::get_ref);
+        let of_phases = self.phases.iter().flat_map(|phase| {
+            let displacement = phase.displacement.iter().map(|input| &input.line);
+            let free = phase.free.iter().map(|input| &input.line);
+            let pressure = phase.pressure.iter().map(|input| &input.line);
+            let force = phase.force.iter().map(|input| &input.line);
+            displacement
+                .chain(free)
+                .chain(pressure)
+                .chain(force)
+                .chain(&phase.rigid)
+        });
+        let supports = self.supports.iter().map(|input| &input.line);
+        groups
+            .filter_map(|group| group.line.as_ref())
+            .chain(supports)
+            .chain(of_phases)
+            .chain(probes.filter_map(|probe| probe.line.as_ref()))
+    }
+}
+
 /// Settings chosen for an `accuracy`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Chosen {
@@ -206,26 +232,35 @@ pub struct Chosen {
     pub runs: usize,
 }
 
-/// A structured mesh of 8-node quads.
+/// A mesh: a grid of 8-node quads, or a file of Gmsh.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
+    /// Instead of a grid: a file of Gmsh (4.1 or 2.2), relative to the case file.
+    #[schemars(with = "Option<PathBuf>")]
+    pub file: Option<Spanned<PathBuf>>,
+    /// Metres in a unit of that file; 1 if left out.
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    pub scale: Option<Spanned<f64>>,
     /// Where columns and rows start; (0, 0) if left out.
     #[schemars(with = "Option<[f64; 2]>")]
     pub origin: Option<Spanned<[f64; 2]>>,
     /// Columns, in the direction of x (r).
-    #[schemars(with = "Vec<PartInput>")]
-    pub columns: Spanned<Vec<Spanned<PartInput>>>,
+    #[schemars(with = "Option<Vec<PartInput>>")]
+    pub columns: Option<Spanned<Vec<Spanned<PartInput>>>>,
     /// Rows, in the direction of y (z).
-    #[schemars(with = "Vec<PartInput>")]
-    pub rows: Spanned<Vec<Spanned<PartInput>>>,
+    #[schemars(with = "Option<Vec<PartInput>>")]
+    pub rows: Option<Spanned<Vec<Spanned<PartInput>>>>,
     /// Which group an element belongs to; later regions override earlier ones.
-    #[serde(rename = "region")]
+    #[serde(default, rename = "region")]
     pub regions: Vec<RegionInput>,
     /// Named lines.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, LineInput>")]
     pub lines: Named<LineInput>,
+    /// How often each element of the file is divided into four.
+    #[serde(skip)]
+    pub divisions: u32,
 }
 
 /// Some columns or rows, following the previous ones.
@@ -364,6 +399,9 @@ pub struct GroupInput {
     /// Zero thickness: the line along which the elements are inserted.
     #[schemars(with = "Option<String>")]
     pub line: Option<Spanned<String>>,
+    /// Zero thickness: what becomes of the ends of that line; `open` if left out.
+    #[schemars(with = "Option<Ends>")]
+    pub ends: Option<Spanned<Ends>>,
     /// Thin layer: direction across the layer; the shorter side if left out.
     #[schemars(with = "Option<Axis>")]
     pub normal: Option<Spanned<Axis>>,
@@ -388,6 +426,16 @@ pub struct GroupInput {
     pub drainage: Option<Spanned<Drainage>>,
     /// Undrained: Poisson's ratio with the pore water; 0.495 if left out.
     pub undrained_poisson_ratio: Option<f64>,
+}
+
+/// Ends of a line along which elements are inserted.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Ends {
+    /// The two sides come apart at an end on the model's outline.
+    Open,
+    /// They stay joined there.
+    Joined,
 }
 
 /// A coordinate direction.

@@ -6,12 +6,14 @@ pub mod case;
 pub mod driver;
 mod error;
 pub mod figures;
-pub mod grid;
+pub mod gmsh;
+mod grid;
 pub mod ground;
 pub mod incremental_driver;
 pub mod lock;
 pub mod material;
 mod measured;
+pub mod mesh;
 pub mod probes;
 pub mod schema;
 

@@ -57,6 +57,22 @@ impl Axes {
         }
     }
 
+    /// The same turned so that the first one lies along a direction, without turning round: of a
+    /// curve beside its chord.
+    #[must_use]
+    pub fn turned_along(&self, direction: [f64; 2]) -> Self {
+        let length = direction[0].hypot(direction[1]);
+        let product = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        let like = |v: [f64; 2], own: [f64; 2]| {
+            let length = length.copysign(product(v, own));
+            [v[0] / length, v[1] / length]
+        };
+        Self {
+            along: like(direction, self.along),
+            across: like([-direction[1], direction[0]], self.across),
+        }
+    }
+
     /// Stress components in global axes of a stress in these axes.
     pub fn stress_to_global(&self, s: [f64; 4]) -> [f64; 4] {
         let [m, n] = [self.along, self.across];
@@ -105,6 +121,10 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn length(&self, element: usize) -> f64;
     /// Axes of an element.
     fn axes(&self, element: usize) -> Axes;
+    /// Axes of an integration point: those of its element, but where that is curved.
+    fn axes_at(&self, point: usize) -> Axes {
+        self.axes(self.place_of(point).0)
+    }
     /// Adds the strains (jumps) of all points under nodal displacements (two per node) to `out`.
     fn add_gradients(&self, displacement: &[f64], out: &mut [f64]);
     /// Adds the nodal forces that balance the stresses (tractions) of all points to `force`.

@@ -897,15 +897,14 @@ impl Group {
     /// (committed), kN. At an end that is not doubled the nodal forces of both sides cancel; the
     /// tractions do not.
     pub fn handed_on(&self, elements: &[usize], component: usize) -> f64 {
-        let of_point = |element: usize, point: usize| {
-            let axes = self.kinematics.axes(element);
+        let of_point = |point: usize| {
+            let axes = self.kinematics.axes_at(point);
             let [normal, tangential] = [0, 1].map(|c| self.stress.committed[2 * point + c]);
             let traction = axes.across[component] * normal + axes.along[component] * tangential;
             self.kinematics.weight(point) * traction
         };
         let of_element = |&element: &usize| {
-            let points = self.kinematics.points_of(element);
-            points.map(|point| of_point(element, point)).sum::<f64>()
+            self.kinematics.points_of(element).map(of_point).sum::<f64>()
         };
         -elements.iter().map(of_element).sum::<f64>()
     }

@@ -1,6 +1,7 @@
 //! Nodes, elements and named lines.
 
 mod insert;
+mod refine;
 
 pub use insert::{Along, CannotInsert, Reason};
 
@@ -95,7 +96,8 @@ impl Solid {
 /// A zero-thickness element of three double nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Joint {
-    /// Ends and middle on the side of smaller coordinates.
+    /// Ends and middle on the side of smaller coordinates; from the first end to the second, too,
+    /// coordinates grow (both as [`Axes::of_facet`](crate::element::Axes::of_facet) says it).
     pub minus: [usize; 3],
     /// The same on the other side.
     pub plus: [usize; 3],
@@ -104,7 +106,7 @@ pub struct Joint {
 }
 
 /// A named line of any course: edges of solids, or a single node.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Line {
     /// Edges, as number of the solid and number of its edge.
     pub edges: Vec<(usize, usize)>,
@@ -113,7 +115,7 @@ pub struct Line {
 }
 
 /// A mesh in the plane.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Coordinates, m.
     pub nodes: Vec<[f64; 2]>,

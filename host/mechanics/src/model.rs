@@ -524,7 +524,7 @@ impl GroupBuilder<'_> {
         let mut stress = Vec::with_capacity(kinematics.n_components() * kinematics.n_points());
         for point in 0..kinematics.n_points() {
             let (element, _) = kinematics.place_of(point);
-            let (axes, at) = (kinematics.axes(element), kinematics.position(point));
+            let (axes, at) = (kinematics.axes_at(point), kinematics.position(point));
             let own = || self.initial.at(self.number, at).unwrap_or_default();
             if kinematics.n_components() == 4 {
                 stress.extend(axes.stress_from_global(own()));

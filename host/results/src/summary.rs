@@ -30,6 +30,8 @@ pub struct About {
     pub files: Vec<(String, String)>,
     /// Settings of the command line, `KEY=VALUE`, in the order given.
     pub settings: Vec<String>,
+    /// Path and SHA-256 of the file of the mesh, if it has one.
+    pub mesh_file: Option<(String, String)>,
     /// Of every group the name of its law, and those of the laws that phases give it, by phase.
     pub laws_of_groups: Vec<LawsOfGroup>,
     /// All laws used, by name and hypothesis.
@@ -129,14 +131,15 @@ impl Summary {
             .collect();
         say("probe_units", units.into());
         say("laws", laws.into());
-        say(
-            "mesh",
-            json!({
-                "nodes": problem.mesh.nodes.len(),
-                "elements": problem.mesh.solids.len() + problem.mesh.joints.len(),
-                "elements_by_group": elements,
-            }),
-        );
+        let mut mesh = json!({
+            "nodes": problem.mesh.nodes.len(),
+            "elements": problem.mesh.solids.len() + problem.mesh.joints.len(),
+            "elements_by_group": elements,
+        });
+        if let Some((path, sha256)) = &about.mesh_file {
+            mesh["file"] = json!({ "path": path, "sha256": sha256 });
+        }
+        say("mesh", mesh);
         Self {
             head,
             probe_names: wanted.probes.names().map(str::to_owned).collect(),

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::ending::{ending, process};
 use input::build::{Laws, Posed};
+use input::mesh::MeshFile;
 use input::{Case, Kind, probes};
 use law::capsule::{self, Capsule};
 use law::{Library, Stop, hexadecimal_sha256};
@@ -50,7 +51,7 @@ pub struct Options {
 /// # Errors
 /// Bad input, or trouble with a library.
 pub fn begin(case: &Case, reuse: Reuse) -> Result<(Simulation, Laws), Error> {
-    let Posed { problem, laws } = case.pose()?;
+    let Posed { problem, laws, .. } = case.pose()?;
     let simulation = Simulation::reusing(problem, reuse).map_err(|error| case.place(error))?;
     Ok((simulation, laws))
 }
@@ -94,10 +95,18 @@ pub fn run_reusing(
     {
         reuse.announces = Some(crate::memory::expect);
     }
-    let (mut simulation, laws) = begin(case, std::mem::take(reuse))?;
+    let Posed {
+        problem,
+        laws,
+        mesh_file,
+        notes,
+    } = case.pose()?;
+    let mut simulation =
+        Simulation::reusing(problem, std::mem::take(reuse)).map_err(|error| case.place(error))?;
     let wanted = case.wanted(&simulation)?;
-    let about = case.about(&laws);
-    let keeper = Keeper::new(identity(case, &laws), folder, options.checkpoints);
+    let about = case.about(&laws, mesh_file.as_ref());
+    let identity = identity(case, &laws, mesh_file.as_ref());
+    let keeper = Keeper::new(identity, folder, options.checkpoints);
     let found = if options.resume {
         keeper.found()?
     } else {
@@ -126,6 +135,7 @@ pub fn run_reusing(
     } else {
         let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
         let mut all: Vec<String> = of_laws.chain(simulation.warnings().to_vec()).collect();
+        all.extend(notes);
         all.extend(case.warnings(&simulation));
         for warning in &all {
             observer.warning(warning);
@@ -345,8 +355,8 @@ impl Keeper {
 }
 
 /// What must be the same for a run to go on: the program, the case with its variant, the bytes of
-/// its libraries and of their sidecars, and the parameters.
-fn identity(case: &Case, laws: &Laws) -> String {
+/// its mesh, of its libraries and of their sidecars, and the parameters.
+fn identity(case: &Case, laws: &Laws, mesh: Option<&MeshFile>) -> String {
     let mut text = format!("pilum {}\n", env!("CARGO_PKG_VERSION"));
     text += case.variant.as_deref().unwrap_or_default();
     text += "\n";
@@ -359,6 +369,9 @@ fn identity(case: &Case, laws: &Laws) -> String {
         for parameter in &built.parameters {
             let _ = writeln!(text, "{} {:x}", parameter.id, parameter.value.to_bits());
         }
+    }
+    if let Some(mesh) = mesh {
+        let _ = writeln!(text, "{}", mesh.sha256);
     }
     let _ = writeln!(text, "{:?}", case.file.chosen);
     text += case.source.text();

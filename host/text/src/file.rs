@@ -6,6 +6,8 @@ use std::path::Path;
 
 /// Longest input file, in bytes.
 pub const LONGEST_TEXT: u64 = 16 << 20;
+/// Largest file of a mesh, in bytes.
+pub const LARGEST_MESH: u64 = 1 << 30;
 /// Largest library, in bytes.
 pub const LARGEST_LIBRARY: u64 = 1 << 30;
 
@@ -28,6 +30,14 @@ pub fn read_text(path: &Path) -> io::Result<Vec<u8>> {
     };
     let file = open_if(path, |metadata| metadata.is_file() || is_pipe(metadata))?;
     up_to(file, LONGEST_TEXT, "an input file")
+}
+
+/// Reads a mesh.
+///
+/// # Errors
+/// That of the system; anything but a regular file; more than [`LARGEST_MESH`].
+pub fn read_mesh(path: &Path) -> io::Result<Vec<u8>> {
+    up_to(open_regular(path)?, LARGEST_MESH, "a mesh")
 }
 
 /// Reads a library.

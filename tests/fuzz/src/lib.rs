@@ -19,10 +19,11 @@ use text::Source;
 type Target = fn(&[u8]);
 
 /// All targets by name.
-pub const TARGETS: [(&str, Target); 8] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("case", case::read),
     ("driver", driver::read),
     ("incremental", incremental::read),
+    ("mesh", mesh),
     ("lock", lock),
     ("sidecar", sidecar),
     ("capsule", capsule),
@@ -64,6 +65,24 @@ fn shown<T>(outcome: Result<T, Error>) -> Option<T> {
             let message = format!("{:?}", miette::Report::new(error));
             assert!(!message.is_empty(), "an error without a message");
             None
+        }
+    }
+}
+
+/// A mesh has nodes for its elements and elements for its lines, also when it is divided.
+fn mesh(data: &[u8]) {
+    let mesh = match ways_in::mesh_file(data) {
+        Ok(mesh) => mesh,
+        Err(message) => return assert!(!message.is_empty(), "an error without a message"),
+    };
+    for mesh in [mesh.refined(), mesh] {
+        let n = mesh.nodes.len();
+        let mut nodes = mesh.solids.iter().flat_map(|solid| solid.nodes());
+        assert!(nodes.all(|&node| node < n), "an element without a node");
+        for line in mesh.lines.values() {
+            let sides = line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
+            let mut nodes = sides.chain(line.nodes.iter().copied());
+            assert!(nodes.all(|node| node < n), "a line without a node");
         }
     }
 }

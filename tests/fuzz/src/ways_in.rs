@@ -1,7 +1,7 @@
 //! What reads files and libraries of others, by their contents: the ways in of `tests/fuzz`.
 
 use input::case::PartInput;
-use input::{Case, Driver, Error, grid};
+use input::{Case, Driver, Error};
 use law::capsule::Capsule;
 use law::inspect::{Inspection, inspect_bytes};
 use law::{LawDescription, Pins, SearchPath, adapter};
@@ -20,22 +20,34 @@ pub(crate) fn case(source: Source) -> Result<Vec<Case>, Error> {
     Case::of(source)
 }
 
-/// Number of elements that a case asks for.
+/// Number of elements that a case asks for; of a mesh that is a file, which a text cannot be trusted to
+/// name, more than any.
 pub(crate) fn elements(case: &Case) -> usize {
-    let of = |parts: &[toml::Spanned<PartInput>]| {
-        let parts = parts.iter().map(|part| part.get_ref().n);
-        parts.fold(0, usize::saturating_add)
+    let of = |parts: &Option<toml::Spanned<Vec<toml::Spanned<PartInput>>>>| {
+        let parts = parts.iter().flat_map(|parts| parts.get_ref());
+        parts.fold(0, |sum: usize, part| sum.saturating_add(part.get_ref().n))
     };
     let mesh = &case.file.mesh;
-    of(mesh.columns.get_ref()).saturating_mul(of(mesh.rows.get_ref()))
+    if mesh.file.is_some() {
+        return usize::MAX;
+    }
+    of(&mesh.columns).saturating_mul(of(&mesh.rows))
 }
 
 /// The mesh of a case.
 ///
 /// # Errors
-/// Those of [`grid::build`].
+/// Those of [`input::mesh::build`].
 pub(crate) fn mesh(case: &Case) -> Result<Mesh, Error> {
-    grid::build(&case.source, &case.file)
+    Ok(input::mesh::build(&case.source, &case.file)?.mesh)
+}
+
+/// A mesh file of Gmsh.
+///
+/// # Errors
+/// What is wrong with it.
+pub(crate) fn mesh_file(bytes: &[u8]) -> Result<Mesh, String> {
+    input::gmsh::whole(bytes)
 }
 
 /// A driver file with all its variants.

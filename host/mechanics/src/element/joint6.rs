@@ -23,7 +23,11 @@ struct Point {
     n: [f64; 3],
     weight: f64,
     position: [f64; 2],
+    axes: Axes,
 }
+
+/// A side whose middle lies off its chord by less than this part of it is straight.
+const STRAIGHT: f64 = 1e-12;
 
 impl Joint6 {
     /// Elements with Gauss points, or with the nodes as points.
@@ -45,17 +49,29 @@ impl Joint6 {
         for joint in joints {
             let at = joint.minus.map(|n| coordinates[n]);
             let along = [at[1][0] - at[0][0], at[1][1] - at[0][1]];
-            axes.push(Axes::of_facet(along));
-            lengths.push(along[0].hypot(along[1]));
+            let chord = Axes::of_facet(along);
+            axes.push(chord);
+            let chord_length = along[0].hypot(along[1]);
+            lengths.push(chord_length);
+            let rise = [0, 1].map(|c| at[2][c] - f64::midpoint(at[0][c], at[1][c]));
+            let off = (rise[0] * chord.across[0] + rise[1] * chord.across[1]).abs();
+            let is_straight = off <= STRAIGHT * chord_length;
             for (&xi, weight) in xi.iter().zip(weights) {
                 let (n, d) = line_shape(xi);
                 let sum = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * at[i][c]).sum() };
                 let position = [sum(&n, 0), sum(&n, 1)];
-                let length = sum(&d, 0).hypot(sum(&d, 1));
+                let direction = [sum(&d, 0), sum(&d, 1)];
+                let length = direction[0].hypot(direction[1]);
+                let axes = if is_straight {
+                    chord
+                } else {
+                    chord.turned_along(direction)
+                };
                 points.push(Point {
                     n,
                     weight: weight * length * depth(analysis, position[0]),
                     position,
+                    axes,
                 });
             }
         }
@@ -122,9 +138,13 @@ impl Kinematics for Joint6 {
         self.axes[element]
     }
 
+    fn axes_at(&self, point: usize) -> Axes {
+        self.points[point].axes
+    }
+
     fn add_gradients(&self, displacement: &[f64], out: &mut [f64]) {
         let mut jumps = out.chunks_exact_mut(2);
-        for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
+        for (element, nodes) in self.nodes.iter().enumerate() {
             let u = |node: usize, c: usize| displacement[2 * node + c];
             for (point, jump) in self.own(element).iter().zip(&mut jumps) {
                 let opening: [f64; 2] = std::array::from_fn(|c| {
@@ -132,6 +152,7 @@ impl Kinematics for Joint6 {
                         .map(|i| point.n[i] * (u(nodes[i + 3], c) - u(nodes[i], c)))
                         .sum()
                 });
+                let axes = &point.axes;
                 jump[0] += axes.across[0] * opening[0] + axes.across[1] * opening[1];
                 jump[1] += axes.along[0] * opening[0] + axes.along[1] * opening[1];
             }
@@ -140,10 +161,10 @@ impl Kinematics for Joint6 {
 
     fn add_forces(&self, flux: &[f64], force: &mut [f64]) {
         let mut tractions = flux.chunks_exact(2);
-        for (element, (nodes, axes)) in self.nodes.iter().zip(&self.axes).enumerate() {
+        for (element, nodes) in self.nodes.iter().enumerate() {
             for (point, t) in self.own(element).iter().zip(&mut tractions) {
                 for c in 0..2 {
-                    let traction = axes.across[c] * t[0] + axes.along[c] * t[1];
+                    let traction = point.axes.across[c] * t[0] + point.axes.along[c] * t[1];
                     for i in 0..3 {
                         let f = point.weight * point.n[i] * traction;
                         force[2 * nodes[i] + c] -= f;
@@ -156,9 +177,8 @@ impl Kinematics for Joint6 {
 
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
         out.fill(0.0);
-        let axes = &self.axes[element];
-        let directions = [axes.across, axes.along];
         for (point, tangent) in self.own(element).iter().zip(tangent.chunks_exact(4)) {
+            let directions = [point.axes.across, point.axes.along];
             // The law's 2 × 2 tangent in global axes.
             let d = |c: usize, e: usize| -> f64 {
                 let pairs = (0..2).flat_map(|i| (0..2).map(move |j| (i, j)));

@@ -40,19 +40,24 @@ struct Joint {
 }
 
 impl Joint {
-    /// Nodes on the near and on the far side, so that the far side lies where the axis across the
-    /// facet points: towards increasing coordinates (see `Axes::of_facet`), whatever the direction
-    /// of the line.
+    /// Nodes on the near and on the far side, each from the first end to the second, so that both
+    /// axes of the facet point from the one to the other: towards increasing coordinates (see
+    /// `Axes::of_facet`), whatever the direction of the line.
     fn near_and_far(&self, coordinates: &[[f64; 2]]) -> [[usize; 3]; 2] {
+        let increases = |[x, y]: [f64; 2]| (if x.abs() > y.abs() { x } else { y }) > 0.0;
         let [a, b, _] = self.right.map(|node| coordinates[node]);
         let to_the_left = [a[1] - b[1], b[0] - a[0]];
-        let [x, y] = to_the_left;
-        let dominant = if x.abs() > y.abs() { x } else { y };
-        if dominant > 0.0 {
+        let mut sides = if increases(to_the_left) {
             [self.right, self.left]
         } else {
             [self.left, self.right]
+        };
+        if !increases([b[0] - a[0], b[1] - a[1]]) {
+            for side in &mut sides {
+                side.swap(0, 1);
+            }
         }
+        sides
     }
 }
 
@@ -104,12 +109,14 @@ pub struct Along {
 }
 
 /// Why elements cannot be inserted along a line.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CannotInsert {
     /// Which of the lines.
     pub number: usize,
     /// What is wrong with one of its edges; `None`: there is no such line, or it is a point.
     pub reason: Option<Reason>,
+    /// Middle of that edge, m.
+    pub at: Option<[f64; 2]>,
 }
 
 impl Mesh {
@@ -125,8 +132,11 @@ impl Mesh {
             let line = self.lines.get(&along.line);
             let edges = line.map(|line| self.course(line)).unwrap_or_default();
             if edges.is_empty() {
-                let reason = None;
-                return Err(CannotInsert { number, reason });
+                return Err(CannotInsert {
+                    number,
+                    reason: None,
+                    at: None,
+                });
             }
             interfaces.push(Interface {
                 edges,
@@ -134,8 +144,12 @@ impl Mesh {
             });
         }
         let split = split(self.nodes.len(), &self.solids, &interfaces).map_err(|fault| {
-            let (number, reason) = (fault.interface, Some(fault.reason));
-            CannotInsert { number, reason }
+            let [_, _, middle] = interfaces[fault.interface].edges[fault.edge];
+            CannotInsert {
+                number: fault.interface,
+                reason: Some(fault.reason),
+                at: self.nodes.get(middle).copied(),
+            }
         })?;
         let nodes = split.original.iter().map(|&node| self.nodes[node]);
         self.nodes = nodes.collect();
@@ -181,7 +195,7 @@ fn split(n_nodes: usize, elements: &[Solid], interfaces: &[Interface]) -> Result
         joints: Vec::new(),
     };
     let sides = sides(elements, interfaces, &around)?;
-    for node in 0..n_nodes {
+    for node in nodes_along(n_nodes, interfaces) {
         let here = &around.elements[around.start[node]..around.start[node + 1]];
         if here.is_empty() || cuts.closes(node, interfaces) {
             continue;
@@ -217,6 +231,17 @@ fn split(n_nodes: usize, elements: &[Solid], interfaces: &[Interface]) -> Result
         }
     }
     Ok(result)
+}
+
+/// The nodes of interfaces, each once, edge by edge: the end with the smaller number, the other one,
+/// the middle. Copies are numbered in this order, so that those of one line lie together.
+fn nodes_along(n_nodes: usize, interfaces: &[Interface]) -> Vec<usize> {
+    let mut is_known = vec![false; n_nodes];
+    let edges = interfaces.iter().flat_map(|interface| &interface.edges);
+    let nodes = edges.flat_map(|&[a, b, middle]| [a.min(b), a.max(b), middle]);
+    nodes
+        .filter(|&node| !std::mem::replace(&mut is_known[node], true))
+        .collect()
 }
 
 /// The edges that are cut.

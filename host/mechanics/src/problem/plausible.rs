@@ -193,8 +193,10 @@ fn hung(mesh: &Mesh, groups: &[Group], number: usize) -> Vec<String> {
                     beside.push(solid.group);
                 }
             }
+            // On the outline an end is joined because the case says so.
+            let is_inside = turns.values().sum::<f64>() > std::f64::consts::TAU - 1e-6;
             let corner = beside.iter().find(|group| turns[law(**group)] < CORNER);
-            if let Some(&corner) = corner.filter(|_| turns.len() > 1) {
+            if let Some(&corner) = corner.filter(|_| is_inside && turns.len() > 1) {
                 let [x, y] = mesh.nodes[node];
                 warnings.push(format!(
                     "group `{}` ends inside the mesh at ({x:.6}, {y:.6}), at a corner of group \

@@ -117,7 +117,7 @@ impl Simulation {
             let sides: Vec<[f64; 4]> = [nodes[2], nodes[5]].into_iter().filter_map(of_side).collect();
             let share = 1.0 / sides.len().max(1) as f64;
             let mean = std::array::from_fn(|c| share * sides.iter().map(|side| side[c]).sum::<f64>());
-            let [_, mut normal, _, shear] = kinematics.axes(element).stress_from_global(mean);
+            let [_, mut normal, _, shear] = kinematics.axes_at(point).stress_from_global(mean);
             if self.problem.groups[number].pore_water && !sides.is_empty() {
                 normal += pressure;
             }

@@ -2,23 +2,32 @@
 
 use crate::Error;
 use input::case::{Axis, PartInput};
-use input::{Case, grid};
+use input::{Case, mesh};
 use mechanics::mesh::{Mesh, Solid};
 use mechanics::problem::Formulation;
 use toml::Spanned;
 
-/// Divides columns and rows by a whole number, so that the lines of the given mesh stay. Parts
-/// across a thin layer keep their number: the thickness of a layer is its element's.
+/// Divides sides of elements by a whole number: columns and rows of a grid, so that the lines of the
+/// given mesh stay; elements of a file by halving their sides until there are that many parts. Parts
+/// across a thin layer of a grid keep their number: the thickness of a layer is its element's. With
+/// such a layer a file is not divided.
 ///
 /// # Errors
 /// Those of building the mesh.
 pub(super) fn divide(case: &mut Case, by: usize) -> Result<(), Error> {
-    let mesh = grid::build(&case.source, &case.file)?;
+    if case.file.mesh.file.is_some() {
+        case.file.mesh.divisions += by.next_power_of_two().ilog2();
+        return Ok(());
+    }
+    let mesh = mesh::build(&case.source, &case.file)?.mesh;
     let layers = layers(case, &mesh);
     let input = &mut case.file.mesh;
     let origin = input.origin.as_ref().map_or([0.0; 2], |at| *at.get_ref());
     let directions = [&mut input.columns, &mut input.rows];
     for (axis, parts) in directions.into_iter().enumerate() {
+        let Some(parts) = parts else {
+            continue;
+        };
         let mut start = origin[axis];
         for part in parts.get_mut().iter_mut().map(Spanned::get_mut) {
             let end = part.to;
@@ -87,7 +96,7 @@ increments = 1
 "#;
 
     fn xs(case: &Case) -> Vec<f64> {
-        let mesh = grid::build(&case.source, &case.file).unwrap();
+        let mesh = mesh::build(&case.source, &case.file).unwrap().mesh;
         let mut xs: Vec<f64> = mesh
             .solids
             .iter()

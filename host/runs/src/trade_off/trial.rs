@@ -99,6 +99,8 @@ impl Settings {
         let integration = self.integration.map(|integration| match integration {
             Integration::Full => "integration full",
             Integration::Reduced => "integration reduced",
+            Integration::Projected => "integration projected",
+            Integration::BBar => "integration b_bar",
             Integration::Mean => "integration mean",
             Integration::Nodes => "integration nodes",
         });

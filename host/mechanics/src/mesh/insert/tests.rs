@@ -340,6 +340,10 @@ fn the_far_side_lies_towards_increasing_coordinates() {
             };
             let [near, far] = joint.near_and_far(&coordinates);
             assert!(centre(near) < centre(far));
+            for [from, to, _] in [near, far] {
+                let sum = |node: usize| coordinates[node].iter().sum::<f64>();
+                assert!(sum(from) < sum(to));
+            }
         }
     }
 }

@@ -1,0 +1,213 @@
+//! Meshes from files of Gmsh: formats 4.1 and 2.2, as text or bytes. Physical surfaces are groups,
+//! physical curves lines, physical points points.
+
+mod assemble;
+mod contents;
+mod cursor;
+mod kind;
+
+use crate::Error;
+use crate::case::CaseFile;
+use crate::mesh::MeshFile;
+use contents::Contents;
+use indexmap::IndexMap;
+use law::hexadecimal_sha256;
+use mechanics::mesh::Mesh;
+use mechanics::problem::{Analysis, Formulation};
+use std::collections::{HashMap, HashSet};
+use std::io;
+use std::path::{Path, PathBuf};
+use text::{Source, file};
+use toml::Spanned;
+
+/// What the case takes from the file.
+struct Wanted<'c> {
+    /// Numbers of groups, by the names of their surfaces.
+    groups: HashMap<&'c str, usize>,
+    /// Names of lines and points.
+    lines: HashSet<&'c str>,
+    analysis: Analysis,
+    /// Metres in a unit of the file.
+    scale: f64,
+}
+
+/// What the names of one kind in a file stand for.
+type Counts = IndexMap<String, usize>;
+
+/// The mesh of a case that names a file, divided as often as the case says, with notes for the user.
+///
+/// # Errors
+/// [`text::Error::Unreadable`] with the place in the mesh file; [`text::Error::Input`] where the case
+/// does not fit it.
+pub(crate) fn mesh(
+    source: &Source,
+    file: &CaseFile,
+    written: &Spanned<PathBuf>,
+) -> Result<(Mesh, MeshFile), Error> {
+    let input = &file.mesh;
+    if let Some(region) = file.groups.iter().find(|(_, group)| {
+        let group = group.get_ref();
+        input.divisions > 0 && group.formulation == Formulation::ThinLayer
+    }) {
+        let message = format!(
+            "group `{}` is a thin layer, whose thickness is that of its elements: a mesh from a file \
+             is not divided across it",
+            region.0.get_ref()
+        );
+        return Err(source.error(region.0.span(), message).into());
+    }
+    let scale = input.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
+    if let Some(key) = &input.scale
+        && !(scale > 0.0 && scale.is_finite())
+    {
+        let message = format!("`scale` is {scale}, expected a positive number");
+        return Err(source.error(key.span(), message).into());
+    }
+    let folder = source.path_at(&written.span()).parent();
+    let path = folder.unwrap_or(Path::new(".")).join(written.get_ref());
+    let unreadable = |why: io::Error| Error::from(unreadable(&path, why));
+    let bytes = file::read_mesh(&path).map_err(unreadable)?;
+    let wrong = |fault: String| unreadable(io::Error::new(io::ErrorKind::InvalidData, fault));
+    let contents = Contents::read(&bytes).map_err(wrong)?;
+    let wanted = wanted(source, file, scale, &contents, &path)?;
+    let (mut mesh, notes) = assemble::assemble(&contents, &wanted).map_err(wrong)?;
+    for _ in 0..input.divisions {
+        mesh = mesh.refined();
+    }
+    let name = path.display().to_string();
+    let notes = notes.into_iter().map(|note| format!("{name}: {note}"));
+    let file = MeshFile {
+        notes: notes.collect(),
+        sha256: hexadecimal_sha256(&bytes),
+        path: name,
+    };
+    Ok((mesh, file))
+}
+
+fn unreadable(path: &Path, source: io::Error) -> text::Error {
+    text::Error::Unreadable {
+        path: path.to_owned(),
+        source,
+    }
+}
+
+/// The whole mesh of a file in plane strain: every physical surface is a group, in their order.
+///
+/// # Errors
+/// What is wrong with the file, and where.
+pub fn whole(bytes: &[u8]) -> Result<Mesh, String> {
+    let contents = Contents::read(bytes)?;
+    let [points, curves, surfaces] = counts(&contents);
+    let names = |counts: &'_ Counts| counts.keys().cloned().collect::<Vec<_>>();
+    let (surfaces, lines) = (names(&surfaces), [names(&curves), names(&points)].concat());
+    let wanted = Wanted {
+        groups: surfaces.iter().map(String::as_str).zip(0..).collect(),
+        lines: lines.iter().map(String::as_str).collect(),
+        analysis: Analysis::PlaneStrain,
+        scale: 1.0,
+    };
+    assemble::assemble(&contents, &wanted).map(|(mesh, _)| mesh)
+}
+
+/// What the case takes from the file, which must be there.
+fn wanted<'c>(
+    source: &Source,
+    file: &'c CaseFile,
+    scale: f64,
+    contents: &Contents<'_>,
+    path: &Path,
+) -> Result<Wanted<'c>, Error> {
+    let [points, curves, surfaces] = counts(contents);
+    let mut wanted = Wanted {
+        groups: HashMap::new(),
+        lines: HashSet::new(),
+        analysis: file.analysis,
+        scale,
+    };
+    for (number, (name, group)) in file.groups.iter().enumerate() {
+        if group.get_ref().formulation == Formulation::ZeroThickness {
+            continue;
+        }
+        if !surfaces.contains_key(name.get_ref()) {
+            let message = format!(
+                "{} has no physical surface `{}`",
+                path.display(),
+                name.get_ref()
+            );
+            let hint = known(name.get_ref(), &[(&surfaces, "element", "elements")]);
+            return Err(source.error(name.span(), message).hint(hint).into());
+        }
+        wanted.groups.insert(name.get_ref(), number);
+    }
+    for name in file.line_names() {
+        let is_curve = curves.contains_key(name.get_ref());
+        let is_point = points.contains_key(name.get_ref());
+        if is_curve && is_point {
+            let message = format!(
+                "{} has both a physical curve and a physical point `{}`",
+                path.display(),
+                name.get_ref()
+            );
+            return Err(source.error(name.span(), message).into());
+        }
+        if !is_curve && !is_point {
+            let message = format!("there is no line `{}`", name.get_ref());
+            let kinds = [(&curves, "edge", "edges"), (&points, "point", "points")];
+            let hint = known(name.get_ref(), &kinds);
+            return Err(source.error(name.span(), message).hint(hint).into());
+        }
+        wanted.lines.insert(name.get_ref());
+    }
+    Ok(wanted)
+}
+
+/// Elements of the physical points, curves and surfaces, by name.
+fn counts(contents: &Contents<'_>) -> [Counts; 3] {
+    let mut counts = <[Counts; 3]>::default();
+    for (dimension, name) in &contents.named {
+        if let Some(counts) = counts.get_mut(usize::from(*dimension)) {
+            counts.entry(name.clone()).or_default();
+        }
+    }
+    // Elements of one set first: names are looked up once for each.
+    let mut sets: IndexMap<(u8, usize), (&contents::Element, usize)> = IndexMap::new();
+    for element in &contents.elements {
+        let entry = sets.entry(Contents::set_of(element));
+        entry.or_insert((element, 0)).1 += 1;
+    }
+    for ((dimension, _), (element, n)) in sets {
+        for name in contents.groups_of(element) {
+            if let Some(counts) = counts.get_mut(usize::from(dimension)) {
+                *counts.entry(name).or_default() += n;
+            }
+        }
+    }
+    counts
+}
+
+/// `did you mean …?` and all names with their numbers of elements.
+fn known(name: &str, kinds: &[(&Counts, &str, &str)]) -> String {
+    let names = kinds.iter().flat_map(|(counts, ..)| counts.keys());
+    let names: Vec<&str> = names.map(String::as_str).collect();
+    let listed = kinds.iter().flat_map(|(counts, one, many)| {
+        counts.iter().map(move |(name, n)| {
+            let what = if *n == 1 { one } else { many };
+            format!("{name} ({n} {what})")
+        })
+    });
+    let listed: Vec<String> = listed.collect();
+    if listed.is_empty() {
+        return "the file has none; in Gmsh, `Physical Surface(\"name\") = {1};` names the surface \
+                1, and so for curves and points"
+            .to_owned();
+    }
+    let list = listed.join(", ");
+    match text::nearest(name, names) {
+        Some(near) => format!("did you mean `{near}`? There is: {list}"),
+        None => format!("there is: {list}"),
+    }
+}
+
+#[cfg(test)]
+#[path = "gmsh/tests.rs"]
+mod tests;

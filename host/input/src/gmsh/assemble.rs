@@ -1,0 +1,475 @@
+//! From what a mesh file says to the mesh of a case.
+
+use super::Wanted;
+use super::contents::{Contents, Element};
+use super::cursor::Fault;
+use super::kind::Kind;
+use indexmap::IndexMap;
+use mechanics::mesh::{Line, Mesh, Solid};
+use mechanics::problem::Analysis;
+use std::collections::{HashMap, HashSet};
+
+/// Nodes of a mesh, and their numbers by those of the file.
+type Numbered = (Vec<[f64; 2]>, HashMap<usize, usize>);
+
+/// Largest coordinate, m.
+const FARTHEST: f64 = 1e9;
+/// Lengths within this fraction of the mesh's size are none.
+const NOTHING: f64 = 1e-9;
+/// Names that a note lists.
+const MOST_NAMES: usize = 20;
+
+/// A side of an element.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    /// Its ends, as the first element that has it goes round.
+    ends: [usize; 2],
+    /// Elements that have it, with the number of their edge.
+    owners: [Option<(usize, usize)>; 2],
+}
+
+/// A mesh in the making.
+struct Assembly<'a> {
+    contents: &'a Contents<'a>,
+    wanted: &'a Wanted<'a>,
+    /// Elements of the file that the case has, as those of the mesh; by their nodes in the file.
+    own: HashMap<[usize; 8], usize>,
+    /// Those elements, with their nodes in the file.
+    taken: Vec<(&'a Element, [usize; 8], usize)>,
+    /// Whether a node of the file belongs to an element that the case leaves out.
+    is_outside: Vec<bool>,
+    notes: Vec<String>,
+}
+
+/// The mesh, and notes for the user.
+///
+/// # Errors
+/// What is wrong with the file, and where.
+pub(super) fn assemble(
+    contents: &Contents<'_>,
+    wanted: &Wanted<'_>,
+) -> Result<(Mesh, Vec<String>), Fault> {
+    let mut assembly = Assembly {
+        contents,
+        wanted,
+        own: HashMap::new(),
+        taken: Vec::new(),
+        is_outside: vec![false; contents.nodes.len()],
+        notes: Vec::new(),
+    };
+    assembly.take_elements()?;
+    assembly.leave_out()?;
+    let (nodes, number) = assembly.nodes()?;
+    let mut mesh = Mesh {
+        nodes,
+        ..Mesh::default()
+    };
+    for (element, nodes, group) in &assembly.taken {
+        let nodes = nodes.map(|node| number.get(&node).copied().unwrap_or_default());
+        let solid = turned(element.kind, &mesh.nodes, nodes, *group);
+        mesh.solids.push(solid);
+    }
+    let sides = assembly.sides(&mesh)?;
+    assembly.lines(&mut mesh, &number, &sides)?;
+    assembly.note_lines();
+    assembly.note_cracks(&mesh);
+    Ok((mesh, assembly.notes))
+}
+
+impl Assembly<'_> {
+    fn fault<T>(&self, element: &Element, message: &str) -> Result<T, Fault> {
+        Err(self.contents.cursor.fault(element.place, message))
+    }
+
+    /// The elements that are in groups of the case, in the order of the file.
+    fn take_elements(&mut self) -> Result<(), Fault> {
+        let contents = self.contents;
+        let mut group_of_set: HashMap<(u8, usize), Vec<usize>> = HashMap::new();
+        for element in contents.elements.iter().filter(|e| e.kind.dimension() == 2) {
+            let groups = group_of_set
+                .entry(Contents::set_of(element))
+                .or_insert_with(|| {
+                    let names = contents.groups_of(element);
+                    let groups = names.filter_map(|n| self.wanted.groups.get(n.as_str()).copied());
+                    let mut groups: Vec<usize> = groups.collect();
+                    groups.sort_unstable();
+                    groups.dedup();
+                    groups
+                });
+            let group = match groups.as_slice() {
+                [] => continue,
+                [group] => *group,
+                [first, second, ..] => {
+                    let pair = [*first, *second];
+                    return self.in_two_groups(element, pair);
+                }
+            };
+            let nodes = contents.nodes_of(element)?;
+            // Format 2.2 has an element that is in two groups twice.
+            let mut key = nodes;
+            key.sort_unstable();
+            if let Some(other) = self.own.insert(key, self.taken.len()) {
+                let (other, _, other_group) = self.taken[other];
+                if other_group != group {
+                    return self.in_two_groups(element, [other_group, group]);
+                }
+                let message = format!(
+                    "elements {} and {} have the same nodes",
+                    other.number, element.number
+                );
+                return self.fault(element, &message);
+            }
+            self.taken.push((element, nodes, group));
+        }
+        Ok(())
+    }
+
+    fn in_two_groups(&self, element: &Element, groups: [usize; 2]) -> Result<(), Fault> {
+        let name = |group: usize| {
+            let mut all = self.wanted.groups.iter();
+            all.find(|(_, number)| **number == group)
+                .map_or("", |(name, _)| *name)
+        };
+        let [first, second] = groups.map(name);
+        let message = format!(
+            "element {} is in two groups of the case, `{first}` and `{second}`",
+            element.number
+        );
+        self.fault(element, &message)
+    }
+
+    /// Says which elements are left out.
+    fn leave_out(&mut self) -> Result<(), Fault> {
+        let contents = self.contents;
+        let mut left: IndexMap<(u8, usize), (&Element, usize)> = IndexMap::new();
+        for element in contents.elements.iter().filter(|e| e.kind.dimension() == 2) {
+            let nodes = contents.nodes_of(element)?;
+            let mut key = nodes;
+            key.sort_unstable();
+            if self.own.contains_key(&key) {
+                continue;
+            }
+            for node in &nodes[..element.kind.n_nodes()] {
+                self.is_outside[*node] = true;
+            }
+            let entry = left.entry(Contents::set_of(element));
+            entry.or_insert((element, 0)).1 += 1;
+        }
+        let mut names: IndexMap<String, usize> = IndexMap::new();
+        let mut nameless = 0;
+        for (element, n) in left.into_values() {
+            let mut is_nameless = true;
+            for name in contents.groups_of(element) {
+                *names.entry(name).or_default() += n;
+                is_nameless = false;
+            }
+            if is_nameless {
+                nameless += n;
+            }
+        }
+        if !names.is_empty() {
+            let listed = names.iter().map(|(name, n)| format!("`{name}` ({n})"));
+            self.notes.push(format!(
+                "physical surfaces that are no groups of the case are left out, with their elements: \
+                 {}",
+                list(listed)
+            ));
+        }
+        if nameless > 0 {
+            self.notes.push(format!(
+                "{} in no physical surface and left out",
+                counted(nameless, "element", " is", "s are")
+            ));
+        }
+        Ok(())
+    }
+
+    /// The nodes of the mesh, and their numbers by those of the file.
+    fn nodes(&mut self) -> Result<Numbered, Fault> {
+        let Self {
+            contents, wanted, ..
+        } = *self;
+        let mut is_used = vec![false; contents.nodes.len()];
+        for (element, nodes, _) in &self.taken {
+            for node in &nodes[..element.kind.n_nodes()] {
+                is_used[*node] = true;
+            }
+        }
+        let used = || {
+            contents
+                .nodes
+                .iter()
+                .zip(&is_used)
+                .filter(|(_, used)| **used)
+        };
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for (node, _) in used() {
+            for c in 0..3 {
+                low[c] = low[c].min(wanted.scale * node.at[c]);
+                high[c] = high[c].max(wanted.scale * node.at[c]);
+            }
+        }
+        let size = f64::max(high[0] - low[0], high[1] - low[1]);
+        let nothing = NOTHING * size;
+        let mut nodes = Vec::new();
+        let mut number = HashMap::new();
+        for (place, node) in contents.nodes.iter().enumerate() {
+            if !is_used[place] {
+                continue;
+            }
+            let [mut x, y, z] = node.at.map(|at| wanted.scale * at);
+            let wrong = |message: String| Err(contents.cursor.fault(node.place, &message));
+            if [x, y, z].iter().any(|at| at.abs() > FARTHEST) {
+                return wrong(format!(
+                    "node {} is at ({x:e}, {y:e}), expected at most {FARTHEST:e} m",
+                    node.number
+                ));
+            }
+            if z.abs() > nothing {
+                return wrong(format!(
+                    "node {} is at z = {z}: the mesh does not lie in the plane of x and y (in \
+                     axisymmetry x is the radius, y the axis)",
+                    node.number
+                ));
+            }
+            if wanted.analysis == Analysis::Axisymmetric {
+                if x < -nothing {
+                    return wrong(format!(
+                        "node {} is at x = {x}, across the axis; x is the radius, 0 on the axis",
+                        node.number
+                    ));
+                }
+                // Round-off of Gmsh; what is on the axis is told by 0.
+                if x.abs() <= 1e-3 * nothing {
+                    x = 0.0;
+                }
+            }
+            number.insert(place, nodes.len());
+            nodes.push([x, y]);
+        }
+        let left_out = is_used.iter().zip(&self.is_outside);
+        let left_out = left_out.filter(|(used, outside)| !**used && !**outside);
+        let left_out = left_out.count();
+        if left_out > 0 {
+            self.notes.push(format!(
+                "{} to no triangle or quad and left out",
+                counted(left_out, "node", " belongs", "s belong")
+            ));
+        }
+        Ok((nodes, number))
+    }
+
+    /// Sides of the mesh's elements, by the node in their middle.
+    fn sides(&self, mesh: &Mesh) -> Result<Vec<Option<Side>>, Fault> {
+        let mut sides: Vec<Option<Side>> = vec![None; mesh.nodes.len()];
+        let mut is_corner = vec![false; mesh.nodes.len()];
+        for (number, solid) in mesh.solids.iter().enumerate() {
+            let element = self.taken[number].0;
+            for (edge, [a, b, middle]) in solid.edges().enumerate() {
+                is_corner[a] = true;
+                let owner = Some((number, edge));
+                let Some(side) = &mut sides[middle] else {
+                    let owners = [owner, None];
+                    let ends = [a, b];
+                    sides[middle] = Some(Side { ends, owners });
+                    continue;
+                };
+                let first = side.owners[0].map_or(number, |(first, _)| first);
+                let other = self.taken[first].0.number;
+                if side.ends == [b, a] && side.owners[1].is_none() {
+                    side.owners[1] = owner;
+                } else if side.ends == [b, a] {
+                    let message = format!(
+                        "element {} is the third one on a side of element {other}",
+                        element.number
+                    );
+                    return self.fault(element, &message);
+                } else if side.ends == [a, b] {
+                    let message = format!(
+                        "elements {other} and {} lie on each other: both are on the same side of \
+                         an edge",
+                        element.number
+                    );
+                    return self.fault(element, &message);
+                } else {
+                    let message = format!(
+                        "elements {other} and {} have the middle of a side in common, but not its \
+                         ends",
+                        element.number
+                    );
+                    return self.fault(element, &message);
+                }
+            }
+        }
+        for (middle, _) in is_corner.iter().enumerate().filter(|(_, is)| **is) {
+            if let Some(side) = &sides[middle] {
+                let owner = side.owners[0].map_or(0, |(owner, _)| owner);
+                let element = self.taken[owner].0;
+                let message = format!(
+                    "the middle of a side of element {} is a corner of another element: the mesh \
+                     does not fit together there",
+                    element.number
+                );
+                return self.fault(element, &message);
+            }
+        }
+        Ok(sides)
+    }
+
+    /// Names the lines and points of the mesh.
+    fn lines(
+        &self,
+        mesh: &mut Mesh,
+        number: &HashMap<usize, usize>,
+        sides: &[Option<Side>],
+    ) -> Result<(), Fault> {
+        let contents = self.contents;
+        let mut seen: HashSet<(String, usize)> = HashSet::new();
+        let mut of_name: IndexMap<String, (Line, &Element)> = IndexMap::new();
+        let mut is_curve: HashSet<String> = HashSet::new();
+        for kind in [Kind::Line, Kind::Point] {
+            for element in contents.elements.iter().filter(|e| e.kind == kind) {
+                let names: Vec<String> = contents.groups_of(element).collect();
+                if names.is_empty() {
+                    continue;
+                }
+                let nodes = contents.nodes_of(element)?;
+                let own = nodes.map(|node| number.get(&node).copied());
+                for name in names {
+                    if kind == Kind::Line {
+                        is_curve.insert(name.clone());
+                    } else if is_curve.contains(&name) {
+                        // A curve of this name; that the case does not use it was seen to.
+                        continue;
+                    }
+                    let (line, _) = of_name
+                        .entry(name.clone())
+                        .or_insert_with(|| (Line::default(), element));
+                    if kind == Kind::Point {
+                        if let Some(node) = own[0]
+                            && seen.insert((name, node))
+                        {
+                            line.nodes.push(node);
+                        }
+                        continue;
+                    }
+                    if let [Some(a), Some(b), Some(middle), ..] = own
+                        && let Some(side) = &sides[middle]
+                        && (side.ends == [a, b] || side.ends == [b, a])
+                    {
+                        if seen.insert((name, middle)) {
+                            line.edges.extend(side.owners.iter().flatten());
+                        }
+                        continue;
+                    }
+                    // Where a surface is left out, its outline is.
+                    let is_outside = self.is_outside[nodes[2]];
+                    if self.wanted.lines.contains(name.as_str()) && !is_outside {
+                        let message = format!(
+                            "element {} of the physical curve `{name}` is no side of an element of \
+                             the case's groups",
+                            element.number
+                        );
+                        return self.fault(element, &message);
+                    }
+                }
+            }
+        }
+        for (name, (line, element)) in of_name {
+            if !line.edges.is_empty() || !line.nodes.is_empty() {
+                mesh.lines.insert(name, line);
+            } else if self.wanted.lines.contains(name.as_str()) {
+                let message = format!("no element of the case's groups is at `{name}`");
+                return self.fault(element, &message);
+            }
+        }
+        Ok(())
+    }
+
+    /// Says which names of lines and points the case does not use.
+    fn note_lines(&mut self) {
+        let [points, curves, _] = super::counts(self.contents);
+        let unused = |name: &&String| !self.wanted.lines.contains(name.as_str());
+        let unused: Vec<&String> = curves.keys().chain(points.keys()).filter(unused).collect();
+        if !unused.is_empty() {
+            let names = unused.iter().map(|name| format!("`{name}`"));
+            let names = list(names);
+            self.notes.push(format!(
+                "physical curves and points that the case does not use: {names}"
+            ));
+        }
+    }
+
+    /// Says if nodes stand at one place without being one: nothing holds elements together there.
+    fn note_cracks(&mut self, mesh: &Mesh) {
+        let size = mesh.longer_side();
+        let grain = if size > 0.0 { NOTHING * size } else { 1.0 };
+        let mut known = HashSet::new();
+        let mut twins = 0;
+        let mut first = None;
+        for node in &mesh.nodes {
+            let key = node.map(|c| (c / grain).round() as i64);
+            if !known.insert(key) {
+                twins += 1;
+                first.get_or_insert(*node);
+            }
+        }
+        if let Some([x, y]) = first {
+            self.notes.push(format!(
+                "{} where another one is, first at ({x}, {y}): elements are not joined there \
+                 (`Coherence Mesh` in Gmsh joins them)",
+                counted(twins, "node", " is", "s are")
+            ));
+        }
+    }
+}
+
+/// `1 node is`, `2 nodes are`.
+fn counted(n: usize, what: &str, one: &str, many: &str) -> String {
+    let verb = if n == 1 { one } else { many };
+    format!("{n} {what}{verb}")
+}
+
+/// Some names and how many more there are.
+fn list(names: impl ExactSizeIterator<Item = String>) -> String {
+    let more = names.len().saturating_sub(MOST_NAMES);
+    let names: Vec<String> = names.take(MOST_NAMES).collect();
+    let names = names.join(", ");
+    if more == 0 {
+        names
+    } else {
+        format!("{names}, and {more} more")
+    }
+}
+
+/// An element of the mesh, its nodes counter-clockwise. They are the first ones of eight.
+fn turned(kind: Kind, at: &[[f64; 2]], nodes: [usize; 8], group: usize) -> Solid {
+    let [a, b, c, d, e, f, g, h] = nodes;
+    if kind == Kind::Triangle {
+        let solid = Solid::triangle([a, b, c, d, e, f], group);
+        if area(at, &solid) < 0.0 {
+            return Solid::triangle([a, c, b, f, e, d], group);
+        }
+        return solid;
+    }
+    let solid = Solid::quad(nodes, group);
+    if area(at, &solid) < 0.0 {
+        return Solid::quad([a, d, c, b, h, g, f, e], group);
+    }
+    solid
+}
+
+/// Area of an element, negative if it goes round clockwise.
+fn area(at: &[[f64; 2]], solid: &Solid) -> f64 {
+    let origin = at[solid.nodes()[0]];
+    let cross = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+    let sides = solid.edges().map(|side| {
+        let [a, b, middle] = side.map(|node| [0, 1].map(|c| at[node][c] - origin[c]));
+        let along = [0, 1].map(|c| b[c] - a[c]);
+        let rise = [0, 1].map(|c| middle[c] - 0.5 * (a[c] + b[c]));
+        // Below the chord, and between it and the parabola.
+        0.5 * cross(a, b) + 2.0 / 3.0 * cross(rise, along)
+    });
+    sides.sum()
+}
