@@ -11,8 +11,10 @@
 mod column;
 mod initial;
 mod loading;
+mod pores;
 
 pub use column::Columns;
 pub(crate) use initial::{InitialStresses, beside_joints};
 pub use loading::{Loading, pressure_on};
 pub(crate) use loading::unit_pressure;
+pub use pores::Pores;

@@ -24,7 +24,7 @@ pub use watch::{Increment, Part, Watch, When};
 use crate::assembly::Tie;
 use crate::equilibrium::{Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
-use crate::ground::Loading;
+use crate::ground::{Loading, Pores};
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -64,6 +64,8 @@ pub struct Snapshot<'a> {
     /// Internal less external forces by degree of freedom: reactions where displacements are
     /// prescribed.
     pub reaction: &'a [f64],
+    /// Hydrostatic pore pressures.
+    pub pores: &'a Pores,
 }
 
 /// A problem on its way through its phases.
@@ -84,6 +86,7 @@ pub struct Simulation {
     prescribed: BTreeMap<usize, f64>,
     /// What acts at the start of the phase, and at its end.
     loading: [Loading; 2],
+    pores: Pores,
     /// External forces.
     force: Vec<f64>,
     /// Internal less external forces of the last state that was completed.
@@ -160,6 +163,7 @@ impl Simulation {
             warnings,
             displacement: vec![0.0; n_dofs],
             prescribed: BTreeMap::new(),
+            pores: Pores::before(&problem),
             loading: [Loading::before(&problem), Loading::before(&problem)],
             force: vec![0.0; n_dofs],
             reaction: vec![0.0; n_dofs],
@@ -233,6 +237,7 @@ impl Simulation {
             ties: &self.tied,
             displacement: &self.displacement,
             reaction: &self.reaction,
+            pores: &self.pores,
         }
     }
 

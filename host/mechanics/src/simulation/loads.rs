@@ -113,6 +113,18 @@ impl Simulation {
         true
     }
 
+    /// Takes note of the pore pressures at the phase's load factor.
+    pub(super) fn note_pores(&mut self, number: usize, course: &PhaseCourse) {
+        if self.problem.water.is_none() {
+            return;
+        }
+        let leg = leg(&self.problem.phases[number], course.leg);
+        let [[t_0, f_0], [t_1, f_1]] = leg.unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
+        let water = |factor: f64| self.loading_at(factor).water(&self.problem);
+        let (from, to) = (water(f_0), water(f_1));
+        self.pores.are(from, to, (course.lambda - t_0) / (t_1 - t_0));
+    }
+
     /// Takes note of what a phase ends with.
     pub(super) fn keep_loads(&mut self, number: usize, prescribed: &[Prescribed]) {
         let course = &self.problem.phases[number].course;

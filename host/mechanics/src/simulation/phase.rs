@@ -67,6 +67,12 @@ impl Simulation {
         let loads = self.loads_on(number, 0, &prescribed);
         let (equations, loads) = self.equations_of(number, loads, None)?;
         let imbalance = equations.out_of_balance;
+        let weight = crate::equilibrium::norm(&loads.force_start);
+        let has_weight = self.loading[0].unit_weight.iter().flatten().any(|weight| *weight > 0.0);
+        if number == 0 && has_weight && weight > 0.0 {
+            let rest = crate::equilibrium::norm(&loads.out_of_balance);
+            watch.at_rest(&name, rest / weight);
+        }
         if imbalance > 1e-6 {
             watch.warning(&Warning::OutOfBalance(name.clone(), imbalance));
         }

@@ -105,6 +105,10 @@ pub trait Watch {
     ) {
     }
 
+    /// The ground was found at rest but for this share of its weight, which the first phase carries to
+    /// equilibrium.
+    fn at_rest(&mut self, _phase: &str, _share: f64) {}
+
     /// A phase has ended, or cannot go on.
     fn phase_ends(&mut self, _record: PhaseRecord) {}
 
