@@ -373,7 +373,7 @@ fn two_blocks(mesh: &str) -> String {
          [laws.joint]\nlaw = \"coulomb_joint\"\n[laws.joint.parameters]\n\
          normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
          dilatancy_angle = 5.0\n\
-         [groups]\nsoil = {{ formulation = \"solid\", law = \"soil\" }}\n\
+         [groups]\nsoil = {{ formulation = \"solid\", integration = \"full\", law = \"soil\" }}\n\
          joint = {{ formulation = \"zero_thickness\", law = \"joint\", line = \"between\" }}\n\
          [[supports]]\nline = \"bottom\"\nfixed = [\"x\", \"y\"]\n\
          [[phase]]\nname = \"press\"\nincrements = 2\n\

@@ -210,6 +210,7 @@ friction_angle = 30.0
 dilatancy_angle = 0.0
 [groups.soil]
 formulation = "solid"
+integration = "full"
 law = "soil"
 [groups.layer]
 formulation = "thin_layer"

@@ -409,6 +409,7 @@ law = "fixture"
 parameters = { normal_stiffness = 1e6, shear_stiffness = 1e5 }
 [groups.soil]
 formulation = "solid"
+integration = "full"
 law = "soil"
 [groups.joint]
 formulation = "zero_thickness"

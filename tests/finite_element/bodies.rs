@@ -42,9 +42,9 @@ elastic = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_rati
 rock = {{ law = "mohr_coulomb", parameters = {{ young_modulus = {stiffness}, poisson_ratio = 0.3, cohesion = {cohesion}, friction_angle = 20.0, dilatancy_angle = 10.0 }} }}
 ground = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 20.0, dilatancy_angle = 10.0 }} }}
 [groups]
-wall = {{ formulation = "solid", law = "elastic" }}
-first = {{ formulation = "solid", law = "rock" }}
-second = {{ formulation = "solid", law = "ground" }}
+wall = {{ formulation = "solid", integration = "full", law = "elastic" }}
+first = {{ formulation = "solid", integration = "full", law = "rock" }}
+second = {{ formulation = "solid", integration = "full", law = "ground" }}
 [[supports]]
 line = "base"
 fixed = ["x", "y"]
@@ -138,8 +138,8 @@ base = {{ y = 0.0 }}
 elastic = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
 mc = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 20.0, dilatancy_angle = 0.0 }} }}
 [groups]
-wall = {{ formulation = "solid", law = "elastic" }}
-ground = {{ formulation = "solid", law = "mc" }}
+wall = {{ formulation = "solid", integration = "full", law = "elastic" }}
+ground = {{ formulation = "solid", integration = "full", law = "mc" }}
 [[supports]]
 line = "base"
 fixed = ["x", "y"]
@@ -185,7 +185,7 @@ top = {{ y = 1.0 }}
 [laws]
 ground = {law}
 [groups]
-block = {{ formulation = "solid", law = "ground" }}
+block = {{ formulation = "solid", integration = "full", law = "ground" }}
 [[supports]]
 line = "base"
 fixed = ["y"]
@@ -239,7 +239,7 @@ strip = {{ y = 4.0, x = [0.0, 1.0] }}
 elastic = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
 mc = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 30.0, dilatancy_angle = 0.0 }} }}
 [groups]
-ground = {{ formulation = "solid", law = "elastic" }}
+ground = {{ formulation = "solid", integration = "full", law = "elastic" }}
 [[supports]]
 line = "base"
 fixed = ["y"]

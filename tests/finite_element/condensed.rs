@@ -166,7 +166,7 @@ soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.
 law = "mohr_coulomb"
 parameters = { young_modulus = 1e4, poisson_ratio = 0.2, cohesion = 10.0, friction_angle = 30.0, dilatancy_angle = 0.0 }
 [groups]
-soil = { formulation = "solid", law = "soil" }
+soil = { formulation = "solid", integration = "full", law = "soil" }
 layer = { formulation = "thin_layer", integration = "mean", law = "soil" }
 yielding = { formulation = "thin_layer", integration = "mean", law = "yielding" }
 [[supports]]

@@ -112,8 +112,8 @@ bottom = {{ z = 0.0 }}
 [laws]
 {}{}{law}
 [groups]
-core = {{ formulation = "solid", law = "core" }}
-ground = {{ formulation = "solid", law = "ground" }}
+core = {{ formulation = "solid", integration = "full", law = "core" }}
+ground = {{ formulation = "solid", integration = "full", law = "ground" }}
 {group}
 [[supports]]
 line = "top"

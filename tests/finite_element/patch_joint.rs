@@ -114,8 +114,8 @@ impl JointPatch<'_> {
                 elastic("ground_2", grounds[1].0, grounds[1].1)
             ),
             groups: &format!(
-                "ground_1 = {{ formulation = \"solid\", law = \"ground_1\" }}\n\
-                 ground_2 = {{ formulation = \"solid\", law = \"ground_2\" }}\n\
+                "ground_1 = {{ formulation = \"solid\", integration = \"full\", law = \"ground_1\" }}\n\
+                 ground_2 = {{ formulation = \"solid\", integration = \"full\", law = \"ground_2\" }}\n\
                  joint = {{ formulation = \"zero_thickness\", line = \"joint\", \
                  integration = \"{integration}\", law = \"joint\" }}\n"
             ),

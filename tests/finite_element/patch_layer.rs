@@ -191,8 +191,8 @@ fn laminate(analysis: &str, normal: Normal, law: &LayerLaw, integration: &str, s
     };
     let regions = region("ground_1", 0) + &region("layer", 1) + &region("ground_2", 2);
     let groups = format!(
-        "ground_1 = {{ formulation = \"solid\", law = \"ground_1\" }}\n\
-         ground_2 = {{ formulation = \"solid\", law = \"ground_2\" }}\n{}",
+        "ground_1 = {{ formulation = \"solid\", integration = \"full\", law = \"ground_1\" }}\n\
+         ground_2 = {{ formulation = \"solid\", integration = \"full\", law = \"ground_2\" }}\n{}",
         law.group(integration)
     );
     let (x, y) = match normal {
@@ -317,7 +317,7 @@ fn homogeneous(analysis: &str, normal: Normal, interface: bool, integration: &st
             ),
             laws: &format!("{}{layer}", elastic("ground", young, poisson)),
             groups: &format!(
-                "ground = {{ formulation = \"solid\", law = \"ground\" }}\n\
+                "ground = {{ formulation = \"solid\", integration = \"full\", law = \"ground\" }}\n\
                  layer = {{ formulation = \"thin_layer\", normal = \"{axis}\", \
                  integration = \"{integration}\", law = \"layer\" }}\n"
             ),

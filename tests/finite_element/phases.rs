@@ -46,6 +46,7 @@ top = {{ y = 1.0 }}
 {laws}
 [groups.ground]
 formulation = "solid"
+integration = "full"
 {group}
 [[supports]]
 line = "bottom"
@@ -306,8 +307,8 @@ toe = {{ z = 0.5, r = [0.0, 0.3] }}
 law = "coulomb_joint"
 parameters = {{ normal_stiffness = 1e6, shear_stiffness = 3e5, cohesion = 4.0, friction_angle = 25.0, dilatancy_angle = 2.0 }}
 [groups]
-ground = {{ formulation = "solid", law = "ground" }}
-pile = {{ formulation = "solid", law = "pile" }}
+ground = {{ formulation = "solid", integration = "full", law = "ground" }}
+pile = {{ formulation = "solid", integration = "full", law = "pile" }}
 layer = {{ formulation = "thin_layer", integration = "{integration}", law = "layer" }}
 [[supports]]
 line = "axis"

@@ -67,7 +67,7 @@ law = "mohr_coulomb"
 parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 36.5, dilatancy_angle = 12.0 }}
 [groups]
 ground = {{ formulation = "solid", law = "ground", integration = "reduced" }}
-pile = {{ formulation = "solid", law = "steel" }}
+pile = {{ formulation = "solid", integration = "full", law = "steel" }}
 [[supports]]
 line = "bottom"
 fixed = ["x", "y"]
@@ -130,7 +130,7 @@ law = "mohr_coulomb"
 parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 36.5, dilatancy_angle = 12.0, tensile_strength = 0.0 }}
 [groups]
 ground = {{ formulation = "solid", law = "ground", integration = "reduced" }}
-block = {{ formulation = "solid", law = "steel" }}
+block = {{ formulation = "solid", integration = "full", law = "steel" }}
 [[supports]]
 line = "bottom"
 fixed = ["x", "y"]

@@ -53,7 +53,7 @@ parameters = {{ young_modulus = 1e4, poisson_ratio = 0.3 }}
 law = "coulomb_joint"
 parameters = {{ normal_stiffness = 1e6, shear_stiffness = 4e5, cohesion = 10.0, friction_angle = 30.0, dilatancy_angle = 5.0 }}
 [groups]
-column = {{ formulation = "solid", law = "column" }}
+column = {{ formulation = "solid", integration = "full", law = "column" }}
 {joint}
 [[supports]]
 line = "{foot}"
@@ -166,8 +166,8 @@ parameters = {{ young_modulus = 1e5, poisson_ratio = 0.2 }}
 law = "coulomb_joint"
 parameters = {{ normal_stiffness = 1e6, shear_stiffness = 3e5, cohesion = 5.0, friction_angle = 20.0, dilatancy_angle = 0.0 }}
 [groups]
-soil = {{ formulation = "solid", law = "soil" }}
-pile = {{ formulation = "solid", law = "pile" }}
+soil = {{ formulation = "solid", integration = "full", law = "soil" }}
+pile = {{ formulation = "solid", integration = "full", law = "pile" }}
 skin = {group}
 [[supports]]
 line = "axis"
@@ -256,7 +256,7 @@ half = { y = 0.5, x = [0.0, 0.5] }
 elastic = { law = "elastic", parameters = { young_modulus = 34e3, poisson_ratio = 0.0 } }
 joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e7, shear_stiffness = 1e7, cohesion = 1000.0, friction_angle = 30.0, dilatancy_angle = 0.0 } }
 [groups]
-block = { formulation = "solid", law = "elastic", initial_stress = [0.0, -100.0, 0.0, 0.0] }
+block = { formulation = "solid", integration = "full", law = "elastic", initial_stress = [0.0, -100.0, 0.0, 0.0] }
 joint = { formulation = "zero_thickness", line = "half", integration = "nodes", law = "joint" }
 [[supports]]
 line = "base"

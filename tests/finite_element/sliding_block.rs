@@ -100,9 +100,11 @@ top = {{ y = {top:?} }}
 {laws}
 [groups.rigid]
 formulation = "solid"
+integration = "full"
 law = "rigid"
 [groups.column]
 formulation = "solid"
+integration = "full"
 law = "column"
 [groups.interface]
 formulation = "{group}"

@@ -90,9 +90,9 @@ t = {T:?}
 p_0 = 100.0
 sigma_ni = 100.0
 [groups]
-rigid = {{ formulation = "solid", law = "rigid" }}
-rope = {{ formulation = "solid", law = "rope" }}
-nothing = {{ formulation = "solid", law = "nothing" }}
+rigid = {{ formulation = "solid", integration = "full", law = "rigid" }}
+rope = {{ formulation = "solid", integration = "full", law = "rope" }}
+nothing = {{ formulation = "solid", integration = "full", law = "nothing" }}
 interface = {{ formulation = "thin_layer", integration = "mean", law = "interface" }}
 [[supports]]
 line = "base"

@@ -73,6 +73,7 @@ top = {{ y = 1.0 }}
 {}{}{}{}
 [groups.ground]
 formulation = "solid"
+integration = "full"
 {group}
 [[supports]]
 line = "bottom"

@@ -47,7 +47,7 @@ sand = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio =
 mepi = {{ law = "mepi", parameters = {{ k_n = 86e3, k_t = 37e3, n = 0.55, mu_0 = 0.27, mu_p = 0.7, mu_c0 = 0.46, a = 0.008, c_0 = 40.0, t = 0.002, p_0 = 100.0, sigma_ni = 100.0 }} }}
 [groups]
 a = {{ formulation = "solid", law = "sand", integration = "reduced" }}
-b = {{ formulation = "solid", law = "sand" }}
+b = {{ formulation = "solid", integration = "full", law = "sand" }}
 i = {{ formulation = "thin_layer", law = "mepi", integration = "reduced", normal = "y" }}
 [[supports]]
 line = "bottom"

@@ -152,6 +152,7 @@ law = "BrittleZone"
 parameters = {{ NormalStiffness = 1e7, TangentialStiffness = 4e6 }}
 [groups.block]
 formulation = "solid"
+integration = "full"
 law = "block"
 [groups.zone]
 formulation = "zero_thickness"

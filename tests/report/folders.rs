@@ -43,6 +43,7 @@ dilatancy_angle = 1.0
 
 [groups.soil]
 formulation = "solid"
+integration = "full"
 law = "soil"
 
 [groups.layer]

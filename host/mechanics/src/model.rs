@@ -348,7 +348,7 @@ impl GroupBuilder<'_> {
 
     /// Elements of one shape in global axes.
     fn of_one_shape(&self, solids: &[&Solid]) -> Result<Box<dyn Kinematics>, Refusal> {
-        let integration = self.integration(Integration::Full);
+        let integration = self.integration(Integration::Projected);
         let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
         let axes = vec![Axes::GLOBAL; solids.len()];
         let nodes = |solid: &&Solid| solid.nodes().try_into().ok();

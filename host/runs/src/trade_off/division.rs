@@ -88,7 +88,7 @@ mesh.columns = [{ n = 3, to = 1.0, ratio = 2.0 }, { n = 1, to = 1.1 }, { n = 2, 
 mesh.rows = [{ n = 1, to = 1.0 }]
 mesh.region = [{ group = "soil" }, { group = "layer", x = [1.0, 1.1] }]
 laws.soil = { law = "elastic" }
-groups.soil = { formulation = "solid", law = "soil" }
+groups.soil = { formulation = "solid", integration = "full", law = "soil" }
 groups.layer = { formulation = "thin_layer", law = "soil" }
 [[phase]]
 name = "load"
