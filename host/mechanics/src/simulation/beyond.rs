@@ -12,6 +12,12 @@ use std::collections::HashSet;
 /// strains grow without bound as elements shrink, over an area that vanishes.
 const SHARE: f64 = 0.01;
 
+/// An element moves in a way that its 2 × 2 points do not see where the strain of that is so many times
+/// what they see.
+const UNSEEN: f64 = 10.0;
+/// And at least this fraction of the largest strain of all.
+const WORTH: f64 = 0.1;
+
 /// The worst of a run so far.
 #[derive(Debug, Default)]
 pub(super) struct Beyond {
@@ -21,6 +27,9 @@ pub(super) struct Beyond {
     moved: Option<[f64; 2]>,
     /// Largest jump by the length of its interface, with both and the group.
     slipped: Option<(f64, [f64; 2], String)>,
+    /// Elements that move in a way that no point sees: how many, and group and place of the worst, with
+    /// the strain there.
+    unseen: Option<(usize, f64, String, [f64; 2])>,
     /// Laws whose stiffness has been looked at.
     known: HashSet<String>,
     /// What is to be said of them.
@@ -38,6 +47,7 @@ impl Beyond {
     ) {
         self.strains(analysis, groups);
         self.displacements(mesh, displacement);
+        self.mechanisms(mesh, groups, displacement);
         for group in groups {
             if group.formulation != Formulation::Solid {
                 self.jumps(analysis, group);
@@ -87,6 +97,54 @@ impl Beyond {
         }
     }
 
+    /// Quads with 2 × 2 points have a motion without strain at any of them: along the element's own axes
+    /// ξ, η, u_ξ = α ξ (3η² − 1), u_η = −α η (3ξ² − 1). Neighbours hold it, unless they join in.
+    fn mechanisms(&mut self, mesh: &Mesh, groups: &[Group], displacement: &[f64]) {
+        let (mut largest, mut found) = (0.0, Vec::new());
+        let solids = groups.iter().filter(|g| g.formulation == Formulation::Solid);
+        for group in solids.filter(|group| group.is_active) {
+            let kinematics = &group.kinematics;
+            for element in 0..kinematics.n_elements() {
+                let (nodes, points) = (kinematics.nodes(element), kinematics.points_of(element));
+                let strains = &group.strain.committed[4 * points.start..4 * points.end];
+                let seen = strains.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+                largest = f64::max(largest, seen);
+                if nodes.len() != 8 || points.len() != 4 {
+                    continue;
+                }
+                let at = |i: usize| mesh.nodes[nodes[i]];
+                let direction = |from: usize, to: usize| {
+                    let step = [at(to)[0] - at(from)[0], at(to)[1] - at(from)[1]];
+                    let length = step[0].hypot(step[1]);
+                    (step.map(|part| part / length), length)
+                };
+                let ((xi, width), (eta, height)) = (direction(7, 5), direction(4, 6));
+                let along = |axis: [f64; 2], i: usize| {
+                    axis[0] * displacement[2 * nodes[i]] + axis[1] * displacement[2 * nodes[i] + 1]
+                };
+                // Of u_ξ the term ξη², a third of whose factor is α; of u_η the term ξ²η, likewise −α.
+                let alpha = [(xi, [1, 2, 0, 3], [5, 7]), (eta, [2, 3, 1, 0], [6, 4])];
+                let bends = alpha.map(|(axis, corners, middles)| {
+                    let u = |i: usize| along(axis, i);
+                    let ends = u(corners[0]) + u(corners[1]) - u(corners[2]) - u(corners[3]);
+                    ends / 12.0 - (u(middles[0]) - u(middles[1])) / 6.0
+                });
+                let alpha = 0.5 * (bends[0] - bends[1]);
+                let unseen = 4.0 * alpha.abs() / width.min(height);
+                if unseen > UNSEEN * seen {
+                    found.push((unseen, &group.name, kinematics.position(points.start)));
+                }
+            }
+        }
+        found.retain(|(unseen, ..)| *unseen > WORTH * largest);
+        let worst = found.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(&(strain, name, at)) = worst
+            && self.unseen.as_ref().is_none_or(|known| found.len() > known.0)
+        {
+            self.unseen = Some((found.len(), strain, name.clone(), at));
+        }
+    }
+
     fn displacements(&mut self, mesh: &Mesh, displacement: &[f64]) {
         let side = mesh.longer_side();
         let largest = displacement.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
@@ -133,6 +191,13 @@ impl Beyond {
             ));
         }
         let mut warnings = self.stiffness.clone();
+        if let Some((count, strain, group, [x, y])) = &self.unseen {
+            warnings.push(format!(
+                "{count} quads with 2 × 2 points move in a way that no point sees, the worst in group \
+                 `{group}` at ({x:.4}, {y:.4}) by strains of {strain:.1e}: a mechanism without stiffness. \
+                 `integration = \"b_bar\"` or `\"full\"` resists it"
+            ));
+        }
         if !bodies.is_empty() {
             warnings.push(format!(
                 "beyond the theory of small strains: {}",
