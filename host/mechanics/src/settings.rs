@@ -17,6 +17,11 @@ pub struct Settings {
     /// Largest correction, relative to the displacement increment (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub displacement_tolerance: f64,
+    /// Residual, relative as `force_tolerance`, that is tolerated where iterations and relaxation come to a
+    /// standstill above the tolerance and displacements have settled to a tenth of the increment; each is
+    /// said, and counted in the summary. 0 tolerates none.
+    #[serde(deserialize_with = "tolerated")]
+    pub tolerated_residual: f64,
     /// Iterations after which an increment is cut back; those of the method if left out.
     #[serde(deserialize_with = "iterations")]
     pub max_iterations: Option<usize>,
@@ -47,6 +52,7 @@ impl Default for Settings {
             method: Method::default(),
             force_tolerance: 1e-9,
             displacement_tolerance: 1e-7,
+            tolerated_residual: 1e-3,
             max_iterations: None,
             max_halvings: 10,
             line_search: true,
@@ -132,6 +138,10 @@ pub enum Equations {
 /// A tolerance: not below what double precision reaches, and not above the quantity itself.
 fn tolerance<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
     within(f64::deserialize(input)?, 1e-14, 1.0)
+}
+
+fn tolerated<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
+    within(f64::deserialize(input)?, 0.0, 0.1)
 }
 
 fn iterations<'de, D: Deserializer<'de>>(input: D) -> Result<Option<usize>, D::Error> {

@@ -515,6 +515,15 @@ impl Simulation {
         done.iterations += iterations;
         let record = &mut phase.record;
         record.round_off = record.round_off.max(success.round_off);
+        if success.tolerated > 0.0 {
+            record.tolerated += 1;
+            record.tolerated_residual = record.tolerated_residual.max(success.tolerated);
+            watch.warning(&Warning::Tolerated {
+                place: place.clone(),
+                residual: success.tolerated,
+                tolerance: self.problem.settings.force_tolerance,
+            });
+        }
         if let Some(why) = &success.unreliable {
             record.unreliable += 1;
             done.unreliable.get_or_insert_with(|| why.clone());

@@ -239,6 +239,8 @@ impl Summary {
                     "cut_backs": p.cut_backs,
                     "unreliable_steps": p.unreliable,
                     "relaxed_steps": p.relaxed,
+                    "tolerated_steps": p.tolerated,
+                    "tolerated_residual": p.tolerated_residual,
                     "arc_length_steps": p.arc_length,
                     "factorisations": p.factorisations,
                     "fallbacks": p.fallbacks,

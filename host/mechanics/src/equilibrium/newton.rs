@@ -259,6 +259,7 @@ impl Equilibrium {
             unreliable: balance.unreliable,
             relaxed,
             round_off: self.round_off,
+            tolerated: self.tolerated,
             scales: balance.scales,
         }
     }

@@ -16,7 +16,8 @@ impl Simulation {
                 group.commit();
             }
         }
-        let tolerance = self.problem.settings.force_tolerance.max(success.round_off);
+        let tolerance = self.problem.settings.force_tolerance;
+        let tolerance = tolerance.max(success.round_off).max(success.tolerated);
         equations.measured = Some((success.scales.clone(), tolerance));
         if let Some(domain) = &mut equations.domain {
             let boundary = equations.places.boundary.iter();

@@ -116,6 +116,7 @@ mod tests {
                 iterations: Vec::new(),
                 unreliable: None,
                 relaxed: false,
+                tolerated: 0.0,
                 round_off: 0.0,
                 scales: Vec::new(),
             };

@@ -25,6 +25,10 @@ pub struct PhaseRecord {
     pub unreliable: usize,
     /// Steps that viscous relaxation led to equilibrium.
     pub relaxed: usize,
+    /// Steps whose residual was tolerated above the tolerance.
+    pub tolerated: usize,
+    /// The largest of these residuals, relative.
+    pub tolerated_residual: f64,
     /// Largest relative residual that was taken for round-off in the steps' iterations.
     pub round_off: f64,
     /// Steps along the path of equilibrium under arc-length control.

@@ -32,6 +32,15 @@ pub enum Warning {
     },
     /// Viscous relaxation led to the equilibrium of this increment.
     Relaxed(Place),
+    /// Iterations came to a standstill above the tolerance; the residual is tolerated.
+    Tolerated {
+        /// The increment.
+        place: Place,
+        /// The relative residual.
+        residual: f64,
+        /// The tolerance.
+        tolerance: f64,
+    },
     /// A law changed the process, which was set right.
     Restored(Place, String),
     /// What a law, which starts in this phase, makes of the stresses it finds.
@@ -87,6 +96,16 @@ impl fmt::Display for Warning {
                  equilibrium; others may lie near, and which one is found depends on the course of \
                  the relaxation: run it with other increments, or in another unit of stress, and hold \
                  the results against each other"
+            ),
+            Self::Tolerated {
+                place,
+                residual,
+                tolerance,
+            } => write!(
+                f,
+                "{place}: iterations came to a standstill at a residual of {residual:.1e}, above the \
+                 tolerance {tolerance:.1e}, and no equilibrium lies nearer; `tolerated_residual` accepts it: \
+                 forces are out of balance by that share, displacements are less certain"
             ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::TookOver(phase, change) => write!(

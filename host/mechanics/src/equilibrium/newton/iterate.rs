@@ -47,6 +47,20 @@ pub(super) struct Equilibrium {
     pub(super) state: State,
     /// The relative residual if it had to be taken for round-off; else 0.
     pub(super) round_off: f64,
+    /// The relative residual if it is tolerated above the tolerance; else 0.
+    pub(super) tolerated: f64,
+}
+
+impl Equilibrium {
+    /// One that meets the tolerances, or round-off.
+    pub(super) fn at(state: State, round_off: f64) -> Self {
+        let tolerated = 0.0;
+        Self {
+            state,
+            round_off,
+            tolerated,
+        }
+    }
 }
 
 /// What a step holds fixed, and what follows for its iterations.
@@ -91,6 +105,22 @@ pub(super) trait Control {
         false
     }
 
+    /// Takes note of an iterate.
+    fn note(&mut self, _state: &State) {}
+
+    /// An iterate that is tolerated where iterations have come to their end without meeting the
+    /// tolerances.
+    ///
+    /// # Errors
+    /// A law fails at it, though it did not before.
+    fn tolerate(
+        &mut self,
+        _newton: &mut Newton<'_>,
+        _iterations: &[Iteration],
+    ) -> Result<Option<State>, StepFailure> {
+        Ok(None)
+    }
+
     /// What is said of iterations that have come to their end.
     fn give_up(
         &self,
@@ -115,15 +145,22 @@ impl Newton<'_> {
         loop {
             self.may_go_on()?;
             if let Some(round_off) = control.accept(self, &state, iterations) {
-                return Ok(Equilibrium { state, round_off });
+                return Ok(Equilibrium::at(state, round_off));
             }
+            control.note(&state);
             if self.is_over(control.series(iterations)) {
+                if let Some(state) = control.tolerate(self, iterations)? {
+                    let tolerated = state.balance.relative;
+                    return Ok(Equilibrium {
+                        tolerated,
+                        ..Equilibrium::at(state, 0.0)
+                    });
+                }
                 return Err(control.give_up(self, &state, iterations));
             }
             state = match control.correct(self, &state, iterations) {
                 Err(failure) if failure.is_singular() && control.has_settled(self, &state) => {
-                    let round_off = 0.0;
-                    return Ok(Equilibrium { state, round_off });
+                    return Ok(Equilibrium::at(state, 0.0));
                 }
                 corrected => corrected?,
             };

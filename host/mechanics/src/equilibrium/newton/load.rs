@@ -14,6 +14,10 @@ use super::{Newton, norm};
 use crate::settings::Method;
 use law::Operator;
 
+/// A residual is tolerated only where none of so many last corrections was larger than this, relative to the
+/// increment: what moves on is a mechanism, however small its residual.
+const LAST: usize = 5;
+const STILL_MOVES: f64 = 0.1;
 /// Lengths of a correction that the line search tries.
 const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 
@@ -27,6 +31,8 @@ pub(super) struct LoadControl {
     /// With a quasi-Newton matrix only.
     acceleration: Option<Acceleration>,
     pub(super) relaxation: Relaxation,
+    /// Displacement increments that left the least out of balance, and how much, relative.
+    least: Option<(Vec<f64>, f64)>,
 }
 
 impl LoadControl {
@@ -38,6 +44,7 @@ impl LoadControl {
             guess,
             acceleration: is_quasi.then(Acceleration::default),
             relaxation: Relaxation::new(newton.settings),
+            least: None,
         }
     }
 
@@ -159,6 +166,34 @@ impl Control for LoadControl {
 
     fn has_settled(&self, newton: &mut Newton<'_>, state: &State) -> bool {
         newton.has_settled(&state.increment, &state.balance, &self.task)
+    }
+
+    fn note(&mut self, state: &State) {
+        let residual = state.balance.relative;
+        let is_least = self.least.as_ref().is_none_or(|(_, least)| residual < *least);
+        if is_least && !state.balance.away.contains(&true) {
+            self.least = Some((state.increment.clone(), residual));
+        }
+    }
+
+    fn tolerate(
+        &mut self,
+        newton: &mut Newton<'_>,
+        iterations: &[Iteration],
+    ) -> Result<Option<State>, StepFailure> {
+        let last = iterations.len().saturating_sub(LAST);
+        let corrections = iterations[last..].iter().filter_map(|i| i.correction);
+        let largest = corrections.fold(0.0, f64::max);
+        let tolerated = newton.settings.tolerated_residual;
+        let Some((increment, _)) = self.least.take().filter(|(_, least)| *least <= tolerated) else {
+            return Ok(None);
+        };
+        if largest > STILL_MOVES {
+            return Ok(None);
+        }
+        let at = (increment, self.task.period.1);
+        let state = self.evaluate(newton, at, Operator::None)?;
+        Ok(Some(state).filter(|state| state.balance.relative <= tolerated))
     }
 
     fn give_up(

@@ -62,6 +62,9 @@ pub struct StepSuccess {
     pub relaxed: bool,
     /// Relative residual that had to be taken for round-off, above the tolerance; else 0.
     pub round_off: f64,
+    /// Relative residual that is tolerated above the tolerance, where iterations had come to a standstill;
+    /// else 0.
+    pub tolerated: f64,
     /// What the residual was measured against, by body.
     pub scales: Vec<f64>,
 }
