@@ -11,5 +11,6 @@ mod chamber_interface_model;
 mod chamber_loading;
 mod chamber_mesh;
 mod chamber_soil_law;
+mod ground;
 mod shear_box;
 mod variant;

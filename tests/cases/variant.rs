@@ -29,7 +29,7 @@ pub(crate) struct Point {
 type Shelf = HashMap<(String, String), Arc<OnceLock<Arc<Run>>>>;
 static RUNS: LazyLock<Mutex<Shelf>> = LazyLock::new(Mutex::default);
 
-/// Runs a variant, however it ends.
+/// Runs a variant, `""` of a file without variants, however it ends.
 pub(crate) fn run(case: &str, variant: &str) -> Arc<Run> {
     let key = (case.to_owned(), variant.to_owned());
     let place = Arc::clone(RUNS.lock().unwrap().entry(key).or_default());
@@ -53,7 +53,7 @@ impl Run {
         let cases = Case::load(&path).unwrap();
         let case = cases
             .iter()
-            .find(|case| case.variant.as_deref() == Some(variant))
+            .find(|case| case.variant.as_deref().unwrap_or("") == variant)
             .unwrap_or_else(|| panic!("no variant `{variant}`"));
         let folder = TempDir::new().unwrap();
         let file = |name| folder.path().join(name);

@@ -113,11 +113,17 @@ impl Case {
                     Some(stress) => Some(stress.get_ref().read(source, stress.span())?),
                     None => None,
                 },
-                unit_weight: input.unit_weight.as_ref().map_or(0.0, |weight| *weight.get_ref()),
+                unit_weight: input
+                    .unit_weight
+                    .as_ref()
+                    .map_or(0.0, |weight| *weight.get_ref()),
                 saturated_unit_weight: input.saturated_unit_weight.as_ref().map(|w| *w.get_ref()),
                 pore_water: input.pore_water.unwrap_or(true),
                 is_active: input.active.unwrap_or(true),
-                drainage: input.drainage.as_ref().map_or_else(Default::default, |d| *d.get_ref()),
+                drainage: input
+                    .drainage
+                    .as_ref()
+                    .map_or_else(Default::default, |d| *d.get_ref()),
                 undrained_poisson_ratio: input.undrained_poisson_ratio.unwrap_or(0.495),
             });
         }
@@ -130,7 +136,11 @@ impl Case {
                 analysis: file.analysis,
                 mesh,
                 groups,
-                water: file.water.as_ref().map(|water| water.get_ref().read(source)).transpose()?,
+                water: file
+                    .water
+                    .as_ref()
+                    .map(|water| water.get_ref().read(source))
+                    .transpose()?,
                 supports: supports.collect(),
                 phases,
                 settings: file.solver,
@@ -294,7 +304,9 @@ impl Case {
                     &phase.deactivate
                 };
                 let (name, _) = group(*of)?;
-                let mut same = names.iter().filter(|other| other.get_ref() == name.get_ref());
+                let mut same = names
+                    .iter()
+                    .filter(|other| other.get_ref() == name.get_ref());
                 same.next_back().map(Spanned::span)
             }),
             Item::UnitWeight(phase, number) => file.phases.get(*phase).and_then(|phase| {
@@ -305,7 +317,10 @@ impl Case {
                 let (_, drainage) = phase.drainage.get_index(*number)?;
                 Some(drainage.span())
             }),
-            Item::Water(None) => file.water.as_ref().map(|water| water.get_ref().level.span()),
+            Item::Water(None) => file
+                .water
+                .as_ref()
+                .map(|water| water.get_ref().level.span()),
             Item::Water(Some(phase)) => file
                 .phases
                 .get(*phase)
@@ -402,13 +417,19 @@ fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, 
         drainage: drainage
             .filter_map(|(name, drainage)| Some((number(name)?, *drainage.get_ref())))
             .collect(),
-        rigid: input.rigid.iter().map(|line| line.get_ref().clone()).collect(),
+        rigid: input
+            .rigid
+            .iter()
+            .map(|line| line.get_ref().clone())
+            .collect(),
         course: match course {
             Some(course) if course.get_ref().is_empty() => {
                 let message = "`course` is empty; left out, a phase's loads rise straight";
                 return Err(source.error(course.span(), message).into());
             }
-            course => course.map(|course| course.get_ref().clone()).unwrap_or_default(),
+            course => course
+                .map(|course| course.get_ref().clone())
+                .unwrap_or_default(),
         },
         force: force.collect(),
         reset_displacements: input.reset_displacements,
@@ -517,7 +538,10 @@ impl<'a> LawShelf<'a> {
                 varying.push((id.get_ref().clone(), profile));
             }
         }
-        let most = varying.iter().map(|(_, profile)| profile.points().len()).max();
+        let most = varying
+            .iter()
+            .map(|(_, profile)| profile.points().len())
+            .max();
         for point in 1..most.unwrap_or(0) {
             let mut parameters = entry.parameters.clone();
             for value in parameters.values_mut() {

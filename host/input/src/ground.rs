@@ -159,16 +159,21 @@ impl StressInput {
     pub(crate) fn read(&self, source: &Source, at: Range<usize>) -> Result<InitialStress, Error> {
         let components = [&self.s11, &self.s22, &self.s33, &self.s12];
         let profile = |input: &Spanned<ProfileInput>| input.get_ref().read(source, input.span());
-        let optional = |input: &Option<Spanned<ProfileInput>>| input.as_ref().map(profile).transpose();
+        let optional =
+            |input: &Option<Spanned<ProfileInput>>| input.as_ref().map(profile).transpose();
         let wrong = |at: Range<usize>, why: &str| Err(source.error(at, why).into());
         let is_at_rest = self.k_0.is_some() || self.friction_angle.is_some();
         if !is_at_rest {
             let alone = [("ocr", &self.ocr), ("pop", &self.pop)];
-            if let Some((key, input)) = alone.into_iter().find_map(|(k, i)| Some((k, i.as_ref()?))) {
+            if let Some((key, input)) = alone.into_iter().find_map(|(k, i)| Some((k, i.as_ref()?)))
+            {
                 return wrong(input.span(), &format!("`{key}` needs a `friction_angle`"));
             }
             if self.surcharge.is_some() || self.poisson_ratio.is_some() {
-                return wrong(at, "`surcharge` and `poisson_ratio` go with `k_0` or `friction_angle`");
+                return wrong(
+                    at,
+                    "`surcharge` and `poisson_ratio` go with `k_0` or `friction_angle`",
+                );
             }
             let profiles = components.map(optional);
             let [s11, s22, s33, s12] = profiles;
@@ -180,7 +185,10 @@ impl StressInput {
             });
         }
         if let Some(given) = components.into_iter().flatten().next() {
-            return wrong(given.span(), "components do not go with earth pressure at rest");
+            return wrong(
+                given.span(),
+                "components do not go with earth pressure at rest",
+            );
         }
         let ratio = match (&self.k_0, &self.friction_angle) {
             (Some(_), Some(angle)) => {
@@ -189,7 +197,10 @@ impl StressInput {
             (Some(k_0), None) => {
                 let others = [&self.ocr, &self.pop].into_iter().flatten().next();
                 if let Some(other) = others {
-                    return wrong(other.span(), "`ocr` and `pop` go with `friction_angle`, not with `k_0`");
+                    return wrong(
+                        other.span(),
+                        "`ocr` and `pop` go with `friction_angle`, not with `k_0`",
+                    );
                 }
                 Ratio::K0(profile(k_0)?)
             }

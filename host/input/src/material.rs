@@ -56,7 +56,8 @@ pub fn build_law(
     hypothesis: Hypothesis,
     parameters: &ParameterTable,
 ) -> Result<BuiltLaw, Error> {
-    let varies = |value: &&Spanned<ParameterValue>| matches!(value.get_ref(), ParameterValue::Varying(_));
+    let varies =
+        |value: &&Spanned<ParameterValue>| matches!(value.get_ref(), ParameterValue::Varying(_));
     if let Some(value) = parameters.values().find(varies) {
         let message = "one point has no height for a parameter to vary with";
         return Err(source.error(value.span(), message).into());

@@ -3,10 +3,10 @@
 use crate::Error;
 use crate::build::{Laws, line};
 use crate::case::{Case, ProbeInput};
-use mechanics::group::Group;
-use mechanics::mesh::Mesh;
 use mechanics::Problem;
 use mechanics::ground::pressure_on;
+use mechanics::group::Group;
+use mechanics::mesh::Mesh;
 use mechanics::problem::Formulation;
 use mechanics::settings::Control;
 use mechanics::{Place, Simulation};
@@ -363,9 +363,13 @@ impl Resolver<'_> {
             return true;
         }
         let is_weighted = matches!(self.input.reduce, Some(Reduce::Average | Reduce::Integral));
-        let points = group.kinematics.points_of(group.kinematics.place_of(point).0);
+        let points = group
+            .kinematics
+            .points_of(group.kinematics.place_of(point).0);
         let middle = [0, 1].map(|c| {
-            let of_element = points.clone().map(|point| group.kinematics.position(point)[c]);
+            let of_element = points
+                .clone()
+                .map(|point| group.kinematics.position(point)[c]);
             of_element.sum::<f64>() / points.len() as f64
         });
         is_weighted && self.touches(position) && self.inside(middle)

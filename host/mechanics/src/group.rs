@@ -14,9 +14,9 @@ pub use tangent::Fault;
 use crate::element::Kinematics;
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
+use law::Law;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
 use layer::Layer;
-use law::Law;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -384,7 +384,8 @@ impl Group {
             let one = self
                 .operator_of_first_point()
                 .map_err(|failure| self.locate(&failure))?;
-            let most = (0..self.kinematics.n_elements()).map(|e| self.kinematics.points_of(e).len());
+            let most =
+                (0..self.kinematics.n_elements()).map(|e| self.kinematics.points_of(e).len());
             self.tangent = one.repeat(most.max().unwrap_or(0));
             return Ok(());
         }
@@ -428,7 +429,10 @@ impl Group {
     /// Consecutive points of one law, at most so many at a time.
     fn pieces(&self, most: usize) -> Vec<(Range<usize>, &Law)> {
         let all = [(0..self.kinematics.n_points(), 0)];
-        let runs = self.varying.as_ref().map_or(&all[..], |varying| &varying.runs);
+        let runs = self
+            .varying
+            .as_ref()
+            .map_or(&all[..], |varying| &varying.runs);
         let law = |number: usize| match &self.varying {
             Some(varying) => &varying.law(number).law,
             None => &self.law.built.law,
@@ -676,7 +680,9 @@ impl Group {
                 ..failure
             })
             .map(|success| BatchSuccess {
-                unreliable: success.unreliable.map(|(point, why)| (points.start + point, why)),
+                unreliable: success
+                    .unreliable
+                    .map(|(point, why)| (points.start + point, why)),
             })
         };
         let mut rest = [&mut flux_end[..], &mut states_end[..], operators];
@@ -814,7 +820,10 @@ impl Group {
     /// Stress that an element carries at a place in or beside it, in global axes (committed): the plane
     /// that is nearest to the stresses at its points.
     pub fn carried_at(&self, element: usize, at: [f64; 2]) -> [f64; 4] {
-        let (points, axes) = (self.kinematics.points_of(element), self.kinematics.axes(element));
+        let (points, axes) = (
+            self.kinematics.points_of(element),
+            self.kinematics.axes(element),
+        );
         let carried = self.carried();
         let n = points.len() as f64;
         let mut middle = [0.0; 2];
@@ -904,7 +913,10 @@ impl Group {
             self.kinematics.weight(point) * traction
         };
         let of_element = |&element: &usize| {
-            self.kinematics.points_of(element).map(of_point).sum::<f64>()
+            self.kinematics
+                .points_of(element)
+                .map(of_point)
+                .sum::<f64>()
         };
         -elements.iter().map(of_element).sum::<f64>()
     }

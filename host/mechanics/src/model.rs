@@ -2,15 +2,13 @@
 //! can be checked before the first increment.
 
 use crate::assembly::Tie;
-use crate::element::{
-    Axes, Joint6, Kinematics, Mixed, Quad8, Strains, Tri6,
-};
+use crate::element::{Axes, Joint6, Kinematics, Mixed, Quad8, Strains, Tri6};
 use crate::ground::InitialStresses;
 use crate::group::{Group, PointFailure};
 use crate::mesh::{Mesh, Solid};
 use crate::problem::{
-    Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item, Key,
-    Material, Problem, Refusal, check, constraints, plausible, tension,
+    Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item,
+    Key, Material, Problem, Refusal, check, constraints, plausible, tension,
 };
 use abi::Hypothesis;
 use law::{End, Moment, Operator, Start, Strided};
@@ -303,9 +301,7 @@ impl GroupBuilder<'_> {
         }
         let fits = match integration {
             None | Some(Integration::Full | Integration::Reduced) => true,
-            Some(Integration::BBar | Integration::Projected) => {
-                *formulation == Formulation::Solid
-            }
+            Some(Integration::BBar | Integration::Projected) => *formulation == Formulation::Solid,
             Some(Integration::Mean) => *formulation == Formulation::ThinLayer,
             Some(Integration::Nodes) => *formulation == Formulation::ZeroThickness,
         };

@@ -152,8 +152,7 @@ impl Simulation {
         let nodes = &problem.mesh.nodes;
         // A line that is kept from turning takes up moments.
         let is_kept = problem.phases.iter().any(|phase| !phase.rigid.is_empty());
-        let turns_freely =
-            !is_kept && groups.iter().all(|group| phase::turns_freely(group, nodes));
+        let turns_freely = !is_kept && groups.iter().all(|group| phase::turns_freely(group, nodes));
         let mut simulation = Self {
             first_materials: groups.iter().map(|group| group.law.clone()).collect(),
             tied: ties.clone(),

@@ -4,8 +4,8 @@
 use law::{Hypothesis, SearchPath};
 use mechanics::mesh::{Along, Solid};
 use mechanics::problem::{
-    Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation, InitialStress,
-    Integration, Phase, Pressure, Profile, Ratio, Support, Water,
+    Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation,
+    InitialStress, Integration, Phase, Pressure, Profile, Ratio, Support, Water,
 };
 use mechanics::{Material, Mesh, Problem, Simulation};
 
@@ -26,7 +26,11 @@ fn elastic(analysis: Analysis, e: f64, nu: f64) -> Material {
         Analysis::Axisymmetric => Hypothesis::Axisymmetric,
         Analysis::PlaneStrain => Hypothesis::PlaneStrain,
     };
-    material("elastic", hypothesis, &[("young_modulus", e), ("poisson_ratio", nu)])
+    material(
+        "elastic",
+        hypothesis,
+        &[("young_modulus", e), ("poisson_ratio", nu)],
+    )
 }
 
 fn joint(k: f64) -> Material {
@@ -59,7 +63,11 @@ fn grid(x: &[f64], y: &[f64], group: impl Fn(usize, usize) -> usize, shape: Shap
         let (left, right) = (x[0], x[x.len() - 1]);
         for node in &mut mesh.nodes {
             let t = (node[0] - left) / (right - left);
-            node[0] += 0.25 * (right - left) / x.len() as f64 * t * (1.0 - t) * 4.0 * (3.0 * node[1]).sin();
+            node[0] += 0.25 * (right - left) / x.len() as f64
+                * t
+                * (1.0 - t)
+                * 4.0
+                * (3.0 * node[1]).sin();
         }
         straighten(&mut mesh);
     }
@@ -70,12 +78,22 @@ fn grid(x: &[f64], y: &[f64], group: impl Fn(usize, usize) -> usize, shape: Shap
     }
     let extent = |c: usize| {
         let at = mesh.nodes.iter().map(|node| node[c]);
-        [at.clone().fold(f64::INFINITY, f64::min), at.fold(f64::NEG_INFINITY, f64::max)]
+        [
+            at.clone().fold(f64::INFINITY, f64::min),
+            at.fold(f64::NEG_INFINITY, f64::max),
+        ]
     };
     let ([left, right], [low, high]) = (extent(0), extent(1));
-    let sides = [("left", 0, left), ("right", 0, right), ("bottom", 1, low), ("top", 1, high)];
+    let sides = [
+        ("left", 0, left),
+        ("right", 0, right),
+        ("bottom", 1, low),
+        ("top", 1, high),
+    ];
     for (name, c, at) in sides {
-        mesh.name_line(name, |edge| edge.iter().all(|node| (node[c] - at).abs() < 1e-9));
+        mesh.name_line(name, |edge| {
+            edge.iter().all(|node| (node[c] - at).abs() < 1e-9)
+        });
     }
     mesh
 }
@@ -100,7 +118,12 @@ enum Shape {
     Cut,
 }
 
-const SHAPES: [Shape; 4] = [Shape::Rectangles, Shape::Skewed, Shape::Triangles, Shape::Mixed];
+const SHAPES: [Shape; 4] = [
+    Shape::Rectangles,
+    Shape::Skewed,
+    Shape::Triangles,
+    Shape::Mixed,
+];
 
 fn triangles(mesh: &mut Mesh, is_cut: impl Fn(usize) -> bool) {
     let quads = std::mem::take(&mut mesh.solids);
@@ -112,18 +135,27 @@ fn triangles(mesh: &mut Mesh, is_cut: impl Fn(usize) -> bool) {
         let [a, b, c, d, ab, bc, cd, da] = quad.nodes().try_into().unwrap();
         let middle = mesh.nodes.len();
         let ends = [a, c].map(|node| mesh.nodes[node]);
-        mesh.nodes.push([0, 1].map(|i| f64::midpoint(ends[0][i], ends[1][i])));
+        mesh.nodes
+            .push([0, 1].map(|i| f64::midpoint(ends[0][i], ends[1][i])));
         let halves = [[a, b, c, ab, bc, middle], [a, c, d, middle, cd, da]];
-        mesh.solids.extend(halves.map(|nodes| Solid::triangle(nodes, quad.group)));
+        mesh.solids
+            .extend(halves.map(|nodes| Solid::triangle(nodes, quad.group)));
     }
 }
 
 fn held(line: &str, fixed: &[Axis]) -> Support {
-    Support { line: line.to_owned(), fixed: fixed.to_vec() }
+    Support {
+        line: line.to_owned(),
+        fixed: fixed.to_vec(),
+    }
 }
 
 fn roller_box() -> Vec<Support> {
-    vec![held("left", &[Axis::X]), held("right", &[Axis::X]), held("bottom", &[Axis::X, Axis::Y])]
+    vec![
+        held("left", &[Axis::X]),
+        held("right", &[Axis::X]),
+        held("bottom", &[Axis::X, Axis::Y]),
+    ]
 }
 
 fn solid(name: &str, material: Material) -> ElementGroup {
@@ -148,7 +180,12 @@ fn level_ground_at_rest_stays() {
             for integration in [None, Some(Integration::Full), Some(Integration::BBar)] {
                 for level in [None, Some(3.0), Some(2.6), Some(7.0)] {
                     let x = [0.0, 0.7, 1.5, 3.0];
-                    let mesh = grid(&x, &[0.0, 1.2, 2.0, 3.0, 4.0], |_, row| usize::from(row > 1), shape);
+                    let mesh = grid(
+                        &x,
+                        &[0.0, 1.2, 2.0, 3.0, 4.0],
+                        |_, row| usize::from(row > 1),
+                        shape,
+                    );
                     let mut problem = Problem::new(analysis, mesh);
                     let mut lower = solid("lower", elastic(analysis, E, NU));
                     (lower.unit_weight, lower.saturated_unit_weight) = (18.0, Some(18.0));
@@ -160,7 +197,10 @@ fn level_ground_at_rest_stays() {
                     for group in &mut problem.groups {
                         group.integration = integration;
                     }
-                    problem.water = level.map(|level| Water { level: level.into(), unit_weight: 10.0 });
+                    problem.water = level.map(|level| Water {
+                        level: level.into(),
+                        unit_weight: 10.0,
+                    });
                     problem.supports = roller_box();
                     problem.phases = vec![Phase::new("rest", 1)];
                     let at = format!("{analysis:?} {shape:?} {integration:?} {level:?}");
@@ -181,9 +221,16 @@ fn level_ground_at_rest_stays() {
                     // The lake's water stands on the top, which is free.
                     let lake = (table - 4.0).max(0.0) * 10.0;
                     let reaction = simulation.reaction_of("bottom").unwrap()[1];
-                    assert!((reaction / (total * (weight + lake)) - 1.0).abs() < 1e-12, "{at}: {reaction}");
+                    assert!(
+                        (reaction / (total * (weight + lake)) - 1.0).abs() < 1e-12,
+                        "{at}: {reaction}"
+                    );
                     for group in simulation.groups() {
-                        let (k_0, is_upper) = if group.name == "upper" { (0.9, true) } else { (0.5, false) };
+                        let (k_0, is_upper) = if group.name == "upper" {
+                            (0.9, true)
+                        } else {
+                            (0.5, false)
+                        };
                         for point in 0..group.kinematics.n_points() {
                             let [_, y] = group.kinematics.position(point);
                             let wet = (table.min(4.0) - y.max(2.0)).clamp(0.0, 2.0);
@@ -192,8 +239,12 @@ fn level_ground_at_rest_stays() {
                             let pore = (table - y).max(0.0) * 10.0;
                             let v = below + 16.0 * dry + 20.0 * wet + lake - pore;
                             let stress = group.global_stress(point).unwrap();
-                            let close = |a: f64, b: f64| (a - b).abs() < if is_bent { 2.0 } else { 1e-9 };
-                            assert!(close(stress[1], -v) && close(stress[0], -k_0 * v), "{at}: {stress:?} {v}");
+                            let close =
+                                |a: f64, b: f64| (a - b).abs() < if is_bent { 2.0 } else { 1e-9 };
+                            assert!(
+                                close(stress[1], -v) && close(stress[0], -k_0 * v),
+                                "{at}: {stress:?} {v}"
+                            );
                         }
                     }
                 }
@@ -206,14 +257,22 @@ fn level_ground_at_rest_stays() {
 #[test]
 fn sloping_layers_without_horizontal_stress_stay() {
     for shape in SHAPES {
-        let mut mesh = grid(&[0.0, 1.0, 2.0, 3.0], &[0.0, 1.0, 2.0, 3.0], |_, row| row / 2, shape);
+        let mut mesh = grid(
+            &[0.0, 1.0, 2.0, 3.0],
+            &[0.0, 1.0, 2.0, 3.0],
+            |_, row| row / 2,
+            shape,
+        );
         for node in &mut mesh.nodes {
             node[1] *= 1.0 + 0.1 * node[0];
         }
         straighten(&mut mesh);
         let analysis = Analysis::PlaneStrain;
         let mut problem = Problem::new(analysis, mesh);
-        problem.groups = vec![solid("lower", elastic(analysis, E, 0.0)), solid("upper", elastic(analysis, E, 0.0))];
+        problem.groups = vec![
+            solid("lower", elastic(analysis, E, 0.0)),
+            solid("upper", elastic(analysis, E, 0.0)),
+        ];
         for (group, weight) in problem.groups.iter_mut().zip([20.0, 17.0]) {
             group.unit_weight = weight;
             group.initial_stress = k_0(0.0);
@@ -230,15 +289,25 @@ fn sloping_layers_without_horizontal_stress_stay() {
 fn an_excavation_heaves_by_what_it_weighed() {
     for analysis in [Analysis::PlaneStrain, Analysis::Axisymmetric] {
         for shape in SHAPES {
-            let mesh = grid(&[0.0, 0.5, 1.0], &[0.0, 2.0, 4.0, 5.0, 6.0], |_, row| usize::from(row > 1), shape);
+            let mesh = grid(
+                &[0.0, 0.5, 1.0],
+                &[0.0, 2.0, 4.0, 5.0, 6.0],
+                |_, row| usize::from(row > 1),
+                shape,
+            );
             let mut problem = Problem::new(analysis, mesh);
-            let mut groups = vec![solid("below", elastic(analysis, E, NU)), solid("dug", elastic(analysis, E, NU))];
+            let mut groups = vec![
+                solid("below", elastic(analysis, E, NU)),
+                solid("dug", elastic(analysis, E, NU)),
+            ];
             for group in &mut groups {
                 group.unit_weight = 20.0;
                 group.initial_stress = k_0(0.5);
             }
             problem.groups = groups;
-            problem.mesh.name_line("floor", |edge| edge.iter().all(|node| (node[1] - 4.0).abs() < 1e-9));
+            problem.mesh.name_line("floor", |edge| {
+                edge.iter().all(|node| (node[1] - 4.0).abs() < 1e-9)
+            });
             problem.supports = roller_box();
             let mut dig = Phase::new("dig", 2);
             dig.deactivate = vec![1];
@@ -251,13 +320,19 @@ fn an_excavation_heaves_by_what_it_weighed() {
             }
             let heave = 20.0 * 2.0 * 4.0 / oedometric(E, NU);
             let up = simulation.displacement_of("floor").unwrap()[1];
-            assert!((up / heave - 1.0).abs() < 1e-9, "{analysis:?} {shape:?}: {up} {heave}");
+            assert!(
+                (up / heave - 1.0).abs() < 1e-9,
+                "{analysis:?} {shape:?}: {up} {heave}"
+            );
             simulation.run(&mut ()).unwrap();
             let back = simulation.displacement_of("floor").unwrap()[1];
             // Mean strains weighted with the radius are not quite those at the points.
             let has_mean = analysis == Analysis::Axisymmetric && shape != Shape::Rectangles;
             let least = if has_mean { 2e-4 } else { 1e-9 };
-            assert!(back.abs() < least * heave, "{analysis:?} {shape:?}: {back} of {heave}");
+            assert!(
+                back.abs() < least * heave,
+                "{analysis:?} {shape:?}: {back} of {heave}"
+            );
             let fill = &simulation.groups()[1];
             let lowest = (0..fill.kinematics.n_points()).map(|p| fill.global_stress(p).unwrap()[1]);
             assert!(lowest.fold(0.0, f64::min) < -30.0);
@@ -277,7 +352,10 @@ fn an_undrained_column_carries_by_its_water_and_then_settles() {
         problem.groups = vec![clay];
         problem.supports = roller_box();
         let mut load = Phase::new("load", 1);
-        load.pressure = vec![Pressure { line: "top".to_owned(), value: 50.0.into() }];
+        load.pressure = vec![Pressure {
+            line: "top".to_owned(),
+            value: 50.0.into(),
+        }];
         let mut drain = Phase::new("drain", 4);
         drain.drainage = vec![(0, Drainage::Drained)];
         problem.phases = vec![load, drain];
@@ -313,13 +391,26 @@ fn a_stiffness_that_grows_with_depth_is_that_of_each_element() {
         problem.groups = vec![solid("ground", ground)];
         problem.supports = roller_box();
         let mut load = Phase::new("load", 1);
-        load.pressure = vec![Pressure { line: "top".to_owned(), value: 100.0.into() }];
+        load.pressure = vec![Pressure {
+            line: "top".to_owned(),
+            value: 100.0.into(),
+        }];
         problem.phases = vec![load];
         let top = -run(problem).displacement_of("top").unwrap()[1];
-        let sum: f64 = y.windows(2).map(|r| 50.0 / profile.at(f64::midpoint(r[0], r[1]))).sum();
+        let sum: f64 = y
+            .windows(2)
+            .map(|r| 50.0 / profile.at(f64::midpoint(r[0], r[1])))
+            .sum();
         // Triangles of one row take their own centres' stiffness.
-        let tolerance = if shape == Shape::Triangles || shape == Shape::Mixed { 0.02 } else { 1e-9 };
-        assert!((top / sum - 1.0).abs() < tolerance, "{shape:?}: {top} {sum}");
+        let tolerance = if shape == Shape::Triangles || shape == Shape::Mixed {
+            0.02
+        } else {
+            1e-9
+        };
+        assert!(
+            (top / sum - 1.0).abs() < tolerance,
+            "{shape:?}: {top} {sum}"
+        );
     }
 }
 
@@ -330,10 +421,21 @@ fn an_interface_appears_with_the_stress_beside_it() {
     for shape in [Shape::Rectangles, Shape::Cut] {
         let analysis = Analysis::Axisymmetric;
         let mut mesh = grid(&[0.0, 0.5, 1.0, 2.0], &[0.0, 1.0, 2.0], |_, _| 0, shape);
-        mesh.name_line("shaft", |e| e.iter().all(|n| (n[0] - 0.5).abs() < 1e-9 && n[1] >= 1.0 - 1e-9));
-        mesh.name_line("base", |e| e.iter().all(|n| (n[1] - 1.0).abs() < 1e-9 && n[0] <= 0.5 + 1e-9));
-        let along = |line: &str, group| Along { line: line.to_owned(), group, opens_ends: true };
-        mesh.insert_joints(&[along("shaft", 1), along("base", 2)]).unwrap();
+        mesh.name_line("shaft", |e| {
+            e.iter()
+                .all(|n| (n[0] - 0.5).abs() < 1e-9 && n[1] >= 1.0 - 1e-9)
+        });
+        mesh.name_line("base", |e| {
+            e.iter()
+                .all(|n| (n[1] - 1.0).abs() < 1e-9 && n[0] <= 0.5 + 1e-9)
+        });
+        let along = |line: &str, group| Along {
+            line: line.to_owned(),
+            group,
+            opens_ends: true,
+        };
+        mesh.insert_joints(&[along("shaft", 1), along("base", 2)])
+            .unwrap();
         let mut problem = Problem::new(analysis, mesh);
         let mut ground = solid("ground", elastic(analysis, E, NU));
         ground.unit_weight = 20.0;
@@ -344,7 +446,10 @@ fn an_interface_appears_with_the_stress_beside_it() {
             group.is_active = false;
             problem.groups.push(group);
         }
-        problem.water = Some(Water { level: 2.0.into(), unit_weight: 10.0 });
+        problem.water = Some(Water {
+            level: 2.0.into(),
+            unit_weight: 10.0,
+        });
         problem.supports = roller_box();
         let mut appear = Phase::new("appear", 1);
         appear.activate = vec![1, 2];
@@ -358,7 +463,10 @@ fn an_interface_appears_with_the_stress_beside_it() {
                 let [_, y] = group.kinematics.position(point);
                 let effective = 10.0 * (2.0 - y);
                 let (_, [normal, shear]) = group.jump_and_traction(point).unwrap();
-                assert!((normal + k * effective).abs() < 1e-9, "{normal} {effective}");
+                assert!(
+                    (normal + k * effective).abs() < 1e-9,
+                    "{normal} {effective}"
+                );
                 assert!(shear.abs() < 1e-9);
             }
         }
@@ -369,16 +477,29 @@ fn an_interface_appears_with_the_stress_beside_it() {
 #[test]
 fn a_force_follows_its_course() {
     let analysis = Analysis::PlaneStrain;
-    let mesh = grid(&[0.0, 0.5, 1.0], &[0.0, 1.0, 2.0], |_, _| 0, Shape::Rectangles);
+    let mesh = grid(
+        &[0.0, 0.5, 1.0],
+        &[0.0, 1.0, 2.0],
+        |_, _| 0,
+        Shape::Rectangles,
+    );
     let mut problem = Problem::new(analysis, mesh);
     problem.groups = vec![solid("block", elastic(analysis, E, 0.0))];
     problem.supports = roller_box();
     let mut load = Phase::new("load", 8);
     load.rigid = vec!["top".to_owned()];
-    load.force = vec![Force { line: "top".to_owned(), x: None, y: Some(-40.0) }];
+    load.force = vec![Force {
+        line: "top".to_owned(),
+        x: None,
+        y: Some(-40.0),
+    }];
     load.course = vec![[0.0, 0.0], [0.5, 1.0], [0.55, 1.5], [1.0, 0.25]];
     let mut hold = Phase::new("hold", 1);
-    hold.displacement = vec![Displacement { line: "top".to_owned(), x: None, y: Some(0.0) }];
+    hold.displacement = vec![Displacement {
+        line: "top".to_owned(),
+        x: None,
+        y: Some(0.0),
+    }];
     problem.phases = vec![load, hold];
     let mut simulation = Simulation::new(problem).unwrap();
     let mut course = Vec::new();
@@ -387,11 +508,18 @@ fn a_force_follows_its_course() {
         let [_, u] = simulation.displacement_of("top").unwrap();
         course.push((increment.time, -u * E / 2.0 / 40.0));
     }
-    let factor = |t: f64| Profile::new(vec![[0.0, 0.0], [0.5, 1.0], [0.55, 1.5], [1.0, 0.25]]).unwrap().at(t);
+    let factor = |t: f64| {
+        Profile::new(vec![[0.0, 0.0], [0.5, 1.0], [0.55, 1.5], [1.0, 0.25]])
+            .unwrap()
+            .at(t)
+    };
     for (time, share) in course {
         assert!((share - factor(time)).abs() < 1e-9, "{time}: {share}");
     }
     simulation.step().unwrap();
     let reaction = simulation.reaction_of("top").unwrap()[1];
-    assert!((reaction - 10.0).abs() < 1e-9, "held against what is left: {reaction}");
+    assert!(
+        (reaction - 10.0).abs() < 1e-9,
+        "held against what is left: {reaction}"
+    );
 }

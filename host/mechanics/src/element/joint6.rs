@@ -107,7 +107,10 @@ impl Kinematics for Joint6 {
     }
 
     fn place_of(&self, point: usize) -> (usize, usize) {
-        (point / self.points_per_element, point % self.points_per_element)
+        (
+            point / self.points_per_element,
+            point % self.points_per_element,
+        )
     }
 
     fn n_components(&self) -> usize {

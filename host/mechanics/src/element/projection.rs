@@ -67,11 +67,16 @@ pub(super) fn linear_volume_stress<const N: usize>(points: &[Point<N>], stresses
 
 /// Replaces the trace of each point's tensor by the linear function nearest to all of them.
 fn even_out(linear: &Linear, tensors: &mut [f64]) {
-    let traces: Vec<f64> = tensors.chunks_exact(4).map(|t| t[0] + t[1] + t[2]).collect();
+    let traces: Vec<f64> = tensors
+        .chunks_exact(4)
+        .map(|t| t[0] + t[1] + t[2])
+        .collect();
     let nearest = linear.nearest(&traces);
     for ((tensor, trace), nearest) in tensors.chunks_exact_mut(4).zip(traces).zip(nearest) {
         let change = (nearest - trace) / 3.0;
-        tensor[..3].iter_mut().for_each(|component| *component += change);
+        tensor[..3]
+            .iter_mut()
+            .for_each(|component| *component += change);
     }
 }
 

@@ -121,7 +121,9 @@ impl<const N: usize> Solid<N> {
             }
             let volume = |i: usize| {
                 let weights = exact.iter().zip(&fine);
-                weights.map(|(at, point)| (reference.shape)(at.at).0[i] * point.weight).sum()
+                weights
+                    .map(|(at, point)| (reference.shape)(at.at).0[i] * point.weight)
+                    .sum()
             };
             volumes.push(std::array::from_fn(volume));
             points_per_element = own.len();
@@ -200,7 +202,10 @@ impl<const N: usize> Kinematics for Solid<N> {
     }
 
     fn place_of(&self, point: usize) -> (usize, usize) {
-        (point / self.points_per_element, point % self.points_per_element)
+        (
+            point / self.points_per_element,
+            point % self.points_per_element,
+        )
     }
 
     fn n_components(&self) -> usize {
@@ -398,11 +403,7 @@ impl<const N: usize> Solid<N> {
             std::array::from_fn(|i| axis[0] * u_r[i] + axis[1] * u_z[i])
         };
         let (u_1, u_2) = (turned(axes.along), turned(axes.across));
-        for (point, strain) in self
-            .own(element)
-            .iter()
-            .zip(strains.chunks_exact_mut(4))
-        {
+        for (point, strain) in self.own(element).iter().zip(strains.chunks_exact_mut(4)) {
             strain[0] += dot(&point.a, &u_1);
             strain[1] += dot(&point.b, &u_2);
             strain[2] += dot(&point.h, &u_r);

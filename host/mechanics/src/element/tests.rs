@@ -87,7 +87,14 @@ fn patch_of_quads(analysis: Analysis, axes: Axes, rule: (usize, usize)) -> Patch
     ];
     let corners = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]];
     let nodes = with_middles(&mut coordinates, &corners);
-    let elements = Quad8::new(analysis, &coordinates, nodes, vec![axes; 4], Strains::AtPoints, |_| rule);
+    let elements = Quad8::new(
+        analysis,
+        &coordinates,
+        nodes,
+        vec![axes; 4],
+        Strains::AtPoints,
+        |_| rule,
+    );
     Patch {
         elements: Box::new(elements.unwrap()),
         coordinates,
@@ -98,7 +105,14 @@ fn patch_of_triangles(analysis: Analysis, axes: Axes, n_points: usize) -> Patch 
     let mut coordinates = vec![[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0], CENTRE];
     let corners = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
     let nodes = with_middles(&mut coordinates, &corners);
-    let elements = Tri6::new(analysis, &coordinates, nodes, vec![axes; 4], Strains::AtPoints, n_points);
+    let elements = Tri6::new(
+        analysis,
+        &coordinates,
+        nodes,
+        vec![axes; 4],
+        Strains::AtPoints,
+        n_points,
+    );
     Patch {
         elements: Box::new(elements.unwrap()),
         coordinates,
@@ -300,7 +314,14 @@ fn elements_turned_inside_out_are_refused() {
     ];
     let new = |nodes| {
         let axes = vec![Axes::GLOBAL];
-        Tri6::new(Analysis::PlaneStrain, &coordinates, vec![nodes], axes, Strains::AtPoints, 3)
+        Tri6::new(
+            Analysis::PlaneStrain,
+            &coordinates,
+            vec![nodes],
+            axes,
+            Strains::AtPoints,
+            3,
+        )
     };
     assert!(new([0, 1, 2, 3, 4, 5]).is_ok());
     assert_eq!(
@@ -325,7 +346,15 @@ fn curved_triangles_have_the_area_of_a_disc() {
             nodes.push(std::array::from_fn(|i| first + i));
         }
         let axes = vec![Axes::GLOBAL; n];
-        let disc = Tri6::new(Analysis::PlaneStrain, &coordinates, nodes, axes, Strains::AtPoints, 3).unwrap();
+        let disc = Tri6::new(
+            Analysis::PlaneStrain,
+            &coordinates,
+            nodes,
+            axes,
+            Strains::AtPoints,
+            3,
+        )
+        .unwrap();
         let weights = (0..disc.n_points()).map(|point| disc.weight(point));
         // Triangle and parabola.
         let (s, c) = (0.5 * angle).sin_cos();

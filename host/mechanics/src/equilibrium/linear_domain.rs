@@ -114,7 +114,13 @@ impl LinearDomain {
         always: bool,
         mut reuse: Option<&mut Reuse>,
     ) -> Result<Option<(Self, System)>, Singular> {
-        let mut system = System::new(groups, |group| group.is_active && group.is_linear(), prescribed, ties, None);
+        let mut system = System::new(
+            groups,
+            |group| group.is_active && group.is_linear(),
+            prescribed,
+            ties,
+            None,
+        );
         if system.n_equations() == 0 {
             return Ok(None);
         }
@@ -233,9 +239,7 @@ impl LinearDomain {
         let mut internal = vec![0.0; n_dofs];
         for (number, group) in groups.iter().enumerate() {
             if self.system.includes(number) {
-                group
-                    .kinematics
-                    .add_forces(&group.carried(), &mut internal);
+                group.kinematics.add_forces(&group.carried(), &mut internal);
             }
         }
         self.system.fold(&mut internal);

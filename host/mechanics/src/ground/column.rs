@@ -41,14 +41,26 @@ impl<'m> Columns<'m> {
         };
         let boxes: Vec<[[f64; 2]; 2]> = mesh.solids.iter().map(extent).collect();
         let least = |c: usize| boxes.iter().map(|b| b[0][c]).fold(f64::INFINITY, f64::min);
-        let most = |c: usize| boxes.iter().map(|b| b[1][c]).fold(f64::NEG_INFINITY, f64::max);
+        let most = |c: usize| {
+            boxes
+                .iter()
+                .map(|b| b[1][c])
+                .fold(f64::NEG_INFINITY, f64::max)
+        };
         // About as many strips as a square of elements has columns, twice over.
         let n = 1 + 2 * (boxes.len() as f64).sqrt() as usize;
-        let (start, width) = (least(0), ((most(0) - least(0)) / n as f64).max(f64::MIN_POSITIVE));
+        let (start, width) = (
+            least(0),
+            ((most(0) - least(0)) / n as f64).max(f64::MIN_POSITIVE),
+        );
         let mut columns = Self {
             mesh,
             water,
-            weights: mesh.solids.iter().map(|solid| weight(solid.group)).collect(),
+            weights: mesh
+                .solids
+                .iter()
+                .map(|solid| weight(solid.group))
+                .collect(),
             boxes,
             strips: vec![Vec::new(); n],
             start,
@@ -94,7 +106,9 @@ impl<'m> Columns<'m> {
             sum += below_water * (wet - from) + above_water * (to - wet);
         }
         let stands = self.water.zip(level);
-        sum + stands.map_or(0.0, |(water, level)| water.unit_weight * (level - top).max(0.0))
+        sum + stands.map_or(0.0, |(water, level)| {
+            water.unit_weight * (level - top).max(0.0)
+        })
     }
 
     /// Where a vertical enters and leaves an element.
@@ -152,7 +166,9 @@ mod tests {
     #[test]
     fn layers_and_water_are_added_up() {
         // Two layers, 3 m of 20 (22 below water) over 4 m of 18 (19).
-        let mesh = Mesh::grid(&[0.0, 1.0, 2.5], &[0.0, 1.5, 4.0, 7.0], |_, row| usize::from(row == 2));
+        let mesh = Mesh::grid(&[0.0, 1.0, 2.5], &[0.0, 1.5, 4.0, 7.0], |_, row| {
+            usize::from(row == 2)
+        });
         let weight = |group| Some([[18.0, 19.0], [20.0, 22.0]][group]);
         let dry = Columns::new(&mesh, None, weight);
         assert!((dry.above([0.3, 0.5]) - (60.0 + 18.0 * 3.5)).abs() < 1e-12);
@@ -164,7 +180,9 @@ mod tests {
         let flooded = Columns::new(&mesh, Some(&lake), weight);
         assert!((flooded.above([0.1, 6.0]) - (20.0 + 22.0)).abs() < 1e-12);
         // Without the upper layer the water stands on the lower one.
-        let only = Columns::new(&mesh, Some(&water_table), |group| (group == 0).then_some([18.0, 19.0]));
+        let only = Columns::new(&mesh, Some(&water_table), |group| {
+            (group == 0).then_some([18.0, 19.0])
+        });
         assert!((only.above([0.1, 3.0]) - (10.0 + 19.0)).abs() < 1e-12);
     }
 
@@ -177,7 +195,10 @@ mod tests {
         let columns = Columns::new(&mesh, None, |_| Some([10.0, 10.0]));
         for x in [0.1, 0.35, 0.5, 0.8] {
             let height = 1.0 + x * (1.0 - x);
-            assert!((columns.above([x, 0.0]) - 10.0 * height).abs() < 1e-12, "{x}");
+            assert!(
+                (columns.above([x, 0.0]) - 10.0 * height).abs() < 1e-12,
+                "{x}"
+            );
         }
     }
 }

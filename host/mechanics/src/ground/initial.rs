@@ -20,14 +20,18 @@ pub(crate) struct InitialStresses<'p> {
 impl<'p> InitialStresses<'p> {
     pub(crate) fn new(problem: &'p Problem) -> Self {
         let groups = &problem.groups;
-        let is_at_rest = |stress: &Option<InitialStress>| matches!(stress, Some(InitialStress::AtRest(_)));
-        let columns = groups.iter().any(|group| is_at_rest(&group.initial_stress)).then(|| {
-            Columns::new(&problem.mesh, problem.water.as_ref(), |number| {
-                let group = &groups[number];
-                let wet = group.saturated_unit_weight.unwrap_or(group.unit_weight);
-                group.is_active.then_some([group.unit_weight, wet])
-            })
-        });
+        let is_at_rest =
+            |stress: &Option<InitialStress>| matches!(stress, Some(InitialStress::AtRest(_)));
+        let columns = groups
+            .iter()
+            .any(|group| is_at_rest(&group.initial_stress))
+            .then(|| {
+                Columns::new(&problem.mesh, problem.water.as_ref(), |number| {
+                    let group = &groups[number];
+                    let wet = group.saturated_unit_weight.unwrap_or(group.unit_weight);
+                    group.is_active.then_some([group.unit_weight, wet])
+                })
+            });
         Self {
             problem,
             columns,
@@ -43,7 +47,10 @@ impl<'p> InitialStresses<'p> {
             InitialStress::Constant(stress) => *stress,
             InitialStress::Profiles(profiles) => [0, 1, 2, 3].map(|c| profiles[c].at(at[1])),
             InitialStress::AtRest(at_rest) => {
-                let total = self.columns.as_ref().map_or(0.0, |columns| columns.above(at));
+                let total = self
+                    .columns
+                    .as_ref()
+                    .map_or(0.0, |columns| columns.above(at));
                 let water = self.problem.water.as_ref().filter(|_| group.pore_water);
                 let pore = water.map_or(0.0, |water| water.pressure(at));
                 let vertical = (total + at_rest.surcharge - pore).max(0.0);
@@ -60,7 +67,14 @@ impl<'p> InitialStresses<'p> {
         let of_side = |face: &usize| {
             let solid = &mesh.solids[*self.beside.get(face)?];
             let n = solid.n_corners() as f64;
-            let middle = |c: usize| solid.corners().iter().map(|&i| mesh.nodes[i][c]).sum::<f64>() / n;
+            let middle = |c: usize| {
+                solid
+                    .corners()
+                    .iter()
+                    .map(|&i| mesh.nodes[i][c])
+                    .sum::<f64>()
+                    / n
+            };
             let inside = [0, 1].map(|c| at[c] + INSIDE * (middle(c) - at[c]));
             self.at(solid.group, inside)
         };
@@ -73,8 +87,9 @@ impl<'p> InitialStresses<'p> {
 /// Element beside each face of every joint, by the node in the face's middle.
 pub(crate) fn beside_joints(mesh: &Mesh) -> HashMap<usize, usize> {
     let joints = mesh.joints.iter();
-    let mut beside: HashMap<usize, Option<usize>> =
-        joints.flat_map(|joint| [(joint.minus[2], None), (joint.plus[2], None)]).collect();
+    let mut beside: HashMap<usize, Option<usize>> = joints
+        .flat_map(|joint| [(joint.minus[2], None), (joint.plus[2], None)])
+        .collect();
     for (number, solid) in mesh.solids.iter().enumerate() {
         for [_, _, middle] in solid.edges() {
             if let Some(of) = beside.get_mut(&middle) {
@@ -83,5 +98,7 @@ pub(crate) fn beside_joints(mesh: &Mesh) -> HashMap<usize, usize> {
         }
     }
     let found = beside.into_iter();
-    found.filter_map(|(middle, of)| Some((middle, of?))).collect()
+    found
+        .filter_map(|(middle, of)| Some((middle, of?)))
+        .collect()
 }

@@ -109,7 +109,10 @@ impl Loading {
                 continue;
             };
             let own = pressure_on(analysis, mesh, &line.edges, value);
-            force.iter_mut().zip(own).for_each(|(force, own)| *force += own);
+            force
+                .iter_mut()
+                .zip(own)
+                .for_each(|(force, own)| *force += own);
         }
         for (line, total) in &self.force {
             add_spread(problem, line, *total, &mut force);
@@ -186,7 +189,10 @@ impl Loading {
         let is_there: HashSet<usize> = sides.keys().copied().collect();
         // Faces of an interface touch each other.
         for joint in &mesh.joints {
-            if [joint.minus[2], joint.plus[2]].iter().all(|middle| is_there.contains(middle)) {
+            if [joint.minus[2], joint.plus[2]]
+                .iter()
+                .all(|middle| is_there.contains(middle))
+            {
                 sides.remove(&joint.minus[2]);
                 sides.remove(&joint.plus[2]);
             }
@@ -203,13 +209,22 @@ impl Loading {
             .collect();
         outline.sort_unstable();
         for edge in outline {
-            if mesh.edge(edge).iter().all(|&node| water.pressure(mesh.nodes[node]) <= 0.0) {
+            if mesh
+                .edge(edge)
+                .iter()
+                .all(|&node| water.pressure(mesh.nodes[node]) <= 0.0)
+            {
                 continue;
             }
             let surface = std::iter::once(|at: [f64; 2]| at[1] - water.level.at(at[0]));
-            over_edge(mesh, problem.analysis, edge, surface, force, |at, inward| {
-                inward.map(|part| part * water.pressure(at))
-            });
+            over_edge(
+                mesh,
+                problem.analysis,
+                edge,
+                surface,
+                force,
+                |at, inward| inward.map(|part| part * water.pressure(at)),
+            );
         }
     }
 }
@@ -240,9 +255,14 @@ fn add_cut_weights(
         }
         for edge in 0..mesh.solids[solid].n_corners() {
             let surface = std::iter::once(|at: [f64; 2]| at[1] - water.level.at(at[0]));
-            over_edge(mesh, analysis, (solid, edge), surface, force, |at, inward| {
-                [0.0, -inward[1] * stress(at)]
-            });
+            over_edge(
+                mesh,
+                analysis,
+                (solid, edge),
+                surface,
+                force,
+                |at, inward| [0.0, -inward[1] * stress(at)],
+            );
         }
     }
     kinematics.add_forces(&flux, force);
@@ -323,12 +343,15 @@ fn over_edge<K: Fn([f64; 2]) -> f64>(
     traction: impl Fn([f64; 2], [f64; 2]) -> [f64; 2],
 ) {
     let nodes = mesh.edge(edge);
-    let at = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * mesh.nodes[nodes[i]][c]).sum() };
+    let at =
+        |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * mesh.nodes[nodes[i]][c]).sum() };
     let place = |xi: f64| {
         let (n, _) = line_shape(xi);
         [at(&n, 0), at(&n, 1)]
     };
-    let mut ends: Vec<f64> = kinks.filter_map(|kink| root(|xi| kink(place(xi)))).collect();
+    let mut ends: Vec<f64> = kinks
+        .filter_map(|kink| root(|xi| kink(place(xi))))
+        .collect();
     ends.extend([-1.0, 1.0]);
     ends.sort_unstable_by(f64::total_cmp);
     for piece in ends.windows(2) {

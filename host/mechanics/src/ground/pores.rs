@@ -17,7 +17,11 @@ impl Pores {
     /// Before the first phase.
     pub(crate) fn before(problem: &Problem) -> Self {
         Self {
-            fills: problem.groups.iter().map(|group| group.pore_water).collect(),
+            fills: problem
+                .groups
+                .iter()
+                .map(|group| group.pore_water)
+                .collect(),
             from: problem.water.clone(),
             to: problem.water.clone(),
             share: 0.0,

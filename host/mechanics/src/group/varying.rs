@@ -34,7 +34,10 @@ impl Varying {
             let points = kinematics.points_of(element);
             let heights = points.clone().map(|point| kinematics.position(point)[1]);
             let height = heights.sum::<f64>() / points.len() as f64;
-            let values = material.varying.iter().map(|(_, profile)| profile.at(height));
+            let values = material
+                .varying
+                .iter()
+                .map(|(_, profile)| profile.at(height));
             let values: Vec<f64> = values.collect();
             let key = values.iter().map(|value| value.to_bits()).collect();
             let number = match known.get(&key) {

@@ -1,8 +1,8 @@
 //! What can be seen of a problem without its laws: references, counts, bounds, what is there in which phase.
 
 use super::{
-    Cause, Drainage, ElementGroup, Formulation, InitialStress, Item, Key, Phase, Problem, Ratio, Refusal,
-    constraints,
+    Cause, Drainage, ElementGroup, Formulation, InitialStress, Item, Key, Phase, Problem, Ratio,
+    Refusal, constraints,
 };
 use crate::mesh::{Mesh, Solid};
 use crate::settings::Control;
@@ -26,11 +26,23 @@ pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
         let refuse = |cause| Err(Refusal::new(Item::Water(None), cause));
         if !(water.unit_weight.is_finite() && water.unit_weight > 0.0) {
             let what = "the water's `unit_weight`";
-            return refuse(Cause::OutOfBounds(what, water.unit_weight, "a positive number"));
+            return refuse(Cause::OutOfBounds(
+                what,
+                water.unit_weight,
+                "a positive number",
+            ));
         }
-        let lowest = problem.mesh.nodes.iter().map(|[_, y]| *y).fold(f64::INFINITY, f64::min);
+        let lowest = problem
+            .mesh
+            .nodes
+            .iter()
+            .map(|[_, y]| *y)
+            .fold(f64::INFINITY, f64::min);
         let highest = water.level.values().fold(f64::NEG_INFINITY, f64::max);
-        let later = problem.phases.iter().any(|phase| phase.water_level.is_some());
+        let later = problem
+            .phases
+            .iter()
+            .any(|phase| phase.water_level.is_some());
         if highest < lowest && !later {
             return refuse(Cause::WaterBelow(highest, lowest));
         }
@@ -44,17 +56,28 @@ fn mesh(problem: &Problem) -> Result<(), Refusal> {
     let refuse = |cause| Err(Refusal::new(Item::Problem, cause));
     let of_elements = mesh.solids.iter().map(|solid| solid.group);
     let of_joints = mesh.joints.iter().map(|joint| joint.group);
-    if let Some(group) = of_elements.chain(of_joints).find(|&group| group >= n_groups) {
+    if let Some(group) = of_elements
+        .chain(of_joints)
+        .find(|&group| group >= n_groups)
+    {
         return refuse(Cause::NoGroup(group));
     }
-    let solid_nodes = mesh.solids.iter().flat_map(|solid| solid.nodes().iter().copied());
-    let joint_nodes = mesh.joints.iter().flat_map(|joint| joint.minus.into_iter().chain(joint.plus));
+    let solid_nodes = mesh
+        .solids
+        .iter()
+        .flat_map(|solid| solid.nodes().iter().copied());
+    let joint_nodes = mesh
+        .joints
+        .iter()
+        .flat_map(|joint| joint.minus.into_iter().chain(joint.plus));
     if solid_nodes.chain(joint_nodes).any(|node| node >= n) {
         return refuse(Cause::OutOfRange("an element"));
     }
     for line in mesh.lines.values() {
         let has_edge = |&(solid, edge): &(usize, usize)| {
-            mesh.solids.get(solid).is_some_and(|solid| edge < solid.n_corners())
+            mesh.solids
+                .get(solid)
+                .is_some_and(|solid| edge < solid.n_corners())
         };
         if !line.edges.iter().all(has_edge) || line.nodes.iter().any(|&node| node >= n) {
             return refuse(Cause::OutOfRange("a line"));
@@ -66,14 +89,22 @@ fn mesh(problem: &Problem) -> Result<(), Refusal> {
     let is_joint = |group: usize| problem.groups[group].formulation == Formulation::ZeroThickness;
     let solids = mesh.solids.iter().map(|solid| (solid.group, false));
     let joints = mesh.joints.iter().map(|joint| (joint.group, true));
-    if let Some((group, _)) = solids.chain(joints).find(|&(group, joint)| is_joint(group) != joint) {
+    if let Some((group, _)) = solids
+        .chain(joints)
+        .find(|&(group, joint)| is_joint(group) != joint)
+    {
         let own = &problem.groups[group];
         let cause = Cause::OtherElements(own.name.clone(), own.formulation);
         return Err(Refusal::new(Item::Group(group), cause));
     }
     if problem.analysis == super::Analysis::Axisymmetric {
         let least = -BEYOND_AXIS * mesh.longer_side();
-        let beyond = |solid: &&Solid| solid.nodes().iter().any(|&node| mesh.nodes[node][0] < least);
+        let beyond = |solid: &&Solid| {
+            solid
+                .nodes()
+                .iter()
+                .any(|&node| mesh.nodes[node][0] < least)
+        };
         if let Some(solid) = mesh.solids.iter().find(beyond) {
             let cause = Cause::BadShape(problem.groups[solid.group].name.clone());
             return Err(Refusal::new(Item::Group(solid.group), cause));
@@ -85,7 +116,11 @@ fn mesh(problem: &Problem) -> Result<(), Refusal> {
 fn check_group(number: usize, group: &ElementGroup) -> Result<(), Refusal> {
     let refuse = |key, cause| Err(Refusal::new(Item::GroupKey(number, key), cause));
     let weights = [Some(group.unit_weight), group.saturated_unit_weight];
-    if let Some(weight) = weights.into_iter().flatten().find(|w| !(w.is_finite() && *w >= 0.0)) {
+    if let Some(weight) = weights
+        .into_iter()
+        .flatten()
+        .find(|w| !(w.is_finite() && *w >= 0.0))
+    {
         let cause = Cause::OutOfBounds("the unit weight", weight, "zero or more");
         return refuse(Key::UnitWeight, cause);
     }
@@ -98,7 +133,10 @@ fn check_group(number: usize, group: &ElementGroup) -> Result<(), Refusal> {
         let nu = group.undrained_poisson_ratio;
         if !(nu > 0.0 && nu < 0.5) {
             let what = "`undrained_poisson_ratio`";
-            return refuse(Key::Drainage, Cause::OutOfBounds(what, nu, "more than 0, less than 0.5"));
+            return refuse(
+                Key::Drainage,
+                Cause::OutOfBounds(what, nu, "more than 0, less than 0.5"),
+            );
         }
     }
     match &group.initial_stress {
@@ -135,14 +173,28 @@ fn unlikely(ratio: &Ratio) -> Option<Cause> {
             poisson_ratio,
         } => {
             let steep = friction_angle.values().find(|phi| *phi >= 90.0);
-            let steep = steep.map(|phi| Cause::OutOfBounds("`friction_angle`", phi, "less than 90"));
+            let steep =
+                steep.map(|phi| Cause::OutOfBounds("`friction_angle`", phi, "less than 90"));
             let nu = *poisson_ratio;
             let no_ratio = !(0.0..0.5).contains(&nu);
             steep
-                .or_else(|| outside("`friction_angle`", Box::new(friction_angle.values()), 0.0, "zero or more"))
+                .or_else(|| {
+                    outside(
+                        "`friction_angle`",
+                        Box::new(friction_angle.values()),
+                        0.0,
+                        "zero or more",
+                    )
+                })
                 .or_else(|| outside("`ocr`", Box::new(ocr.values()), 1.0, "1 or more"))
                 .or_else(|| outside("`pop`", Box::new(pop.values()), 0.0, "zero or more"))
-                .or_else(|| no_ratio.then_some(Cause::OutOfBounds("`poisson_ratio`", nu, "0 to less than 0.5")))
+                .or_else(|| {
+                    no_ratio.then_some(Cause::OutOfBounds(
+                        "`poisson_ratio`",
+                        nu,
+                        "0 to less than 0.5",
+                    ))
+                })
         }
     }
 }
@@ -152,7 +204,11 @@ fn phases(problem: &Problem) -> Result<(), Refusal> {
         return Err(Refusal::new(Item::Problem, Cause::NoPhase));
     }
     let mut active: Vec<bool> = problem.groups.iter().map(|group| group.is_active).collect();
-    let faces = problem.mesh.joints.iter().flat_map(|joint| [joint.minus[2], joint.plus[2]]);
+    let faces = problem
+        .mesh
+        .joints
+        .iter()
+        .flat_map(|joint| [joint.minus[2], joint.plus[2]]);
     let faces: HashSet<usize> = faces.collect();
     let mut names: Vec<&str> = Vec::new();
     for (number, phase) in problem.phases.iter().enumerate() {
@@ -226,7 +282,13 @@ fn activation(
         }
         if active[group] == is_activated || !changed.insert(group) {
             let is_active = is_activated;
-            return Err(Refusal::new(item, Cause::AlreadySo { group: name, is_active }));
+            return Err(Refusal::new(
+                item,
+                Cause::AlreadySo {
+                    group: name,
+                    is_active,
+                },
+            ));
         }
         active[group] = is_activated;
     }
@@ -244,7 +306,11 @@ fn ground(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal
             return refuse(Cause::Misplaced(Key::UnitWeight, formulation));
         }
         if !(weight.is_finite() && weight >= 0.0) {
-            return refuse(Cause::OutOfBounds("the unit weight", weight, "zero or more"));
+            return refuse(Cause::OutOfBounds(
+                "the unit weight",
+                weight,
+                "zero or more",
+            ));
         }
     }
     for (place, &(group, _)) in phase.drainage.iter().enumerate() {
@@ -300,7 +366,9 @@ fn pressures(
         if middles().any(|middle| faces.contains(&middle)) {
             return refuse(Cause::OnInterface(name.to_owned()));
         }
-        if line.edges.is_empty() || middles().any(|middle| there.get(&middle).is_some_and(|n| *n > 1)) {
+        if line.edges.is_empty()
+            || middles().any(|middle| there.get(&middle).is_some_and(|n| *n > 1))
+        {
             return refuse(Cause::NoBoundary(name.to_owned()));
         }
         if middles().any(|middle| !there.contains_key(&middle)) {
@@ -330,11 +398,18 @@ fn forces(
         if input.x.is_none() && input.y.is_none() {
             return refuse(Cause::NoValue(name.to_owned(), problem.analysis));
         }
-        if [input.x, input.y].into_iter().flatten().any(|value| !value.is_finite()) {
+        if [input.x, input.y]
+            .into_iter()
+            .flatten()
+            .any(|value| !value.is_finite())
+        {
             return refuse(Cause::NotFinite("the force"));
         }
         let middles = line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
-        if middles.into_iter().any(|middle| !there.contains_key(&middle)) {
+        if middles
+            .into_iter()
+            .any(|middle| !there.contains_key(&middle))
+        {
             return refuse(Cause::NotThere(name.to_owned()));
         }
     }

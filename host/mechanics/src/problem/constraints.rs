@@ -3,8 +3,8 @@
 use super::held::{Motion, Part, loose, parts};
 use super::{Analysis, Axis, Cause, Displacement, Free, Item, Phase, Pressure, Problem, Refusal};
 use crate::assembly::Tie;
-use crate::mesh::{Line, Mesh};
 use crate::ground::unit_pressure;
+use crate::mesh::{Line, Mesh};
 use std::collections::{HashMap, HashSet};
 
 /// A node is on the axis of symmetry within this fraction of the largest radius.
@@ -43,8 +43,14 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
     let mut held: Vec<HashSet<usize>> = Vec::new();
     for (number, phase) in problem.phases.iter().enumerate() {
         if !phase.activate.is_empty() || !phase.deactivate.is_empty() {
-            phase.activate.iter().for_each(|&group| active[group] = true);
-            phase.deactivate.iter().for_each(|&group| active[group] = false);
+            phase
+                .activate
+                .iter()
+                .for_each(|&group| active[group] = true);
+            phase
+                .deactivate
+                .iter()
+                .for_each(|&group| active[group] = false);
             constraints.parts = parts(&problem.mesh, &|group| active[group]);
         }
         let mut released = Vec::new();

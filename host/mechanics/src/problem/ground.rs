@@ -27,13 +27,17 @@ impl Profile {
 
     /// Whether it is the same everywhere.
     pub fn is_constant(&self) -> bool {
-        self.values().all(|value| value.to_bits() == self.0[0][1].to_bits())
+        self.values()
+            .all(|value| value.to_bits() == self.0[0][1].to_bits())
     }
 
     /// The value at a height (of a water table: the level at x).
     pub fn at(&self, y: f64) -> f64 {
         let above = self.0.partition_point(|[at, _]| *at <= y);
-        match (above.checked_sub(1).map(|i| self.0[i]), self.0.get(above).copied()) {
+        match (
+            above.checked_sub(1).map(|i| self.0[i]),
+            self.0.get(above).copied(),
+        ) {
             (None, Some([_, value])) | (Some([_, value]), None) => value,
             (Some([y_0, v_0]), Some([y_1, v_1])) => v_0 + (v_1 - v_0) * (y - y_0) / (y_1 - y_0),
             (None, None) => 0.0,
@@ -138,7 +142,9 @@ impl Water {
 }
 
 /// Whether pore water leaves the ground.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Drainage {
     /// Freely.

@@ -410,21 +410,34 @@ impl fmt::Display for Cause {
             Self::AlreadySo { group, is_active } => write!(
                 f,
                 "group `{group}` is {} at the start of this phase",
-                if *is_active { "active already" } else { "not active" }
+                if *is_active {
+                    "active already"
+                } else {
+                    "not active"
+                }
             ),
             Self::BothWays(group) => {
-                write!(f, "group `{group}` is activated and deactivated in one phase")
+                write!(
+                    f,
+                    "group `{group}` is activated and deactivated in one phase"
+                )
             }
             Self::TwoForces(line) => write!(f, "line `{line}` has two forces in this phase"),
             Self::NotThere(line) => {
-                write!(f, "line `{line}` lies on elements that are not active in this phase")
+                write!(
+                    f,
+                    "line `{line}` lies on elements that are not active in this phase"
+                )
             }
             Self::BadCourse => write!(
                 f,
                 "a `course` leads from [0, 0] to time 1: pairs [time, factor] with rising times"
             ),
             Self::CourseOfArcLength => {
-                write!(f, "a `course` has a time of its own, arc-length control another")
+                write!(
+                    f,
+                    "a `course` has a time of its own, arc-length control another"
+                )
             }
             Self::NoWater => write!(f, "this phase changes the water, and there is none"),
             Self::WaterBelow(level, lowest) => write!(
@@ -502,9 +515,9 @@ impl Cause {
             Self::AtRestOutsideStrength { .. } => {
                 "K_0 lies between active and passive pressure: at the surface cohesion, or another K_0"
             }
-            Self::AlreadySo { is_active: true, .. } => {
-                "`active = false` on the group keeps it out from the start"
-            }
+            Self::AlreadySo {
+                is_active: true, ..
+            } => "`active = false` on the group keeps it out from the start",
             Self::LocalAxes { .. } => "use the formulation `thin_layer`",
             Self::FreeForNothing { .. } => {
                 "leave one of the two out; a displacement stays until a phase frees it"

@@ -101,7 +101,9 @@ impl Beyond {
     /// ξ, η, u_ξ = α ξ (3η² − 1), u_η = −α η (3ξ² − 1). Neighbours hold it, unless they join in.
     fn mechanisms(&mut self, mesh: &Mesh, groups: &[Group], displacement: &[f64]) {
         let (mut largest, mut found) = (0.0, Vec::new());
-        let solids = groups.iter().filter(|g| g.formulation == Formulation::Solid);
+        let solids = groups
+            .iter()
+            .filter(|g| g.formulation == Formulation::Solid);
         for group in solids.filter(|group| group.is_active) {
             let kinematics = &group.kinematics;
             for element in 0..kinematics.n_elements() {
@@ -139,7 +141,10 @@ impl Beyond {
         found.retain(|(unseen, ..)| *unseen > WORTH * largest);
         let worst = found.iter().max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some(&(strain, name, at)) = worst
-            && self.unseen.as_ref().is_none_or(|known| found.len() > known.0)
+            && self
+                .unseen
+                .as_ref()
+                .is_none_or(|known| found.len() > known.0)
         {
             self.unseen = Some((found.len(), strain, name.clone(), at));
         }

@@ -57,10 +57,14 @@ impl Simulation {
     }
 
     /// Loads on a leg of a phase that starts here.
-    pub(super) fn loads_on(&self, number: usize, course: usize, prescribed: &[Prescribed]) -> Loads {
+    pub(super) fn loads_on(
+        &self,
+        number: usize,
+        course: usize,
+        prescribed: &[Prescribed],
+    ) -> Loads {
         let phase = &self.problem.phases[number];
-        let [[t_0, _], [t_1, factor]] =
-            leg(phase, course).unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
+        let [[t_0, _], [t_1, factor]] = leg(phase, course).unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
         let end_of = |start: f64, end: f64| {
             if factor.to_bits() == 1.0_f64.to_bits() {
                 end
@@ -122,7 +126,8 @@ impl Simulation {
         let [[t_0, f_0], [t_1, f_1]] = leg.unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
         let water = |factor: f64| self.loading_at(factor).water(&self.problem);
         let (from, to) = (water(f_0), water(f_1));
-        self.pores.are(from, to, (course.lambda - t_0) / (t_1 - t_0));
+        self.pores
+            .are(from, to, (course.lambda - t_0) / (t_1 - t_0));
     }
 
     /// Takes note of what a phase ends with.

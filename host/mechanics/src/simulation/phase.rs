@@ -68,7 +68,11 @@ impl Simulation {
         let (equations, loads) = self.equations_of(number, loads, None)?;
         let imbalance = equations.out_of_balance;
         let weight = crate::equilibrium::norm(&loads.force_start);
-        let has_weight = self.loading[0].unit_weight.iter().flatten().any(|weight| *weight > 0.0);
+        let has_weight = self.loading[0]
+            .unit_weight
+            .iter()
+            .flatten()
+            .any(|weight| *weight > 0.0);
         if number == 0 && has_weight && weight > 0.0 {
             let rest = crate::equilibrium::norm(&loads.out_of_balance);
             watch.at_rest(&name, rest / weight);
@@ -106,7 +110,9 @@ impl Simulation {
                 return 0.0;
             }
             let masters = tie.masters.iter();
-            let followed: f64 = masters.map(|&(dof, weight)| weight * self.displacement[dof]).sum();
+            let followed: f64 = masters
+                .map(|&(dof, weight)| weight * self.displacement[dof])
+                .sum();
             self.displacement[tie.dof] - followed
         };
         self.tied.iter().map(offset).collect()
@@ -311,9 +317,7 @@ impl Simulation {
         let n_dofs = self.displacement.len();
         let mut internal = vec![0.0; n_dofs];
         for group in self.groups.iter().filter(|group| group.is_active) {
-            group
-                .kinematics
-                .add_forces(&group.carried(), &mut internal);
+            group.kinematics.add_forces(&group.carried(), &mut internal);
         }
         fold(&self.tied, &mut internal);
         loads.out_of_balance = vec![0.0; n_dofs];

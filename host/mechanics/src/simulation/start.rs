@@ -1,8 +1,8 @@
 //! The start of a phase: laws are swapped, and what they make of the stresses they find is taken
 //! over; loads.
 
-use super::{Simulation, Warning, Watch};
 use super::loads::Prescribed;
+use super::{Simulation, Warning, Watch};
 use crate::equilibrium::StepFailure;
 use crate::error::{Error, Place};
 use crate::ground::beside_joints;
@@ -34,7 +34,11 @@ impl Simulation {
         let cannot_start = |failure| Error::CannotStart(Box::new(failure));
         let start = self.loading[1].clone();
         self.loading = [start.clone(), start.changed_by(&phase)];
-        let beside: Vec<Vec<f64>> = phase.activate.iter().map(|&g| self.stress_beside(g)).collect();
+        let beside: Vec<Vec<f64>> = phase
+            .activate
+            .iter()
+            .map(|&g| self.stress_beside(g))
+            .collect();
         for &group in &phase.deactivate {
             self.groups[group].disappear();
         }
@@ -110,13 +114,19 @@ impl Simulation {
                 }
                 let mut total = self.groups[group].carried_at(within[solid], at);
                 if self.problem.groups[group].pore_water {
-                    total[..3].iter_mut().for_each(|component| *component -= pressure);
+                    total[..3]
+                        .iter_mut()
+                        .for_each(|component| *component -= pressure);
                 }
                 Some(total)
             };
-            let sides: Vec<[f64; 4]> = [nodes[2], nodes[5]].into_iter().filter_map(of_side).collect();
+            let sides: Vec<[f64; 4]> = [nodes[2], nodes[5]]
+                .into_iter()
+                .filter_map(of_side)
+                .collect();
             let share = 1.0 / sides.len().max(1) as f64;
-            let mean = std::array::from_fn(|c| share * sides.iter().map(|side| side[c]).sum::<f64>());
+            let mean =
+                std::array::from_fn(|c| share * sides.iter().map(|side| side[c]).sum::<f64>());
             let [_, mut normal, _, shear] = kinematics.axes_at(point).stress_from_global(mean);
             if self.problem.groups[number].pore_water && !sides.is_empty() {
                 normal += pressure;

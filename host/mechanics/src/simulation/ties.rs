@@ -42,7 +42,12 @@ impl Simulation {
         }
         let mut held = Vec::new();
         for line in self.rigid_in(number) {
-            let nodes = self.problem.mesh.lines.get(line).map(|line| &line.nodes[..]);
+            let nodes = self
+                .problem
+                .mesh
+                .lines
+                .get(line)
+                .map(|line| &line.nodes[..]);
             let nodes = nodes.unwrap_or_default();
             let axis = ON_AXIS * self.problem.mesh.longer_side();
             let is_on_axis = |&node: &usize| self.problem.mesh.nodes[node][0] <= axis;
@@ -56,8 +61,10 @@ impl Simulation {
                 held.extend(nodes.iter().map(|node| 2 * node));
             }
         }
-        let own: HashMap<usize, f64> =
-            prescribed.iter().map(|&(dof, start, end)| (dof, end - start)).collect();
+        let own: HashMap<usize, f64> = prescribed
+            .iter()
+            .map(|&(dof, start, end)| (dof, end - start))
+            .collect();
         let layers: HashMap<usize, [(usize, f64); 2]> =
             self.ties.iter().map(|tie| (tie.dof, tie.masters)).collect();
         let mut ties = Vec::new();
@@ -95,9 +102,14 @@ impl Simulation {
         }
         // Faces of layers that follow others themselves.
         for tie in &self.ties {
-            let masters = tie.masters.map(|(dof, weight)| (*follows.get(&dof).unwrap_or(&dof), weight));
+            let masters = tie
+                .masters
+                .map(|(dof, weight)| (*follows.get(&dof).unwrap_or(&dof), weight));
             if !follows.contains_key(&tie.dof) {
-                ties.push(Tie { dof: tie.dof, masters });
+                ties.push(Tie {
+                    dof: tie.dof,
+                    masters,
+                });
             }
         }
         prescribed.sort_unstable_by_key(|(dof, ..)| *dof);
@@ -106,7 +118,9 @@ impl Simulation {
 
     /// Lines that are rigid in a phase: those that it or an earlier one names.
     fn rigid_in(&self, number: usize) -> impl Iterator<Item = &String> {
-        self.problem.phases[..=number].iter().flat_map(|phase| &phase.rigid)
+        self.problem.phases[..=number]
+            .iter()
+            .flat_map(|phase| &phase.rigid)
     }
 }
 
@@ -139,6 +153,9 @@ impl Alike {
         for dof in dofs {
             classes.entry(self.find(dof)).or_default().push(dof);
         }
-        classes.into_values().filter(|members| members.len() > 1).collect()
+        classes
+            .into_values()
+            .filter(|members| members.len() > 1)
+            .collect()
     }
 }

@@ -103,9 +103,9 @@ impl fmt::Display for Warning {
                 tolerance,
             } => write!(
                 f,
-                "{place}: iterations came to a standstill at a residual of {residual:.1e}, above the \
-                 tolerance {tolerance:.1e}, and no equilibrium lies nearer; `tolerated_residual` accepts it: \
-                 forces are out of balance by that share, displacements are less certain"
+                "{place}: iterations came to a standstill short of the tolerances, with a residual of \
+                 {residual:.1e} ({tolerance:.1e} asked for); `tolerated_residual` accepts it: forces are out \
+                 of balance by that share, displacements are uncertain by up to a tenth of the increment"
             ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::TookOver(phase, change) => write!(

@@ -18,6 +18,8 @@ use law::Operator;
 /// increment: what moves on is a mechanism, however small its residual.
 const LAST: usize = 5;
 const STILL_MOVES: f64 = 0.1;
+/// Nor is one whose displacement increments are so many times those that the iterations started from.
+const FAR: f64 = 5.0;
 /// Lengths of a correction that the line search tries.
 const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 
@@ -33,6 +35,8 @@ pub(super) struct LoadControl {
     pub(super) relaxation: Relaxation,
     /// Displacement increments that left the least out of balance, and how much, relative.
     least: Option<(Vec<f64>, f64)>,
+    /// Size of the first iterate's displacement increments.
+    predicted: Option<f64>,
 }
 
 impl LoadControl {
@@ -45,6 +49,7 @@ impl LoadControl {
             acceleration: is_quasi.then(Acceleration::default),
             relaxation: Relaxation::new(newton.settings),
             least: None,
+            predicted: None,
         }
     }
 
@@ -170,7 +175,15 @@ impl Control for LoadControl {
 
     fn note(&mut self, state: &State) {
         let residual = state.balance.relative;
-        let is_least = self.least.as_ref().is_none_or(|(_, least)| residual < *least);
+        let size = norm(&state.increment);
+        // What goes far beyond what was predicted runs away, whatever it leaves out of balance.
+        if size > FAR * *self.predicted.get_or_insert(size) {
+            return;
+        }
+        let is_least = self
+            .least
+            .as_ref()
+            .is_none_or(|(_, least)| residual < *least);
         if is_least && !state.balance.away.contains(&true) {
             self.least = Some((state.increment.clone(), residual));
         }
@@ -185,7 +198,8 @@ impl Control for LoadControl {
         let corrections = iterations[last..].iter().filter_map(|i| i.correction);
         let largest = corrections.fold(0.0, f64::max);
         let tolerated = newton.settings.tolerated_residual;
-        let Some((increment, _)) = self.least.take().filter(|(_, least)| *least <= tolerated) else {
+        let Some((increment, _)) = self.least.take().filter(|(_, least)| *least <= tolerated)
+        else {
             return Ok(None);
         };
         if largest > STILL_MOVES {

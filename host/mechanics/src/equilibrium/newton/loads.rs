@@ -59,7 +59,9 @@ impl Loads {
     /// External forces and what is left of the forces out of balance.
     pub fn external(&self, lambda: f64) -> Vec<f64> {
         let forces = self.forces(lambda).zip(&self.out_of_balance);
-        forces.map(|(force, rest)| force + (1.0 - lambda) * rest).collect()
+        forces
+            .map(|(force, rest)| force + (1.0 - lambda) * rest)
+            .collect()
     }
 
     /// Change of the external forces with λ, by degree of freedom.
