@@ -98,7 +98,10 @@ fn mistakes_do_not_follow_it() {
         // What is missing, and what is of another kind.
         ("analysis = \"plane_strain\"\n", ""),
         ("formulation = \"solid\", integration = \"full\"\n", ""),
-        ("formulation = \"solid\", integration = \"full\"", "formulation = \"solids\""),
+        (
+            "formulation = \"solid\", integration = \"full\"",
+            "formulation = \"solids\"",
+        ),
         ("increments = 10", "increments = \"ten\""),
         ("fixed = [\"x\", \"y\"]", "fixed = [\"x\", \"w\"]"),
     ] {
