@@ -277,12 +277,11 @@ impl Group {
         }
     }
 
-    /// Takes over a state that [`Self::state`] gave, with the law it names (`laws`: those that the
-    /// group carries in the course of the case).
+    /// The law that a state names, if the state is one of this group.
     ///
     /// # Errors
-    /// The state is not that of this group, or its law has no elastic operator.
-    pub fn restore(&mut self, state: GroupState<'_>, laws: &[Material]) -> Result<(), String> {
+    /// It is not, in words.
+    pub fn check(&self, state: &GroupState<'_>, laws: &[Material]) -> Result<Material, String> {
         let wrong = || format!("the state is not that of group `{}`", self.name);
         let known = laws.iter().chain([&self.law]);
         let law = known.into_iter().find(|law| law.name == state.law);
@@ -299,6 +298,16 @@ impl Group {
         {
             return Err(wrong());
         }
+        Ok(law)
+    }
+
+    /// Takes over a state that [`Self::state`] gave, with the law it names (`laws`: those that the
+    /// group carries in the course of the case).
+    ///
+    /// # Errors
+    /// The state is not that of this group, or its law has no elastic operator.
+    pub fn restore(&mut self, state: GroupState<'_>, laws: &[Material]) -> Result<(), String> {
+        let law = self.check(&state, laws)?;
         self.stress = Field::new(state.stress.into_owned());
         self.pores = state.pores.map(Cow::into_owned);
         self.start_law(law, Some(state.internal.to_vec()))

@@ -108,6 +108,8 @@ pub struct Simulation {
     /// Phases that are over.
     done: usize,
     under_way: Option<UnderWay>,
+    /// It came to an error from which it cannot go on.
+    has_failed: bool,
 }
 
 /// A phase under way.
@@ -175,6 +177,7 @@ impl Simulation {
             stop: Stop::never(),
             done: 0,
             under_way: None,
+            has_failed: false,
             problem,
         };
         simulation.beyond.knows(&simulation.groups);
@@ -296,6 +299,10 @@ impl Simulation {
     /// As [`Self::step`].
     pub fn step_watched(&mut self, watch: &mut dyn Watch) -> Result<Option<Increment>, Error> {
         self.stop = watch.stop();
+        if self.has_failed {
+            let message = "the simulation has come to an error; it goes on from a state only";
+            return Err(Error::OtherState(message.to_owned()));
+        }
         loop {
             if self.under_way.is_none() {
                 if self.done == self.problem.phases.len() {
@@ -307,8 +314,8 @@ impl Simulation {
                 continue;
             };
             let n = self.problem.phases[phase.number].increments;
-            if phase.course.increment == n {
-                self.end_phase(phase, watch);
+            if phase.course.increment >= n {
+                self.end_phase(&phase, watch);
                 continue;
             }
             let outcome = self.increment(&mut phase, watch);
@@ -317,10 +324,13 @@ impl Simulation {
                 self.hand_out_state(&increment, watch)?;
                 Ok(increment)
             });
-            if outcome.is_err()
+            if let Err(error) = &outcome
                 && let Some(phase) = self.under_way.take()
             {
-                self.end_phase(phase, watch);
+                self.report_phase(&phase, watch);
+                // What was stopped goes on where it stands.
+                self.has_failed = !error.is_stop() && !matches!(error, Error::Halted);
+                self.under_way = Some(phase);
             }
             return outcome.map(Some);
         }

@@ -146,19 +146,23 @@ impl Simulation {
     }
 
     /// Ends a phase, be it as it may.
-    pub(super) fn end_phase(&mut self, phase: UnderWay, watch: &mut dyn Watch) {
+    pub(super) fn end_phase(&mut self, phase: &UnderWay, watch: &mut dyn Watch) {
+        self.keep_loads(phase.number, &phase.course.prescribed);
+        self.time += 1.0;
+        self.done = phase.number + 1;
+        self.report_phase(phase, watch);
+    }
+
+    /// Says what there is to say of a phase that has ended, or that goes on later.
+    pub(super) fn report_phase(&mut self, phase: &UnderWay, watch: &mut dyn Watch) {
         for group in &self.groups {
             for note in group.law.built.law.take_notes() {
                 watch.warning(&Warning::Note(note));
             }
         }
         let UnderWay {
-            number,
-            equations,
-            record,
-            course,
+            equations, record, ..
         } = phase;
-        self.keep_loads(number, &course.prescribed);
         let of_domain = equations
             .domain
             .as_ref()
@@ -171,12 +175,10 @@ impl Simulation {
                 left,
             });
         }
-        self.time += 1.0;
-        self.done = number + 1;
         let (mesh, analysis) = (&self.problem.mesh, self.problem.analysis);
         self.beyond
             .look(mesh, analysis, &self.groups, &self.displacement);
-        watch.phase_ends(equations.counted_in(&record));
+        watch.phase_ends(equations.counted_in(record));
     }
 
     fn equations_of(

@@ -21,6 +21,7 @@ pub struct State<'s> {
     prescribed: Cow<'s, BTreeMap<usize, f64>>,
     loading: Cow<'s, [Loading; 2]>,
     force: Cow<'s, [f64]>,
+    reaction: Cow<'s, [f64]>,
     /// Pseudo-time at the start of the phase.
     time: f64,
     largest_force: f64,
@@ -75,6 +76,7 @@ impl State<'_> {
             prescribed: Cow::Owned(self.prescribed.into_owned()),
             loading: Cow::Owned(self.loading.into_owned()),
             force: Cow::Owned(self.force.into_owned()),
+            reaction: Cow::Owned(self.reaction.into_owned()),
             time: self.time,
             largest_force: self.largest_force,
             course: Cow::Owned(self.course.into_owned()),
@@ -121,6 +123,7 @@ impl Simulation {
             prescribed: Cow::Borrowed(&self.prescribed),
             loading: Cow::Borrowed(&self.loading),
             force: (&self.force).into(),
+            reaction: (&self.reaction).into(),
             time: self.time,
             largest_force: self.largest_force,
             course: Cow::Borrowed(&phase.course),
@@ -137,24 +140,36 @@ impl Simulation {
         let sizes = [
             &state.displacement[..],
             &state.force,
+            &state.reaction,
             &course.loads.force_start,
         ];
         let is_other = state.phase >= self.problem.phases.len()
             || state.groups.len() != self.groups.len()
-            || sizes.iter().any(|v| v.len() != n_dofs);
+            || sizes.iter().any(|v| v.len() != n_dofs)
+            || course.increment > self.problem.phases[state.phase].increments;
         if is_other {
             let message = "the checkpoint is not that of this mesh; run without --resume";
             return Err(Error::OtherState(message.to_owned()));
         }
+        let laws_of = |number: usize| -> Vec<Material> {
+            let swaps = self.swaps.iter().flatten();
+            let laws = swaps.filter(|(g, _)| *g == number);
+            let first = self.first_materials[number].clone();
+            laws.map(|(_, law)| law.clone()).chain([first]).collect()
+        };
+        let laws: Vec<Vec<Material>> = (0..self.groups.len()).map(laws_of).collect();
+        // All of it fits, or nothing is touched.
+        for (number, (group, state)) in self.groups.iter().zip(&state.groups).enumerate() {
+            group
+                .check(state, &laws[number])
+                .map_err(Error::OtherState)?;
+        }
         self.under_way = None;
         let groups = self.groups.iter_mut().zip(state.groups).enumerate();
         for (number, (group, state)) in groups {
-            let swaps = self.swaps.iter().flatten();
-            let laws = swaps.filter(|(g, _)| *g == number);
-            let laws: Vec<Material> = laws.map(|(_, law)| law.clone()).collect();
-            let first = self.first_materials[number].clone();
-            let laws: Vec<Material> = laws.into_iter().chain([first]).collect();
-            group.restore(state, &laws).map_err(Error::OtherState)?;
+            group
+                .restore(state, &laws[number])
+                .map_err(Error::OtherState)?;
         }
         self.displacement = state.displacement.into_owned();
         self.prescribed = state.prescribed.into_owned();
@@ -165,6 +180,8 @@ impl Simulation {
         let own = state.course.prescribed.clone();
         self.tied = self.tied_in(state.phase, own)?.ties;
         self.force = state.force.into_owned();
+        self.reaction = state.reaction.into_owned();
+        self.has_failed = false;
         self.time = state.time;
         self.largest_force = state.largest_force;
         self.largest_forces.clone_from(&state.course.loads.largest);
