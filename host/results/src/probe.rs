@@ -2,6 +2,7 @@
 
 mod section;
 
+use crate::pressures::Pressure;
 use crate::wanted::Reduce;
 use mechanics::assembly::fold;
 use mechanics::group::Group;
@@ -83,6 +84,8 @@ pub enum PointQuantity {
     Jump(usize),
     /// Traction, normal or tangential, kPa.
     Traction(usize),
+    /// Pore pressure, excess pore pressure or a total stress, kPa.
+    Pressure(Pressure),
     /// An internal variable.
     Internal(String),
 }
@@ -139,7 +142,7 @@ impl Probes {
     }
 
     /// Values, in order. `None`: the quantity does not exist now (an internal variable of another
-    /// law).
+    /// law, a group that is not active).
     pub fn values(&self, snapshot: &Snapshot<'_>) -> Vec<Option<f64>> {
         let mut values: Vec<Option<f64>> = Vec::new();
         for (_, probe) in &self.probes {
@@ -160,8 +163,8 @@ impl Probe {
                 reduce,
                 scale,
             } => {
-                let group = &snapshot.groups[*group];
-                let values = points.iter().map(|&point| quantity.at(group, point));
+                active(snapshot, *group)?;
+                let values = points.iter().map(|&point| quantity.at(snapshot, *group, point));
                 reduced(*reduce, values, weights).map(|value| scale * value)
             }
             Self::Displacement {
@@ -187,7 +190,7 @@ impl Probe {
                     None => snapshot.reaction,
                     Some(group) => {
                         let n_dofs = snapshot.displacement.len();
-                        let group = &snapshot.groups[*group];
+                        let group = active(snapshot, *group)?;
                         let mut forces = match elements {
                             None => group.forces(n_dofs),
                             Some(elements) => group.forces_of(elements, n_dofs),
@@ -210,7 +213,7 @@ impl Probe {
                 elements,
                 component,
                 scale,
-            } => Some(scale * snapshot.groups[*group].handed_on(elements, *component)),
+            } => Some(scale * active(snapshot, *group)?.handed_on(elements, *component)),
             Self::Combination(terms) => terms
                 .iter()
                 .map(|&(i, factor)| earlier[i].map(|v| factor * v))
@@ -219,8 +222,15 @@ impl Probe {
     }
 }
 
+/// The group of this number if it is there.
+fn active<'s>(snapshot: &Snapshot<'s>, number: usize) -> Option<&'s Group> {
+    let group = snapshot.groups.get(number)?;
+    group.is_active.then_some(group)
+}
+
 impl PointQuantity {
-    fn at(&self, group: &Group, point: usize) -> Option<f64> {
+    fn at(&self, snapshot: &Snapshot<'_>, number: usize, point: usize) -> Option<f64> {
+        let group = &snapshot.groups[number];
         match self {
             Self::Stress(c) => group.global_stress(point).map(|s| s[*c]),
             Self::Strain(c) => group.global_strain(point).map(|e| e[*c]),
@@ -228,6 +238,7 @@ impl PointQuantity {
             Self::Traction(c) => group
                 .jump_and_traction(point)
                 .map(|(_, traction)| traction[*c]),
+            Self::Pressure(quantity) => quantity.at(snapshot, number, point),
             Self::Internal(id) => group.internal_variable(point, id),
         }
     }

@@ -28,6 +28,9 @@ pub trait Observer {
     fn cut_back(&mut self, place: &Place, reason: &str);
     /// Something the user should know.
     fn warning(&mut self, message: &str);
+    /// The ground was found at rest in this phase but for a share of its weight, which the phase
+    /// carries to equilibrium.
+    fn at_rest(&mut self, _phase: &str, _share: f64) {}
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
     /// Who may want the run to stop: after the increment under way, or within it if that takes
@@ -274,6 +277,11 @@ impl Watch for Follower<'_> {
         let _ = self
             .results
             .last_equilibrium(place, load_factor, time, state);
+    }
+
+    fn at_rest(&mut self, phase: &str, share: f64) {
+        self.results.at_rest(phase, share);
+        self.observer.at_rest(phase, share);
     }
 
     fn phase_ends(&mut self, record: PhaseRecord) {

@@ -6,6 +6,7 @@ use super::log::Log;
 use super::profile::Profile;
 use super::short::{Short, extremes, thinned};
 use super::table::Table;
+use crate::pressures::Pressure;
 use crate::record::{entries, list, text};
 use serde::Serialize;
 use serde_json::Value;
@@ -299,6 +300,7 @@ impl Run {
         let fields = self.fields.iter().flat_map(|fields| &fields.names);
         for name in profile.chain(fields) {
             let unit = match name.split_once('_') {
+                _ if Pressure::named(name).is_some() => "kPa",
                 Some(("stress" | "traction", _)) => "kPa",
                 Some(("jump", _)) => "m",
                 _ => continue,

@@ -4,24 +4,25 @@ part(() => {
   const host = document.getElementById('contour');
   if (!host) return;
   const drawn = runs.filter(run => run.fields);
-  // Nodes of a quad around it, of an edge along it.
-  const ROUND = [0, 4, 1, 5, 2, 6, 3, 7];
-  const ALONG = [0, 2, 1];
+  // By number of nodes: those of a quad or triangle around it, of an edge along it.
+  const OUTLINE = { 8: [0, 4, 1, 5, 2, 6, 3, 7], 6: [0, 3, 1, 4, 2, 5], 3: [0, 2, 1] };
+  const isSolid = cell => cell.length > 3;
   const axes = run => (run.axisymmetric ? ['r', 'z'] : ['x', 'y']);
 
   /** Everything about a run's mesh that does not change with time. */
   const prepare = run => {
     const { fields } = run;
-    const outlines = fields.cells.map(cell => (cell.length === 8 ? ROUND : ALONG).map(i => cell[i]));
+    const outlines = fields.cells.map(cell => OUTLINE[cell.length].map(i => cell[i]));
     const within = [];
     const counts = fields.groups.map(() => 0);
     fields.group.forEach(g => within.push(++counts[g]));
     // Edges between groups and at the boundary.
     const edges = new Map();
     fields.cells.forEach((cell, c) => {
-      if (cell.length !== 8) return;
-      for (let k = 0; k < 4; k++) {
-        const nodes = [cell[k], cell[4 + k], cell[(k + 1) % 4]];
+      if (!isSolid(cell)) return;
+      const corners = cell.length / 2;
+      for (let k = 0; k < corners; k++) {
+        const nodes = [cell[k], cell[corners + k], cell[(k + 1) % corners]];
         const key = nodes[0] < nodes[2] ? `${nodes[0]} ${nodes[2]}` : `${nodes[2]} ${nodes[0]}`;
         const known = edges.get(key);
         if (known) known.groups.push(fields.group[c]);
@@ -143,7 +144,7 @@ part(() => {
       const t = value == null ? null : (value - bounds[0]) / (bounds[1] - bounds[0]);
       const fill = t == null ? ink.blank : colours[Math.round(256 * Math.min(1, Math.max(0, t)))];
       const outline = mesh.outlines[c].map(n => at[n]);
-      if (cell.length === 8) pen.polygon(outline, fill, state.lines && fine ? ink.mesh : fill, state.lines && fine ? 0.5 : 0.7);
+      if (isSolid(cell)) pen.polygon(outline, fill, state.lines && fine ? ink.mesh : fill, state.lines && fine ? 0.5 : 0.7);
       else edges.push([outline, fill]);
     });
     for (const edge of mesh.borders) {
@@ -278,7 +279,7 @@ part(() => {
       const outline = mesh.outlines[state.hover].map(n => view.to(position(mesh, n, SCALES[state.scale])));
       const pen = onCanvas(context);
       pen.within(view.width - BAR, view.height);
-      pen.line(mesh.fields.cells[state.hover].length === 8 ? [...outline, outline[0]] : outline, '#ff3b6b', 2);
+      pen.line(isSolid(mesh.fields.cells[state.hover]) ? [...outline, outline[0]] : outline, '#ff3b6b', 2);
       pen.everywhere();
     }
     host.dataset.drawn = `${state.field} ${state.time} ${SCALES[state.scale]} ${bounds.map(b => b.toPrecision(6)).join(' ')}`;
