@@ -107,7 +107,10 @@ part(() => {
     return { k, centre, width, height, to: ([x, y]) => [(width - BAR) / 2 + (x - centre[0]) * k, height / 2 - (y - centre[1]) * k], from: (px, py) => [centre[0] + (px - (width - BAR) / 2) / k, centre[1] - (py - height / 2) / k] };
   };
 
-  const visible = (mesh, values) => values.filter((v, c) => v != null && !state.hidden.has(mesh.fields.groups[mesh.fields.group[c]]));
+  /** Whether a group is chosen, and there at this time: what is not active is left out. */
+  const isShown = (mesh, g) => !state.hidden.has(mesh.fields.groups[g]) && !mesh.fields.times[state.time].inactive.includes(g);
+
+  const visible = (mesh, values) => values.filter((v, c) => v != null && isShown(mesh, mesh.fields.group[c]));
 
   const boundsOf = (mesh, values) => {
     const seen = visible(mesh, values);
@@ -139,7 +142,7 @@ part(() => {
     pen.within(view.width - BAR, view.height);
     const edges = [];
     fields.cells.forEach((cell, c) => {
-      if (state.hidden.has(fields.groups[fields.group[c]])) return;
+      if (!isShown(mesh, fields.group[c])) return;
       const value = shownValues[c];
       const t = value == null ? null : (value - bounds[0]) / (bounds[1] - bounds[0]);
       const fill = t == null ? ink.blank : colours[Math.round(256 * Math.min(1, Math.max(0, t)))];
@@ -148,7 +151,7 @@ part(() => {
       else edges.push([outline, fill]);
     });
     for (const edge of mesh.borders) {
-      if (edge.groups.every(g => state.hidden.has(fields.groups[g]))) continue;
+      if (!edge.groups.some(g => isShown(mesh, g))) continue;
       pen.line(edge.nodes.map(n => at[n]), ink.edge, 1);
     }
     for (const [outline, fill] of edges) pen.line(outline, fill, 5);
@@ -318,13 +321,13 @@ part(() => {
     const { fields } = mesh;
     let found = null;
     fields.cells.forEach((cell, c) => {
-      if (state.hidden.has(fields.groups[fields.group[c]])) return;
+      if (!isShown(mesh, fields.group[c])) return;
       const outline = mesh.outlines[c].map(n => view.to(position(mesh, n, factor)));
-      if (cell.length !== 8) {
+      if (!isSolid(cell)) {
         for (let i = 1; i < outline.length; i++) if (distance([px, py], outline[i - 1], outline[i]) < 5) found = c;
         return;
       }
-      if (found != null && fields.cells[found].length !== 8) return;
+      if (found != null && !isSolid(fields.cells[found])) return;
       let inside = false;
       for (let i = 0, j = outline.length - 1; i < outline.length; j = i++) {
         const [a, b] = [outline[i], outline[j]];
