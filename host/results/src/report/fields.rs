@@ -86,12 +86,8 @@ impl Fields {
             };
             if fields.is_none() {
                 let size = grid.nodes.len() + grid.cells.len() * grid.fields.len();
-                let whole = size + grid.nodes.len() + 8 * grid.cells.len();
-                if whole > budget.mesh {
-                    notes.push(format!(
-                        "the fields are not shown: {whole} numbers for mesh and one time are too \
-                         many for this page"
-                    ));
+                if grid.size() > budget.mesh {
+                    notes.push(too_large(grid.size()));
                     return None;
                 }
                 let must = |i: usize| i == number;
@@ -112,6 +108,31 @@ impl Fields {
             }
         }
         fields.filter(|fields| !fields.times.is_empty())
+    }
+
+    /// The fields of one file's text, at a time that is called so; `None` if the page cannot hold them.
+    pub(super) fn of_one(
+        text: &str,
+        (groups, label): (&[String], &str),
+        budget: &Budget,
+        notes: &mut Vec<String>,
+    ) -> Option<Self> {
+        let grid = match Grid::parse(text) {
+            Ok(grid) => grid,
+            Err(why) => {
+                notes.push(why);
+                return None;
+            }
+        };
+        if grid.size() > budget.mesh {
+            notes.push(too_large(grid.size()));
+            return None;
+        }
+        let mut fields = Self::new(&grid);
+        let snapshot = fields.snapshot(0.0, &grid)?;
+        fields.times.push(snapshot);
+        fields.label(groups, |_| label.to_owned());
+        Some(fields)
     }
 
     fn new(grid: &Grid) -> Self {
@@ -164,7 +185,18 @@ impl Fields {
     }
 }
 
+fn too_large(size: usize) -> String {
+    format!(
+        "the fields are not shown: {size} numbers for mesh and one time are too many for this page"
+    )
+}
+
 impl Grid {
+    /// Numbers of the mesh and of the fields.
+    fn size(&self) -> usize {
+        2 * self.nodes.len() + self.cells.len() * (self.fields.len() + 8)
+    }
+
     fn parse(text: &str) -> Result<Self, String> {
         let part = |name: &str| {
             let start = text.find(&format!("<{name}"))?;

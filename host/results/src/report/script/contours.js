@@ -39,9 +39,12 @@ part(() => {
       return fields.groups.map((_name, g) => !has.has(g));
     });
     const [x, y] = axes(run);
-    const names = [['u', '|displacement|'], ['u0', `displacement ${x}`], ['u1', `displacement ${y}`], ...fields.names.map((name, f) => [String(f), name])];
+    // Of a model before its first phase the groups, of a run its displacements.
+    const own = run.model ? [['g', 'group']] : [['u', '|displacement|'], ['u0', `displacement ${x}`], ['u1', `displacement ${y}`]];
+    const names = [...own, ...fields.names.map((name, f) => [String(f), name])];
     const values = (field, t) => {
       const time = fields.times[t];
+      if (field === 'g') return fields.group;
       if (!field.startsWith('u')) {
         const f = Number(field);
         return fields.cells.map((_, c) => (blank[f][fields.group[c]] || !time.values[f].length ? null : time.values[f][c]));
@@ -53,7 +56,7 @@ part(() => {
         return sum / cell.length;
       });
     };
-    const unit = field => (field.startsWith('u') ? 'm' : unitOf(fields.names[Number(field)]));
+    const unit = field => (field === 'g' ? '' : field.startsWith('u') ? 'm' : unitOf(fields.names[Number(field)]));
     const title = field => names.find(([key]) => key === field)[1];
     const moved = Math.max(...fields.times.map(time => largestOf(time.displacement)));
     return { run, fields, outlines, within, borders, extent, size, names, values, unit, title, moved };
@@ -71,7 +74,7 @@ part(() => {
   };
 
   const state = {
-    run: drawn[0], field: 'u', time: drawn[0].fields.times.length - 1, scale: suggested(meshOf(drawn[0])), hidden: new Set(),
+    run: drawn[0], field: drawn[0].model ? 'g' : 'u', marks: new Set(['lines', 'supports', 'loads', 'water']), stage: drawn[0].model ? Math.min(1, drawn[0].model.stages.length - 1) : 0, time: drawn[0].fields.times.length - 1, scale: suggested(meshOf(drawn[0])), hidden: new Set(),
     range: '2', low: 0, high: 1, map: 'viridis', lines: true, outline: false, hover: null, centre: null, zoom: 1,
   };
 
@@ -107,8 +110,10 @@ part(() => {
     return { k, centre, width, height, to: ([x, y]) => [(width - BAR) / 2 + (x - centre[0]) * k, height / 2 - (y - centre[1]) * k], from: (px, py) => [centre[0] + (px - (width - BAR) / 2) / k, centre[1] - (py - height / 2) / k] };
   };
 
-  /** Whether a group is chosen, and there at this time: what is not active is left out. */
-  const isShown = (mesh, g) => !state.hidden.has(mesh.fields.groups[g]) && !mesh.fields.times[state.time].inactive.includes(g);
+  /** Whether a group is chosen, and there at this time: what is not active is left out, but of a model. */
+  const isShown = (mesh, g) => !state.hidden.has(mesh.fields.groups[g]) && (mesh.run.model || !mesh.fields.times[state.time].inactive.includes(g));
+
+  const groupColour = g => (g < LIGHT.length ? LIGHT[g] : `hsl(${(g * 137) % 360},60%,45%)`);
 
   const visible = (mesh, values) => values.filter((v, c) => v != null && isShown(mesh, mesh.fields.group[c]));
 
@@ -145,7 +150,7 @@ part(() => {
       if (!isShown(mesh, fields.group[c])) return;
       const value = shownValues[c];
       const t = value == null ? null : (value - bounds[0]) / (bounds[1] - bounds[0]);
-      const fill = t == null ? ink.blank : colours[Math.round(256 * Math.min(1, Math.max(0, t)))];
+      const fill = state.field === 'g' ? groupColour(fields.group[c]) : t == null ? ink.blank : colours[Math.round(256 * Math.min(1, Math.max(0, t)))];
       const outline = mesh.outlines[c].map(n => at[n]);
       if (isSolid(cell)) pen.polygon(outline, fill, state.lines && fine ? ink.mesh : fill, state.lines && fine ? 0.5 : 0.7);
       else edges.push([outline, fill]);
@@ -160,7 +165,15 @@ part(() => {
         if (edge.groups.length === 1) pen.line(edge.nodes.map(n => view.to(position(mesh, n, 0))), ink.soft, 1, [4, 3]);
       }
     }
+    if (state.run.model) paintModel(pen, mesh, at, ink);
     pen.everywhere();
+    if (state.field === 'g') {
+      fields.groups.forEach((name, g) => {
+        pen.box(view.width - BAR + 8, 12 + 18 * g, 12, 12, groupColour(g));
+        pen.text(view.width - BAR + 25, 22 + 18 * g, name.length > 12 ? name.slice(0, 11) + '…' : name, ink.text, 'start');
+      });
+      return;
+    }
     // The colour bar.
     const high = Math.min(320, view.height - 90);
     const left = view.width - BAR + 8;
@@ -176,6 +189,81 @@ part(() => {
       pen.line([[left + 14, y], [left + 18, y]], ink.soft, 1);
       const mark = i === 0 && beyond[1] ? '≥ ' : i === 6 && beyond[0] ? '≤ ' : '';
       pen.text(left + 22, y + 4, mark + barText(value * display.factor), ink.text, 'start');
+    }
+  };
+
+  /** Places along a line, not nearer to each other than so many pixels. */
+  const spread = (places, gap) => {
+    const kept = [];
+    for (const place of places) {
+      if (kept.every(other => Math.hypot(other.at[0] - place.at[0], other.at[1] - place.at[1]) >= gap)) kept.push(place);
+    }
+    return kept;
+  };
+
+  const arrow = (pen, [x, y], [dx, dy], ink) => {
+    const [tx, ty] = [x - 22 * dx, y - 22 * dy];
+    pen.line([[tx, ty], [x, y]], ink, 1.5);
+    pen.polygon([[x, y], [x - 7 * dx + 3 * dy, y - 7 * dy - 3 * dx], [x - 7 * dx - 3 * dy, y - 7 * dy + 3 * dx]], ink, ink, 1);
+  };
+
+  /** Lines with their names, supports, water table and loads over the mesh. */
+  const paintModel = (pen, mesh, at, ink) => {
+    const { model } = state.run;
+    const stage = model.stages[state.stage];
+    const labels = [];
+    const label = (x, y, text, fill) => {
+      // Names that would lie on each other stand one below the other.
+      let line = y;
+      while (labels.some(other => Math.abs(other.x - x) < 3.5 * (other.text.length + text.length) && Math.abs(other.y - line) < 13)) line += 13;
+      labels.push({ x, y: line, text });
+      pen.box(x - 3.4 * text.length - 2, line - 10, 6.8 * text.length + 4, 13, ink.paper);
+      pen.text(x, line, text, fill, 'middle');
+    };
+    const places = line => (line.edges.length ? [].concat(...line.edges.map(edge => [0, 2, 1].map(k => ({ at: at[edge[k]], edge })))) : line.nodes.map(n => ({ at: at[n], edge: null })));
+    if (state.marks.has('supports')) {
+      for (const line of model.lines) {
+        if (!line.fixed[0] && !line.fixed[1]) continue;
+        for (const { at: [x, y] } of spread(places(line), 22)) {
+          if (line.fixed[1]) pen.polygon([[x, y], [x - 5, y + 9], [x + 5, y + 9]], ink.paper, ink.edge, 1.2);
+          if (line.fixed[0]) pen.polygon([[x, y], [x - 9, y - 5], [x - 9, y + 5]], ink.paper, ink.edge, 1.2);
+        }
+      }
+    }
+    if (state.marks.has('water') && stage.water.length) pen.line(stage.water.map(place => view.to(place)), '#1f6fd6', 2, [8, 4]);
+    if (state.marks.has('lines')) {
+      model.lines.forEach((line, i) => {
+        const fill = colour(i, ink.dark);
+        for (const edge of line.edges) pen.line([at[edge[0]], at[edge[2]], at[edge[1]]], fill, 3);
+        if (!line.edges.length) for (const n of line.nodes) pen.box(at[n][0] - 3, at[n][1] - 3, 6, 6, fill);
+      });
+    }
+    if (state.marks.has('loads')) {
+      for (const load of stage.loads) {
+        const line = model.lines.find(other => other.name === load.line);
+        if (!line) continue;
+        for (const { at: place, edge } of spread(places(line), 26)) {
+          let way = load.towards ? [load.towards[0], -load.towards[1]] : null;
+          if (load.kind === 'pressure' && edge) {
+            // The body lies to the left of its edge, which is upside down on the canvas.
+            const [a, b] = [at[edge[0]], at[edge[1]]];
+            way = [load.sign * (b[1] - a[1]), -load.sign * (b[0] - a[0])];
+          }
+          const size = way ? Math.hypot(...way) : 0;
+          if (size > 0) arrow(pen, place, way.map(c => c / size), load.kind === 'displacement' ? '#b0528f' : '#d13a2f');
+        }
+      }
+    }
+    if (state.marks.has('water') && stage.water.length) {
+      const [x, y] = view.to(stage.water[stage.water.length - 1]);
+      label(x - 40, y - 5, 'water', '#1f6fd6');
+    }
+    if (state.marks.has('lines')) {
+      model.lines.forEach((line, i) => {
+        const edge = line.edges[Math.floor(line.edges.length / 2)];
+        const [x, y] = edge ? at[edge[2]] : at[line.nodes[0]] || [0, 0];
+        label(x, y + 4, line.name, colour(i, ink.dark));
+      });
     }
   };
 
@@ -244,6 +332,7 @@ part(() => {
 
   const caption = () => {
     const mesh = meshOf(state.run);
+    if (state.run.model) return `${mesh.title(state.field)}, loads and water of: ${state.run.model.stages[state.stage].name}`;
     return `${isComparison ? state.run.name + ': ' : ''}${mesh.title(state.field)}, ${mesh.fields.times[state.time].label}, displacements × ${SCALES[state.scale]}`;
   };
 
@@ -276,7 +365,7 @@ part(() => {
     context.lineJoin = 'round';
     view = look(mesh, width, height);
     paint(onCanvas(context), mesh, {
-      blank: variable('--blank'), mesh: isDark() ? 'rgba(0,0,0,.45)' : 'rgba(255,255,255,.55)', edge: variable('--ink'), soft: variable('--soft'), text: variable('--ink'),
+      dark: isDark(), paper: variable('--card'), blank: variable('--blank'), mesh: isDark() ? 'rgba(0,0,0,.45)' : 'rgba(255,255,255,.55)', edge: variable('--ink'), soft: variable('--soft'), text: variable('--ink'),
     });
     if (state.hover != null) {
       const outline = mesh.outlines[state.hover].map(n => view.to(position(mesh, n, SCALES[state.scale])));
@@ -308,7 +397,7 @@ part(() => {
     const mesh = meshOf(state.run);
     const out = [`<svg xmlns="${SVG}" width="${view.width}" height="${view.height + 28}" font-family="sans-serif" font-size="12">`, '<rect width="100%" height="100%" fill="#fff"/>',
       `<text x="${view.width / 2}" y="18" text-anchor="middle" font-size="14">${xml(caption())}</text>`, `<svg y="28" width="${view.width}" height="${view.height}"><g stroke-linejoin="round">`];
-    paint(inSvg(out), mesh, { blank: '#e9ecee', mesh: 'rgba(255,255,255,.55)', edge: '#222', soft: '#666', text: '#222' });
+    paint(inSvg(out), mesh, { dark: false, paper: '#fff', blank: '#e9ecee', mesh: 'rgba(255,255,255,.55)', edge: '#222', soft: '#666', text: '#222' });
     out.push('</g></svg></svg>');
     return out.join('\n');
   };
@@ -356,7 +445,7 @@ part(() => {
     const outline = mesh.outlines[c];
     const centre = [0, 1].map(k => outline.reduce((sum, n) => sum + fields.nodes[2 * n + k], 0) / outline.length);
     const [x, y] = axes(state.run);
-    const value = shownValues[c] == null ? 'none, or zero' : `${shown(shownValues[c] * display.factor)}${display.unit && display.unit !== '-' ? ' ' + display.unit : ''}`;
+    const value = state.field === 'g' ? fields.groups[fields.group[c]] : shownValues[c] == null ? 'none, or zero' : `${shown(shownValues[c] * display.factor)}${display.unit && display.unit !== '-' ? ' ' + display.unit : ''}`;
     tip.textContent = `${fields.groups[fields.group[c]]}, element ${mesh.within[c]}\n${mesh.title(state.field)}: ${value}\nat ${x} = ${shown(Number(centre[0].toPrecision(4)))}, ${y} = ${shown(Number(centre[1].toPrecision(4)))} m`;
     tip.style.left = px > view.width / 2 ? '' : px + 16 + 'px';
     tip.style.right = px > view.width / 2 ? view.width - px + 16 + 'px' : '';
@@ -433,7 +522,7 @@ part(() => {
 
   const fill = () => {
     const mesh = meshOf(state.run);
-    if (!mesh.names.some(([key]) => key === state.field)) state.field = 'u';
+    if (!mesh.names.some(([key]) => key === state.field)) state.field = mesh.names[0][0];
     fieldHost.replaceChildren(choice('field', mesh.names, state.field, value => {
       state.field = value;
       if (state.range === 'manual') state.range = rangeChoice.querySelector('select').value = '2';
@@ -471,12 +560,18 @@ part(() => {
         update();
       }) : null,
       fieldHost, time.node,
-      make('label', {}, 'deformation', scaleText), scaleInput,
+      ...(state.run.model ? [
+        choice('loads and water', state.run.model.stages.map((stage, i) => [i, stage.name]), state.stage, value => { state.stage = Number(value); update(); }),
+        ...['lines', 'supports', 'loads', 'water'].map(mark => tick(mark, true, value => {
+          if (value) state.marks.add(mark);
+          else state.marks.delete(mark);
+          draw();
+        })),
+      ] : [make('label', {}, 'deformation', scaleText), scaleInput, tick('undeformed outline', state.outline, value => { state.outline = value; draw(); })]),
       rangeChoice, make('span', { class: 'chips' }, lowInput, highInput),
       choice('colours', [['viridis', 'viridis'], ['diverging', 'blue–red about 0']], state.map, value => { state.map = value; update(); }),
       make('div', {}, make('div', { class: 'small' }, 'groups'), groupHost),
       tick('mesh lines', state.lines, value => { state.lines = value; draw(); }),
-      tick('undeformed outline', state.outline, value => { state.outline = value; draw(); }),
       make('span', { class: 'chips' },
         make('button', { type: 'button', title: 'nearer', onclick: () => zoomBy(1.5, ...middle()) }, '+'),
         make('button', { type: 'button', title: 'farther', onclick: () => zoomBy(1 / 1.5, ...middle()) }, '−'),
