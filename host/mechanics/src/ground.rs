@@ -15,6 +15,6 @@ mod pores;
 
 pub use column::Columns;
 pub(crate) use initial::{InitialStresses, beside_joints};
-pub use loading::{Loading, pressure_on};
+pub use loading::{Acting, Loading, pressure_on};
 pub(crate) use loading::unit_pressure;
 pub use pores::Pores;

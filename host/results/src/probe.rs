@@ -44,8 +44,8 @@ pub enum Probe {
         /// Factor.
         scale: f64,
     },
-    /// Sum of internal forces at nodes: of all elements (the reaction), of one group, or of some of
-    /// its elements.
+    /// Sum of forces at nodes: the reaction; or what a group, or some of its elements, receive from others
+    /// there: internal forces less those of weight and pore water within them.
     Force {
         /// The nodes.
         nodes: Vec<usize>,
@@ -58,7 +58,8 @@ pub enum Probe {
         /// Factor.
         scale: f64,
     },
-    /// What zero-thickness elements along a line hand on from one side to the other.
+    /// What zero-thickness elements along a line hand on from one side to the other, with the water between
+    /// their faces.
     HandedOn {
         /// Number of the group.
         group: usize,
@@ -190,11 +191,18 @@ impl Probe {
                     None => snapshot.reaction,
                     Some(group) => {
                         let n_dofs = snapshot.displacement.len();
-                        let group = active(snapshot, *group)?;
+                        let number = *group;
+                        let group = active(snapshot, number)?;
                         let mut forces = match elements {
                             None => group.forces(n_dofs),
                             Some(elements) => group.forces_of(elements, n_dofs),
                         };
+                        // Weight and pore water act within the elements; the rest comes from others.
+                        let (acting, problem) = (snapshot.acting, snapshot.problem);
+                        let within = acting.in_bodies(problem, (number, group), elements.as_deref());
+                        for (force, within) in forces.iter_mut().zip(within) {
+                            *force -= within;
+                        }
                         fold(snapshot.ties, &mut forces);
                         of_group = forces;
                         &of_group
@@ -213,7 +221,10 @@ impl Probe {
                 elements,
                 component,
                 scale,
-            } => Some(scale * active(snapshot, *group)?.handed_on(elements, *component)),
+            } => {
+                let tractions = active(snapshot, *group)?.handed_on(elements, *component);
+                Some(scale * (tractions + water_between(snapshot, *group, elements, *component)))
+            }
             Self::Combination(terms) => terms
                 .iter()
                 .map(|&(i, factor)| earlier[i].map(|v| factor * v))
@@ -226,6 +237,22 @@ impl Probe {
 fn active<'s>(snapshot: &Snapshot<'s>, number: usize) -> Option<&'s Group> {
     let group = snapshot.groups.get(number)?;
     group.is_active.then_some(group)
+}
+
+/// Force of the water between faces on the side of smaller coordinates, kN.
+fn water_between(
+    snapshot: &Snapshot<'_>,
+    number: usize,
+    elements: &[usize],
+    component: usize,
+) -> f64 {
+    let kinematics = &snapshot.groups[number].kinematics;
+    let points = elements.iter().flat_map(|&element| kinematics.points_of(element));
+    let of_point = |point: usize| {
+        let pressure = snapshot.pores.pressure(number, kinematics.position(point));
+        kinematics.weight(point) * kinematics.axes_at(point).across[component] * pressure
+    };
+    points.map(of_point).sum()
 }
 
 impl PointQuantity {

@@ -113,7 +113,12 @@ part(() => {
   /** Whether a group is chosen, and there at this time: what is not active is left out, but of a model. */
   const isShown = (mesh, g) => !state.hidden.has(mesh.fields.groups[g]) && (mesh.run.model || !mesh.fields.times[state.time].inactive.includes(g));
 
-  const groupColour = g => (g < LIGHT.length ? LIGHT[g] : `hsl(${(g * 137) % 360},60%,45%)`);
+  /** Pale, so that what is drawn over it stands out. */
+  const groupColour = g => {
+    if (g >= LIGHT.length) return `hsl(${(g * 137) % 360},45%,68%)`;
+    const channel = k => Math.round(0.5 * parseInt(LIGHT[g].slice(1 + 2 * k, 3 + 2 * k), 16) + 0.5 * 235);
+    return `rgb(${channel(0)},${channel(1)},${channel(2)})`;
+  };
 
   const visible = (mesh, values) => values.filter((v, c) => v != null && isShown(mesh, mesh.fields.group[c]));
 
@@ -214,6 +219,7 @@ part(() => {
     const labels = [];
     const label = (x, y, text, fill) => {
       // Names that would lie on each other stand one below the other.
+      x = Math.min(view.width - BAR - 3.4 * text.length, Math.max(3.4 * text.length + 2, x));
       let line = y;
       while (labels.some(other => Math.abs(other.x - x) < 3.5 * (other.text.length + text.length) && Math.abs(other.y - line) < 13)) line += 13;
       labels.push({ x, y: line, text });
@@ -230,7 +236,10 @@ part(() => {
         }
       }
     }
-    if (state.marks.has('water') && stage.water.length) pen.line(stage.water.map(place => view.to(place)), '#1f6fd6', 2, [8, 4]);
+    if (state.marks.has('water') && stage.water.length) {
+      pen.line(stage.water.map(place => view.to(place)), ink.paper, 4);
+      pen.line(stage.water.map(place => view.to(place)), '#1f6fd6', 2, [8, 4]);
+    }
     if (state.marks.has('lines')) {
       model.lines.forEach((line, i) => {
         const fill = colour(i, ink.dark);
@@ -312,7 +321,7 @@ part(() => {
     },
     text(x, y, content, fill, anchor) {
       context.font = '12px system-ui, sans-serif';
-      context.textAlign = anchor;
+      context.textAlign = anchor === 'middle' ? 'center' : anchor;
       context.fillStyle = fill;
       context.fillText(content, x, y);
     },
@@ -559,7 +568,7 @@ part(() => {
         fill();
         update();
       }) : null,
-      fieldHost, time.node,
+      fieldHost, state.run.model ? null : time.node,
       ...(state.run.model ? [
         choice('loads and water', state.run.model.stages.map((stage, i) => [i, stage.name]), state.stage, value => { state.stage = Number(value); update(); }),
         ...['lines', 'supports', 'loads', 'water'].map(mark => tick(mark, true, value => {
