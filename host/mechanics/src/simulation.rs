@@ -57,7 +57,7 @@ pub struct Snapshot<'a> {
     pub mesh: &'a Mesh,
     /// Groups with their committed state.
     pub groups: &'a [Group],
-    /// Degrees of freedom that follow others.
+    /// Middles of layers, which always follow their faces.
     pub ties: &'a [Tie],
     /// Displacements by degree of freedom (two a node), m, counted since the last reset.
     pub displacement: &'a [f64],
@@ -240,7 +240,7 @@ impl Simulation {
         Snapshot {
             mesh: &self.problem.mesh,
             groups: &self.groups,
-            ties: &self.tied,
+            ties: &self.ties,
             displacement: &self.displacement,
             reaction: &self.reaction,
             pores: &self.pores,
