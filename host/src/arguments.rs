@@ -44,6 +44,11 @@ pub(crate) enum Command {
         /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Read, build and check everything and compute nothing: `report.html` shows mesh, lines,
+        /// supports, loads, water, initial stress and what is active when. A folder that holds the
+        /// results of a run is refused.
+        #[arg(long, conflicts_with_all = ["resume", "record", "checkpoint"])]
+        dry_run: bool,
         /// Go on from where an earlier run into the same folder was stopped, or start if none was.
         #[arg(long)]
         resume: bool,

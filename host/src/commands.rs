@@ -4,7 +4,7 @@ mod cases;
 
 use crate::arguments::{Arguments, Command, File};
 use crate::say::{print, printing, say};
-use cases::{run_cases, write_report};
+use cases::{dry_run_cases, run_cases, write_report};
 use clap::CommandFactory;
 use input::schema::{self, FileKind};
 use input::{Case, Error};
@@ -26,6 +26,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             variant,
             set,
             out,
+            dry_run,
             resume,
             checkpoint,
             threads,
@@ -36,6 +37,9 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
                 resume,
                 checkpoints: Some(Duration::from_secs_f64(checkpoint)),
             };
+            if dry_run {
+                return dry_run_cases(&opener, (&case, &set), variant.as_deref(), out.as_deref());
+            }
             let stop = stop_on_signals()?;
             recorded(record.as_deref(), opener, |opener| {
                 run_cases(

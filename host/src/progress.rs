@@ -95,6 +95,12 @@ impl Observer for Progress {
         self.say(&format!("warning: {message}"));
     }
 
+    fn at_rest(&mut self, phase: &str, share: f64) {
+        self.say(&format!(
+            "phase {phase}: at rest within {share:.1e} of its weight"
+        ));
+    }
+
     fn resumed(&mut self, from: Option<&Place>) {
         self.has_begun = true;
         match from {

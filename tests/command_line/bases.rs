@@ -21,6 +21,47 @@ fn refused(case: &str, base: &str, at: &str, says: &str) {
 const BASED: &str = "base = \"base.toml\"\n";
 
 #[test]
+fn keys_that_belong_to_the_whole_file_are_among_those_that_are_known() {
+    let says = |case: &str, says: &str| {
+        let place = Place::new();
+        let outcome = place.run_case(case);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(
+            outcome.says(says),
+            "it does not say {says:?}:\n{}",
+            outcome.stderr
+        );
+        outcome
+    };
+    let misspelt = |key: &str| CASE.replacen("title =", &format!("{key} = \"a\"\ntitle ="), 1);
+    says(&misspelt("bsae"), "did you mean `base`?");
+    let variants = format!("{CASE}\n[[varaint]]\nname = \"a\"\n");
+    says(&variants, "did you mean `variant`?");
+    // Within a variant there is none of them.
+    let variants = format!("{CASE}\n[[variant]]\nname = \"a\"\nbase = \"base.toml\"\n");
+    says(&variants, "a variant has no `base`");
+    let outcome = says(
+        &variants.replacen("base =", "bsae =", 1),
+        "unknown key `bsae`",
+    );
+    assert!(!outcome.says("did you mean `base`?"), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_key_that_one_variant_lacks_names_the_variant() {
+    let case = format!(
+        "{CASE}\n[[variant]]\nname = \"whole\"\n\n[[variant]]\nname = \"lacking\"\nlaws.other = {{ parameters = {{}} }}\n"
+    );
+    let outcome = Place::new().run_case(&case);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("missing key `law` in variant `lacking`"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
 fn finds_mistakes_in_the_base() {
     let line = |text: &str| {
         CASE.lines()

@@ -9,6 +9,7 @@ mod libraries;
 mod loading;
 mod measured;
 mod mesh;
+mod model;
 mod names;
 mod overflow;
 mod parameters;

@@ -598,7 +598,9 @@ pub struct ProbeInput {
     /// Over the integration points of this group; with a line, only its forces.
     #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
-    /// What.
+    /// What: of a line `displacement_…`, `reaction_…`, with a group `force_…`; of a group a stress, strain,
+    /// traction, jump or internal variable, and where there is water or undrained ground `pore_pressure`,
+    /// `excess_pore_pressure` (compression positive) and `total_stress_…`, kPa.
     #[schemars(with = "Option<String>")]
     pub quantity: Option<Spanned<String>>,
     /// How values become one; `sum` for forces, else `mean`.

@@ -7,8 +7,9 @@ use results::wanted::{Cut, Figure};
 use text::{Source, suggestion};
 use toml::Spanned;
 
-/// What can be drawn along a cut; `k_0` is the ratio of radial to vertical stress.
-const CUT_QUANTITIES: [&str; 7] = [
+/// What can be drawn along a cut; `k_0` is the ratio of radial to vertical stress, both
+/// effective. Without water pore pressures are zero.
+const CUT_QUANTITIES: [&str; 13] = [
     "x",
     "y",
     "stress_11",
@@ -16,6 +17,12 @@ const CUT_QUANTITIES: [&str; 7] = [
     "stress_33",
     "stress_12",
     "k_0",
+    "pore_pressure",
+    "excess_pore_pressure",
+    "total_stress_11",
+    "total_stress_22",
+    "total_stress_33",
+    "total_stress_12",
 ];
 
 /// The figures of a case, with the points measured for them.

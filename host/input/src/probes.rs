@@ -10,6 +10,7 @@ use mechanics::mesh::Mesh;
 use mechanics::problem::Formulation;
 use mechanics::settings::Control;
 use mechanics::{Place, Simulation};
+use results::pressures::Pressure;
 use results::probe::{PointQuantity, Probe, Probes, section};
 use results::wanted::Reduce;
 use std::collections::HashSet;
@@ -299,6 +300,12 @@ impl Resolver<'_> {
                 known.push((format!("traction_{component}"), PointQuantity::Traction(c)));
             }
         }
+        let problem = self.simulation.problem();
+        let pressures = Pressure::ALL.into_iter().filter(|quantity| match quantity {
+            Pressure::Pore => problem.has_pore_pressure() && (has_stress || problem.has_water()),
+            Pressure::Excess | Pressure::Total(_) => problem.has_pore_pressure() && has_stress,
+        });
+        known.extend(pressures.map(|q| (q.name().to_owned(), PointQuantity::Pressure(q))));
         let later = self
             .simulation
             .swaps()
@@ -321,11 +328,16 @@ impl Resolver<'_> {
                 name.get_ref(),
                 quantity.get_ref()
             );
-            return Err(self
-                .source()
-                .error(quantity.span(), message)
-                .hint(suggestion(quantity.get_ref(), names))
-                .into());
+            let is_dry = !problem.has_pore_pressure();
+            let hint = match Pressure::named(quantity.get_ref()) {
+                Some(_) if is_dry => {
+                    "there is no water in the case: no `[water]`, no `drainage = \"undrained\"`"
+                        .into()
+                }
+                _ => suggestion(quantity.get_ref(), names),
+            };
+            let error = self.source().error(quantity.span(), message);
+            return Err(error.hint(hint).into());
         };
         let points: Vec<usize> = (0..group.kinematics.n_points())
             .filter(|&point| self.counts(group, point))
@@ -496,6 +508,7 @@ fn measured_unit(case: &Case, laws: &Laws, input: &ProbeInput) -> Option<String>
     let variable = variables.find(|variable| of_points && variable.id == quantity);
     let unit = match (kind, variable) {
         (_, Some(variable)) => &variable.unit,
+        _ if of_points && Pressure::named(quantity).is_some() => "kPa",
         ("stress" | "traction", None) => "kPa",
         ("strain", None) => "-",
         ("jump" | "displacement", None) => "m",

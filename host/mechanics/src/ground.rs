@@ -16,5 +16,5 @@ mod pores;
 pub use column::Columns;
 pub(crate) use initial::{InitialStresses, beside_joints};
 pub(crate) use loading::unit_pressure;
-pub use loading::{Loading, pressure_on};
+pub use loading::{Acting, Loading, pressure_on};
 pub use pores::Pores;

@@ -52,6 +52,25 @@ impl Problem {
             settings: Settings::default(),
         }
     }
+
+    /// Whether there is ground water in any phase.
+    pub fn has_water(&self) -> bool {
+        self.water.is_some() || self.phases.iter().any(|phase| phase.water_level.is_some())
+    }
+
+    /// Whether there are pressures in pores in any phase: of ground water, or of undrained ground.
+    pub fn has_pore_pressure(&self) -> bool {
+        let is_undrained = |drainage: &Drainage| *drainage == Drainage::Undrained;
+        let of_phases = self.phases.iter().flat_map(|phase| &phase.drainage);
+        self.has_water()
+            || self
+                .groups
+                .iter()
+                .any(|group| is_undrained(&group.drainage))
+            || of_phases
+                .into_iter()
+                .any(|(_, drainage)| is_undrained(drainage))
+    }
 }
 
 /// A law with its values, as groups use it.

@@ -1,7 +1,9 @@
 //! Fields for viewers that read VTK files: `fields.pvd` lists one `fields_<n>.vtu` per time.
 
 use crate::file;
+use crate::pressures::Pressure;
 use crate::wanted::When;
+use mechanics::Simulation;
 use mechanics::problem::Formulation;
 use mechanics::simulation::Snapshot;
 use serde::{Deserialize, Serialize};
@@ -10,15 +12,22 @@ use std::path::{Path, PathBuf};
 use text::Error;
 use text::write::replace;
 
-/// VTK's numbers for cells with these nodes.
-const QUADRATIC_QUAD: u8 = 23;
-const QUADRATIC_EDGE: u8 = 21;
-const QUADRATIC_TRIANGLE: u8 = 22;
+/// Kinds of cells in the files: the number of their nodes, and VTK's number of the kind. Quadratic edges
+/// (elements without thickness), triangles and quads.
+pub(crate) const CELLS: [(usize, u8); 3] = [(3, 21), (6, 22), (8, 23)];
+
+/// VTK's number of the kind of cell with so many nodes.
+fn cell_type(n_nodes: usize) -> Option<u8> {
+    let (_, vtk) = CELLS.iter().find(|(n, _)| *n == n_nodes)?;
+    Some(*vtk)
+}
 
 /// Fields at the times asked for.
 #[derive(Debug)]
 pub(crate) struct Fields {
     folder: PathBuf,
+    /// There are pressures in pores in the course of the problem.
+    has_pressures: bool,
     /// Files written so far.
     pub(crate) written: Vec<Written>,
 }
@@ -47,16 +56,17 @@ pub(crate) fn check(folder: &Path, written: &[Written]) -> Result<(), Error> {
 
 impl Fields {
     /// `None` if fields are not asked for.
-    pub(crate) fn create(folder: &Path, when: When) -> Option<Self> {
+    pub(crate) fn create(folder: &Path, when: When, simulation: &Simulation) -> Option<Self> {
         (when != When::Never).then(|| Self {
             folder: folder.to_owned(),
+            has_pressures: simulation.problem().has_pore_pressure(),
             written: Vec::new(),
         })
     }
 
     pub(crate) fn write(&mut self, time: f64, snapshot: &Snapshot<'_>) -> Result<(), Error> {
         let path = self.folder.join(file_name(self.written.len()));
-        let text = unstructured_grid(snapshot);
+        let text = unstructured_grid(snapshot, self.has_pressures);
         replace(&path, &text)?;
         self.written.push(Written {
             time,
@@ -81,12 +91,16 @@ impl Fields {
     }
 }
 
-/// Means over the integration points of every element, by name of the quantity.
-fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
+/// Means over the integration points of every element, by name of the quantity; nothing where a group
+/// is not active.
+fn cell_data(snapshot: &Snapshot<'_>, has_pressures: bool) -> Vec<(String, Vec<f64>)> {
     let mut names: Vec<String> = ["stress_11", "stress_22", "stress_33", "stress_12"]
         .map(str::to_owned)
         .to_vec();
     names.extend(["jump_n", "jump_t", "traction_n", "traction_t"].map(str::to_owned));
+    let first_pressure = names.len();
+    let pressures: &[Pressure] = if has_pressures { &Pressure::ALL } else { &[] };
+    names.extend(pressures.iter().map(|quantity| quantity.name().to_owned()));
     for group in snapshot.groups {
         for variable in &group.law.built.law.formulation().internal_variables {
             if !names.contains(&variable.id) {
@@ -96,18 +110,24 @@ fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
     }
     let columns = names.iter().enumerate().map(|(number, name)| {
         let mut values = Vec::new();
-        for group in snapshot.groups {
+        for (of, group) in snapshot.groups.iter().enumerate() {
             for element in 0..group.kinematics.n_elements() {
                 let points = group.kinematics.points_of(element);
                 let n = points.len();
+                let pressure = number.checked_sub(first_pressure);
+                let pressure = pressure.and_then(|number| pressures.get(number));
                 let sum: f64 = points
+                    .filter(|_| group.is_active)
                     .map(|point| match number {
                         0..4 => group.global_stress(point).map(|s| s[number]),
                         4..6 => group
                             .jump_and_traction(point)
                             .map(|(jump, _)| jump[number - 4]),
                         6..8 => group.jump_and_traction(point).map(|(_, t)| t[number - 6]),
-                        _ => group.internal_variable(point, name),
+                        _ => match pressure {
+                            Some(quantity) => quantity.at(snapshot, of, point),
+                            None => group.internal_variable(point, name),
+                        },
                     })
                     .map(Option::unwrap_or_default)
                     .sum();
@@ -119,11 +139,12 @@ fn cell_data(snapshot: &Snapshot<'_>) -> Vec<(String, Vec<f64>)> {
     columns.collect()
 }
 
-/// Cells stand group by group, as `cell_data` has them.
-fn unstructured_grid(snapshot: &Snapshot<'_>) -> String {
+/// The text of a file. Cells stand group by group, as `cell_data` has them.
+pub(crate) fn unstructured_grid(snapshot: &Snapshot<'_>, has_pressures: bool) -> String {
     let mesh = snapshot.mesh;
     let mut connectivity = String::new();
     let (mut offsets, mut types, mut groups) = (Vec::new(), Vec::new(), Vec::new());
+    let mut active = Vec::new();
     let mut end = 0;
     for (number, group) in snapshot.groups.iter().enumerate() {
         for element in 0..group.kinematics.n_elements() {
@@ -135,12 +156,9 @@ fn unstructured_grid(snapshot: &Snapshot<'_>) -> String {
             }
             end += shown.len();
             offsets.push(end);
-            types.push(match shown.len() {
-                3 => QUADRATIC_EDGE,
-                6 => QUADRATIC_TRIANGLE,
-                _ => QUADRATIC_QUAD,
-            });
+            types.push(cell_type(shown.len()).map_or(0, usize::from));
             groups.push(number);
+            active.push(usize::from(group.is_active));
         }
     }
     let list = |values: &[usize]| {
@@ -162,9 +180,8 @@ fn unstructured_grid(snapshot: &Snapshot<'_>) -> String {
             .chunks_exact(2)
             .flat_map(|u| [u[0], u[1], 0.0]),
     );
-    let types: Vec<usize> = types.into_iter().map(usize::from).collect();
     let mut cells = String::new();
-    for (name, values) in cell_data(snapshot) {
+    for (name, values) in cell_data(snapshot, has_pressures) {
         let values = reals(&mut values.into_iter());
         let _ = writeln!(
             cells,
@@ -182,11 +199,13 @@ fn unstructured_grid(snapshot: &Snapshot<'_>) -> String {
          <PointData Vectors=\"displacement\"><DataArray type=\"Float64\" Name=\"displacement\" \
          NumberOfComponents=\"3\" format=\"ascii\">{u}</DataArray></PointData>\n\
          <CellData>\n<DataArray type=\"Int64\" Name=\"group\" format=\"ascii\">{}</DataArray>\n\
+         <DataArray type=\"UInt8\" Name=\"active\" format=\"ascii\">{}</DataArray>\n\
          {cells}</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
         mesh.nodes.len(),
         offsets.len(),
         list(&offsets),
         list(&types),
         list(&groups),
+        list(&active),
     )
 }

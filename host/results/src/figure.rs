@@ -1,8 +1,9 @@
 //! Curves of probes, or of stresses along a cut, and measured points beside them, as SVG.
 
+use crate::pressures::Pressure;
 use crate::wanted::{Cut, Figure, Measured};
 use mechanics::Place;
-use mechanics::group::Group;
+use mechanics::simulation::Snapshot;
 use plotters::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -121,7 +122,7 @@ impl Figures {
     }
 
     /// Takes the cuts that are asked for after this increment, one of `of`.
-    pub(crate) fn cuts(&mut self, place: &Place, of: usize, groups: &[Group]) {
+    pub(crate) fn cuts(&mut self, place: &Place, of: usize, snapshot: &Snapshot<'_>) {
         let Place { phase, increment } = place;
         for (figure, curves) in &mut self.drawn {
             let Some(cut) = cut_at(figure, place, of) else {
@@ -130,7 +131,7 @@ impl Figures {
             for y in &figure.y {
                 curves.push(Curve {
                     name: format!("{y}, {phase} {increment}"),
-                    points: cut_points(cut, [&figure.x, y], groups),
+                    points: cut_points(cut, [&figure.x, y], snapshot),
                 });
             }
         }
@@ -193,11 +194,14 @@ fn cut_at<'f>(figure: &'f Figure, place: &Place, of: usize) -> Option<&'f Cut> {
 }
 
 /// Two quantities at the points of a cut, by increasing first one.
-fn cut_points(cut: &Cut, quantities: [&str; 2], groups: &[Group]) -> Vec<(f64, f64)> {
+fn cut_points(cut: &Cut, quantities: [&str; 2], snapshot: &Snapshot<'_>) -> Vec<(f64, f64)> {
     let inside = |extent: Option<[f64; 2]>, c| extent.is_none_or(|[from, to]| from < c && c < to);
-    let wanted = |group: &&Group| cut.group.as_ref().is_none_or(|g| *g == group.name);
+    let groups = snapshot.groups.iter().enumerate();
+    let groups = groups.filter(|(_, group)| {
+        group.is_active && cut.group.as_ref().is_none_or(|name| *name == group.name)
+    });
     let mut points = Vec::new();
-    for group in groups.iter().filter(wanted) {
+    for (number, group) in groups {
         for point in 0..group.kinematics.n_points() {
             let [x, y] = group.kinematics.position(point);
             let Some(stress) = group.global_stress(point) else {
@@ -210,7 +214,10 @@ fn cut_points(cut: &Cut, quantities: [&str; 2], groups: &[Group]) -> Vec<(f64, f
                 "stress_22" => stress[1],
                 "stress_33" => stress[2],
                 "stress_12" => stress[3],
-                _ => stress[0] / stress[1],
+                "k_0" => stress[0] / stress[1],
+                other => Pressure::named(other)
+                    .and_then(|quantity| quantity.at(snapshot, number, point))
+                    .unwrap_or(f64::NAN),
             };
             let [across, up] = quantities.map(value);
             let pair = (across, cut.scale * up);

@@ -9,6 +9,7 @@ mod leftovers;
 pub mod point_figure;
 pub mod point_table;
 mod points;
+pub mod pressures;
 pub mod probe;
 mod profile;
 mod record;

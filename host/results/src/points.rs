@@ -1,18 +1,21 @@
 //! Stresses at all integration points.
 
 use crate::file::Extent;
+use crate::pressures::Pressure;
 use crate::recorder::{Table, internal_variables};
-use crate::table::number;
+use crate::table;
 use crate::wanted::When;
-use mechanics::group::Group;
+use mechanics::simulation::Snapshot;
 use mechanics::{Place, Simulation};
 use std::path::Path;
 use text::Error;
 
-/// `points.csv`: one row per integration point of every group that has a stress.
+/// `points.csv`: one row per integration point of every active group that has a stress.
 #[derive(Debug)]
 pub(crate) struct Points {
     pub(crate) table: Table,
+    /// What pore water has a part in, if there is any in the course of the problem.
+    pressures: &'static [Pressure],
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,
 }
@@ -42,15 +45,23 @@ impl Points {
             "stress_33",
             "stress_12",
         ];
+        let has_pressures = simulation.problem().has_pore_pressure();
+        let pressures: &[Pressure] = if has_pressures { &Pressure::ALL } else { &[] };
         let columns = columns
             .into_iter()
+            .chain(pressures.iter().map(|quantity| quantity.name()))
             .chain(variables.iter().map(String::as_str));
         let table = Table::begin(folder.join("points.csv"), columns, from)?;
-        Ok(Some(Self { table, variables }))
+        Ok(Some(Self {
+            table,
+            pressures,
+            variables,
+        }))
     }
 
-    pub(crate) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
-        for group in groups {
+    pub(crate) fn write(&mut self, place: &Place, snapshot: &Snapshot<'_>) -> Result<(), Error> {
+        let groups = snapshot.groups.iter().enumerate();
+        for (number, group) in groups.filter(|(_, group)| group.is_active) {
             for point in 0..group.kinematics.n_points() {
                 let Some(stress) = group.global_stress(point) else {
                     break;
@@ -63,12 +74,16 @@ impl Points {
                     (element + 1).to_string(),
                     (within + 1).to_string(),
                 ];
-                row.extend(group.kinematics.position(point).map(number));
-                row.extend(stress.map(number));
+                row.extend(group.kinematics.position(point).map(table::number));
+                row.extend(stress.map(table::number));
+                row.extend(self.pressures.iter().map(|quantity| {
+                    let value = quantity.at(snapshot, number, point);
+                    value.map(table::number).unwrap_or_default()
+                }));
                 row.extend(self.variables.iter().map(|id| {
                     group
                         .internal_variable(point, id)
-                        .map(number)
+                        .map(table::number)
                         .unwrap_or_default()
                 }));
                 self.table.row(&row)?;

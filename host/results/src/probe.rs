@@ -2,6 +2,7 @@
 
 mod section;
 
+use crate::pressures::Pressure;
 use crate::wanted::Reduce;
 use mechanics::assembly::fold;
 use mechanics::group::Group;
@@ -43,8 +44,8 @@ pub enum Probe {
         /// Factor.
         scale: f64,
     },
-    /// Sum of internal forces at nodes: of all elements (the reaction), of one group, or of some of
-    /// its elements.
+    /// Sum of forces at nodes: the reaction; or what a group, or some of its elements, receive from others
+    /// there: internal forces less those of weight and pore water within them.
     Force {
         /// The nodes.
         nodes: Vec<usize>,
@@ -57,7 +58,8 @@ pub enum Probe {
         /// Factor.
         scale: f64,
     },
-    /// What zero-thickness elements along a line hand on from one side to the other.
+    /// What zero-thickness elements along a line hand on from one side to the other, with the water between
+    /// their faces.
     HandedOn {
         /// Number of the group.
         group: usize,
@@ -83,6 +85,8 @@ pub enum PointQuantity {
     Jump(usize),
     /// Traction, normal or tangential, kPa.
     Traction(usize),
+    /// Pore pressure, excess pore pressure or a total stress, kPa.
+    Pressure(Pressure),
     /// An internal variable.
     Internal(String),
 }
@@ -139,7 +143,7 @@ impl Probes {
     }
 
     /// Values, in order. `None`: the quantity does not exist now (an internal variable of another
-    /// law).
+    /// law, a group that is not active).
     pub fn values(&self, snapshot: &Snapshot<'_>) -> Vec<Option<f64>> {
         let mut values: Vec<Option<f64>> = Vec::new();
         for (_, probe) in &self.probes {
@@ -160,8 +164,10 @@ impl Probe {
                 reduce,
                 scale,
             } => {
-                let group = &snapshot.groups[*group];
-                let values = points.iter().map(|&point| quantity.at(group, point));
+                active(snapshot, *group)?;
+                let values = points
+                    .iter()
+                    .map(|&point| quantity.at(snapshot, *group, point));
                 reduced(*reduce, values, weights).map(|value| scale * value)
             }
             Self::Displacement {
@@ -187,11 +193,19 @@ impl Probe {
                     None => snapshot.reaction,
                     Some(group) => {
                         let n_dofs = snapshot.displacement.len();
-                        let group = &snapshot.groups[*group];
+                        let number = *group;
+                        let group = active(snapshot, number)?;
                         let mut forces = match elements {
                             None => group.forces(n_dofs),
                             Some(elements) => group.forces_of(elements, n_dofs),
                         };
+                        // Weight and pore water act within the elements; the rest comes from others.
+                        let (acting, problem) = (snapshot.acting, snapshot.problem);
+                        let within =
+                            acting.in_bodies(problem, (number, group), elements.as_deref());
+                        for (force, within) in forces.iter_mut().zip(within) {
+                            *force -= within;
+                        }
                         fold(snapshot.ties, &mut forces);
                         of_group = forces;
                         &of_group
@@ -210,7 +224,10 @@ impl Probe {
                 elements,
                 component,
                 scale,
-            } => Some(scale * snapshot.groups[*group].handed_on(elements, *component)),
+            } => {
+                let tractions = active(snapshot, *group)?.handed_on(elements, *component);
+                Some(scale * (tractions + water_between(snapshot, *group, elements, *component)))
+            }
             Self::Combination(terms) => terms
                 .iter()
                 .map(|&(i, factor)| earlier[i].map(|v| factor * v))
@@ -219,8 +236,33 @@ impl Probe {
     }
 }
 
+/// The group of this number if it is there.
+fn active<'s>(snapshot: &Snapshot<'s>, number: usize) -> Option<&'s Group> {
+    let group = snapshot.groups.get(number)?;
+    group.is_active.then_some(group)
+}
+
+/// Force of the water between faces on the side of smaller coordinates, kN.
+fn water_between(
+    snapshot: &Snapshot<'_>,
+    number: usize,
+    elements: &[usize],
+    component: usize,
+) -> f64 {
+    let kinematics = &snapshot.groups[number].kinematics;
+    let points = elements
+        .iter()
+        .flat_map(|&element| kinematics.points_of(element));
+    let of_point = |point: usize| {
+        let pressure = snapshot.pores.pressure(number, kinematics.position(point));
+        kinematics.weight(point) * kinematics.axes_at(point).across[component] * pressure
+    };
+    points.map(of_point).sum()
+}
+
 impl PointQuantity {
-    fn at(&self, group: &Group, point: usize) -> Option<f64> {
+    fn at(&self, snapshot: &Snapshot<'_>, number: usize, point: usize) -> Option<f64> {
+        let group = &snapshot.groups[number];
         match self {
             Self::Stress(c) => group.global_stress(point).map(|s| s[*c]),
             Self::Strain(c) => group.global_strain(point).map(|e| e[*c]),
@@ -228,6 +270,7 @@ impl PointQuantity {
             Self::Traction(c) => group
                 .jump_and_traction(point)
                 .map(|(_, traction)| traction[*c]),
+            Self::Pressure(quantity) => quantity.at(snapshot, number, point),
             Self::Internal(id) => group.internal_variable(point, id),
         }
     }

@@ -1,18 +1,23 @@
 //! Values along interfaces.
 
 use crate::file::Extent;
+use crate::pressures::Pressure;
 use crate::recorder::{Table, internal_variables};
-use crate::table::number;
+use crate::table;
 use crate::wanted::When;
 use mechanics::group::Group;
+use mechanics::simulation::Snapshot;
 use mechanics::{Place, Simulation};
 use std::path::Path;
 use text::Error;
 
-/// `profile.csv`: one row per integration point of every thin layer and zero-thickness group.
+/// `profile.csv`: one row per integration point of every active thin layer and
+/// zero-thickness group.
 #[derive(Debug)]
 pub(crate) struct Profile {
     pub(crate) table: Table,
+    /// There is ground water in the course of the problem.
+    has_water: bool,
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,
 }
@@ -44,15 +49,22 @@ impl Profile {
             "traction_n",
             "traction_t",
         ];
+        let has_water = simulation.problem().has_water();
         let columns = columns
             .into_iter()
+            .chain(has_water.then(|| Pressure::Pore.name()))
             .chain(variables.iter().map(String::as_str));
         let table = Table::begin(folder.join("profile.csv"), columns, from)?;
-        Ok(Some(Self { table, variables }))
+        Ok(Some(Self {
+            table,
+            has_water,
+            variables,
+        }))
     }
 
-    pub(crate) fn write(&mut self, place: &Place, groups: &[Group]) -> Result<(), Error> {
-        for group in groups {
+    pub(crate) fn write(&mut self, place: &Place, snapshot: &Snapshot<'_>) -> Result<(), Error> {
+        let groups = snapshot.groups.iter().enumerate();
+        for (number, group) in groups.filter(|(_, group)| group.is_active) {
             for point in 0..group.kinematics.n_points() {
                 let Some((jump, traction)) = group.jump_and_traction(point) else {
                     break;
@@ -69,11 +81,15 @@ impl Profile {
                     (within + 1).to_string(),
                 ];
                 let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]];
-                row.extend(values.map(number));
+                row.extend(values.map(table::number));
+                if self.has_water {
+                    let pressure = Pressure::Pore.at(snapshot, number, point);
+                    row.push(pressure.map(table::number).unwrap_or_default());
+                }
                 row.extend(self.variables.iter().map(|id| {
                     group
                         .internal_variable(point, id)
-                        .map(number)
+                        .map(table::number)
                         .unwrap_or_default()
                 }));
                 self.table.row(&row)?;

@@ -241,7 +241,7 @@ impl Recorder {
             path,
             profile,
             points,
-            fields: Fields::create(folder, settings.fields),
+            fields: Fields::create(folder, settings.fields, simulation),
             log,
             summary: Summary::new(about, &wanted, simulation),
             figures: empty_figures(&wanted),
@@ -449,12 +449,12 @@ impl Recorder {
         if self.settings.profile.includes(place.increment, *of)
             && let Some(profile) = &mut self.profile
         {
-            profile.write(place, snapshot.groups)?;
+            profile.write(place, snapshot)?;
         }
         if self.settings.points.includes(place.increment, *of)
             && let Some(points) = &mut self.points
         {
-            points.write(place, snapshot.groups)?;
+            points.write(place, snapshot)?;
         }
         if self.settings.fields.includes(place.increment, *of)
             && let Some(fields) = &mut self.fields
@@ -470,10 +470,15 @@ impl Recorder {
             }))?;
         }
         self.figures.increment(place, &probes);
-        self.figures.cuts(place, *of, snapshot.groups);
+        self.figures.cuts(place, *of, snapshot);
         self.summary.last_increment(increment, probes);
         self.seconds += start.elapsed();
         Ok(())
+    }
+
+    /// Takes how far from rest the ground was found: in this phase, by this share of its weight.
+    pub fn at_rest(&mut self, phase: &str, share: f64) {
+        self.summary.course.at_rest = Some((phase.to_owned(), share));
     }
 
     /// Takes the record of a phase.

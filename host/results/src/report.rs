@@ -11,6 +11,7 @@ mod budget;
 mod comparison;
 mod fields;
 mod log;
+mod model;
 mod page;
 mod profile;
 mod results;
@@ -22,7 +23,10 @@ use text::Error;
 use text::write::replace;
 
 use crate::record;
+use crate::summary::About;
+use crate::wanted::Wanted;
 use budget::Budget;
+use mechanics::Simulation;
 use results::Run;
 use std::path::{Path, PathBuf};
 
@@ -39,6 +43,40 @@ pub fn default_path(folders: &[PathBuf]) -> PathBuf {
         [first, ..] => first.parent().unwrap_or(first).join(FILE),
         [] => PathBuf::from(FILE),
     }
+}
+
+/// Whether a folder holds what a run has written, which a dry run leaves as it is.
+fn has_results(folder: &Path) -> bool {
+    let written = ["summary.json", "history.csv", crate::checkpoint::FILE_NAME];
+    written.iter().any(|name| folder.join(name).is_file())
+}
+
+/// Writes the report of a case that is not run into a folder, and returns the file's path: its mesh, lines,
+/// supports, loads, water and initial stress. `warnings` are to be read first.
+///
+/// # Errors
+/// [`Error::Usage`] if the folder holds the results of a run, whose report that would replace;
+/// [`Error::Unwritable`].
+pub fn write_dry(
+    folder: &Path,
+    about: &About,
+    wanted: &Wanted,
+    simulation: &Simulation,
+    warnings: &[String],
+) -> Result<PathBuf, Error> {
+    if has_results(folder) {
+        return Err(Error::Usage(format!(
+            "all of it could be built, but {} holds the results of a run, whose report a dry run does not \
+             replace: `--out` names another folder",
+            folder.display()
+        )));
+    }
+    let run = Run::before(folder, about, wanted, simulation, warnings);
+    std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
+    let text = page::render(&[run], folder)?;
+    let file = folder.join(FILE);
+    replace(&file, text)?;
+    Ok(file)
 }
 
 /// Writes the report of a results folder, or the comparison of several, and returns the file's

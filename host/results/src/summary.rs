@@ -84,6 +84,8 @@ pub(crate) struct Course {
     /// Phases, with the values of the probes after their last increments.
     phases: Vec<(PhaseRecord, Vec<Option<f64>>)>,
     last: Option<(Place, Vec<Option<f64>>)>,
+    /// The phase that found the ground at rest, but for this share of its weight.
+    pub(crate) at_rest: Option<(String, f64)>,
     /// Where a phase could not go on.
     pub(crate) stopped: Option<Stopped>,
     /// By phase, the first increment with a result that a law calls inaccurate, and why.
@@ -224,6 +226,10 @@ impl Summary {
         summary.insert("status".to_owned(), ending.status.into());
         summary.insert("error".to_owned(), json!(ending.error));
         summary.insert("warnings".to_owned(), json!(warnings));
+        let at_rest = |phase: &str| {
+            let found = self.course.at_rest.as_ref().filter(|(of, _)| of == phase);
+            found.map(|(_, share)| share)
+        };
         let phases: Vec<Value> = self
             .course
             .phases
@@ -234,6 +240,7 @@ impl Summary {
                     "method": p.method.name(),
                     "equations": p.equations,
                     "out_of_balance": p.out_of_balance,
+                    "at_rest": at_rest(&p.name),
                     "increments": p.increments,
                     "iterations": p.iterations,
                     "cut_backs": p.cut_backs,

@@ -12,7 +12,7 @@ use mechanics::group::{Group, PointFailure};
 use mechanics::settings::Method;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
 use mechanics::{Place, Simulation, State, Watch};
-use results::{Checkpoint, Fault, Figures, Recorder};
+use results::{Checkpoint, Fault, Figures, Recorder, report};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -28,6 +28,9 @@ pub trait Observer {
     fn cut_back(&mut self, place: &Place, reason: &str);
     /// Something the user should know.
     fn warning(&mut self, message: &str);
+    /// The ground was found at rest in this phase but for a share of its weight, which the phase
+    /// carries to equilibrium.
+    fn at_rest(&mut self, _phase: &str, _share: f64) {}
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
     /// Who may want the run to stop: after the increment under way, or within it if that takes
@@ -64,6 +67,43 @@ pub fn check(case: &Case) -> Result<(), Error> {
     let (simulation, _) = begin(case, Reuse::default())?;
     case.wanted(&simulation)?;
     Ok(())
+}
+
+/// Reads, builds and checks a case as a run would, computes nothing, and writes the report of what there
+/// is into `folder`, which must not hold results. Returns the report's path.
+///
+/// # Errors
+/// As [`begin`]; results in the folder, or a folder that cannot be written.
+pub fn dry_run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<PathBuf, Error> {
+    let Posed {
+        problem,
+        laws,
+        mesh_file,
+        notes,
+    } = case.pose()?;
+    let simulation = Simulation::new(problem).map_err(|error| case.place(error))?;
+    let wanted = case.wanted(&simulation)?;
+    let about = case.about(&laws, mesh_file.as_ref());
+    let warnings = all_warnings(case, &laws, &simulation, notes);
+    for warning in &warnings {
+        observer.warning(warning);
+    }
+    let report = report::write_dry(folder, &about, &wanted, &simulation, &warnings)?;
+    Ok(report)
+}
+
+/// What is to be said of a case before its first phase.
+fn all_warnings(
+    case: &Case,
+    laws: &Laws,
+    simulation: &Simulation,
+    notes: Vec<String>,
+) -> Vec<String> {
+    let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
+    let mut all: Vec<String> = of_laws.chain(simulation.warnings().to_vec()).collect();
+    all.extend(notes);
+    all.extend(case.warnings(simulation));
+    all
 }
 
 /// Runs a case and writes its results into `folder`.
@@ -133,10 +173,7 @@ pub fn run_reusing(
         simulation.go_to(state.into_owned())?;
         results
     } else {
-        let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
-        let mut all: Vec<String> = of_laws.chain(simulation.warnings().to_vec()).collect();
-        all.extend(notes);
-        all.extend(case.warnings(&simulation));
+        let all = all_warnings(case, &laws, &simulation, notes);
         for warning in &all {
             observer.warning(warning);
         }
@@ -274,6 +311,11 @@ impl Watch for Follower<'_> {
         let _ = self
             .results
             .last_equilibrium(place, load_factor, time, state);
+    }
+
+    fn at_rest(&mut self, phase: &str, share: f64) {
+        self.results.at_rest(phase, share);
+        self.observer.at_rest(phase, share);
     }
 
     fn phase_ends(&mut self, record: PhaseRecord) {

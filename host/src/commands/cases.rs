@@ -7,7 +7,7 @@ use input::{Case, Error};
 use law::{Opener, Stop};
 use mechanics::equilibrium::Reuse;
 use results::{Figures, remove_comparison, report};
-use runs::run::{Observer as _, Options, check, run_reusing};
+use runs::run::{Observer as _, Options, check, dry_run, run_reusing};
 use runs::{supervision, trade_off, variants};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -49,11 +49,7 @@ pub(super) fn run_cases(
     let mut reuse = Reuse::default();
     for (number, case) in (1..).zip(&cases) {
         reuse.is_last_run = number == cases.len();
-        let folder = match (out, &case.variant) {
-            (None, _) => case.default_folder(),
-            (Some(out), Some(name)) if variant.is_none() => out.join(name),
-            (Some(out), _) => out.to_owned(),
-        };
+        let folder = folder_of(case, variant, out);
         if let Some(name) = &case.variant {
             say!("variant {name}");
         }
@@ -101,6 +97,43 @@ pub(super) fn run_cases(
             Err(run)
         }
         (outcome, reports) => outcome.and(reports),
+    }
+}
+
+/// Reads, builds and checks a case, or all variants of one, and writes the report of each; nothing is
+/// computed. What is wrong with one does not hide what is wrong with the others.
+pub(super) fn dry_run_cases(
+    opener: &Opener,
+    (path, settings): (&Path, &[String]),
+    variant: Option<&str>,
+    out: Option<&Path>,
+) -> Result<(), Error> {
+    let cases = Case::load_with(path, settings)?.into_iter();
+    let mut cases: Vec<Case> = cases.map(|case| case.opened_by(opener)).collect();
+    variants::keep(&mut cases, variant, |case| case.variant.clone())?;
+    let mut outcome = Ok(());
+    for (number, case) in (1..).zip(&cases) {
+        let folder = folder_of(case, variant, out);
+        if let Some(name) = &case.variant {
+            say!("variant {name}");
+        }
+        let mut progress = Progress::new(number, &folder, &Stop::never());
+        match dry_run(case, &folder, &mut progress) {
+            Ok(report) => {
+                let _ = writeln!(supervision::stdout(), "report in {}", report.display());
+            }
+            Err(error) => keep_last(&mut outcome, error),
+        }
+    }
+    outcome
+}
+
+/// Where the results of a case go.
+fn folder_of(case: &Case, variant: Option<&str>, out: Option<&Path>) -> PathBuf {
+    match (out, &case.variant) {
+        (None, _) => case.default_folder(),
+        (Some(out), Some(name)) if variant.is_none() => out.join(name),
+        (Some(out), _) => out.to_owned(),
     }
 }
 

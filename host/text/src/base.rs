@@ -7,9 +7,11 @@
 
 use crate::read::{deserialize_or, toml_error};
 use crate::setting::Setting;
+use crate::wording;
 use crate::{Error, Source};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -110,7 +112,10 @@ pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error
         .collect::<Result<Vec<_>, _>>()?;
     let mut merged = merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))?;
     let Some(variants) = merged.get_mut().remove("variant") else {
-        return Ok(vec![(None, with_settings(source, merged, &settings)?)]);
+        return Ok(vec![(
+            None,
+            with_settings(source, merged, &settings, None)?,
+        )]);
     };
     let span = variants.span();
     let DeValue::Array(variants) = variants.into_inner() else {
@@ -143,25 +148,50 @@ pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error
             return Err(source.error(span, message).into());
         }
         over.remove("name");
+        if let Some((key, _)) = over.iter().find(|(key, _)| key.get_ref() == "base") {
+            let message = "a variant has no `base`: it differs from the file that it stands in";
+            let error = source.error(key.span(), message);
+            return Err(error
+                .hint("the `base` stands at the top of the file")
+                .into());
+        }
+        let own: Vec<Range<usize>> = over.keys().map(Spanned::span).collect();
         let mut table = merged.clone();
         merge(table.get_mut(), over);
-        files.push((Some(name), with_settings(source, table, &settings)?));
+        let read = with_settings(source, table, &settings, Some((&name, &own)))?;
+        files.push((Some(name), read));
     }
     Ok(files)
 }
 
-/// The contents of a file with settings over it.
+/// The contents of a file with settings over it; of a variant with its name, and the places of the keys
+/// that are its own.
 fn with_settings<'i, T: DeserializeOwned>(
     source: &Source,
     mut table: Spanned<DeTable<'i>>,
     settings: &[Setting<'i>],
+    variant: Option<(&str, &[Range<usize>])>,
 ) -> Result<T, Error> {
     let mut made = Vec::new();
     for setting in settings {
         made.extend(setting.apply(source, table.get_mut())?);
     }
+    let own = variant.map_or(&[][..], |(_, own)| own);
+    let keys = table.get_ref().keys().map(Spanned::span);
+    let of_file: Vec<Range<usize>> = keys.filter(|key| !own.contains(key)).collect();
     deserialize_or(source, table, |error| {
-        made.iter().find_map(|made| made.instead_of(error))
+        let explained = made.iter().find_map(|made| made.instead_of(error));
+        explained.or_else(|| {
+            let is_key_of_file = error.span().is_some_and(|span| of_file.contains(&span));
+            let reworded = if is_key_of_file {
+                // Those are taken out before the rest is read.
+                wording::unknown_key(source, error, &["variant", "base"])
+            } else {
+                let (name, _) = variant?;
+                wording::missing_key(source, error, &format!(" in variant `{name}`"))
+            };
+            reworded.map(Error::from)
+        })
     })
 }
 

@@ -6,25 +6,21 @@ use toml::de::DeValue;
 
 /// The error with its place, the key where one is concerned, and a hint where one is known.
 pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
-    let span = error.span().unwrap_or(0..0);
+    let span = first_line(source, error);
     let message = error.message().trim();
-    // An error about a whole table underlines its first line at most.
-    let underlined = source.text().get(span.clone()).unwrap_or_default();
-    let first_line = underlined.find('\n');
-    let span = first_line.map_or(span.clone(), |length| span.start..span.start + length);
     let at = |message: String| source.error(span.clone(), message);
     let of_key = |message: String| match key_before(source.text(), span.start) {
         Some(key) => at(format!("`{key}`: {message}")),
         None => at(message),
     };
-    if let Some((name, known)) = unknown(message, "unknown field ") {
-        return at(format!("unknown key `{name}`")).hint(suggestion(name, known));
+    if let Some(error) = unknown_key(source, error, &[]) {
+        return error;
     }
     if let Some((name, known)) = unknown(message, "unknown variant ") {
         return of_key(format!("there is no `{name}`")).hint(suggestion(name, known));
     }
-    if let Some(name) = message.strip_prefix("missing field ") {
-        return at(format!("missing key {name}"));
+    if let Some(error) = missing_key(source, error, "") {
+        return error;
     }
     if let Some(name) = message.strip_prefix("duplicate field ") {
         return at(format!("{name} is given twice"))
@@ -63,6 +59,38 @@ pub(super) fn reword(source: &Source, error: &toml::de::Error) -> InputError {
             None => at(message.to_owned()),
         },
     }
+}
+
+/// The place of an error; of one about a whole table its first line at most.
+fn first_line(source: &Source, error: &toml::de::Error) -> Range<usize> {
+    let span = error.span().unwrap_or(0..0);
+    let underlined = source.text().get(span.clone()).unwrap_or_default();
+    let length = underlined.find('\n').unwrap_or(underlined.len());
+    span.start..span.start + length
+}
+
+/// The error of a key that there is not; `more` keys may stand there than the reader knows.
+pub(super) fn unknown_key(
+    source: &Source,
+    error: &toml::de::Error,
+    more: &[&str],
+) -> Option<InputError> {
+    let (name, mut known) = unknown(error.message().trim(), "unknown field ")?;
+    known.extend(more);
+    let message = format!("unknown key `{name}`");
+    let error = source.error(first_line(source, error), message);
+    Some(error.hint(suggestion(name, known)))
+}
+
+/// The error of a key that is not given, `whose` it is.
+pub(super) fn missing_key(
+    source: &Source,
+    error: &toml::de::Error,
+    whose: &str,
+) -> Option<InputError> {
+    let name = error.message().trim().strip_prefix("missing field ")?;
+    let message = format!("missing key {name}{whose}");
+    Some(source.error(first_line(source, error), message))
 }
 
 /// Whether the value is of no type that a choice can be written as.

@@ -122,7 +122,7 @@ impl Loading {
         if let Some(water) = &water {
             for (number, group) in groups.iter().enumerate() {
                 if self.active[number] && problem.groups[number].pore_water {
-                    group.add_pore_forces(water, &mut force);
+                    group.add_pore_forces(water, None, &mut force);
                 }
             }
             self.add_outer_water(problem, water, &mut force);
@@ -139,39 +139,76 @@ impl Loading {
         force: &mut [f64],
     ) {
         for (number, group) in groups.iter().enumerate() {
-            let [dry, wet] = self.unit_weight[number];
-            let is_solid = group.formulation != Formulation::ZeroThickness;
-            if !self.active[number] || !is_solid || (dry == 0.0 && wet == 0.0) {
+            self.add_weight_of(problem, (number, group), None, water, force);
+        }
+    }
+
+    /// Weight of a group, or of some of its elements, if it is there.
+    fn add_weight_of(
+        &self,
+        problem: &Problem,
+        (number, group): (usize, &Group),
+        elements: Option<&[usize]>,
+        water: Option<&Water>,
+        force: &mut [f64],
+    ) {
+        let [dry, wet] = self.unit_weight[number];
+        let is_solid = group.formulation != Formulation::ZeroThickness;
+        if !self.active[number] || !is_solid || (dry == 0.0 && wet == 0.0) {
+            return;
+        }
+        let counts: Option<HashSet<usize>> = elements.map(|all| all.iter().copied().collect());
+        let solids = problem.mesh.solids.iter().enumerate();
+        let own = solids.filter(|(_, solid)| solid.group == number);
+        let mut cut = Vec::new();
+        for (element, (solid, _)) in own.enumerate() {
+            if counts
+                .as_ref()
+                .is_some_and(|counts| !counts.contains(&element))
+            {
                 continue;
             }
-            let solids = problem.mesh.solids.iter().enumerate();
-            let own = solids.filter(|(_, solid)| solid.group == number);
-            let mut cut = Vec::new();
-            for (element, (solid, _)) in own.enumerate() {
-                let nodes = group.kinematics.nodes(element);
-                let height = |node: usize| {
-                    let [x, y] = problem.mesh.nodes[node];
-                    water.map_or(f64::INFINITY, |water| y - water.level.at(x))
-                };
-                let heights = nodes.iter().map(|&node| height(node));
-                let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| {
-                    (a.min(h), b.max(h))
-                });
-                let weight = if high <= 0.0 {
-                    wet
-                } else if low >= 0.0 || dry.to_bits() == wet.to_bits() {
-                    dry
-                } else {
-                    cut.push((element, solid));
-                    continue;
-                };
-                for (node, volume) in nodes.iter().zip(group.kinematics.volumes(element)) {
-                    force[2 * node + 1] -= weight * volume;
-                }
+            let nodes = group.kinematics.nodes(element);
+            let height = |node: usize| {
+                let [x, y] = problem.mesh.nodes[node];
+                water.map_or(f64::INFINITY, |water| y - water.level.at(x))
+            };
+            let heights = nodes.iter().map(|&node| height(node));
+            let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| {
+                (a.min(h), b.max(h))
+            });
+            let weight = if high <= 0.0 {
+                wet
+            } else if low >= 0.0 || dry.to_bits() == wet.to_bits() {
+                dry
+            } else {
+                cut.push((element, solid));
+                continue;
+            };
+            for (node, volume) in nodes.iter().zip(group.kinematics.volumes(element)) {
+                force[2 * node + 1] -= weight * volume;
             }
-            if let Some(water) = water.filter(|_| !cut.is_empty()) {
-                add_cut_weights(problem, group, &cut, [dry, wet], water, force);
-            }
+        }
+        if let Some(water) = water.filter(|_| !cut.is_empty()) {
+            add_cut_weights(problem, group, &cut, [dry, wet], water, force);
+        }
+    }
+
+    /// Adds the nodal forces of weight and pore water in a group, or in some of its elements.
+    fn add_bodies(
+        &self,
+        problem: &Problem,
+        (number, group): (usize, &Group),
+        elements: Option<&[usize]>,
+        force: &mut [f64],
+    ) {
+        let water = self.water(problem);
+        self.add_weight_of(problem, (number, group), elements, water.as_ref(), force);
+        if let Some(water) = &water
+            && self.active[number]
+            && problem.groups[number].pore_water
+        {
+            group.add_pore_forces(water, elements, force);
         }
     }
 
@@ -226,6 +263,50 @@ impl Loading {
                 |at, inward| inward.map(|part| part * water.pressure(at)),
             );
         }
+    }
+}
+
+/// What acts within bodies at one time: a part of the way between two loadings.
+#[derive(Clone, Debug)]
+pub struct Acting {
+    /// At the start of the way.
+    pub(crate) from: Loading,
+    /// At its end.
+    pub(crate) to: Loading,
+    /// The part of it.
+    pub(crate) share: f64,
+}
+
+impl Acting {
+    /// Before the first phase.
+    pub(crate) fn before(problem: &Problem) -> Self {
+        Self {
+            from: Loading::before(problem),
+            to: Loading::before(problem),
+            share: 0.0,
+        }
+    }
+
+    /// Nodal forces of weight and pore water in group `number`, or in some of its elements, by degree of
+    /// freedom. What its stresses leave beside them comes from others.
+    pub fn in_bodies(
+        &self,
+        problem: &Problem,
+        (number, group): (usize, &Group),
+        elements: Option<&[usize]>,
+    ) -> Vec<f64> {
+        let of = |loading: &Loading| {
+            let mut force = vec![0.0; 2 * problem.mesh.nodes.len()];
+            loading.add_bodies(problem, (number, group), elements, &mut force);
+            force
+        };
+        let mut force = of(&self.from);
+        if self.share > 0.0 && self.to != self.from {
+            for (force, to) in force.iter_mut().zip(of(&self.to)) {
+                *force += self.share * (to - *force);
+            }
+        }
+        force
     }
 }
 

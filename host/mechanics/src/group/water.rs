@@ -151,12 +151,20 @@ impl Group {
         Cow::Owned(carried)
     }
 
-    /// Adds the nodal forces of hydrostatic pore pressures.
-    pub fn add_pore_forces(&self, water: &Water, force: &mut [f64]) {
+    /// Adds the nodal forces of hydrostatic pore pressures, in all elements or in some.
+    pub fn add_pore_forces(&self, water: &Water, elements: Option<&[usize]>, force: &mut [f64]) {
         let n = self.kinematics.n_components();
         let mut flux = vec![0.0; n * self.kinematics.n_points()];
         let mut is_dry = true;
+        let mut counts = vec![elements.is_none(); self.kinematics.n_elements()];
+        elements
+            .into_iter()
+            .flatten()
+            .for_each(|&element| counts[element] = true);
         for (point, flux) in flux.chunks_exact_mut(n).enumerate() {
+            if !counts[self.kinematics.place_of(point).0] {
+                continue;
+            }
             let pressure = water.pressure(self.kinematics.position(point));
             is_dry &= pressure <= 0.0;
             // Of a traction, the normal component.

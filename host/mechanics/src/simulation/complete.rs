@@ -99,7 +99,7 @@ impl Simulation {
         }
         record.costs.laws += started.elapsed();
         self.reaction = reaction;
-        self.note_pores(phase.number, &phase.course);
+        self.note_bodies(phase.number, &phase.course);
         Ok(())
     }
 

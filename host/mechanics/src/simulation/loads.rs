@@ -9,7 +9,7 @@ use super::ties::Tied;
 use crate::assembly::fold;
 use crate::equilibrium::Loads;
 use crate::error::Error;
-use crate::ground::Loading;
+use crate::ground::{Acting, Loading};
 use crate::problem::{Axis, Phase};
 
 /// A prescribed displacement of a phase: degree of freedom, value at its start and at its end.
@@ -117,17 +117,23 @@ impl Simulation {
         true
     }
 
-    /// Takes note of the pore pressures at the phase's load factor.
-    pub(super) fn note_pores(&mut self, number: usize, course: &PhaseCourse) {
-        if self.problem.water.is_none() {
-            return;
-        }
+    /// Takes note of what acts within bodies at the phase's load factor.
+    pub(super) fn note_bodies(&mut self, number: usize, course: &PhaseCourse) {
         let leg = leg(&self.problem.phases[number], course.leg);
         let [[t_0, f_0], [t_1, f_1]] = leg.unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
-        let water = |factor: f64| self.loading_at(factor).water(&self.problem);
-        let (from, to) = (water(f_0), water(f_1));
-        self.pores
-            .are(from, to, (course.lambda - t_0) / (t_1 - t_0));
+        // What a phase activates comes in the course of its first leg.
+        let from = if course.leg == 0 {
+            self.loading[0].clone()
+        } else {
+            self.loading_at(f_0)
+        };
+        let to = self.loading_at(f_1);
+        let share = (course.lambda - t_0) / (t_1 - t_0);
+        if self.problem.water.is_some() {
+            self.pores
+                .are(from.water(&self.problem), to.water(&self.problem), share);
+        }
+        self.acting = Acting { from, to, share };
     }
 
     /// Takes note of what a phase ends with.

@@ -186,7 +186,7 @@ impl Simulation {
         self.largest_force = state.largest_force;
         self.largest_forces.clone_from(&state.course.loads.largest);
         self.groups.iter_mut().for_each(Group::forget_trial);
-        self.note_pores(state.phase, &state.course);
+        self.note_bodies(state.phase, &state.course);
         self.resume_phase(state.phase, state.course.into_owned())
     }
 }

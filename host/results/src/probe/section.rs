@@ -50,7 +50,8 @@ fn of_solids(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
         starts.get(&middle) == Some(&a)
     };
     let edges: Vec<(usize, usize)> = own().filter(counted).copied().collect();
-    let quads: HashSet<usize> = edges.iter().map(|(quad, _)| *quad).collect();
+    let other: Vec<(usize, usize)> = own().filter(|edge| !counted(edge)).copied().collect();
+    let quads = on_the_side(mesh, number, &edges, &other);
     let of_group = mesh.solids.iter().enumerate();
     let of_group = of_group.filter(|(_, quad)| quad.group == number);
     let elements = of_group
@@ -60,6 +61,81 @@ fn of_solids(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
         .collect();
     let nodes = edges.into_iter().flat_map(|edge| mesh.edge(edge)).collect();
     Some(Section { elements, nodes })
+}
+
+/// Elements of a group on the side of a line on which these edges count, `other` edges being those of the
+/// other side: with an edge on the line, or around a node of it, as triangles are. Around a node at
+/// which the line ends within the group there are no two sides: what lies beside the line counts there.
+fn on_the_side(
+    mesh: &Mesh,
+    group: usize,
+    edges: &[(usize, usize)],
+    other: &[(usize, usize)],
+) -> HashSet<usize> {
+    let all = edges.iter().chain(other);
+    let line: HashSet<usize> = all.map(|&edge| mesh.edge(edge)[2]).collect();
+    let ends = |&edge: &(usize, usize)| {
+        let [a, b, _] = mesh.edge(edge);
+        [a, b]
+    };
+    let on_line: HashSet<usize> = edges.iter().flat_map(ends).collect();
+    // Elements at the nodes of the line, by the middles of their edges that do not follow it.
+    let mut beside: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (number, solid) in mesh.solids.iter().enumerate() {
+        if solid.group == group && solid.corners().iter().any(|node| on_line.contains(node)) {
+            for [_, _, middle] in solid
+                .edges()
+                .filter(|[_, _, middle]| !line.contains(middle))
+            {
+                beside.entry(middle).or_default().push(number);
+            }
+        }
+    }
+    let mut found: HashSet<usize> = edges.iter().map(|(solid, _)| *solid).collect();
+    for &node in &on_line {
+        let at_node = |edge: &&(usize, usize)| ends(edge).contains(&node);
+        let first = edges.iter().filter(at_node).map(|(solid, _)| *solid);
+        let mut queue: Vec<usize> = first.collect();
+        let mut around: HashSet<usize> = queue.iter().copied().collect();
+        while let Some(solid) = queue.pop() {
+            let own = mesh.solids[solid].edges();
+            for [_, _, middle] in own.filter(|[a, b, _]| [a, b].contains(&&node)) {
+                for &next in beside.get(&middle).into_iter().flatten() {
+                    if around.insert(next) {
+                        queue.push(next);
+                    }
+                }
+            }
+        }
+        let comes_around = other
+            .iter()
+            .filter(at_node)
+            .any(|(solid, _)| around.contains(solid));
+        if !comes_around {
+            found.extend(around);
+        } else if let Some(&edge) = edges.iter().find(at_node) {
+            found.extend(
+                around
+                    .into_iter()
+                    .filter(|&solid| is_beside(mesh, edge, node, solid)),
+            );
+        }
+    }
+    found
+}
+
+/// Whether an element at an end of an edge lies on the edge's left, and not beyond that end.
+fn is_beside(mesh: &Mesh, edge: (usize, usize), end: usize, solid: usize) -> bool {
+    let [from, to, _] = mesh.edge(edge);
+    let ([x, y], [x_to, y_to]) = (mesh.nodes[from], mesh.nodes[to]);
+    let along = [x_to - x, y_to - y];
+    let inward = if end == from { 1.0 } else { -1.0 };
+    let corners = mesh.solids[solid].corners();
+    let n = corners.len() as f64;
+    let centre = [0, 1].map(|c| corners.iter().map(|&node| mesh.nodes[node][c]).sum::<f64>() / n);
+    let arm = [0, 1].map(|c| centre[c] - mesh.nodes[end][c]);
+    let left = along[0] * arm[1] - along[1] * arm[0];
+    left > 0.0 && inward * (along[0] * arm[0] + along[1] * arm[1]) > 0.0
 }
 
 /// Zero-thickness elements along the line: what they hand on to the side of greater coordinates is
@@ -216,6 +292,57 @@ mod tests {
         assert_eq!(elements(&[[-1.0, 0.0], [0.0, -1.0]]), Some(vec![0]));
         // The outline has no two sides.
         assert_eq!(elements(&[[2.0, 0.0], [0.0, 2.0]]), None);
+    }
+
+    /// Triangles of the unit squares of a grid, each divided from its lower left to its upper right.
+    fn triangles(n: usize) -> Mesh {
+        let mut mesh = Mesh::default();
+        let mut node = |x: f64, y: f64| {
+            let found = mesh.nodes.iter().position(|at| *at == [x, y]);
+            found.unwrap_or_else(|| {
+                mesh.nodes.push([x, y]);
+                mesh.nodes.len() - 1
+            })
+        };
+        let mut solids = Vec::new();
+        for (column, row) in (0..n * n).map(|cell| ((cell % n) as f64, (cell / n) as f64)) {
+            let at = |x: f64, y: f64| [column + x, row + y];
+            let [a, b, c, d] = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
+            for [a, b, c] in [[a, b, c], [a, c, d]] {
+                let middle = |a: [f64; 2], b: [f64; 2]| {
+                    [f64::midpoint(a[0], b[0]), f64::midpoint(a[1], b[1])]
+                };
+                let all = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
+                solids.push(Solid::triangle(all.map(|[x, y]| node(x, y)), 0));
+            }
+        }
+        mesh.solids = solids;
+        mesh
+    }
+
+    #[test]
+    fn triangles_around_a_node_of_the_line_count_without_an_edge_on_it() {
+        let mesh = triangles(3);
+        let of = |middles: &[[f64; 2]]| {
+            let all = (0..mesh.solids.len()).flat_map(|s| (0..3).map(move |e| (s, e)));
+            let on = |&edge: &(usize, usize)| middles.contains(&mesh.nodes[mesh.edge(edge)[2]]);
+            let line = Line {
+                edges: all.filter(on).collect(),
+                nodes: Vec::new(),
+            };
+            section(&mesh, &line, 0).unwrap().elements
+        };
+        // Across the whole: all triangles of the row above that touch the line.
+        assert_eq!(
+            of(&[[0.5, 1.0], [1.5, 1.0], [2.5, 1.0]]),
+            [6, 7, 8, 9, 10, 11]
+        );
+        // From one side to a node within: there, only what lies beside the line.
+        assert_eq!(of(&[[0.5, 1.0]]), [6, 7]);
+        // A line across the diagonals.
+        let mut right = of(&[[1.0, 0.5], [1.0, 1.5], [1.0, 2.5]]);
+        right.sort_unstable();
+        assert_eq!(right, [2, 3, 8, 9, 14, 15]);
     }
 
     #[test]

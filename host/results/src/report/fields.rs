@@ -2,6 +2,7 @@
 
 use super::budget::Budget;
 use super::short::{Short, thinned};
+use crate::fields::CELLS;
 use serde::Serialize;
 use std::path::Path;
 use std::str::FromStr;
@@ -11,7 +12,7 @@ use std::str::FromStr;
 pub(super) struct Fields {
     /// Coordinates of the nodes, x y x y …
     nodes: Vec<Short>,
-    /// Nodes of every cell: eight of a quad, three of an edge.
+    /// Nodes of every cell: eight of a quad, six of a triangle, three of an edge; corners first.
     cells: Vec<Vec<usize>>,
     /// Number of every cell's group.
     group: Vec<usize>,
@@ -28,6 +29,8 @@ pub(super) struct Snapshot {
     pub(super) time: Short,
     /// What the page calls it.
     pub(super) label: String,
+    /// Numbers of the groups that are not active.
+    inactive: Vec<usize>,
     /// x y x y …
     displacement: Vec<Short>,
     /// By field and cell; empty if there is no such field at this time (a law was swapped).
@@ -40,6 +43,8 @@ struct Grid {
     nodes: Vec<f64>,
     cells: Vec<Vec<usize>>,
     group: Vec<usize>,
+    /// Numbers of the groups that are not active.
+    inactive: Vec<usize>,
     displacement: Vec<f64>,
     fields: Vec<(String, Vec<f64>)>,
 }
@@ -81,12 +86,8 @@ impl Fields {
             };
             if fields.is_none() {
                 let size = grid.nodes.len() + grid.cells.len() * grid.fields.len();
-                let whole = size + grid.nodes.len() + 8 * grid.cells.len();
-                if whole > budget.mesh {
-                    notes.push(format!(
-                        "the fields are not shown: {whole} numbers for mesh and one time are too \
-                         many for this page"
-                    ));
+                if grid.size() > budget.mesh {
+                    notes.push(too_large(grid.size()));
                     return None;
                 }
                 let must = |i: usize| i == number;
@@ -107,6 +108,31 @@ impl Fields {
             }
         }
         fields.filter(|fields| !fields.times.is_empty())
+    }
+
+    /// The fields of one file's text, at a time that is called so; `None` if the page cannot hold them.
+    pub(super) fn of_one(
+        text: &str,
+        (groups, label): (&[String], &str),
+        budget: &Budget,
+        notes: &mut Vec<String>,
+    ) -> Option<Self> {
+        let grid = match Grid::parse(text) {
+            Ok(grid) => grid,
+            Err(why) => {
+                notes.push(why);
+                return None;
+            }
+        };
+        if grid.size() > budget.mesh {
+            notes.push(too_large(grid.size()));
+            return None;
+        }
+        let mut fields = Self::new(&grid);
+        let snapshot = fields.snapshot(0.0, &grid)?;
+        fields.times.push(snapshot);
+        fields.label(groups, |_| label.to_owned());
+        Some(fields)
     }
 
     fn new(grid: &Grid) -> Self {
@@ -141,6 +167,7 @@ impl Fields {
         Some(Snapshot {
             time: time.into(),
             label: String::new(),
+            inactive: grid.inactive.clone(),
             displacement: short(&grid.displacement),
             values: values.collect(),
         })
@@ -158,7 +185,18 @@ impl Fields {
     }
 }
 
+fn too_large(size: usize) -> String {
+    format!(
+        "the fields are not shown: {size} numbers for mesh and one time are too many for this page"
+    )
+}
+
 impl Grid {
+    /// Numbers of the mesh and of the fields.
+    fn size(&self) -> usize {
+        2 * self.nodes.len() + self.cells.len() * (self.fields.len() + 8)
+    }
+
     fn parse(text: &str) -> Result<Self, String> {
         let part = |name: &str| {
             let start = text.find(&format!("<{name}"))?;
@@ -177,9 +215,14 @@ impl Grid {
         let displacement = planar(numbers(named(part("PointData")?, "displacement")?)?);
         let data = part("CellData")?;
         let group: Vec<usize> = numbers(named(data, "group")?)?;
+        // Results of earlier versions do not tell: there, all were.
+        let active: Vec<u8> = match named(data, "active") {
+            Ok(values) => numbers(values)?,
+            Err(_) => vec![1; group.len()],
+        };
         let mut fields = Vec::new();
         for (name, values) in arrays(data) {
-            if name != "group" {
+            if !["group", "active"].contains(&name) {
                 fields.push((name.to_owned(), numbers(values)?));
             }
         }
@@ -187,22 +230,33 @@ impl Grid {
         let mut all = Vec::new();
         for &end in &offsets {
             let cell = connectivity.get(start..end).ok_or("its cells do not fit")?;
-            if !matches!(cell.len(), 3 | 8) || cell.iter().any(|&node| 2 * node >= nodes.len()) {
-                return Err("a cell is no quadratic quad or edge of the mesh".to_owned());
+            let is_known = CELLS.iter().any(|(n, _)| *n == cell.len());
+            if !is_known || cell.iter().any(|&node| 2 * node >= nodes.len()) {
+                return Err("a cell is no quadratic quad, triangle or edge of the mesh".to_owned());
             }
             all.push(cell.to_vec());
             start = end;
         }
         let n = all.len();
-        let fits = group.len() == n && fields.iter().all(|(_, values)| values.len() == n);
+        let fits = group.len() == n
+            && active.len() == n
+            && fields.iter().all(|(_, values)| values.len() == n);
         // A number that is far too large can only come from a broken file.
         if !fits || displacement.len() != nodes.len() || group.iter().any(|&g| g > n) {
             return Err("its arrays have different lengths".to_owned());
         }
+        let cells = group
+            .iter()
+            .zip(&active)
+            .filter(|(_, active)| **active == 0);
+        let mut inactive: Vec<usize> = cells.map(|(group, _)| *group).collect();
+        inactive.sort_unstable();
+        inactive.dedup();
         Ok(Self {
             nodes,
             cells: all,
             group,
+            inactive,
             displacement,
             fields,
         })
@@ -262,6 +316,34 @@ mod tests {
         assert_eq!(grid.cells, [[0, 1, 2]]);
         assert_eq!(grid.displacement, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(grid.fields, [("traction_n".to_owned(), vec![-7.0])]);
+    }
+
+    #[test]
+    fn cells_of_all_kinds_that_are_written_are_read() {
+        let connectivity = "0 1 2 0 1 2 0 1 2 0 1 2 0 1 2 0 1 ";
+        let mixed = TEXT
+            .replace("0 1 2 </DataArray>", &format!("{connectivity}</DataArray>"))
+            .replace("3 </DataArray></Cells>", "3 9 17</DataArray></Cells>")
+            .replace("\"group\">0 ", "\"group\">1 0 0 ")
+            .replace("-7 ", "-7 -8 -9 ");
+        let grid = Grid::parse(&mixed).unwrap();
+        let sizes: Vec<usize> = grid.cells.iter().map(Vec::len).collect();
+        assert_eq!(sizes, CELLS.map(|(n, _)| n));
+        assert!(grid.inactive.is_empty());
+        // A kind that is never written.
+        let why = Grid::parse(&mixed.replace("3 9 17", "3 10 17")).unwrap_err();
+        assert!(why.contains("no quadratic"), "{why}");
+    }
+
+    #[test]
+    fn groups_that_are_not_there_are_told_from_fields() {
+        let gone = TEXT.replace(
+            "<DataArray Name=\"traction_n\">",
+            "<DataArray Name=\"active\">0 </DataArray><DataArray Name=\"traction_n\">",
+        );
+        let grid = Grid::parse(&gone).unwrap();
+        assert_eq!(grid.inactive, [0]);
+        assert_eq!(grid.fields.len(), 1);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::budget::MANY;
 use super::comparison::{final_values, settings, subject, varied};
 use super::fields::Fields;
 use super::log::Log;
+use super::model::Model;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use super::short::display;
@@ -59,6 +60,7 @@ struct Drawn<'a> {
     profile: Option<&'a Profile>,
     fields: Option<&'a Fields>,
     log: &'a Log,
+    model: Option<&'a Model>,
     force_tolerance: Option<f64>,
     units: BTreeMap<&'a str, &'a str>,
 }
@@ -106,6 +108,7 @@ fn page(runs: &[Run], folder: &Path, data: &str) -> serde_json::Result<Template>
         final_values => Template::from(Serde(final_values(runs))),
         n_differing => settings.iter().filter(|setting| setting.differs).count(),
         settings => Template::from(Serde(settings)),
+        model => Template::from(Serde(runs.iter().find_map(|run| run.model.as_ref()))),
         has_profiles => runs.iter().any(|run| run.profile.is_some()),
         has_fields => runs.iter().any(|run| run.fields.is_some()),
         version => env!("CARGO_PKG_VERSION"),
@@ -177,6 +180,7 @@ fn drawn((run, figures): (&Run, Value)) -> Drawn<'_> {
         profile: run.profile.as_ref(),
         fields: run.fields.as_ref(),
         log: &run.log,
+        model: run.model.as_ref(),
         force_tolerance: run.summary["solver"]["force_tolerance"].as_f64(),
         units: run.units(),
     }
@@ -186,6 +190,7 @@ fn run_context(run: &Run, folder: &Path) -> Template {
     let summary = &run.summary;
     let (status, failed, reason) = match run.ending() {
         Ending::Done => ("done".to_owned(), false, String::new()),
+        Ending::NotRun => ("dry run: nothing computed".to_owned(), false, String::new()),
         Ending::Failed(status, reason) => (status, true, reason),
         Ending::Unfinished(why) => ("unfinished".to_owned(), true, why.to_owned()),
     };

@@ -3,10 +3,16 @@
 use super::budget::Budget;
 use super::fields::Fields;
 use super::log::Log;
+use super::model::Model;
 use super::profile::Profile;
 use super::short::{Short, extremes, thinned};
 use super::table::Table;
+use crate::fields::unstructured_grid;
+use crate::pressures::Pressure;
 use crate::record::{entries, list, text};
+use crate::summary::{About, Summary};
+use crate::wanted::Wanted;
+use mechanics::Simulation;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
@@ -26,6 +32,8 @@ pub(super) struct Run {
     pub(super) profile: Option<Profile>,
     pub(super) fields: Option<Fields>,
     pub(super) log: Log,
+    /// The model, of a case that was not run.
+    pub(super) model: Option<Model>,
     /// What is missing or broken.
     pub(super) notes: Vec<String>,
 }
@@ -34,6 +42,8 @@ pub(super) struct Run {
 #[derive(Debug, PartialEq)]
 pub(super) enum Ending {
     Done,
+    /// Nothing was computed.
+    NotRun,
     /// With the status and the reason.
     Failed(String, String),
     /// With what shows it.
@@ -41,7 +51,7 @@ pub(super) enum Ending {
 }
 
 /// `history.csv`.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct History {
     /// Names of the phases, in order.
     phases: Vec<String>,
@@ -239,12 +249,45 @@ impl Run {
             profile,
             fields,
             log,
+            model: None,
             notes,
         })
     }
 
+    /// A case that is not run, as it stands before its first phase.
+    pub(super) fn before(
+        folder: &Path,
+        about: &About,
+        wanted: &Wanted,
+        simulation: &Simulation,
+        warnings: &[String],
+    ) -> Self {
+        let mut summary = Summary::new(about, wanted, simulation).running();
+        summary["warnings"] = warnings.into();
+        let has_pressures = simulation.problem().has_pore_pressure();
+        let text = unstructured_grid(&simulation.snapshot(), has_pressures);
+        let groups = simulation.groups().iter().map(|group| group.name.clone());
+        let groups: Vec<String> = groups.collect();
+        let mut notes = Vec::new();
+        let called = (&groups[..], "before the first phase");
+        Self {
+            name: about.case.clone(),
+            folder: folder.to_owned(),
+            summary,
+            history: History::default(),
+            profile: None,
+            fields: Fields::of_one(&text, called, &Budget::of(1), &mut notes),
+            log: Log::default(),
+            model: Some(Model::of(simulation, about)),
+            notes,
+        }
+    }
+
     /// How it ended.
     pub(super) fn ending(&self) -> Ending {
+        if self.model.is_some() {
+            return Ending::NotRun;
+        }
         if self.summary.is_null() {
             return Ending::Unfinished(
                 "there is no summary.json, so the run was stopped from outside or has not ended yet",
@@ -299,6 +342,7 @@ impl Run {
         let fields = self.fields.iter().flat_map(|fields| &fields.names);
         for name in profile.chain(fields) {
             let unit = match name.split_once('_') {
+                _ if Pressure::named(name).is_some() => "kPa",
                 Some(("stress" | "traction", _)) => "kPa",
                 Some(("jump", _)) => "m",
                 _ => continue,

@@ -4,24 +4,25 @@ part(() => {
   const host = document.getElementById('contour');
   if (!host) return;
   const drawn = runs.filter(run => run.fields);
-  // Nodes of a quad around it, of an edge along it.
-  const ROUND = [0, 4, 1, 5, 2, 6, 3, 7];
-  const ALONG = [0, 2, 1];
+  // By number of nodes: those of a quad or triangle around it, of an edge along it.
+  const OUTLINE = { 8: [0, 4, 1, 5, 2, 6, 3, 7], 6: [0, 3, 1, 4, 2, 5], 3: [0, 2, 1] };
+  const isSolid = cell => cell.length > 3;
   const axes = run => (run.axisymmetric ? ['r', 'z'] : ['x', 'y']);
 
   /** Everything about a run's mesh that does not change with time. */
   const prepare = run => {
     const { fields } = run;
-    const outlines = fields.cells.map(cell => (cell.length === 8 ? ROUND : ALONG).map(i => cell[i]));
+    const outlines = fields.cells.map(cell => OUTLINE[cell.length].map(i => cell[i]));
     const within = [];
     const counts = fields.groups.map(() => 0);
     fields.group.forEach(g => within.push(++counts[g]));
     // Edges between groups and at the boundary.
     const edges = new Map();
     fields.cells.forEach((cell, c) => {
-      if (cell.length !== 8) return;
-      for (let k = 0; k < 4; k++) {
-        const nodes = [cell[k], cell[4 + k], cell[(k + 1) % 4]];
+      if (!isSolid(cell)) return;
+      const corners = cell.length / 2;
+      for (let k = 0; k < corners; k++) {
+        const nodes = [cell[k], cell[corners + k], cell[(k + 1) % corners]];
         const key = nodes[0] < nodes[2] ? `${nodes[0]} ${nodes[2]}` : `${nodes[2]} ${nodes[0]}`;
         const known = edges.get(key);
         if (known) known.groups.push(fields.group[c]);
@@ -38,9 +39,12 @@ part(() => {
       return fields.groups.map((_name, g) => !has.has(g));
     });
     const [x, y] = axes(run);
-    const names = [['u', '|displacement|'], ['u0', `displacement ${x}`], ['u1', `displacement ${y}`], ...fields.names.map((name, f) => [String(f), name])];
+    // Of a model before its first phase the groups, of a run its displacements.
+    const own = run.model ? [['g', 'group']] : [['u', '|displacement|'], ['u0', `displacement ${x}`], ['u1', `displacement ${y}`]];
+    const names = [...own, ...fields.names.map((name, f) => [String(f), name])];
     const values = (field, t) => {
       const time = fields.times[t];
+      if (field === 'g') return fields.group;
       if (!field.startsWith('u')) {
         const f = Number(field);
         return fields.cells.map((_, c) => (blank[f][fields.group[c]] || !time.values[f].length ? null : time.values[f][c]));
@@ -52,7 +56,7 @@ part(() => {
         return sum / cell.length;
       });
     };
-    const unit = field => (field.startsWith('u') ? 'm' : unitOf(fields.names[Number(field)]));
+    const unit = field => (field === 'g' ? '' : field.startsWith('u') ? 'm' : unitOf(fields.names[Number(field)]));
     const title = field => names.find(([key]) => key === field)[1];
     const moved = Math.max(...fields.times.map(time => largestOf(time.displacement)));
     return { run, fields, outlines, within, borders, extent, size, names, values, unit, title, moved };
@@ -70,7 +74,7 @@ part(() => {
   };
 
   const state = {
-    run: drawn[0], field: 'u', time: drawn[0].fields.times.length - 1, scale: suggested(meshOf(drawn[0])), hidden: new Set(),
+    run: drawn[0], field: drawn[0].model ? 'g' : 'u', marks: new Set(['lines', 'supports', 'loads', 'water']), stage: drawn[0].model ? Math.min(1, drawn[0].model.stages.length - 1) : 0, time: drawn[0].fields.times.length - 1, scale: suggested(meshOf(drawn[0])), hidden: new Set(),
     range: '2', low: 0, high: 1, map: 'viridis', lines: true, outline: false, hover: null, centre: null, zoom: 1,
   };
 
@@ -106,7 +110,17 @@ part(() => {
     return { k, centre, width, height, to: ([x, y]) => [(width - BAR) / 2 + (x - centre[0]) * k, height / 2 - (y - centre[1]) * k], from: (px, py) => [centre[0] + (px - (width - BAR) / 2) / k, centre[1] - (py - height / 2) / k] };
   };
 
-  const visible = (mesh, values) => values.filter((v, c) => v != null && !state.hidden.has(mesh.fields.groups[mesh.fields.group[c]]));
+  /** Whether a group is chosen, and there at this time: what is not active is left out, but of a model. */
+  const isShown = (mesh, g) => !state.hidden.has(mesh.fields.groups[g]) && (mesh.run.model || !mesh.fields.times[state.time].inactive.includes(g));
+
+  /** Pale, so that what is drawn over it stands out. */
+  const groupColour = g => {
+    if (g >= LIGHT.length) return `hsl(${(g * 137) % 360},45%,68%)`;
+    const channel = k => Math.round(0.5 * parseInt(LIGHT[g].slice(1 + 2 * k, 3 + 2 * k), 16) + 0.5 * 235);
+    return `rgb(${channel(0)},${channel(1)},${channel(2)})`;
+  };
+
+  const visible = (mesh, values) => values.filter((v, c) => v != null && isShown(mesh, mesh.fields.group[c]));
 
   const boundsOf = (mesh, values) => {
     const seen = visible(mesh, values);
@@ -138,16 +152,16 @@ part(() => {
     pen.within(view.width - BAR, view.height);
     const edges = [];
     fields.cells.forEach((cell, c) => {
-      if (state.hidden.has(fields.groups[fields.group[c]])) return;
+      if (!isShown(mesh, fields.group[c])) return;
       const value = shownValues[c];
       const t = value == null ? null : (value - bounds[0]) / (bounds[1] - bounds[0]);
-      const fill = t == null ? ink.blank : colours[Math.round(256 * Math.min(1, Math.max(0, t)))];
+      const fill = state.field === 'g' ? groupColour(fields.group[c]) : t == null ? ink.blank : colours[Math.round(256 * Math.min(1, Math.max(0, t)))];
       const outline = mesh.outlines[c].map(n => at[n]);
-      if (cell.length === 8) pen.polygon(outline, fill, state.lines && fine ? ink.mesh : fill, state.lines && fine ? 0.5 : 0.7);
+      if (isSolid(cell)) pen.polygon(outline, fill, state.lines && fine ? ink.mesh : fill, state.lines && fine ? 0.5 : 0.7);
       else edges.push([outline, fill]);
     });
     for (const edge of mesh.borders) {
-      if (edge.groups.every(g => state.hidden.has(fields.groups[g]))) continue;
+      if (!edge.groups.some(g => isShown(mesh, g))) continue;
       pen.line(edge.nodes.map(n => at[n]), ink.edge, 1);
     }
     for (const [outline, fill] of edges) pen.line(outline, fill, 5);
@@ -156,7 +170,15 @@ part(() => {
         if (edge.groups.length === 1) pen.line(edge.nodes.map(n => view.to(position(mesh, n, 0))), ink.soft, 1, [4, 3]);
       }
     }
+    if (state.run.model) paintModel(pen, mesh, at, ink);
     pen.everywhere();
+    if (state.field === 'g') {
+      fields.groups.forEach((name, g) => {
+        pen.box(view.width - BAR + 8, 12 + 18 * g, 12, 12, groupColour(g));
+        pen.text(view.width - BAR + 25, 22 + 18 * g, name.length > 12 ? name.slice(0, 11) + '…' : name, ink.text, 'start');
+      });
+      return;
+    }
     // The colour bar.
     const high = Math.min(320, view.height - 90);
     const left = view.width - BAR + 8;
@@ -172,6 +194,85 @@ part(() => {
       pen.line([[left + 14, y], [left + 18, y]], ink.soft, 1);
       const mark = i === 0 && beyond[1] ? '≥ ' : i === 6 && beyond[0] ? '≤ ' : '';
       pen.text(left + 22, y + 4, mark + barText(value * display.factor), ink.text, 'start');
+    }
+  };
+
+  /** Places along a line, not nearer to each other than so many pixels. */
+  const spread = (places, gap) => {
+    const kept = [];
+    for (const place of places) {
+      if (kept.every(other => Math.hypot(other.at[0] - place.at[0], other.at[1] - place.at[1]) >= gap)) kept.push(place);
+    }
+    return kept;
+  };
+
+  const arrow = (pen, [x, y], [dx, dy], ink) => {
+    const [tx, ty] = [x - 22 * dx, y - 22 * dy];
+    pen.line([[tx, ty], [x, y]], ink, 1.5);
+    pen.polygon([[x, y], [x - 7 * dx + 3 * dy, y - 7 * dy - 3 * dx], [x - 7 * dx - 3 * dy, y - 7 * dy + 3 * dx]], ink, ink, 1);
+  };
+
+  /** Lines with their names, supports, water table and loads over the mesh. */
+  const paintModel = (pen, mesh, at, ink) => {
+    const { model } = state.run;
+    const stage = model.stages[state.stage];
+    const labels = [];
+    const label = (x, y, text, fill) => {
+      // Names that would lie on each other stand one below the other.
+      x = Math.min(view.width - BAR - 3.4 * text.length, Math.max(3.4 * text.length + 2, x));
+      let line = y;
+      while (labels.some(other => Math.abs(other.x - x) < 3.5 * (other.text.length + text.length) && Math.abs(other.y - line) < 13)) line += 13;
+      labels.push({ x, y: line, text });
+      pen.box(x - 3.4 * text.length - 2, line - 10, 6.8 * text.length + 4, 13, ink.paper);
+      pen.text(x, line, text, fill, 'middle');
+    };
+    const places = line => (line.edges.length ? [].concat(...line.edges.map(edge => [0, 2, 1].map(k => ({ at: at[edge[k]], edge })))) : line.nodes.map(n => ({ at: at[n], edge: null })));
+    if (state.marks.has('supports')) {
+      for (const line of model.lines) {
+        if (!line.fixed[0] && !line.fixed[1]) continue;
+        for (const { at: [x, y] } of spread(places(line), 22)) {
+          if (line.fixed[1]) pen.polygon([[x, y], [x - 5, y + 9], [x + 5, y + 9]], ink.paper, ink.edge, 1.2);
+          if (line.fixed[0]) pen.polygon([[x, y], [x - 9, y - 5], [x - 9, y + 5]], ink.paper, ink.edge, 1.2);
+        }
+      }
+    }
+    if (state.marks.has('water') && stage.water.length) {
+      pen.line(stage.water.map(place => view.to(place)), ink.paper, 4);
+      pen.line(stage.water.map(place => view.to(place)), '#1f6fd6', 2, [8, 4]);
+    }
+    if (state.marks.has('lines')) {
+      model.lines.forEach((line, i) => {
+        const fill = colour(i, ink.dark);
+        for (const edge of line.edges) pen.line([at[edge[0]], at[edge[2]], at[edge[1]]], fill, 3);
+        if (!line.edges.length) for (const n of line.nodes) pen.box(at[n][0] - 3, at[n][1] - 3, 6, 6, fill);
+      });
+    }
+    if (state.marks.has('loads')) {
+      for (const load of stage.loads) {
+        const line = model.lines.find(other => other.name === load.line);
+        if (!line) continue;
+        for (const { at: place, edge } of spread(places(line), 26)) {
+          let way = load.towards ? [load.towards[0], -load.towards[1]] : null;
+          if (load.kind === 'pressure' && edge) {
+            // The body lies to the left of its edge, which is upside down on the canvas.
+            const [a, b] = [at[edge[0]], at[edge[1]]];
+            way = [load.sign * (b[1] - a[1]), -load.sign * (b[0] - a[0])];
+          }
+          const size = way ? Math.hypot(...way) : 0;
+          if (size > 0) arrow(pen, place, way.map(c => c / size), load.kind === 'displacement' ? '#b0528f' : '#d13a2f');
+        }
+      }
+    }
+    if (state.marks.has('water') && stage.water.length) {
+      const [x, y] = view.to(stage.water[stage.water.length - 1]);
+      label(x - 40, y - 5, 'water', '#1f6fd6');
+    }
+    if (state.marks.has('lines')) {
+      model.lines.forEach((line, i) => {
+        const edge = line.edges[Math.floor(line.edges.length / 2)];
+        const [x, y] = edge ? at[edge[2]] : at[line.nodes[0]] || [0, 0];
+        label(x, y + 4, line.name, colour(i, ink.dark));
+      });
     }
   };
 
@@ -220,7 +321,7 @@ part(() => {
     },
     text(x, y, content, fill, anchor) {
       context.font = '12px system-ui, sans-serif';
-      context.textAlign = anchor;
+      context.textAlign = anchor === 'middle' ? 'center' : anchor;
       context.fillStyle = fill;
       context.fillText(content, x, y);
     },
@@ -240,6 +341,7 @@ part(() => {
 
   const caption = () => {
     const mesh = meshOf(state.run);
+    if (state.run.model) return `${mesh.title(state.field)}, loads and water of: ${state.run.model.stages[state.stage].name}`;
     return `${isComparison ? state.run.name + ': ' : ''}${mesh.title(state.field)}, ${mesh.fields.times[state.time].label}, displacements × ${SCALES[state.scale]}`;
   };
 
@@ -272,13 +374,13 @@ part(() => {
     context.lineJoin = 'round';
     view = look(mesh, width, height);
     paint(onCanvas(context), mesh, {
-      blank: variable('--blank'), mesh: isDark() ? 'rgba(0,0,0,.45)' : 'rgba(255,255,255,.55)', edge: variable('--ink'), soft: variable('--soft'), text: variable('--ink'),
+      dark: isDark(), paper: variable('--card'), blank: variable('--blank'), mesh: isDark() ? 'rgba(0,0,0,.45)' : 'rgba(255,255,255,.55)', edge: variable('--ink'), soft: variable('--soft'), text: variable('--ink'),
     });
     if (state.hover != null) {
       const outline = mesh.outlines[state.hover].map(n => view.to(position(mesh, n, SCALES[state.scale])));
       const pen = onCanvas(context);
       pen.within(view.width - BAR, view.height);
-      pen.line(mesh.fields.cells[state.hover].length === 8 ? [...outline, outline[0]] : outline, '#ff3b6b', 2);
+      pen.line(isSolid(mesh.fields.cells[state.hover]) ? [...outline, outline[0]] : outline, '#ff3b6b', 2);
       pen.everywhere();
     }
     host.dataset.drawn = `${state.field} ${state.time} ${SCALES[state.scale]} ${bounds.map(b => b.toPrecision(6)).join(' ')}`;
@@ -304,7 +406,7 @@ part(() => {
     const mesh = meshOf(state.run);
     const out = [`<svg xmlns="${SVG}" width="${view.width}" height="${view.height + 28}" font-family="sans-serif" font-size="12">`, '<rect width="100%" height="100%" fill="#fff"/>',
       `<text x="${view.width / 2}" y="18" text-anchor="middle" font-size="14">${xml(caption())}</text>`, `<svg y="28" width="${view.width}" height="${view.height}"><g stroke-linejoin="round">`];
-    paint(inSvg(out), mesh, { blank: '#e9ecee', mesh: 'rgba(255,255,255,.55)', edge: '#222', soft: '#666', text: '#222' });
+    paint(inSvg(out), mesh, { dark: false, paper: '#fff', blank: '#e9ecee', mesh: 'rgba(255,255,255,.55)', edge: '#222', soft: '#666', text: '#222' });
     out.push('</g></svg></svg>');
     return out.join('\n');
   };
@@ -317,13 +419,13 @@ part(() => {
     const { fields } = mesh;
     let found = null;
     fields.cells.forEach((cell, c) => {
-      if (state.hidden.has(fields.groups[fields.group[c]])) return;
+      if (!isShown(mesh, fields.group[c])) return;
       const outline = mesh.outlines[c].map(n => view.to(position(mesh, n, factor)));
-      if (cell.length !== 8) {
+      if (!isSolid(cell)) {
         for (let i = 1; i < outline.length; i++) if (distance([px, py], outline[i - 1], outline[i]) < 5) found = c;
         return;
       }
-      if (found != null && fields.cells[found].length !== 8) return;
+      if (found != null && !isSolid(fields.cells[found])) return;
       let inside = false;
       for (let i = 0, j = outline.length - 1; i < outline.length; j = i++) {
         const [a, b] = [outline[i], outline[j]];
@@ -352,7 +454,7 @@ part(() => {
     const outline = mesh.outlines[c];
     const centre = [0, 1].map(k => outline.reduce((sum, n) => sum + fields.nodes[2 * n + k], 0) / outline.length);
     const [x, y] = axes(state.run);
-    const value = shownValues[c] == null ? 'none, or zero' : `${shown(shownValues[c] * display.factor)}${display.unit && display.unit !== '-' ? ' ' + display.unit : ''}`;
+    const value = state.field === 'g' ? fields.groups[fields.group[c]] : shownValues[c] == null ? 'none, or zero' : `${shown(shownValues[c] * display.factor)}${display.unit && display.unit !== '-' ? ' ' + display.unit : ''}`;
     tip.textContent = `${fields.groups[fields.group[c]]}, element ${mesh.within[c]}\n${mesh.title(state.field)}: ${value}\nat ${x} = ${shown(Number(centre[0].toPrecision(4)))}, ${y} = ${shown(Number(centre[1].toPrecision(4)))} m`;
     tip.style.left = px > view.width / 2 ? '' : px + 16 + 'px';
     tip.style.right = px > view.width / 2 ? view.width - px + 16 + 'px' : '';
@@ -429,7 +531,7 @@ part(() => {
 
   const fill = () => {
     const mesh = meshOf(state.run);
-    if (!mesh.names.some(([key]) => key === state.field)) state.field = 'u';
+    if (!mesh.names.some(([key]) => key === state.field)) state.field = mesh.names[0][0];
     fieldHost.replaceChildren(choice('field', mesh.names, state.field, value => {
       state.field = value;
       if (state.range === 'manual') state.range = rangeChoice.querySelector('select').value = '2';
@@ -466,13 +568,19 @@ part(() => {
         fill();
         update();
       }) : null,
-      fieldHost, time.node,
-      make('label', {}, 'deformation', scaleText), scaleInput,
+      fieldHost, state.run.model ? null : time.node,
+      ...(state.run.model ? [
+        choice('loads and water', state.run.model.stages.map((stage, i) => [i, stage.name]), state.stage, value => { state.stage = Number(value); update(); }),
+        ...['lines', 'supports', 'loads', 'water'].map(mark => tick(mark, true, value => {
+          if (value) state.marks.add(mark);
+          else state.marks.delete(mark);
+          draw();
+        })),
+      ] : [make('label', {}, 'deformation', scaleText), scaleInput, tick('undeformed outline', state.outline, value => { state.outline = value; draw(); })]),
       rangeChoice, make('span', { class: 'chips' }, lowInput, highInput),
       choice('colours', [['viridis', 'viridis'], ['diverging', 'blue–red about 0']], state.map, value => { state.map = value; update(); }),
       make('div', {}, make('div', { class: 'small' }, 'groups'), groupHost),
       tick('mesh lines', state.lines, value => { state.lines = value; draw(); }),
-      tick('undeformed outline', state.outline, value => { state.outline = value; draw(); }),
       make('span', { class: 'chips' },
         make('button', { type: 'button', title: 'nearer', onclick: () => zoomBy(1.5, ...middle()) }, '+'),
         make('button', { type: 'button', title: 'farther', onclick: () => zoomBy(1 / 1.5, ...middle()) }, '−'),

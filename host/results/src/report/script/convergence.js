@@ -2,6 +2,7 @@
 
 part(() => {
   const host = document.getElementById('residuals');
+  if (!host) return;
   const logged = runs.filter(run => run.log.attempts.length);
   if (!logged.length) {
     host.append(make('p', { class: 'small' }, 'There is no convergence history.'));

@@ -70,6 +70,7 @@ const chosen = {};
 
 part(() => {
   const host = document.getElementById('figures');
+  if (!host) return;
   const figures = allFigures();
   chosen.figures = figures.map(figure => {
     const title = figure.title || figure.name.replace(/[_-]/g, ' ');
@@ -94,6 +95,7 @@ part(() => {
 
 part(() => {
   const host = document.getElementById('chooser');
+  if (!host) return;
   const names = [...new Set([].concat(...runs.map(run => run.history.names)))];
   const phases = [...new Set([].concat(...runs.map(run => run.history.phases)))];
   const first = allFigures()[0];

@@ -28,10 +28,12 @@ async function selftest() {
   outcome.canvases = [...document.querySelectorAll('canvas')].map(isDrawn);
   outcome.figures = (chosen.figures || []).map(chart => ({ svg: isSvg(chart.svg('<title> & "figure"')), hover: chart.hoverLast() }));
   const pick = document.querySelector('#chooser select');
-  const before = chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
-  pick.value = pick.options[0].value;
-  pick.dispatchEvent(new Event('change'));
-  outcome.chooser_changes = before !== chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
+  if (pick) {
+    const before = chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
+    pick.value = pick.options[0].value;
+    pick.dispatchEvent(new Event('change'));
+    outcome.chooser_changes = before !== chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
+  }
   await settled();
   const { profile, contour, residuals } = chosen;
   if (profile) {
@@ -69,7 +71,7 @@ async function selftest() {
     }
   }
   outcome.legend_entries = Math.max(0, ...[...document.querySelectorAll('.legend')].map(legend => legend.querySelectorAll('button').length));
-  outcome.png_bytes = (await png(chosen.chart.svg('chosen'))).size;
+  if (chosen.chart) outcome.png_bytes = (await png(chosen.chart.svg('chosen'))).size;
   redrawAll();
   await settled();
   return outcome;
