@@ -24,7 +24,7 @@ pub use watch::{Increment, Part, Watch, When};
 use crate::assembly::Tie;
 use crate::equilibrium::{Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
-use crate::ground::{Loading, Pores};
+use crate::ground::{Acting, Loading, Pores};
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -66,6 +66,10 @@ pub struct Snapshot<'a> {
     pub reaction: &'a [f64],
     /// Hydrostatic pore pressures.
     pub pores: &'a Pores,
+    /// Weights and pore pressures as they are among the loads.
+    pub acting: &'a Acting,
+    /// The problem.
+    pub problem: &'a Problem,
 }
 
 /// A problem on its way through its phases.
@@ -87,6 +91,7 @@ pub struct Simulation {
     /// What acts at the start of the phase, and at its end.
     loading: [Loading; 2],
     pores: Pores,
+    acting: Acting,
     /// External forces.
     force: Vec<f64>,
     /// Internal less external forces of the last state that was completed.
@@ -164,6 +169,7 @@ impl Simulation {
             displacement: vec![0.0; n_dofs],
             prescribed: BTreeMap::new(),
             pores: Pores::before(&problem),
+            acting: Acting::before(&problem),
             loading: [Loading::before(&problem), Loading::before(&problem)],
             force: vec![0.0; n_dofs],
             reaction: vec![0.0; n_dofs],
@@ -238,6 +244,8 @@ impl Simulation {
             displacement: &self.displacement,
             reaction: &self.reaction,
             pores: &self.pores,
+            acting: &self.acting,
+            problem: &self.problem,
         }
     }
 

@@ -8,6 +8,7 @@ mod file;
 mod leftovers;
 pub mod point_figure;
 pub mod point_table;
+pub mod pile;
 mod points;
 pub mod probe;
 mod profile;

@@ -136,39 +136,51 @@ impl Loading {
         force: &mut [f64],
     ) {
         for (number, group) in groups.iter().enumerate() {
-            let [dry, wet] = self.unit_weight[number];
-            let is_solid = group.formulation != Formulation::ZeroThickness;
-            if !self.active[number] || !is_solid || (dry == 0.0 && wet == 0.0) {
+            self.add_weight_of(number, problem, group, water, force);
+        }
+    }
+
+    /// Weight of a group of solids, if it is there.
+    pub(super) fn add_weight_of(
+        &self,
+        number: usize,
+        problem: &Problem,
+        group: &Group,
+        water: Option<&Water>,
+        force: &mut [f64],
+    ) {
+        let [dry, wet] = self.unit_weight[number];
+        let is_solid = group.formulation != Formulation::ZeroThickness;
+        if !self.active[number] || !is_solid || (dry == 0.0 && wet == 0.0) {
+            return;
+        }
+        let solids = problem.mesh.solids.iter().enumerate();
+        let own = solids.filter(|(_, solid)| solid.group == number);
+        let mut cut = Vec::new();
+        for (element, (solid, _)) in own.enumerate() {
+            let nodes = group.kinematics.nodes(element);
+            let height = |node: usize| {
+                let [x, y] = problem.mesh.nodes[node];
+                water.map_or(f64::INFINITY, |water| y - water.level.at(x))
+            };
+            let heights = nodes.iter().map(|&node| height(node));
+            let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| {
+                (a.min(h), b.max(h))
+            });
+            let weight = if high <= 0.0 {
+                wet
+            } else if low >= 0.0 || dry.to_bits() == wet.to_bits() {
+                dry
+            } else {
+                cut.push((element, solid));
                 continue;
+            };
+            for (node, volume) in nodes.iter().zip(group.kinematics.volumes(element)) {
+                force[2 * node + 1] -= weight * volume;
             }
-            let solids = problem.mesh.solids.iter().enumerate();
-            let own = solids.filter(|(_, solid)| solid.group == number);
-            let mut cut = Vec::new();
-            for (element, (solid, _)) in own.enumerate() {
-                let nodes = group.kinematics.nodes(element);
-                let height = |node: usize| {
-                    let [x, y] = problem.mesh.nodes[node];
-                    water.map_or(f64::INFINITY, |water| y - water.level.at(x))
-                };
-                let heights = nodes.iter().map(|&node| height(node));
-                let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| {
-                    (a.min(h), b.max(h))
-                });
-                let weight = if high <= 0.0 {
-                    wet
-                } else if low >= 0.0 || dry.to_bits() == wet.to_bits() {
-                    dry
-                } else {
-                    cut.push((element, solid));
-                    continue;
-                };
-                for (node, volume) in nodes.iter().zip(group.kinematics.volumes(element)) {
-                    force[2 * node + 1] -= weight * volume;
-                }
-            }
-            if let Some(water) = water.filter(|_| !cut.is_empty()) {
-                add_cut_weights(problem, group, &cut, [dry, wet], water, force);
-            }
+        }
+        if let Some(water) = water.filter(|_| !cut.is_empty()) {
+            add_cut_weights(problem, group, &cut, [dry, wet], water, force);
         }
     }
 

@@ -9,7 +9,7 @@ use super::ties::Tied;
 use crate::assembly::fold;
 use crate::equilibrium::Loads;
 use crate::error::Error;
-use crate::ground::Loading;
+use crate::ground::{Acting, Loading};
 use crate::problem::{Axis, Phase};
 
 /// A prescribed displacement of a phase: degree of freedom, value at its start and at its end.
@@ -113,13 +113,21 @@ impl Simulation {
         true
     }
 
-    /// Takes note of the pore pressures at the phase's load factor.
+    /// Takes note of the weights and pore pressures at the phase's load factor.
     pub(super) fn note_pores(&mut self, number: usize, course: &PhaseCourse) {
+        let leg = leg(&self.problem.phases[number], course.leg);
+        let [[t_0, f_0], [t_1, f_1]] = leg.unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
+        // What becomes active is not there yet where the phase begins.
+        let start = if course.leg == 0 {
+            self.loading[0].clone()
+        } else {
+            self.loading_at(f_0)
+        };
+        let share = (course.lambda - t_0) / (t_1 - t_0);
+        self.acting = Acting::between(start, self.loading_at(f_1), share);
         if self.problem.water.is_none() {
             return;
         }
-        let leg = leg(&self.problem.phases[number], course.leg);
-        let [[t_0, f_0], [t_1, f_1]] = leg.unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
         let water = |factor: f64| self.loading_at(factor).water(&self.problem);
         let (from, to) = (water(f_0), water(f_1));
         self.pores.are(from, to, (course.lambda - t_0) / (t_1 - t_0));

@@ -40,9 +40,10 @@ const NAMED: usize = 4;
 /// Larger pictures are not copied into the page, in bytes.
 const LARGEST_PICTURE: usize = 200_000;
 /// Files of a run that the page links to.
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 7] = [
     ("history.csv", "every increment, every probe"),
     ("profile.csv", "values along interfaces"),
+    ("pile.csv", "forces, friction and settlement along the pile"),
     ("points.csv", "values at integration points"),
     ("fields.pvd", "fields, for programs that read VTK files"),
     ("log.jsonl", "every iteration and cut-back"),
