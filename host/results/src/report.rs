@@ -12,6 +12,7 @@ mod comparison;
 mod fields;
 mod log;
 mod page;
+mod pile;
 mod profile;
 mod results;
 mod short;

@@ -4,6 +4,7 @@ use super::budget::MANY;
 use super::comparison::{final_values, settings, subject, varied};
 use super::fields::Fields;
 use super::log::Log;
+use super::pile::Pile;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use super::short::display;
@@ -21,10 +22,11 @@ const TEMPLATE: &str = include_str!("page.html");
 /// Looks of a page.
 pub const STYLE: &str = include_str!("style.css");
 /// The parts of the script, one after the other in one scope.
-const SCRIPT: [&str; 7] = [
+const SCRIPT: [&str; 8] = [
     include_str!("script/basics.js"),
     include_str!("script/chart.js"),
     include_str!("script/curves.js"),
+    include_str!("script/pile.js"),
     include_str!("script/profiles.js"),
     include_str!("script/contours.js"),
     include_str!("script/convergence.js"),
@@ -58,6 +60,8 @@ struct Drawn<'a> {
     history: &'a History,
     figures: Value,
     profile: Option<&'a Profile>,
+    pile: Option<&'a Pile>,
+    resistances: &'a Value,
     fields: Option<&'a Fields>,
     log: &'a Log,
     force_tolerance: Option<f64>,
@@ -107,6 +111,7 @@ fn page(runs: &[Run], folder: &Path, data: &str) -> serde_json::Result<Template>
         final_values => Template::from(Serde(final_values(runs))),
         n_differing => settings.iter().filter(|setting| setting.differs).count(),
         settings => Template::from(Serde(settings)),
+        has_pile => runs.iter().any(|run| run.pile.is_some()),
         has_profiles => runs.iter().any(|run| run.profile.is_some()),
         has_fields => runs.iter().any(|run| run.fields.is_some()),
         version => env!("CARGO_PKG_VERSION"),
@@ -176,6 +181,8 @@ fn drawn((run, figures): (&Run, Value)) -> Drawn<'_> {
         history: &run.history,
         figures,
         profile: run.profile.as_ref(),
+        pile: run.pile.as_ref(),
+        resistances: &run.summary["pile"],
         fields: run.fields.as_ref(),
         log: &run.log,
         force_tolerance: run.summary["solver"]["force_tolerance"].as_f64(),
@@ -214,6 +221,7 @@ fn run_context(run: &Run, folder: &Path) -> Template {
         warnings => run.warnings(),
         ends => ends(run),
         pictures => pictures(run),
+        resistances => resistances(&summary["pile"]),
         groups => list(&summary["groups"]).map(group).collect::<Vec<_>>(),
         laws => entries(&summary["laws"]).map(law).collect::<Vec<_>>(),
         solver => named_values(&summary["solver"]),
@@ -304,6 +312,24 @@ fn ends(run: &Run) -> Template {
         .map(|end| format!("{}, increment {}", end.phase, end.increment))
         .collect();
     context! { phases, probes }
+}
+
+/// Criteria of a pile's resistance: name, load or why there is none. Empty without a pile.
+fn resistances(pile: &Value) -> Vec<(&'static str, String)> {
+    let criteria = [
+        ("at a settlement of 10 % of the diameter", "resistance_10_percent_diameter"),
+        ("of it shaft", "shaft_at_10_percent_diameter"),
+        ("of it base", "base_at_10_percent_diameter"),
+        ("by Davisson", "resistance_davisson"),
+        ("by Chin", "resistance_chin"),
+    ];
+    let criteria = criteria.into_iter().filter_map(|(name, key)| {
+        let load = pile[key].as_f64().map(|load| format!("{load:.1}"));
+        let why = text(&pile[format!("{key}_reason")]);
+        let said = load.or_else(|| (!why.is_empty()).then(|| why.to_owned()))?;
+        Some((name, said))
+    });
+    criteria.collect()
 }
 
 fn group(group: &Value) -> Template {
