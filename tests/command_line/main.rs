@@ -12,6 +12,7 @@ mod mesh;
 mod names;
 mod overflow;
 mod parameters;
+mod pile;
 mod plausible;
 mod point;
 mod program;

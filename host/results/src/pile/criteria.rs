@@ -47,6 +47,8 @@ pub struct Resistances {
     pub davisson: Found,
     /// By Chin's inverse slope.
     pub chin: Found,
+    /// Settlement, head, shaft and base load where the phase starts, if settlements are counted from there.
+    start: Option<[f64; 4]>,
     /// Weight of the pile, kN.
     weight: Option<f64>,
 }
@@ -116,6 +118,7 @@ impl Curve {
                 ten_percent: Err(why.clone()),
                 davisson: Err(why.clone()),
                 chin: Err(why),
+                start: None,
                 weight: self.0.last().map(|last| last.weight),
             };
         };
@@ -129,6 +132,7 @@ impl Curve {
                 .ok_or_else(|| "the law of the pile's head has no elastic operator".to_owned())
                 .and_then(|stiffness| davisson(&points, length / stiffness, diameter)),
             chin: chin(&points),
+            start: points.first().copied().filter(|_| phase.resets),
             weight: Some(phase.weight),
         }
     }
@@ -152,6 +156,8 @@ impl Resistances {
         said.insert("shaft_at_10_percent_diameter".to_owned(), json!(split.map(|s| s[1])));
         said.insert("base_at_10_percent_diameter".to_owned(), json!(split.map(|s| s[2])));
         said.insert("phase".to_owned(), json!(self.phase));
+        said.insert("start".to_owned(), json!(self.start));
+        said.insert("unit".to_owned(), json!(self.unit));
         said.insert("diameter".to_owned(), json!(self.diameter));
         said.insert("weight".to_owned(), json!(self.weight));
         said.into()

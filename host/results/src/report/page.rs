@@ -324,7 +324,8 @@ fn resistances(pile: &Value) -> Vec<(&'static str, String)> {
         ("by Chin", "resistance_chin"),
     ];
     let criteria = criteria.into_iter().filter_map(|(name, key)| {
-        let load = pile[key].as_f64().map(|load| format!("{load:.1}"));
+        let unit = text(&pile["unit"]);
+        let load = pile[key].as_f64().map(|load| format!("{load:.1} {unit}"));
         let why = text(&pile[format!("{key}_reason")]);
         let said = load.or_else(|| (!why.is_empty()).then(|| why.to_owned()))?;
         Some((name, said))

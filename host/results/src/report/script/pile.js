@@ -34,12 +34,17 @@ part(() => {
       const settled = column(run, 'pile_settlement', state.phase || null);
       if (!settled) return;
       const down = settled.map(v => (v == null ? null : v * scale.factor));
+      // From where settlements are counted, in front of the first increment.
+      const start = state.phase && run.resistances && run.resistances.phase === state.phase ? run.resistances.start : null;
+      const at = settled.findIndex(v => v != null);
+      const from = (values, first) => (start && at >= 0 ? [...values.slice(0, at), first, ...values.slice(at)] : values);
+      const told = row => (!start || row < at ? place(run, row) : row === at ? 'start' : place(run, row - 1));
       loads.slice(0, isComparison ? 1 : 3).forEach(([name, word], k) => {
         const load = column(run, name, state.phase || null);
         if (load) {
           series.push({
-            name: isComparison ? run.name : word, x: load, y: down, colour: isComparison ? runColour(r) : k, unnamed: isMany,
-            width: k ? 1.6 : 2.2, points: !isMany && down.filter(v => v != null).length <= 60, radius: 1.8, tip: row => place(run, row),
+            name: isComparison ? run.name : word, x: from(load, start && start[k + 1]), y: from(down, start && start[0] * scale.factor), colour: isComparison ? runColour(r) : k, unnamed: isMany,
+            width: k ? 1.6 : 2.2, points: !isMany && down.filter(v => v != null).length <= 60, radius: 1.8, tip: told,
           });
         }
       });
