@@ -4,9 +4,10 @@ use crate::say::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use law::Stop;
 use mechanics::Place;
+use results::pile::Resistances;
 use runs::run::Observer;
 use runs::supervision;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
 
 /// A bar on a terminal, plain lines elsewhere; both on the error stream.
@@ -107,6 +108,20 @@ impl Observer for Progress {
             Some(place) => self.say(&format!("resumed after {place}")),
             None => self.say("done already"),
         }
+    }
+
+    fn pile(&mut self, resistances: &Resistances) {
+        self.finish();
+        let unit = resistances.unit;
+        let line = match &resistances.ten_percent {
+            Ok([head, shaft, base]) => format!(
+                "pile: resistance at 10 % of the diameter ({:.4} m) {head:.1} {unit}, of it shaft {shaft:.1} \
+                 and base {base:.1}",
+                0.1 * resistances.diameter
+            ),
+            Err(why) => format!("pile: no resistance at 10 % of the diameter: {why}"),
+        };
+        let _ = writeln!(supervision::stdout(), "{line}");
     }
 
     fn stop(&self) -> Stop {

@@ -13,6 +13,7 @@ mod model;
 mod names;
 mod overflow;
 mod parameters;
+mod pile;
 mod plausible;
 mod point;
 mod program;

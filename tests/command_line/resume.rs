@@ -182,6 +182,18 @@ fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
     }
 }
 
+#[test]
+fn the_table_of_a_pile_goes_on_to_the_same_bits() {
+    let text = crate::pile::PILE.replace("increments = 12", "increments = 150");
+    let undisturbed = Place::new();
+    undisturbed.write("block.toml", &text);
+    let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let expected = results(&undisturbed.path("out"));
+    assert!(expected.contains_key("pile.csv"));
+    stopped_and_resumed(&text, &expected, "pile");
+}
+
 /// A block pulled off another one. No force ever acts: residuals are measured against the largest
 /// entry of the last matrix, which may be that of a run before.
 const FORCELESS: &str = r#"

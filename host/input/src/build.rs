@@ -5,7 +5,7 @@ use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
 use crate::ground::{ProfileInput, level};
 use crate::material::{ParameterValue, find_law, place_failure, try_law};
 use crate::mesh::{self, Built, MeshFile};
-use crate::{Error, figures, probes};
+use crate::{Error, figures, pile, probes};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -160,14 +160,17 @@ impl Case {
     /// [`text::Error::Input`] at the probe or figure that does not fit.
     pub fn wanted(&self, simulation: &Simulation) -> Result<Wanted, Error> {
         let probes = probes::resolve(self, simulation)?;
-        let figures = figures::case_figures(self, &probes)?;
-        Ok(Wanted {
+        let mut wanted = Wanted {
             output: self.file.output,
             probes,
+            pile: pile::resolve(self, simulation)?,
             title: self.file.title.clone(),
-            figures,
+            figures: Vec::new(),
             follows_path: self.file.solver.control == Control::ArcLength,
-        })
+        };
+        let columns: Vec<&str> = wanted.columns().collect();
+        wanted.figures = figures::case_figures(self, &columns)?;
+        Ok(wanted)
     }
 
     /// What the record of a run says of the case.

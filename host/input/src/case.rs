@@ -164,6 +164,9 @@ pub struct CaseFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ProbeInput>")]
     pub probes: Named<ProbeInput>,
+    /// A pile: its forces, friction and settlement are written for every increment, and its resistance at
+    /// the end.
+    pub pile: Option<PileInput>,
     /// Curves of probes, drawn when the run ends.
     #[serde(default, rename = "figure")]
     pub figures: Vec<FigureInput>,
@@ -206,6 +209,11 @@ impl CaseFile {
             .chain(supports)
             .chain(of_phases)
             .chain(probes.filter_map(|probe| probe.line.as_ref()))
+            .chain(
+                self.pile
+                    .iter()
+                    .flat_map(|pile| pile.line_names(&self.groups)),
+            )
     }
 }
 
@@ -617,6 +625,90 @@ pub struct ProbeInput {
     /// Instead of the above: a sum of other probes with factors.
     #[schemars(with = "Option<BTreeMap<String, f64>>")]
     pub combine: Option<Named<f64>>,
+}
+
+/// A pile: what of the model it is.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PileInput {
+    /// The group of its elements, or several.
+    pub group: GroupNames,
+    /// Interface groups along its shaft, from the head to the toe.
+    pub shaft: GroupNames,
+    /// What is under its base: an interface group, or a line along which it stands on the ground.
+    #[schemars(with = "String")]
+    pub base: Spanned<String>,
+    /// The line of its head.
+    #[schemars(with = "String")]
+    pub head: Spanned<String>,
+    /// Diameter (plane strain: width) for the criteria of its resistance, m; that of the base if left out:
+    /// twice the largest radius, in plane strain the extent in x.
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    pub diameter: Option<Spanned<f64>>,
+}
+
+impl PileInput {
+    fn line_names<'a>(
+        &'a self,
+        groups: &'a Named<GroupInput>,
+    ) -> impl Iterator<Item = &'a Spanned<String>> {
+        let is_group = groups.contains_key(self.base.get_ref().as_str());
+        std::iter::once(&self.head).chain((!is_group).then_some(&self.base))
+    }
+}
+
+/// Names of groups: one, or a list.
+#[derive(Clone, Debug)]
+pub struct GroupNames(pub Vec<Spanned<String>>);
+
+impl<'de> Deserialize<'de> for GroupNames {
+    fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
+        struct OneOrSeveral;
+        impl<'de> de::Visitor<'de> for OneOrSeveral {
+            type Value = Vec<Spanned<String>>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(
+                    "the name of a group, or a list such as [\"shaft_clay\", \"shaft_sand\"]",
+                )
+            }
+
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<Self::Value, E> {
+                Ok(vec![Spanned::new(0..0, name.to_owned())])
+            }
+
+            fn visit_seq<S: de::SeqAccess<'de>>(self, names: S) -> Result<Self::Value, S::Error> {
+                Vec::deserialize(de::value::SeqAccessDeserializer::new(names))
+            }
+        }
+        struct Names(Vec<Spanned<String>>);
+        impl<'de> Deserialize<'de> for Names {
+            fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
+                input.deserialize_any(OneOrSeveral).map(Self)
+            }
+        }
+        let names = Spanned::<Names>::deserialize(input)?;
+        let span = names.span();
+        let placed = |name: Spanned<String>| match name.span() {
+            // One name alone stands where the value does.
+            at if at.is_empty() => Spanned::new(span.clone(), name.into_inner()),
+            _ => name,
+        };
+        Ok(Self(names.into_inner().0.into_iter().map(placed).collect()))
+    }
+}
+
+impl JsonSchema for GroupNames {
+    fn schema_name() -> Cow<'static, str> {
+        "GroupNames".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [
+            { "type": "string" },
+            { "type": "array", "items": { "type": "string" }, "minItems": 1 },
+        ] })
+    }
 }
 
 /// Curves of probes over another probe, or of a stress over the integration points of a cut.

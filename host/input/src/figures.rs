@@ -2,7 +2,6 @@
 
 use crate::case::{Case, CutInput, FigureInput};
 use crate::{Error, measured};
-use results::probe::Probes;
 use results::wanted::{Cut, Figure};
 use text::{Source, suggestion};
 use toml::Spanned;
@@ -30,9 +29,8 @@ const CUT_QUANTITIES: [&str; 13] = [
 /// # Errors
 /// [`text::Error::Input`] at the name of a probe or phase that does not exist, of a second figure of
 /// one name, or at what cannot be used of measured points.
-pub fn case_figures(case: &Case, probes: &Probes) -> Result<Vec<Figure>, Error> {
+pub fn case_figures(case: &Case, names: &[&str]) -> Result<Vec<Figure>, Error> {
     let source = &case.source;
-    let names: Vec<&str> = probes.names().collect();
     let phases: Vec<&str> = case
         .file
         .phases
@@ -42,7 +40,7 @@ pub fn case_figures(case: &Case, probes: &Probes) -> Result<Vec<Figure>, Error> 
     check_names(source, &case.file.figures)?;
     for figure in &case.file.figures {
         match figure.points {
-            None => check_columns(source, figure, "probe", &names)?,
+            None => check_columns(source, figure, "probe", names)?,
             Some(_) => check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?,
         }
         if let Some(group) = figure.points.as_ref().and_then(|cut| cut.group.as_ref())

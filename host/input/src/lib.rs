@@ -14,6 +14,7 @@ pub mod lock;
 pub mod material;
 mod measured;
 pub mod mesh;
+pub mod pile;
 pub mod probes;
 pub mod schema;
 

@@ -70,6 +70,12 @@ fn refuse_column(case: &Case, name: &Spanned<String>) -> Result<(), Error> {
     let has_path = case.file.solver.control == Control::ArcLength;
     let mut tables = vec![("history.csv", OF_HISTORY)];
     tables.extend(has_path.then_some(("path.csv", OF_PATH)));
+    tables.extend(
+        case.file
+            .pile
+            .as_ref()
+            .map(|_| ("history.csv", results::pile::COLUMNS)),
+    );
     let taken = |(_, columns): &&(&str, [&str; 4])| columns.contains(&name.get_ref().as_str());
     let Some((table, _)) = tables.iter().find(taken) else {
         return Ok(());

@@ -8,13 +8,15 @@
 //! Weights, pore pressures and the water's pressure on the outline are nodal forces of a state
 //! ([`Loading`]); between two states they change in proportion to the phase's course.
 
+mod acting;
 mod column;
 mod initial;
 mod loading;
 mod pores;
 
+pub use acting::Acting;
 pub use column::Columns;
 pub(crate) use initial::{InitialStresses, beside_joints};
 pub(crate) use loading::unit_pressure;
-pub use loading::{Acting, Loading, pressure_on};
+pub use loading::{Loading, pressure_on};
 pub use pores::Pores;

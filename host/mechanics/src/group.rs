@@ -4,6 +4,7 @@
 //! from it, so a failed increment leaves nothing behind.
 
 mod layer;
+mod operator;
 mod takeover;
 mod tangent;
 mod varying;

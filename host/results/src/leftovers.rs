@@ -7,11 +7,12 @@ use text::Error;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
 /// are begun anew by each.
-const NAMES: [&str; 9] = [
+const NAMES: [&str; 10] = [
     law::capsule::FILE_NAME,
     crate::checkpoint::FILE_NAME,
     "path.csv",
     "profile.csv",
+    "pile.csv",
     "points.csv",
     "fields.pvd",
     "report.html",

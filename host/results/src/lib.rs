@@ -6,6 +6,7 @@ mod fields;
 pub mod figure;
 mod file;
 mod leftovers;
+pub mod pile;
 pub mod point_figure;
 pub mod point_table;
 mod points;

@@ -1,4 +1,4 @@
-//! Results in a folder: `history.csv`, `profile.csv`, `points.csv`, `fields.pvd` with `*.vtu`,
+//! Results in a folder: `history.csv`, `profile.csv`, `pile.csv`, `points.csv`, `fields.pvd` with `*.vtu`,
 //! `summary.json`, `log.jsonl`. Rows are flushed as increments converge, so whatever was reported
 //! is in its file. What an earlier run left in the folder is removed first, unless it is resumed:
 //! then the files go on from where its last checkpoint saw them.
@@ -7,6 +7,7 @@ use crate::fields::{self, Fields, Written};
 use crate::figure::{Curve, Figures};
 use crate::file::{self, Appended, Extent};
 use crate::leftovers;
+use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Stations};
 use crate::points::Points;
 use crate::probe::Probes;
 use crate::profile::Profile;
@@ -35,6 +36,7 @@ pub struct Recorder {
     history: Table,
     path: Option<Table>,
     profile: Option<Profile>,
+    pile: Option<OfPile>,
     points: Option<Points>,
     fields: Option<Fields>,
     log: LogFile,
@@ -43,12 +45,23 @@ pub struct Recorder {
     seconds: Duration,
 }
 
+/// A pile, as it is written.
+#[derive(Debug)]
+struct OfPile {
+    pile: Pile,
+    stations: Stations,
+    curve: PileCurve,
+    /// Phases that settlements are counted from.
+    resets: Vec<String>,
+}
+
 /// How far the results of a run had come at a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ResultsState {
     history: Extent,
     path: Option<Extent>,
     profile: Option<Extent>,
+    pile: Option<(Extent, PileCurve)>,
     points: Option<Extent>,
     log: Extent,
     fields: Option<Vec<Written>>,
@@ -67,6 +80,7 @@ impl ResultsState {
             ("history.csv", Some(self.history)),
             ("path.csv", self.path),
             ("profile.csv", self.profile),
+            ("pile.csv", self.pile.as_ref().map(|(extent, _)| *extent)),
             ("points.csv", self.points),
             ("log.jsonl", Some(self.log)),
         ];
@@ -87,7 +101,7 @@ impl ResultsState {
 }
 
 fn empty_figures(wanted: &Wanted) -> Figures {
-    let names = wanted.probes.names().map(str::to_owned).collect();
+    let names = wanted.columns().map(str::to_owned).collect();
     Figures::new(&wanted.title, &wanted.figures, names)
 }
 
@@ -216,16 +230,15 @@ impl Recorder {
         state: Option<ResultsState>,
     ) -> Result<Self, Error> {
         let settings = wanted.output;
-        let probes = &wanted.probes;
         let columns = ["phase", "increment", "time"]
             .into_iter()
-            .chain(probes.names())
+            .chain(wanted.columns())
             .chain(["iterations"]);
         let at = state.as_ref();
         let history_from = at.map(|state| state.history);
         let path_columns = ["phase", "increment", "load_factor"]
             .into_iter()
-            .chain(probes.names())
+            .chain(wanted.columns())
             .chain(["iterations"]);
         let path_from = at.and_then(|state| state.path);
         let path = wanted
@@ -234,20 +247,46 @@ impl Recorder {
             .transpose()?;
         let from = at.and_then(|state| state.profile);
         let profile = Profile::begin(folder, settings.profile, simulation, from)?;
+        let from = at.and_then(|state| Some(state.pile.as_ref()?.0));
+        let stations = wanted
+            .pile
+            .as_ref()
+            .map(|_| Stations::begin(folder, from))
+            .transpose()?;
         let from = at.and_then(|state| state.points);
         let points = Points::begin(folder, settings.points, simulation, from)?;
+        let mut looked_at = wanted.probes.looks_at(simulation.groups());
+        if let Some(pile) = &wanted.pile {
+            pile.looks_at(&mut looked_at);
+        }
+        let history = Table::begin(folder.join("history.csv"), columns, history_from)?;
+        let resets = simulation
+            .problem()
+            .phases
+            .iter()
+            .filter(|phase| phase.reset_displacements);
+        let resets: Vec<String> = resets.map(|phase| phase.name.clone()).collect();
+        let summary = Summary::new(about, &wanted, simulation);
+        let figures = empty_figures(&wanted);
+        let of_pile = |(pile, stations)| OfPile {
+            pile,
+            stations,
+            curve: PileCurve::default(),
+            resets,
+        };
         let mut results = Self {
-            history: Table::begin(folder.join("history.csv"), columns, history_from)?,
+            history,
             path,
             profile,
+            pile: wanted.pile.zip(stations).map(of_pile),
             points,
             fields: Fields::create(folder, settings.fields, simulation),
             log,
-            summary: Summary::new(about, &wanted, simulation),
-            figures: empty_figures(&wanted),
+            summary,
+            figures,
             folder: folder.to_owned(),
             settings,
-            looked_at: probes.looks_at(simulation.groups()),
+            looked_at,
             probes: wanted.probes,
             seconds: Duration::ZERO,
         };
@@ -255,6 +294,9 @@ impl Recorder {
             results.summary.course = state.course;
             results.figures.restore(state.curves);
             results.seconds = state.seconds;
+            if let (Some(pile), Some((_, curve))) = (&mut results.pile, state.pile) {
+                pile.curve = curve;
+            }
             if let (Some(fields), Some(written)) = (&mut results.fields, state.fields) {
                 fields.written = written;
             }
@@ -271,10 +313,15 @@ impl Recorder {
         let path = self.path.as_ref().map(Table::sync);
         let profile = self.profile.as_ref().map(|profile| profile.table.sync());
         let points = self.points.as_ref().map(|points| points.table.sync());
+        let pile = self.pile.as_ref().map(|pile| {
+            let extent = pile.stations.table.sync()?;
+            Ok::<_, Error>((extent, pile.curve.clone()))
+        });
         Ok(ResultsState {
             history: self.history.sync()?,
             path: path.transpose()?,
             profile: profile.transpose()?,
+            pile: pile.transpose()?,
             points: points.transpose()?,
             log: self.log.0.sync()?,
             fields: self.fields.as_ref().map(|fields| fields.written.clone()),
@@ -368,7 +415,7 @@ impl Recorder {
         iterations: usize,
         snapshot: &Snapshot<'_>,
     ) -> Result<(), Fault> {
-        let probes = self.values(place, snapshot)?;
+        let (probes, _) = self.values(place, snapshot)?;
         let Some(path) = &mut self.path else {
             return Ok(());
         };
@@ -384,16 +431,31 @@ impl Recorder {
         Ok(path.flush()?)
     }
 
-    /// Values of the probes.
-    fn values(&self, place: &Place, snapshot: &Snapshot<'_>) -> Result<Vec<Option<f64>>, Fault> {
-        let values = self.probes.values(snapshot);
-        match self.probes.overflow(&values) {
-            None => Ok(values),
+    /// Values of the probes and of the pile, and the pile along its length.
+    fn values(
+        &self,
+        place: &Place,
+        snapshot: &Snapshot<'_>,
+    ) -> Result<(Vec<Option<f64>>, Option<PileState>), Fault> {
+        let (values, pile) = self.values_of(snapshot);
+        match self.probes.overflow(&values[..self.probes.names().count()]) {
+            None => Ok((values, pile)),
             Some(probe) => Err(Fault::Overflow {
                 probe: probe.to_owned(),
                 place: place.clone(),
             }),
         }
+    }
+
+    fn values_of(&self, snapshot: &Snapshot<'_>) -> (Vec<Option<f64>>, Option<PileState>) {
+        let mut values = self.probes.values(snapshot);
+        let Some(of_pile) = &self.pile else {
+            return (values, None);
+        };
+        let state = of_pile.pile.state(snapshot);
+        let loads = state.as_ref().map(|state| state.loads.values());
+        values.extend((0..crate::pile::COLUMNS.len()).map(|c| loads.map(|loads| loads[c])));
+        (values, state)
     }
 
     /// Notes the last state of equilibrium of a phase that cannot go on, and writes its fields if
@@ -412,7 +474,7 @@ impl Recorder {
             phase: place.phase.clone(),
             load_factor,
             time,
-            probes: self.probes.values(snapshot),
+            probes: self.values_of(snapshot).0,
         });
         if let Some(fields) = &mut self.fields
             && fields.last() != Some(time)
@@ -434,7 +496,7 @@ impl Recorder {
         let Increment {
             place, of, time, ..
         } = increment;
-        let probes = self.values(place, snapshot)?;
+        let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
         let mut row = vec![
             place.phase.clone(),
@@ -450,6 +512,17 @@ impl Recorder {
             && let Some(profile) = &mut self.profile
         {
             profile.write(place, snapshot)?;
+        }
+        if let Some(of_pile) = &mut self.pile
+            && let Some(state) = pile
+        {
+            of_pile.stations.write(place, &state)?;
+            if of_pile.curve.begins(&place.phase) {
+                let resets = of_pile.resets.contains(&place.phase);
+                let stiffness = of_pile.pile.stiffness(snapshot.groups);
+                of_pile.curve.phase(&place.phase, resets, stiffness);
+            }
+            of_pile.curve.add(&state.loads);
         }
         if self.settings.points.includes(place.increment, *of)
             && let Some(points) = &mut self.points
@@ -491,6 +564,12 @@ impl Recorder {
         &self.figures
     }
 
+    /// Resistances of the pile, if there is one.
+    pub fn resistances(&self) -> Option<Resistances> {
+        let of_pile = self.pile.as_ref()?;
+        Some(of_pile.curve.resistances(&of_pile.pile))
+    }
+
     /// Folder of the results.
     pub fn folder(&self) -> &Path {
         &self.folder
@@ -514,9 +593,12 @@ impl Recorder {
         ending: &Ending,
     ) -> Result<(), Error> {
         let drawn = self.figures.draw(&self.folder);
-        let summary = self
+        let mut summary = self
             .summary
             .finish(groups, [total, self.seconds], warnings, ending);
+        if let Some(resistances) = self.resistances() {
+            summary["pile"] = resistances.summary();
+        }
         let logged = self
             .log
             .line(&json!({ "event": "end", "status": summary["status"] }));

@@ -13,6 +13,7 @@ mod fields;
 mod log;
 mod model;
 mod page;
+mod pile;
 mod profile;
 mod results;
 mod short;

@@ -128,9 +128,20 @@ impl Summary {
         let pictures = pictures.map(|figure| format!("{}.svg", figure.name));
         say("pictures", json!(pictures.collect::<Vec<String>>()));
         let units = about.probe_units.iter();
-        let units: Map<String, Value> = units
+        let mut units: Map<String, Value> = units
             .map(|(name, unit)| (name.clone(), json!(unit)))
             .collect();
+        if wanted.pile.is_some() {
+            for column in crate::pile::COLUMNS {
+                let is_length = column == "pile_settlement";
+                let unit = if is_length {
+                    "m"
+                } else {
+                    problem.analysis.force_unit()
+                };
+                units.insert(column.to_owned(), json!(unit));
+            }
+        }
         say("probe_units", units.into());
         say("laws", laws.into());
         let mut mesh = json!({
@@ -144,7 +155,7 @@ impl Summary {
         say("mesh", mesh);
         Self {
             head,
-            probe_names: wanted.probes.names().map(str::to_owned).collect(),
+            probe_names: wanted.columns().map(str::to_owned).collect(),
             course: Course::default(),
         }
     }

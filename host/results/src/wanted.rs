@@ -1,5 +1,6 @@
 //! What results a run is to write, as plain values.
 
+use crate::pile::{self, Pile};
 use crate::probe::Probes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,12 +12,22 @@ pub struct Wanted {
     pub output: Output,
     /// Numbers for every increment.
     pub probes: Probes,
+    /// A pile whose forces are written for every increment.
+    pub pile: Option<Pile>,
     /// Title of figures that have none of their own.
     pub title: String,
     /// Curves that are drawn.
     pub figures: Vec<Figure>,
     /// Whether steps along the path of equilibrium are written, too.
     pub follows_path: bool,
+}
+
+impl Wanted {
+    /// Columns of numbers that `history.csv` has for every increment.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        let of_pile = self.pile.iter().flat_map(|_| pile::COLUMNS);
+        self.probes.names().chain(of_pile)
+    }
 }
 
 /// Curves of columns over another one, or of a stress over the integration points of a cut.

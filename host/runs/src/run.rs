@@ -12,6 +12,7 @@ use mechanics::group::{Group, PointFailure};
 use mechanics::settings::Method;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
 use mechanics::{Place, Simulation, State, Watch};
+use results::pile::Resistances;
 use results::{Checkpoint, Fault, Figures, Recorder, report};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -33,6 +34,8 @@ pub trait Observer {
     fn at_rest(&mut self, _phase: &str, _share: f64) {}
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
+    /// The run has ended; this is the resistance of its pile.
+    fn pile(&mut self, _resistances: &Resistances) {}
     /// Who may want the run to stop: after the increment under way, or within it if that takes
     /// long.
     fn stop(&self) -> Stop {
@@ -195,6 +198,9 @@ pub fn run_reusing(
         follower.say(warning);
     }
     let outcome = outcome.map_err(|error| explained(case, &simulation, error, &mut follower));
+    if let Some(resistances) = follower.results.resistances() {
+        follower.observer.pile(&resistances);
+    }
     let Follower {
         mut results,
         keeper,

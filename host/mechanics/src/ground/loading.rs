@@ -144,7 +144,7 @@ impl Loading {
     }
 
     /// Weight of a group, or of some of its elements, if it is there.
-    fn add_weight_of(
+    pub(super) fn add_weight_of(
         &self,
         problem: &Problem,
         (number, group): (usize, &Group),
@@ -195,7 +195,7 @@ impl Loading {
     }
 
     /// Adds the nodal forces of weight and pore water in a group, or in some of its elements.
-    fn add_bodies(
+    pub(super) fn add_bodies(
         &self,
         problem: &Problem,
         (number, group): (usize, &Group),
@@ -263,50 +263,6 @@ impl Loading {
                 |at, inward| inward.map(|part| part * water.pressure(at)),
             );
         }
-    }
-}
-
-/// What acts within bodies at one time: a part of the way between two loadings.
-#[derive(Clone, Debug)]
-pub struct Acting {
-    /// At the start of the way.
-    pub(crate) from: Loading,
-    /// At its end.
-    pub(crate) to: Loading,
-    /// The part of it.
-    pub(crate) share: f64,
-}
-
-impl Acting {
-    /// Before the first phase.
-    pub(crate) fn before(problem: &Problem) -> Self {
-        Self {
-            from: Loading::before(problem),
-            to: Loading::before(problem),
-            share: 0.0,
-        }
-    }
-
-    /// Nodal forces of weight and pore water in group `number`, or in some of its elements, by degree of
-    /// freedom. What its stresses leave beside them comes from others.
-    pub fn in_bodies(
-        &self,
-        problem: &Problem,
-        (number, group): (usize, &Group),
-        elements: Option<&[usize]>,
-    ) -> Vec<f64> {
-        let of = |loading: &Loading| {
-            let mut force = vec![0.0; 2 * problem.mesh.nodes.len()];
-            loading.add_bodies(problem, (number, group), elements, &mut force);
-            force
-        };
-        let mut force = of(&self.from);
-        if self.share > 0.0 && self.to != self.from {
-            for (force, to) in force.iter_mut().zip(of(&self.to)) {
-                *force += self.share * (to - *force);
-            }
-        }
-        force
     }
 }
 

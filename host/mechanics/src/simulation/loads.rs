@@ -133,7 +133,7 @@ impl Simulation {
             self.pores
                 .are(from.water(&self.problem), to.water(&self.problem), share);
         }
-        self.acting = Acting { from, to, share };
+        self.acting = Acting::between(from, to, share);
     }
 
     /// Takes note of what a phase ends with.

@@ -16,6 +16,8 @@ pub(super) struct Budget {
     history: usize,
     /// Values along interfaces.
     pub(super) profile: usize,
+    /// Values along a pile.
+    pub(super) pile: usize,
     /// Fields; of the first time alone may be `mesh`.
     pub(super) fields: usize,
     /// A mesh with the fields of one time; of a larger one there are no contours.
@@ -30,6 +32,7 @@ impl Budget {
         let whole = Self {
             history: 400_000,
             profile: 400_000,
+            pile: 100_000,
             fields: 600_000,
             mesh: 2_400_000,
             iterations: 20_000,
@@ -37,7 +40,8 @@ impl Budget {
         // 4 MB in all, so that a page of a hundred runs stays below 5 MB.
         let of_many = Self {
             history: 200_000,
-            profile: 150_000,
+            profile: 130_000,
+            pile: 20_000,
             fields: 30_000,
             mesh: 30_000,
             iterations: 10_000,
@@ -47,6 +51,7 @@ impl Budget {
         Self {
             history: all.history / n,
             profile: all.profile / n,
+            pile: all.pile / n,
             fields: all.fields / n,
             mesh: all.mesh / n,
             iterations: all.iterations / n,

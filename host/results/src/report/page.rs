@@ -5,6 +5,7 @@ use super::comparison::{final_values, settings, subject, varied};
 use super::fields::Fields;
 use super::log::Log;
 use super::model::Model;
+use super::pile::Pile;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use super::short::display;
@@ -22,10 +23,11 @@ const TEMPLATE: &str = include_str!("page.html");
 /// Looks of a page.
 pub const STYLE: &str = include_str!("style.css");
 /// The parts of the script, one after the other in one scope.
-const SCRIPT: [&str; 7] = [
+const SCRIPT: [&str; 8] = [
     include_str!("script/basics.js"),
     include_str!("script/chart.js"),
     include_str!("script/curves.js"),
+    include_str!("script/pile.js"),
     include_str!("script/profiles.js"),
     include_str!("script/contours.js"),
     include_str!("script/convergence.js"),
@@ -41,9 +43,10 @@ const NAMED: usize = 4;
 /// Larger pictures are not copied into the page, in bytes.
 const LARGEST_PICTURE: usize = 200_000;
 /// Files of a run that the page links to.
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 7] = [
     ("history.csv", "every increment, every probe"),
     ("profile.csv", "values along interfaces"),
+    ("pile.csv", "forces, friction and settlement along the pile"),
     ("points.csv", "values at integration points"),
     ("fields.pvd", "fields, for programs that read VTK files"),
     ("log.jsonl", "every iteration and cut-back"),
@@ -58,6 +61,8 @@ struct Drawn<'a> {
     history: &'a History,
     figures: Value,
     profile: Option<&'a Profile>,
+    pile: Option<&'a Pile>,
+    resistances: &'a Value,
     fields: Option<&'a Fields>,
     log: &'a Log,
     model: Option<&'a Model>,
@@ -109,6 +114,7 @@ fn page(runs: &[Run], folder: &Path, data: &str) -> serde_json::Result<Template>
         n_differing => settings.iter().filter(|setting| setting.differs).count(),
         settings => Template::from(Serde(settings)),
         model => Template::from(Serde(runs.iter().find_map(|run| run.model.as_ref()))),
+        has_pile => runs.iter().any(|run| run.pile.is_some()),
         has_profiles => runs.iter().any(|run| run.profile.is_some()),
         has_fields => runs.iter().any(|run| run.fields.is_some()),
         version => env!("CARGO_PKG_VERSION"),
@@ -178,6 +184,8 @@ fn drawn((run, figures): (&Run, Value)) -> Drawn<'_> {
         history: &run.history,
         figures,
         profile: run.profile.as_ref(),
+        pile: run.pile.as_ref(),
+        resistances: &run.summary["pile"],
         fields: run.fields.as_ref(),
         log: &run.log,
         model: run.model.as_ref(),
@@ -218,6 +226,7 @@ fn run_context(run: &Run, folder: &Path) -> Template {
         warnings => run.warnings(),
         ends => ends(run),
         pictures => pictures(run),
+        resistances => resistances(&summary["pile"]),
         groups => list(&summary["groups"]).map(group).collect::<Vec<_>>(),
         laws => entries(&summary["laws"]).map(law).collect::<Vec<_>>(),
         solver => named_values(&summary["solver"]),
@@ -308,6 +317,28 @@ fn ends(run: &Run) -> Template {
         .map(|end| format!("{}, increment {}", end.phase, end.increment))
         .collect();
     context! { phases, probes }
+}
+
+/// Criteria of a pile's resistance: name, load or why there is none. Empty without a pile.
+fn resistances(pile: &Value) -> Vec<(&'static str, String)> {
+    let criteria = [
+        (
+            "at a settlement of 10 % of the diameter",
+            "resistance_10_percent_diameter",
+        ),
+        ("of it shaft", "shaft_at_10_percent_diameter"),
+        ("of it base", "base_at_10_percent_diameter"),
+        ("by Davisson", "resistance_davisson"),
+        ("by Chin", "resistance_chin"),
+    ];
+    let criteria = criteria.into_iter().filter_map(|(name, key)| {
+        let unit = text(&pile["unit"]);
+        let load = pile[key].as_f64().map(|load| format!("{load:.1} {unit}"));
+        let why = text(&pile[format!("{key}_reason")]);
+        let said = load.or_else(|| (!why.is_empty()).then(|| why.to_owned()))?;
+        Some((name, said))
+    });
+    criteria.collect()
 }
 
 fn group(group: &Value) -> Template {

@@ -13,7 +13,7 @@ use std::path::Path;
 use text::Error;
 
 /// So many times what is shown is kept in memory at most.
-const AHEAD: usize = 4;
+pub(super) const AHEAD: usize = 4;
 /// Points of an element closer than this are at the same position, relative to the group's length.
 const SAME_POSITION: f64 = 1e-6;
 /// Columns every profile begins with.
@@ -74,34 +74,34 @@ struct Point {
 
 /// An increment on its way into the page.
 #[derive(Debug)]
-struct Block {
+pub(super) struct Block {
     /// Number among the complete increments.
     number: usize,
-    phase: usize,
-    increment: usize,
+    pub(super) phase: usize,
+    pub(super) increment: usize,
     /// The next increment is of another phase, as far as it is known.
-    ends_phase: bool,
+    pub(super) ends_phase: bool,
     /// Row by row.
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
 }
 
 /// The increments of a table. Of too many, every second is forgotten while they are read, but
 /// for the ends of phases and those where a quantity is lowest or highest.
 #[derive(Debug, Default)]
-struct Blocks {
-    kept: Vec<Block>,
+pub(super) struct Blocks {
+    pub(super) kept: Vec<Block>,
     /// Complete increments so far, and others.
-    n: usize,
-    n_broken: usize,
-    stride: usize,
+    pub(super) n: usize,
+    pub(super) n_broken: usize,
+    pub(super) stride: usize,
     /// So many may be kept.
-    most: usize,
+    pub(super) most: usize,
     /// Numbers of a row.
-    width: usize,
+    pub(super) width: usize,
 }
 
 impl Blocks {
-    fn add(&mut self, phase: usize, increment: usize, values: Vec<f64>) {
+    pub(super) fn add(&mut self, phase: usize, increment: usize, values: Vec<f64>) {
         if let Some(last) = self.kept.last_mut() {
             last.ends_phase = last.phase != phase;
         }

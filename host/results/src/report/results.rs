@@ -4,6 +4,7 @@ use super::budget::Budget;
 use super::fields::Fields;
 use super::log::Log;
 use super::model::Model;
+use super::pile::Pile;
 use super::profile::Profile;
 use super::short::{Short, extremes, thinned};
 use super::table::Table;
@@ -30,6 +31,7 @@ pub(super) struct Run {
     pub(super) summary: Value,
     pub(super) history: History,
     pub(super) profile: Option<Profile>,
+    pub(super) pile: Option<Pile>,
     pub(super) fields: Option<Fields>,
     pub(super) log: Log,
     /// The model, of a case that was not run.
@@ -233,6 +235,14 @@ impl Run {
                 None
             }
         };
+        let pile_path = folder.join("pile.csv");
+        let pile = pile_path
+            .is_file()
+            .then(|| Pile::read(&pile_path, &history.times, budget, &mut notes));
+        let pile = pile.transpose().unwrap_or_else(|error| {
+            notes.push(format!("pile.csv: {error}; left out"));
+            None
+        });
         let mut fields = Fields::read(folder, budget, &mut notes);
         if let Some(fields) = &mut fields {
             let groups: Vec<String> = list(&summary["groups"])
@@ -247,6 +257,7 @@ impl Run {
             summary,
             history,
             profile,
+            pile: pile.flatten(),
             fields,
             log,
             model: None,
@@ -271,6 +282,7 @@ impl Run {
         let mut notes = Vec::new();
         let called = (&groups[..], "before the first phase");
         Self {
+            pile: None,
             name: about.case.clone(),
             folder: folder.to_owned(),
             summary,

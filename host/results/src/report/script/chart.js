@@ -134,7 +134,7 @@ function makeChart(host, height, name) {
       ...(spec[scale].log ? { splits: decadeSplits, values: decadeTexts, filter: (_, splits) => splits } : { values: tickTexts }),
     });
     const scale = key => ({
-      time: false, range: () => rangeAlong(key), ...(spec[key].log ? { distr: 3, log: 10 } : {}),
+      time: false, range: () => rangeAlong(key), ...(spec[key].down ? { dir: -1 } : {}), ...(spec[key].log ? { distr: 3, log: 10 } : {}),
     });
     u = new uPlot({
       mode: 2,

@@ -35,7 +35,14 @@ async function selftest() {
     outcome.chooser_changes = before !== chosen.chart.canvas.closest('[data-drawn]').dataset.drawn;
   }
   await settled();
-  const { profile, contour, residuals } = chosen;
+  const { pile, profile, contour, residuals } = chosen;
+  if (pile) {
+    const state = () => [pile.title.textContent, pile.body.dataset.drawn];
+    await input(pile.steer.input, 0);
+    const first = state();
+    await input(pile.steer.input, pile.steer.input.max);
+    outcome.pile = { first, last: state(), svg: [pile.loads, pile.along, pile.curves].map(chart => isSvg(chart.svg('pile'))), hover: pile.loads.hoverLast() };
+  }
   if (profile) {
     const drawn = () => profile.body.dataset.drawn;
     await input(profile.steer.input, 0);

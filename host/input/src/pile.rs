@@ -1,0 +1,112 @@
+//! The pile of a case: names resolved to groups and lines.
+
+use crate::Error;
+use crate::build::line;
+use crate::case::Case;
+use mechanics::Simulation;
+use results::pile::{Base, Misfit, Parts, Pile};
+use text::suggestion;
+use toml::Spanned;
+
+/// The pile that a case names, within its mesh.
+///
+/// # Errors
+/// [`text::Error::Input`] at the name that does not fit.
+pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Error> {
+    let Some(input) = &case.file.pile else {
+        return Ok(None);
+    };
+    let (source, groups) = (&case.source, simulation.groups());
+    let mesh = &simulation.problem().mesh;
+    let group_names = || groups.iter().map(|group| group.name.as_str());
+    let number = |name: &Spanned<String>| group_names().position(|other| other == name.get_ref());
+    let group = |name: &Spanned<String>| {
+        number(name).ok_or_else(|| {
+            let message = format!("[pile]: there is no group `{}`", name.get_ref());
+            let names: Vec<&str> = group_names().collect();
+            let error = source.error(name.span(), message);
+            Error::from(error.hint(suggestion(name.get_ref(), names)))
+        })
+    };
+    let all = |names: &[Spanned<String>], key: &str| {
+        let numbers = names
+            .iter()
+            .map(group)
+            .collect::<Result<Vec<usize>, Error>>()?;
+        for (number, name) in names.iter().enumerate() {
+            if names[..number]
+                .iter()
+                .any(|other| other.get_ref() == name.get_ref())
+            {
+                let message = format!("[pile]: `{key}` names group `{}` twice", name.get_ref());
+                return Err(Error::from(source.error(name.span(), message)));
+            }
+        }
+        if numbers.is_empty() {
+            let message = format!("[pile]: `{key}` is an empty list; it needs a group");
+            return Err(Error::from(source.error(input.head.span(), message)));
+        }
+        Ok(numbers)
+    };
+    let of_pile = all(&input.group.0, "group")?;
+    let shaft = all(&input.shaft.0, "shaft")?;
+    line(mesh, source, &input.head)?;
+    let base = match number(&input.base) {
+        Some(number) => Base::Group(number),
+        None if mesh.lines.contains_key(input.base.get_ref()) => {
+            Base::Line(input.base.get_ref().clone())
+        }
+        None => {
+            let name = input.base.get_ref();
+            let message = format!("[pile]: there is neither a group nor a line `{name}`");
+            let names: Vec<&str> = group_names()
+                .chain(mesh.lines.keys().map(String::as_str))
+                .collect();
+            let error = source.error(input.base.span(), message);
+            return Err(error.hint(suggestion(name, names)).into());
+        }
+    };
+    let diameter = input.diameter.as_ref();
+    if let Some(diameter) = diameter
+        && !(*diameter.get_ref() > 0.0 && diameter.get_ref().is_finite())
+    {
+        let message = format!("[pile]: a diameter of {} m is none", diameter.get_ref());
+        return Err(source.error(diameter.span(), message).into());
+    }
+    let parts = Parts {
+        groups: of_pile,
+        shaft,
+        base,
+        head: input.head.get_ref().clone(),
+        diameter: diameter.map(|diameter| *diameter.get_ref()),
+    };
+    let misfit = |misfit| {
+        let (at, what) = match misfit {
+            Misfit::NotSolid(number) => (
+                &input.group.0[number],
+                "is an interface; a pile is made of `solid` groups",
+            ),
+            Misfit::Head => (&input.head, "has no node of the pile's groups"),
+            Misfit::NotAnInterface(number) => (
+                &input.shaft.0[number],
+                "is no interface; a shaft has `zero_thickness` or `thin_layer` groups",
+            ),
+            Misfit::ApartFromShaft(number) => {
+                (&input.shaft.0[number], "does not touch the pile's groups")
+            }
+            Misfit::BaseNotAnInterface => (
+                &input.base,
+                "is no interface; a base is a `zero_thickness` or `thin_layer` group, or a line",
+            ),
+            Misfit::Base => (&input.base, "does not touch the pile's groups"),
+            Misfit::BaseInside => (
+                &input.base,
+                "lies inside the pile's groups; the base is where they end below",
+            ),
+            Misfit::UpsideDown => (&input.base, "is not below the pile's head"),
+        };
+        let message = format!("[pile]: `{}` {what}", at.get_ref());
+        source.error(at.span(), message).into()
+    };
+    Pile::new(parts, simulation).map(Some).map_err(misfit)
+}

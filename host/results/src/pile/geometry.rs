@@ -1,0 +1,417 @@
+//! What of a mesh is the pile: its elements, the nodes of its head and base, the faces of its shaft, and
+//! the stations along it.
+
+use super::Parts;
+use mechanics::Simulation;
+use mechanics::group::Group;
+use mechanics::mesh::{Line, Mesh};
+use mechanics::problem::{Analysis, Formulation};
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::PI;
+
+/// Stations closer than this fraction of the pile's length are one.
+const SAME: f64 = 1e-9;
+
+/// Why there is no such pile.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Misfit {
+    /// A group of the pile (by its number in the list) is not of solids.
+    NotSolid(usize),
+    /// No node of the head belongs to the pile.
+    Head,
+    /// A group of the shaft (by its number in the list) is not an interface.
+    NotAnInterface(usize),
+    /// A group of the shaft does not touch the pile.
+    ApartFromShaft(usize),
+    /// The base is a group that is not an interface.
+    BaseNotAnInterface,
+    /// The base does not touch the pile.
+    Base,
+    /// The base is a line inside the pile.
+    BaseInside,
+    /// The base is not below the head.
+    UpsideDown,
+}
+
+/// An element of the shaft or the base, as the pile feels it.
+#[derive(Debug)]
+pub(super) struct Facet {
+    /// Number of its group, and within the group.
+    pub(super) group: usize,
+    pub(super) element: usize,
+    /// The pile's nodes on it: two ends and the middle.
+    pub(super) nodes: [usize; 3],
+    /// The tangential traction is positive where it holds the pile up (1) or draws it down (−1).
+    pub(super) sign: f64,
+    /// Lowest and highest z.
+    pub(super) z: [f64; 2],
+    /// Area, m² over the whole turn.
+    pub(super) area: f64,
+    /// Element of the pile beside it: group and number within the group.
+    pub(super) beside: (usize, usize),
+    /// Elements of one colour and group share no node.
+    pub(super) colour: usize,
+}
+
+/// An element of the pile, seen from the side.
+#[derive(Debug)]
+struct Body {
+    outline: Vec<[f64; 2]>,
+    z: [f64; 2],
+    /// Volume above its lowest point.
+    volume: f64,
+}
+
+/// The pile within the mesh.
+#[derive(Debug)]
+pub(super) struct Geometry {
+    pub(super) head: Vec<usize>,
+    pub(super) base: Vec<usize>,
+    pub(super) shaft: Vec<Facet>,
+    /// Stations from the head down, z.
+    pub(super) stations: Vec<f64>,
+    /// By station, the pile's nodes whose settlement it has.
+    pub(super) settle: Vec<Vec<usize>>,
+    /// Nodes of the pile that are neither of head, shaft nor base, with their z.
+    pub(super) others: Vec<usize>,
+    /// Diameter (plane strain: width) of the base, m.
+    pub(super) width: f64,
+    /// Sides of the head: area and the pile's element there.
+    pub(super) head_sides: Vec<(f64, usize, usize)>,
+    bodies: Vec<(usize, Vec<Body>)>,
+    pub(super) analysis: Analysis,
+}
+
+fn place(mesh: &Mesh, node: usize) -> [u64; 2] {
+    // Without the sign of zero.
+    mesh.nodes[node].map(|c| (c + 0.0).to_bits())
+}
+
+/// Sides of an element: first end, second end, middle.
+fn sides(nodes: &[usize], is_joint: bool) -> Vec<[usize; 3]> {
+    if is_joint {
+        return vec![
+            [nodes[0], nodes[1], nodes[2]],
+            [nodes[3], nodes[4], nodes[5]],
+        ];
+    }
+    let n = nodes.len() / 2;
+    (0..n)
+        .map(|i| [nodes[i], nodes[(i + 1) % n], nodes[n + i]])
+        .collect()
+}
+
+fn is_interface(group: &Group) -> bool {
+    group.formulation != Formulation::Solid
+}
+
+impl Geometry {
+    /// # Errors
+    /// What does not fit.
+    pub(super) fn new(parts: &Parts, simulation: &Simulation) -> Result<Self, Misfit> {
+        let problem = simulation.problem();
+        let (mesh, groups) = (&problem.mesh, simulation.groups());
+        let mut own: HashSet<usize> = HashSet::new();
+        // Element of the pile by the middle of each of its sides.
+        let mut by_side: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
+        for (number, &group) in parts.groups.iter().enumerate() {
+            if is_interface(&groups[group]) {
+                return Err(Misfit::NotSolid(number));
+            }
+            let kinematics = &groups[group].kinematics;
+            for element in 0..kinematics.n_elements() {
+                own.extend(kinematics.nodes(element));
+                for [_, _, middle] in sides(kinematics.nodes(element), false) {
+                    by_side.entry(middle).or_default().push((group, element));
+                }
+            }
+        }
+        let of_line = |line: &Line| -> Vec<usize> {
+            let places: HashSet<[u64; 2]> = line.nodes.iter().map(|&n| place(mesh, n)).collect();
+            let mut nodes: Vec<usize> = own
+                .iter()
+                .copied()
+                .filter(|&node| places.contains(&place(mesh, node)))
+                .collect();
+            nodes.sort_unstable();
+            nodes
+        };
+        let line = |name: &str| mesh.lines.get(name);
+        let head = line(&parts.head).map(of_line).unwrap_or_default();
+        if head.is_empty() {
+            return Err(Misfit::Head);
+        }
+        let facets = |of: &[usize]| facets(problem.analysis, mesh, groups, of, &own, &by_side);
+        for (number, &group) in parts.shaft.iter().enumerate() {
+            if !is_interface(&groups[group]) {
+                return Err(Misfit::NotAnInterface(number));
+            }
+        }
+        let shaft = facets(&parts.shaft);
+        let touches = |group: &usize| shaft.iter().any(|facet| facet.group == *group);
+        if let Some(apart) = parts.shaft.iter().position(|group| !touches(group)) {
+            return Err(Misfit::ApartFromShaft(apart));
+        }
+        let base = match &parts.base {
+            super::Base::Group(group) => {
+                if !is_interface(&groups[*group]) {
+                    return Err(Misfit::BaseNotAnInterface);
+                }
+                let facets = facets(&[*group]);
+                let mut nodes: Vec<usize> = facets.iter().flat_map(|f| f.nodes).collect();
+                nodes.sort_unstable();
+                nodes.dedup();
+                nodes
+            }
+            super::Base::Line(name) => {
+                let nodes = line(name).map(of_line).unwrap_or_default();
+                let inside = nodes
+                    .iter()
+                    .any(|n| by_side.get(n).is_some_and(|e| e.len() > 1));
+                if inside {
+                    return Err(Misfit::BaseInside);
+                }
+                nodes
+            }
+        };
+        if base.is_empty() {
+            return Err(Misfit::Base);
+        }
+        let heights = |nodes: &[usize]| {
+            let at = nodes.iter().map(|&node| mesh.nodes[node][1]);
+            at.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| {
+                [a.min(z), b.max(z)]
+            })
+        };
+        let (top, bottom) = (heights(&head)[1], heights(&base)[0]);
+        if top <= bottom {
+            return Err(Misfit::UpsideDown);
+        }
+        let close = SAME * (top - bottom);
+        let mut stations = vec![top];
+        let mut between: Vec<f64> = shaft.iter().flat_map(|facet| facet.z).collect();
+        between.sort_unstable_by(|a, b| b.total_cmp(a));
+        for z in between {
+            let last = stations.last().copied().unwrap_or(top);
+            if z < last - close && z > bottom + close {
+                stations.push(z);
+            }
+        }
+        stations.push(bottom);
+        let settle = |(number, &z): (usize, &f64)| {
+            if number == 0 {
+                return head.clone();
+            }
+            if number + 1 == stations.len() {
+                return base.clone();
+            }
+            let ends = shaft.iter().flat_map(|facet| &facet.nodes[..2]).copied();
+            let mut nodes: Vec<usize> = ends
+                .filter(|&node| (mesh.nodes[node][1] - z).abs() <= close)
+                .collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            nodes
+        };
+        let settle = stations.iter().enumerate().map(settle).collect();
+        let special: HashSet<usize> = shaft
+            .iter()
+            .flat_map(|facet| facet.nodes)
+            .chain(head.iter().copied())
+            .chain(base.iter().copied())
+            .collect();
+        let mut others: Vec<usize> = own.difference(&special).copied().collect();
+        others.sort_unstable();
+        let x = base.iter().map(|&node| mesh.nodes[node][0]);
+        let [left, right] = x.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+            [a.min(x), b.max(x)]
+        });
+        let width = match problem.analysis {
+            Analysis::Axisymmetric => 2.0 * right,
+            Analysis::PlaneStrain => right - left,
+        };
+        let on_head: HashSet<usize> = head.iter().copied().collect();
+        let mut head_sides = Vec::new();
+        let mut bodies = Vec::new();
+        for &group in &parts.groups {
+            let kinematics = &groups[group].kinematics;
+            let mut of_group = Vec::new();
+            for element in 0..kinematics.n_elements() {
+                let edges = sides(kinematics.nodes(element), false);
+                let outline = edges.iter().flat_map(|[a, _, middle]| [*a, *middle]);
+                let outline: Vec<[f64; 2]> = outline.map(|node| mesh.nodes[node]).collect();
+                of_group.push(Body::new(outline, problem.analysis));
+                for edge in edges {
+                    if edge.iter().all(|node| on_head.contains(node)) {
+                        let [a, b] = [edge[0], edge[1]].map(|node| mesh.nodes[node][0]);
+                        let area = match problem.analysis {
+                            Analysis::Axisymmetric => PI * (a * a - b * b).abs(),
+                            Analysis::PlaneStrain => (a - b).abs(),
+                        };
+                        head_sides.push((area, group, element));
+                    }
+                }
+            }
+            bodies.push((group, of_group));
+        }
+        Ok(Self {
+            head,
+            base,
+            shaft,
+            stations,
+            settle,
+            others,
+            width,
+            head_sides,
+            bodies,
+            analysis: problem.analysis,
+        })
+    }
+
+    /// Length, m.
+    pub(super) fn length(&self) -> f64 {
+        self.stations[0] - self.stations[self.stations.len() - 1]
+    }
+
+    /// Weight of a group above z, kN, with unit weights above and below a water level; `bottom`: of all
+    /// of it.
+    pub(super) fn weight_above(
+        &self,
+        group: usize,
+        z: f64,
+        [dry, wet]: [f64; 2],
+        level: impl Fn(f64) -> Option<f64>,
+    ) -> f64 {
+        let bodies = self.bodies.iter().filter(|(of, _)| *of == group);
+        let bodies = bodies.flat_map(|(_, bodies)| bodies);
+        let weight = |body: &Body| {
+            let above = |z: f64| body.volume_above(z, self.analysis);
+            let all = above(z);
+            if dry.to_bits() == wet.to_bits() || all == 0.0 {
+                return dry * all;
+            }
+            let middle =
+                body.outline.iter().map(|at| at[0]).sum::<f64>() / body.outline.len() as f64;
+            let dry_part = level(middle).map_or(all, |level| above(z.max(level)));
+            dry * dry_part + wet * (all - dry_part)
+        };
+        bodies.map(weight).sum()
+    }
+}
+
+impl Body {
+    fn new(outline: Vec<[f64; 2]>, analysis: Analysis) -> Self {
+        let z = outline.iter().map(|at| at[1]);
+        let z = z.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| {
+            [a.min(z), b.max(z)]
+        });
+        let volume = volume(&outline, analysis);
+        Self { outline, z, volume }
+    }
+
+    fn volume_above(&self, z: f64, analysis: Analysis) -> f64 {
+        if z <= self.z[0] {
+            return self.volume;
+        }
+        if z >= self.z[1] {
+            return 0.0;
+        }
+        let mut kept = Vec::new();
+        for (i, &a) in self.outline.iter().enumerate() {
+            let b = self.outline[(i + 1) % self.outline.len()];
+            if a[1] >= z {
+                kept.push(a);
+            }
+            if (a[1] >= z) != (b[1] >= z) {
+                let t = (z - a[1]) / (b[1] - a[1]);
+                kept.push([a[0] + t * (b[0] - a[0]), z]);
+            }
+        }
+        volume(&kept, analysis)
+    }
+}
+
+/// Volume of a polygon, over the whole turn or a metre deep.
+fn volume(outline: &[[f64; 2]], analysis: Analysis) -> f64 {
+    let pairs = outline.iter().zip(outline.iter().cycle().skip(1));
+    let sum: f64 = pairs
+        .map(|(a, b)| {
+            let cross = a[0] * b[1] - b[0] * a[1];
+            match analysis {
+                Analysis::PlaneStrain => cross / 2.0,
+                Analysis::Axisymmetric => 2.0 * PI * cross * (a[0] + b[0]) / 6.0,
+            }
+        })
+        .sum();
+    sum.abs()
+}
+
+/// Elements of interface groups that touch the pile.
+fn facets(
+    analysis: Analysis,
+    mesh: &Mesh,
+    groups: &[Group],
+    of: &[usize],
+    own: &HashSet<usize>,
+    by_side: &HashMap<usize, Vec<(usize, usize)>>,
+) -> Vec<Facet> {
+    let mut facets = Vec::new();
+    for &number in of {
+        let group = &groups[number];
+        let kinematics = &group.kinematics;
+        let is_joint = group.formulation == Formulation::ZeroThickness;
+        let mut colours: HashMap<usize, Vec<usize>> = HashMap::new();
+        for element in 0..kinematics.n_elements() {
+            let nodes = kinematics.nodes(element);
+            let sides = sides(nodes, is_joint);
+            let at_pile = |[a, b, middle]: &&[usize; 3]| {
+                [a, b, middle].iter().all(|node| own.contains(*node))
+                    && by_side.contains_key(middle)
+            };
+            let Some(&side) = sides.iter().find(at_pile) else {
+                continue;
+            };
+            let axes = kinematics.axes(element);
+            let is_minus = if is_joint {
+                side == sides[0]
+            } else {
+                let middle = |c: usize| {
+                    nodes.iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / nodes.len() as f64
+                };
+                let arm = [0, 1].map(|c| mesh.nodes[side[2]][c] - middle(c));
+                arm[0] * axes.across[0] + arm[1] * axes.across[1] < 0.0
+            };
+            let up = if axes.along[1] < 0.0 { -1.0 } else { 1.0 };
+            let ends = [side[0], side[1]].map(|node| mesh.nodes[node]);
+            let length = (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
+            let area = length
+                * match analysis {
+                    Analysis::Axisymmetric => PI * (ends[0][0] + ends[1][0]),
+                    Analysis::PlaneStrain => 1.0,
+                };
+            let taken: Vec<usize> = nodes
+                .iter()
+                .filter_map(|node| colours.get(node))
+                .flatten()
+                .copied()
+                .collect();
+            let colour = (0..)
+                .find(|colour| !taken.contains(colour))
+                .unwrap_or_default();
+            for &node in nodes {
+                colours.entry(node).or_default().push(colour);
+            }
+            facets.push(Facet {
+                group: number,
+                element,
+                nodes: side,
+                sign: if is_minus { up } else { -up },
+                z: [ends[0][1].min(ends[1][1]), ends[0][1].max(ends[1][1])],
+                area,
+                beside: by_side[&side[2]][0],
+                colour,
+            });
+        }
+    }
+    facets
+}

@@ -1,0 +1,530 @@
+//! `[pile]`: loads that close, what holds along the shaft, resistances, messages.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, DONE, Place};
+use serde_json::Value;
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// A pile of two groups under ground water, wished in place, loaded and pulled.
+pub(crate) const PILE: &str = r#"
+analysis = "axisymmetric"
+water = { level = -1.3 }
+[mesh]
+origin = [0.0, -8.0]
+columns = [{ n = 2, to = 0.4 }, { n = 4, to = 4.0, ratio = 1.5 }]
+rows = [{ n = 3, to = -5.0 }, { n = 2, to = -3.0 }, { n = 3, to = 0.0 }]
+region = [
+  { group = "soil" },
+  { group = "top", r = [0.0, 0.4], z = [-3.0, 0.0] },
+  { group = "foot", r = [0.0, 0.4], z = [-5.0, -3.0] },
+]
+[mesh.lines]
+axis = { r = 0.0 }
+far = { r = 4.0 }
+bottom = { z = -8.0 }
+head = { r = [0.0, 0.4], z = 0.0 }
+upper = { r = 0.4, z = [-3.0, 0.0] }
+lower = { r = 0.4, z = [-5.0, -3.0] }
+base = { r = [0.0, 0.4], z = -5.0 }
+inside = { r = [0.0, 0.4], z = -3.0 }
+[laws]
+ground = { law = "elastic", parameters = { young_modulus = 2e4, poisson_ratio = 0.3 } }
+concrete = { law = "elastic", parameters = { young_modulus = 3e7, poisson_ratio = 0.2 } }
+skin = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_stiffness = 2e5, cohesion = 8.0, friction_angle = 15.0, dilatancy_angle = 0.0 } }
+[groups]
+soil = { formulation = "solid", law = "ground", unit_weight = 17.0, saturated_unit_weight = 20.0, initial_stress = { k_0 = 0.5 } }
+top = { formulation = "solid", law = "ground", unit_weight = 17.0, saturated_unit_weight = 20.0, initial_stress = { k_0 = 0.5 } }
+foot = { formulation = "solid", law = "ground", unit_weight = 17.0, saturated_unit_weight = 20.0, initial_stress = { k_0 = 0.5 } }
+upper = { formulation = "zero_thickness", line = "upper", law = "skin", active = false }
+lower = { formulation = "zero_thickness", line = "lower", law = "skin", active = false }
+toe = { formulation = "zero_thickness", line = "base", law = "skin", active = false }
+[[supports]]
+line = "axis"
+fixed = ["r"]
+[[supports]]
+line = "far"
+fixed = ["r"]
+[[supports]]
+line = "bottom"
+fixed = ["r", "z"]
+[[phase]]
+name = "rest"
+increments = 1
+[[phase]]
+name = "built"
+increments = 3
+laws = { top = "concrete", foot = "concrete" }
+unit_weight = { top = 24.0, foot = 24.0 }
+activate = ["upper", "lower", "toe"]
+[[phase]]
+name = "push"
+increments = 12
+reset_displacements = true
+rigid = ["head"]
+displacement = [{ line = "head", z = -0.09 }]
+[[phase]]
+name = "pull"
+increments = 4
+displacement = [{ line = "head", z = 0.01 }]
+[pile]
+group = ["top", "foot"]
+shaft = ["upper", "lower"]
+base = "toe"
+head = "head"
+"#;
+
+type Row = HashMap<String, String>;
+
+fn rows(path: &Path) -> Vec<Row> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned));
+    let names: Vec<String> = lines.next().unwrap().collect();
+    lines
+        .map(|cells| names.iter().cloned().zip(cells).collect())
+        .collect()
+}
+
+fn value(row: &Row, name: &str) -> f64 {
+    row[name].parse().unwrap()
+}
+
+fn run(text: &str) -> (Place, String) {
+    let place = Place::new();
+    place.write("pile.toml", text);
+    let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    (place, outcome.stdout)
+}
+
+fn summary(place: &Place) -> Value {
+    let text = std::fs::read(place.path("out/summary.json")).unwrap();
+    serde_json::from_slice(&text).unwrap()
+}
+
+/// Head and weight against shaft and base, in every row; the ends of the pile against both.
+fn assert_closes(place: &Place, weight: impl Fn(&Row) -> f64) {
+    let stations = rows(&place.path("out/pile.csv"));
+    for row in rows(&place.path("out/history.csv")) {
+        let load = |part: &str| value(&row, &format!("pile_{part}_load"));
+        let (head, shaft, base) = (load("head"), load("shaft"), load("base"));
+        let scale = 1.0 + head.abs() + shaft.abs() + base.abs();
+        let left = head + weight(&row) - shaft - base;
+        assert!(left.abs() < 1e-9 * scale, "{left} in {row:?}");
+        let same = |other: &&Row| {
+            ["phase", "increment"]
+                .iter()
+                .all(|key| other[*key] == row[*key])
+        };
+        let own: Vec<&Row> = stations.iter().filter(same).collect();
+        let ends = [own[0], own[own.len() - 1]].map(|station| value(station, "axial_force"));
+        assert!((ends[0] - head).abs() < 1e-9 * scale, "{ends:?} in {row:?}");
+        assert!((ends[1] - base).abs() < 1e-9 * scale, "{ends:?} in {row:?}");
+    }
+}
+
+#[test]
+fn head_and_weight_are_shaft_and_base() {
+    let (place, stdout) = run(PILE);
+    let area = PI * 0.16;
+    let built = area * 5.0 * 24.0;
+    let ground = area * (17.0 * 1.3 + 20.0 * 3.7);
+    let weight = |row: &Row| match row["phase"].as_str() {
+        "rest" => ground,
+        "built" => ground + value(row, "increment") / 3.0 * (built - ground),
+        _ => built,
+    };
+    assert_closes(&place, weight);
+    let history = rows(&place.path("out/history.csv"));
+    // At rest all of the weight and of the water's pressure passes through the base, none through the
+    // shaft: not by the interface's own tractions, which is not there yet.
+    let rest = &history[0];
+    assert!(
+        (value(rest, "pile_base_load") - ground).abs() < 1e-9 * ground,
+        "{rest:?}"
+    );
+    assert!(
+        value(rest, "pile_shaft_load").abs() < 1e-9 * ground,
+        "{rest:?}"
+    );
+    let at_rest = rows(&place.path("out/pile.csv"));
+    for station in at_rest.iter().filter(|row| row["phase"] == "rest") {
+        let z = value(station, "z");
+        let above = if z > -1.3 {
+            -17.0 * z
+        } else {
+            17.0 * 1.3 - 20.0 * (z + 1.3)
+        };
+        let pore = 9.81 * (-1.3 - z).max(0.0);
+        let off = |name: &str, expected: f64| {
+            let found = value(station, name);
+            assert!(
+                (found - expected).abs() < 1e-8 * (1.0 + expected),
+                "{name}: {station:?}"
+            );
+        };
+        off("axial_force", area * above);
+        // In the element that the water table cuts, stresses have a kink.
+        if z > -0.5 || z < -2.5 {
+            off("normal_stress", 0.5 * (above - pore));
+        }
+        off("shaft_friction", 0.0);
+        off("slip", 0.0);
+    }
+    // The stations are the ends of the shaft's elements.
+    let z: Vec<f64> = at_rest
+        .iter()
+        .filter(|row| row["phase"] == "rest")
+        .map(|row| value(row, "z"))
+        .collect();
+    let expected = [0.0, -1.0, -2.0, -3.0, -4.0, -5.0];
+    assert!(
+        z.iter().zip(expected).all(|(z, e)| (z - e).abs() < 1e-12),
+        "{z:?}"
+    );
+    assert_eq!(z.len(), expected.len());
+    // Pushed: friction holds the pile up as far as Coulomb's law lets it, and the axial force falls by it.
+    let pushed: Vec<&Row> = at_rest
+        .iter()
+        .filter(|row| row["phase"] == "push" && row["increment"] == "12")
+        .collect();
+    for station in &pushed {
+        let limit = 8.0 + 15.0_f64.to_radians().tan() * value(station, "normal_stress");
+        let friction = value(station, "shaft_friction");
+        // At the toe elastic ground leaves the shaft.
+        let is_toe = value(station, "z") < -4.9;
+        assert!(
+            (friction > 0.0 || is_toe) && friction < limit * (1.0 + 1e-9),
+            "{station:?}"
+        );
+        assert!(value(station, "slip") > 0.0, "{station:?}");
+    }
+    for pair in pushed.windows(2) {
+        let [a, b] = [pair[0], pair[1]].map(|row| value(row, "axial_force"));
+        let own = area * 24.0 * (value(pair[0], "z") - value(pair[1], "z"));
+        assert!(b < a + own, "{pair:?}");
+    }
+    // Pulled: the other way round.
+    let last = history.last().unwrap();
+    assert!(
+        value(last, "pile_head_load") < 0.0 && value(last, "pile_shaft_load") < 0.0,
+        "{last:?}"
+    );
+    assert!(
+        (value(last, "pile_settlement") + 0.01).abs() < 1e-12,
+        "{last:?}"
+    );
+
+    // The criterion at 10 % of the base's width, between two increments, printed with its split.
+    let pile = &summary(&place)["pile"];
+    assert!((pile["diameter"].as_f64().unwrap() - 0.8).abs() < 1e-12);
+    assert_eq!(pile["phase"], "push");
+    let push: Vec<&Row> = history
+        .iter()
+        .filter(|row| row["phase"] == "push")
+        .collect();
+    let [a, b] = [push[9], push[10]]
+        .map(|row| ["pile_settlement", "pile_head_load"].map(|name| value(row, name)));
+    let expected = a[1] + (0.08 - a[0]) / (b[0] - a[0]) * (b[1] - a[1]);
+    let found = pile["resistance_10_percent_diameter"].as_f64().unwrap();
+    assert!(
+        (found - expected).abs() < 1e-9 * expected,
+        "{found} for {expected}"
+    );
+    assert!(
+        stdout.contains(&format!("{found:.1} kN, of it shaft")),
+        "{stdout}"
+    );
+    // Davisson: s = Q L/(E A) + 3.8 mm + D/120, on the straight piece of the curve that it crosses.
+    let davisson = pile["resistance_davisson"].as_f64().unwrap();
+    let s = (davisson - value(&history[3], "pile_head_load")) * 5.0 / (3e7 * area)
+        + 0.0038
+        + 0.8 / 120.0;
+    let before = push
+        .iter()
+        .rposition(|row| value(row, "pile_settlement") < s)
+        .unwrap();
+    let [a, b] = [push[before], push[before + 1]]
+        .map(|row| ["pile_settlement", "pile_head_load"].map(|name| value(row, name)));
+    let expected = a[1] + (s - a[0]) / (b[0] - a[0]) * (b[1] - a[1]);
+    assert!(
+        (davisson - expected).abs() < 1e-8 * expected,
+        "{davisson} for {expected}"
+    );
+}
+
+#[test]
+fn what_the_curve_does_not_reach_has_a_reason() {
+    let (place, stdout) = run(&PILE.replace("z = -0.09", "z = -0.002"));
+    let pile = &summary(&place)["pile"];
+    for name in ["10_percent_diameter", "davisson"] {
+        assert!(pile[format!("resistance_{name}")].is_null(), "{pile}");
+        let reason = pile[format!("resistance_{name}_reason")].as_str().unwrap();
+        assert!(reason.contains("0.002"), "{reason}");
+    }
+    assert!(
+        stdout.contains("no resistance at 10 % of the diameter"),
+        "{stdout}"
+    );
+}
+
+#[test]
+fn both_sides_of_a_pile_in_plane_strain_count() {
+    let both = PILE
+        .replace("analysis = \"axisymmetric\"", "analysis = \"plane_strain\"")
+        .replace("origin = [0.0, -8.0]", "origin = [-4.0, -8.0]")
+        .replace("columns = [{ n = 2, to = 0.4 }", "columns = [{ n = 4, to = -0.4, ratio = 0.6666666666666667 }, { n = 2, to = 0.0 }, { n = 2, to = 0.4 }")
+        .replace("r = [0.0, 0.4]", "x = [-0.4, 0.4]")
+        .replace("axis = { r = 0.0 }", "axis = { x = -4.0 }\nleft = { x = -0.4, z = [-5.0, 0.0] }")
+        .replace(
+            "toe = {",
+            "left = { formulation = \"zero_thickness\", line = \"left\", law = \"skin\", active = false }\ntoe = {",
+        )
+        .replace("[\"upper\", \"lower\", \"toe\"]", "[\"upper\", \"lower\", \"left\", \"toe\"]")
+        .replace("shaft = [\"upper\", \"lower\"]", "shaft = [\"upper\", \"lower\", \"left\"]");
+    let (place, _) = run(&both);
+    let width = 0.8;
+    let built = width * 5.0 * 24.0;
+    let ground = width * (17.0 * 1.3 + 20.0 * 3.7);
+    assert_closes(&place, |row| match row["phase"].as_str() {
+        "rest" => ground,
+        "built" => ground + value(row, "increment") / 3.0 * (built - ground),
+        _ => built,
+    });
+    // One side alone, with the symmetry in the middle, is half of it.
+    let half = PILE.replace("analysis = \"axisymmetric\"", "analysis = \"plane_strain\"");
+    let (one, _) = run(&half);
+    let last = |place: &Place| {
+        let history = rows(&place.path("out/history.csv"));
+        let row = history.iter().rfind(|row| row["phase"] == "push").unwrap();
+        ["pile_head_load", "pile_shaft_load", "pile_base_load"].map(|name| value(row, name))
+    };
+    for (two, one) in last(&place).into_iter().zip(last(&one)) {
+        assert!(
+            (two - 2.0 * one).abs() < 1e-3 * two.abs(),
+            "{two} for twice {one}"
+        );
+    }
+}
+
+/// Pull-out of an elastic bar from rigid surroundings, bond elastic to τ at the slip τ/k and level from
+/// there. P = 2πaτ (x + tanh β(L − x)/β) where the plastic length is x, at the displacement
+/// u = τ/k (1 + βx tanh β(L − x) + β²x²/2), with β² = 2πak/(EA).
+#[test]
+fn a_bar_is_pulled_out_by_its_shear_lag() {
+    let (a, length, modulus, k, tau) = (0.0125, 1.0, 2e8, 2e5, 500.0);
+    let beta = f64::sqrt(2.0 * k / (modulus * a));
+    let text = r#"
+analysis = "axisymmetric"
+[mesh]
+columns = [{ n = 1, to = 0.0125 }, { n = 1, to = 0.05 }]
+rows = [{ n = 80, to = 1.0 }]
+region = [{ group = "rock" }, { group = "bar", r = [0.0, 0.0125] }]
+[mesh.lines]
+wall = { r = 0.0125 }
+outer = { r = 0.05 }
+top = { r = [0.0125, 0.05], z = 1.0 }
+under = { r = [0.0125, 0.05], z = 0.0 }
+head = { r = [0.0, 0.0125], z = 1.0 }
+foot = { r = [0.0, 0.0125], z = 0.0 }
+[laws]
+steel = { law = "elastic", parameters = { young_modulus = 2e8, poisson_ratio = 0.0 } }
+rigid = { law = "elastic", parameters = { young_modulus = 1e13, poisson_ratio = 0.0 } }
+bond = { law = "coulomb_joint", parameters = { normal_stiffness = 1e4, shear_stiffness = 2e5, cohesion = 500.0, friction_angle = 0.0, dilatancy_angle = 0.0 } }
+[groups]
+bar = { formulation = "solid", law = "steel", initial_stress = { stress_11 = -100.0, stress_33 = -100.0 } }
+rock = { formulation = "solid", law = "rigid", initial_stress = { stress_11 = -100.0, stress_33 = -100.0 } }
+bond = { formulation = "zero_thickness", line = "wall", law = "bond" }
+[[supports]]
+line = "outer"
+fixed = ["r", "z"]
+[[supports]]
+line = "top"
+fixed = ["r", "z"]
+[[supports]]
+line = "under"
+fixed = ["r", "z"]
+[[phase]]
+name = "pull"
+increments = 2
+displacement = [{ line = "head", z = 0.0025 }]
+[[phase]]
+name = "on"
+increments = 4
+displacement = [{ line = "head", z = 0.00264869 }]
+[pile]
+group = "bar"
+shaft = "bond"
+base = "foot"
+head = "head"
+"#;
+    let (place, _) = run(text);
+    assert_closes(&place, |_| 0.0);
+    let stations = rows(&place.path("out/pile.csv"));
+    for row in rows(&place.path("out/history.csv")) {
+        let moved = -value(&row, "pile_settlement");
+        // The plastic length by bisection; below τ/k (1 + …) all is elastic.
+        let end = |x: f64| {
+            let (bx, rest) = (beta * x, (beta * (length - x)).tanh());
+            tau / k * (1.0 + bx * rest + bx * bx / 2.0)
+        };
+        let (mut low, mut high) = (0.0, length);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if end(middle) < moved {
+                low = middle
+            } else {
+                high = middle
+            }
+        }
+        let x = low;
+        let force = |x: f64| 2.0 * PI * a * tau * (x + (beta * (length - x)).tanh() / beta);
+        let expected = if moved < tau / k { f64::NAN } else { force(x) };
+        if expected.is_nan() {
+            continue;
+        }
+        let head = value(&row, "pile_head_load");
+        assert!(
+            (head + expected).abs() < 2e-3 * expected,
+            "{head} for {expected}"
+        );
+        assert!(
+            value(&row, "pile_base_load").abs() < 1e-9 * expected,
+            "{row:?}"
+        );
+        let own = stations
+            .iter()
+            .filter(|s| s["phase"] == row["phase"] && s["increment"] == row["increment"]);
+        for station in own {
+            let depth = length - value(station, "z");
+            let (axial, friction) = (
+                value(station, "axial_force"),
+                value(station, "shaft_friction"),
+            );
+            let (n, t) = if depth <= x {
+                (expected - 2.0 * PI * a * tau * depth, tau)
+            } else {
+                let (far, near) = (beta * (length - depth), beta * (length - x));
+                let t = tau * far.cosh() / near.cosh();
+                (2.0 * PI * a * tau * far.sinh() / near.cosh() / beta, t)
+            };
+            assert!(
+                (axial + n).abs() < 4e-3 * expected,
+                "{axial} for {n} at depth {depth}"
+            );
+            assert!(
+                (friction + t).abs() < 1e-2 * tau,
+                "{friction} for {t} at depth {depth}"
+            );
+            assert!(value(station, "slip") <= 0.0, "{station:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_pile_is_told_where_it_is_written() {
+    for (edit, says) in [
+        (
+            ("group = [\"top\", \"foot\"]", "group = [\"top\", \"fot\"]"),
+            "[pile]: there is no group `fot`",
+        ),
+        (
+            ("group = [\"top\", \"foot\"]", "group = \"upper\""),
+            "`upper` is an interface",
+        ),
+        (
+            (
+                "shaft = [\"upper\", \"lower\"]",
+                "shaft = [\"upper\", \"lover\"]",
+            ),
+            "there is no group `lover`",
+        ),
+        (
+            (
+                "shaft = [\"upper\", \"lower\"]",
+                "shaft = [\"upper\", \"soil\"]",
+            ),
+            "`soil` is no interface",
+        ),
+        (
+            ("shaft = [\"upper\", \"lower\"]", "shaft = []"),
+            "`shaft` is an empty list",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"tow\"\n"),
+            "there is neither a group nor a line `tow`",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"soil\"\n"),
+            "`soil` is no interface",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"bottom\"\n"),
+            "`bottom` does not touch the pile's groups",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"inside\"\n"),
+            "`inside` lies inside the pile's groups",
+        ),
+        (
+            ("head = \"head\"\n", "head = \"haed\"\n"),
+            "there is no line `haed`",
+        ),
+        (
+            ("head = \"head\"\n", "head = \"far\"\n"),
+            "`far` has no node of the pile's groups",
+        ),
+        (
+            ("head = \"head\"\n", "head = \"head\"\ndiameter = -1.0\n"),
+            "diameter",
+        ),
+        (
+            (
+                "[pile]",
+                "[probes]\npile_head_load = { line = \"head\", quantity = \"displacement_z\" }\n[pile]",
+            ),
+            "is a column of history.csv already",
+        ),
+    ] {
+        let place = Place::new();
+        assert!(PILE.contains(edit.0), "{edit:?}");
+        let at = PILE.rfind("[pile]").unwrap();
+        let text = PILE[..at].to_owned() + &PILE[at..].replacen(edit.0, edit.1, 1);
+        place.write("pile.toml", text);
+        let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
+        assert_eq!(
+            outcome.code,
+            Some(BAD_INPUT),
+            "{edit:?}: {}",
+            outcome.stderr
+        );
+        assert!(
+            outcome.says(says) && outcome.says("pile.toml:"),
+            "{says}: {}",
+            outcome.stderr
+        );
+    }
+}
+
+#[test]
+fn a_pile_that_is_not_there_has_no_rows() {
+    let text = PILE
+        .replace("[[phase]]\nname = \"pull\"", "[[phase]]\nname = \"gone\"")
+        .replace(
+            "increments = 4\ndisplacement = [{ line = \"head\", z = 0.01 }]",
+            "increments = 2\ndeactivate = [\"top\", \"foot\", \"upper\", \"lower\", \"toe\"]\nfree = [{ line = \"head\", components = [\"z\"] }]",
+        );
+    let (place, _) = run(&text);
+    let history = rows(&place.path("out/history.csv"));
+    let last = history.last().unwrap();
+    assert_eq!(
+        (last["phase"].as_str(), last["pile_head_load"].as_str()),
+        ("gone", "")
+    );
+    assert!(
+        rows(&place.path("out/pile.csv"))
+            .iter()
+            .all(|row| row["phase"] != "gone")
+    );
+}
