@@ -172,8 +172,8 @@ impl Pile {
         let Snapshot {
             groups, problem, ..
         } = snapshot;
-        let there: Vec<usize> = self.parts.groups.iter().copied().collect::<Vec<_>>();
-        let there: Vec<usize> = there.into_iter().filter(|&g| groups[g].is_active).collect();
+        let mut there = self.parts.groups.clone();
+        there.retain(|&group| groups[group].is_active);
         if there.is_empty() {
             return None;
         }
@@ -193,8 +193,8 @@ impl Pile {
         }
         let outer = |node: usize| outer[2 * node + 1];
         let geometry = &self.geometry;
-        let held = self.held(snapshot, &geometry.shaft, n_dofs);
-        let split = Split::new(geometry, held, outer);
+        let held = Self::held(snapshot, &geometry.shaft, n_dofs);
+        let split = Split::new(geometry, &held, outer);
         let weight: f64 = weights.iter().map(|(_, weight)| weight).sum();
         let y = |node: &usize| snapshot.displacement[2 * node + 1];
         let settlements: Vec<f64> = geometry
@@ -252,7 +252,6 @@ impl Pile {
 
     /// What elements of interfaces exert on the pile.
     fn held<'g>(
-        &self,
         snapshot: &Snapshot<'_>,
         facets: &'g [Facet],
         n_dofs: usize,
@@ -276,8 +275,9 @@ impl Pile {
                         let at = group.kinematics.position(point);
                         let pressure = snapshot.acting.pore_pressure(number, snapshot.problem, at);
                         // Of a traction, the normal component.
-                        let normal = &mut flux[..if n == 2 { 1 } else { 3 }];
-                        normal.iter_mut().for_each(|stress| *stress -= pressure);
+                        for stress in &mut flux[..if n == 2 { 1 } else { 3 }] {
+                            *stress -= pressure;
+                        }
                     } else if group.formulation == Formulation::ZeroThickness {
                         flux.copy_from_slice(&beside(snapshot, facet, point));
                     }
@@ -369,13 +369,13 @@ struct Split<'g> {
 }
 
 impl<'g> Split<'g> {
-    fn new(geometry: &'g Geometry, held: Vec<Held<'g>>, outer: impl Fn(usize) -> f64) -> Self {
+    fn new(geometry: &'g Geometry, held: &[Held<'g>], outer: impl Fn(usize) -> f64) -> Self {
         use std::collections::{HashMap, HashSet};
         let head: HashSet<usize> = geometry.head.iter().copied().collect();
         let base: HashSet<usize> = geometry.base.iter().copied().collect();
         // Of every node of the shaft: what its elements exert, and their area.
         let mut at_nodes: HashMap<usize, [f64; 2]> = HashMap::new();
-        for Held { facet, forces } in &held {
+        for Held { facet, forces } in held {
             for (node, force) in facet.nodes.iter().zip(forces) {
                 let at_node = at_nodes.entry(*node).or_default();
                 at_node[0] += force;
