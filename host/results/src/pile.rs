@@ -136,7 +136,7 @@ impl Pile {
     }
 
     /// What it looks at, added to what others do.
-    pub fn looks_at(&self, part: &mut Part) {
+    pub fn looks_at(&self, part: &mut Part, simulation: &Simulation) {
         let Parts {
             groups,
             shaft,
@@ -148,6 +148,11 @@ impl Pile {
         }
         if let Base::Group(group) = base {
             part.groups[*group] = true;
+        }
+        // What the ground exerts at a head whose interface is not there.
+        let starts_closed = |group: &usize| !simulation.problem().groups[*group].is_active;
+        if shaft.iter().any(starts_closed) {
+            part.groups.fill(true);
         }
         let nodes = self.geometry.settle.iter().flatten();
         part.dofs.extend(nodes.map(|node| 2 * node + 1));
@@ -193,7 +198,8 @@ impl Pile {
         }
         let outer = |node: usize| outer[2 * node + 1];
         let geometry = &self.geometry;
-        let held = Self::held(snapshot, &geometry.shaft, n_dofs);
+        let mut held = Self::held(snapshot, &geometry.shaft, n_dofs);
+        self.take_from_ground(snapshot, &mut held, n_dofs);
         let split = Split::new(geometry, &held, outer);
         let weight: f64 = weights.iter().map(|(_, weight)| weight).sum();
         let y = |node: &usize| snapshot.displacement[2 * node + 1];
@@ -291,6 +297,43 @@ impl Pile {
             }));
         }
         held
+    }
+
+    /// Where an interface that is not there begins at the head, its faces are one, and what the ground
+    /// exerts on the pile is known from the ground's own forces.
+    fn take_from_ground(&self, snapshot: &Snapshot<'_>, held: &mut [Held<'_>], n_dofs: usize) {
+        let head = &self.geometry.head;
+        let mut taken: Option<Vec<f64>> = None;
+        for Held { facet, forces } in held {
+            let Some(opposite) = facet.opposite.filter(|_| !snapshot.groups[facet.group].is_active)
+            else {
+                continue;
+            };
+            for (i, node) in facet.nodes.iter().enumerate() {
+                if head.contains(node) {
+                    let outer = taken.get_or_insert_with(|| self.outer_of_ground(snapshot, n_dofs));
+                    forces[i] = -outer[2 * opposite[i] + 1];
+                }
+            }
+        }
+    }
+
+    /// What acts from outside on all solids but the pile, by degree of freedom.
+    fn outer_of_ground(&self, snapshot: &Snapshot<'_>, n_dofs: usize) -> Vec<f64> {
+        let mut outer = vec![0.0; n_dofs];
+        for (number, group) in snapshot.groups.iter().enumerate() {
+            let is_joint = group.formulation == Formulation::ZeroThickness;
+            if !group.is_active || is_joint || self.parts.groups.contains(&number) {
+                continue;
+            }
+            let weight = snapshot.acting.weight_of(number, snapshot.problem, group);
+            let pores = snapshot.acting.pore_forces_of(number, snapshot.problem, group);
+            let forces = group.forces(n_dofs).into_iter().zip(pores).zip(weight);
+            for (outer, ((force, pore), weight)) in outer.iter_mut().zip(forces) {
+                *outer += force - pore - weight;
+            }
+        }
+        outer
     }
 
     /// Friction, effective normal stress (compression positive) and slip at a station: the means over the

@@ -41,6 +41,8 @@ pub(super) struct Facet {
     pub(super) element: usize,
     /// The pile's nodes on it: two ends and the middle.
     pub(super) nodes: [usize; 3],
+    /// Of a zero-thickness element, the nodes of the ground opposite them.
+    pub(super) opposite: Option<[usize; 3]>,
     /// The tangential traction is positive where it holds the pile up (1) or draws it down (−1).
     pub(super) sign: f64,
     /// Lowest and highest z.
@@ -429,6 +431,7 @@ fn facets(
                 group: number,
                 element,
                 nodes: side,
+                opposite: is_joint.then(|| sides[usize::from(is_minus)]),
                 sign: if is_minus { up } else { -up },
                 z: [ends[0][1].min(ends[1][1]), ends[0][1].max(ends[1][1])],
                 area,
