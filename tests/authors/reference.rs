@@ -342,6 +342,7 @@ fn every_example_runs() {
             let name = table.text.lines().next().unwrap();
             let name = name.strip_prefix("# ").unwrap();
             fs::write(place.path().join(name), &table.text).unwrap();
+        }
         for mesh in blocks(&text).iter().filter(|b| b.language == "msh") {
             let name = mesh.text.lines().next().unwrap().strip_prefix("# ");
             fs::write(place.path().join(name.unwrap()), &mesh.text).unwrap();
