@@ -140,7 +140,7 @@ impl Pile {
     }
 
     /// What it looks at, added to what others do.
-    pub fn looks_at(&self, part: &mut Part) {
+    pub fn looks_at(&self, part: &mut Part, simulation: &Simulation) {
         let Parts {
             groups,
             shaft,
@@ -152,6 +152,11 @@ impl Pile {
         }
         if let Base::Group(group) = base {
             part.groups[*group] = true;
+        }
+        // What the ground exerts at a head whose interface is not there.
+        let starts_closed = |group: &usize| !simulation.problem().groups[*group].is_active;
+        if shaft.iter().any(starts_closed) {
+            part.groups.fill(true);
         }
         let nodes = self.geometry.settle.iter().flatten();
         part.dofs.extend(nodes.map(|node| 2 * node + 1));
@@ -176,8 +181,8 @@ impl Pile {
         let Snapshot {
             groups, problem, ..
         } = snapshot;
-        let there: Vec<usize> = self.parts.groups.iter().copied().collect::<Vec<_>>();
-        let there: Vec<usize> = there.into_iter().filter(|&g| groups[g].is_active).collect();
+        let mut there = self.parts.groups.clone();
+        there.retain(|&group| groups[group].is_active);
         if there.is_empty() {
             return None;
         }
@@ -197,8 +202,9 @@ impl Pile {
         }
         let outer = |node: usize| outer[2 * node + 1];
         let geometry = &self.geometry;
-        let held = self.held(snapshot, &geometry.shaft, n_dofs);
-        let split = Split::new(geometry, held, outer);
+        let mut held = Self::held(snapshot, &geometry.shaft, n_dofs);
+        self.take_from_ground(snapshot, &mut held, n_dofs);
+        let split = Split::new(geometry, &held, outer);
         let weight: f64 = weights.iter().map(|(_, weight)| weight).sum();
         let y = |node: &usize| snapshot.displacement[2 * node + 1];
         let settlements: Vec<f64> = geometry
@@ -264,12 +270,7 @@ impl Pile {
     }
 
     /// What elements of interfaces exert on the pile.
-    fn held<'g>(
-        &self,
-        snapshot: &Snapshot<'_>,
-        facets: &'g [Facet],
-        n_dofs: usize,
-    ) -> Vec<Held<'g>> {
+    fn held<'g>(snapshot: &Snapshot<'_>, facets: &'g [Facet], n_dofs: usize) -> Vec<Held<'g>> {
         let mut held = Vec::new();
         let mut passes: Vec<(usize, usize)> = facets
             .iter()
@@ -295,8 +296,9 @@ impl Pile {
                         let at = group.kinematics.position(point);
                         let pressure = snapshot.acting.pore_pressure(number, snapshot.problem, at);
                         // Of a traction, the normal component.
-                        let normal = &mut flux[..if n == 2 { 1 } else { 3 }];
-                        normal.iter_mut().for_each(|stress| *stress -= pressure);
+                        for stress in &mut flux[..if n == 2 { 1 } else { 3 }] {
+                            *stress -= pressure;
+                        }
                     } else if group.formulation == Formulation::ZeroThickness {
                         flux.copy_from_slice(&beside(snapshot, facet, point));
                     }
@@ -310,6 +312,47 @@ impl Pile {
             }));
         }
         held
+    }
+
+    /// Where an interface that is not there begins at the head, its faces are one, and what the ground
+    /// exerts on the pile is known from the ground's own forces.
+    fn take_from_ground(&self, snapshot: &Snapshot<'_>, held: &mut [Held<'_>], n_dofs: usize) {
+        let head = &self.geometry.head;
+        let mut taken: Option<Vec<f64>> = None;
+        for Held { facet, forces } in held {
+            let Some(opposite) = facet
+                .opposite
+                .filter(|_| !snapshot.groups[facet.group].is_active)
+            else {
+                continue;
+            };
+            for (i, node) in facet.nodes.iter().enumerate() {
+                if head.contains(node) {
+                    let outer = taken.get_or_insert_with(|| self.outer_of_ground(snapshot, n_dofs));
+                    forces[i] = -outer[2 * opposite[i] + 1];
+                }
+            }
+        }
+    }
+
+    /// What acts from outside on all solids but the pile, by degree of freedom.
+    fn outer_of_ground(&self, snapshot: &Snapshot<'_>, n_dofs: usize) -> Vec<f64> {
+        let mut outer = vec![0.0; n_dofs];
+        for (number, group) in snapshot.groups.iter().enumerate() {
+            let is_joint = group.formulation == Formulation::ZeroThickness;
+            if !group.is_active || is_joint || self.parts.groups.contains(&number) {
+                continue;
+            }
+            let weight = snapshot.acting.weight_of(number, snapshot.problem, group);
+            let pores = snapshot
+                .acting
+                .pore_forces_of(number, snapshot.problem, group);
+            let forces = group.forces(n_dofs).into_iter().zip(pores).zip(weight);
+            for (outer, ((force, pore), weight)) in outer.iter_mut().zip(forces) {
+                *outer += force - pore - weight;
+            }
+        }
+        outer
     }
 
     /// Friction, effective normal stress (compression positive) and slip at a station: the means over the
@@ -397,13 +440,13 @@ struct Split<'g> {
 }
 
 impl<'g> Split<'g> {
-    fn new(geometry: &'g Geometry, held: Vec<Held<'g>>, outer: impl Fn(usize) -> f64) -> Self {
+    fn new(geometry: &'g Geometry, held: &[Held<'g>], outer: impl Fn(usize) -> f64) -> Self {
         use std::collections::{HashMap, HashSet};
         let head: HashSet<usize> = geometry.head.iter().copied().collect();
         let base: HashSet<usize> = geometry.base.iter().copied().collect();
         // Of every node of the shaft: what its elements exert, and their area.
         let mut at_nodes: HashMap<usize, [f64; 2]> = HashMap::new();
-        for Held { facet, forces } in &held {
+        for Held { facet, forces } in held {
             for (node, force) in facet.nodes.iter().zip(forces) {
                 let at_node = at_nodes.entry(*node).or_default();
                 at_node[0] += force;

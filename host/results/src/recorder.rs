@@ -257,7 +257,7 @@ impl Recorder {
         let points = Points::begin(folder, settings.points, simulation, from)?;
         let mut looked_at = wanted.probes.looks_at(simulation.groups());
         if let Some(pile) = &wanted.pile {
-            pile.looks_at(&mut looked_at);
+            pile.looks_at(&mut looked_at, simulation);
         }
         let history = Table::begin(folder.join("history.csv"), columns, history_from)?;
         let resets = simulation

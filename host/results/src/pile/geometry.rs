@@ -41,6 +41,8 @@ pub(super) struct Facet {
     pub(super) element: usize,
     /// The pile's nodes on it: two ends and the middle.
     pub(super) nodes: [usize; 3],
+    /// Of a zero-thickness element, the nodes of the ground opposite them.
+    pub(super) opposite: Option<[usize; 3]>,
     /// The tangential traction is positive where it holds the pile up (1) or draws it down (−1).
     pub(super) sign: f64,
     /// Lowest and highest z.
@@ -62,6 +64,11 @@ struct Body {
     volume: f64,
 }
 
+/// Elements of a group, by its number.
+type OfGroup = (usize, Vec<Body>);
+/// A side of the head: area, m² (plane strain: m), group and element.
+type Side = (f64, usize, usize);
+
 /// The pile within the mesh.
 #[derive(Debug)]
 pub(super) struct Geometry {
@@ -77,8 +84,8 @@ pub(super) struct Geometry {
     /// Diameter (plane strain: width) of the base, m.
     pub(super) width: f64,
     /// Sides of the head: area and the pile's element there.
-    pub(super) head_sides: Vec<(f64, usize, usize)>,
-    bodies: Vec<(usize, Vec<Body>)>,
+    pub(super) head_sides: Vec<Side>,
+    bodies: Vec<OfGroup>,
     pub(super) analysis: Analysis,
 }
 
@@ -152,28 +159,13 @@ impl Geometry {
         if let Some(apart) = parts.shaft.iter().position(|group| !touches(group)) {
             return Err(Misfit::ApartFromShaft(apart));
         }
-        let base = match &parts.base {
-            super::Base::Group(group) => {
-                if !is_interface(&groups[*group]) {
-                    return Err(Misfit::BaseNotAnInterface);
-                }
-                let facets = facets(&[*group]);
-                let mut nodes: Vec<usize> = facets.iter().flat_map(|f| f.nodes).collect();
-                nodes.sort_unstable();
-                nodes.dedup();
-                nodes
-            }
-            super::Base::Line(name) => {
-                let nodes = line(name).map(of_line).unwrap_or_default();
-                let inside = nodes
-                    .iter()
-                    .any(|n| by_side.get(n).is_some_and(|e| e.len() > 1));
-                if inside {
-                    return Err(Misfit::BaseInside);
-                }
-                nodes
-            }
-        };
+        let base = base(
+            parts,
+            groups,
+            |name| line(name).map(of_line),
+            facets,
+            &by_side,
+        )?;
         if base.is_empty() {
             return Err(Misfit::Base);
         }
@@ -187,33 +179,8 @@ impl Geometry {
         if top <= bottom {
             return Err(Misfit::UpsideDown);
         }
-        let close = SAME * (top - bottom);
-        let mut stations = vec![top];
-        let mut between: Vec<f64> = shaft.iter().flat_map(|facet| facet.z).collect();
-        between.sort_unstable_by(|a, b| b.total_cmp(a));
-        for z in between {
-            let last = stations.last().copied().unwrap_or(top);
-            if z < last - close && z > bottom + close {
-                stations.push(z);
-            }
-        }
-        stations.push(bottom);
-        let settle = |(number, &z): (usize, &f64)| {
-            if number == 0 {
-                return head.clone();
-            }
-            if number + 1 == stations.len() {
-                return base.clone();
-            }
-            let ends = shaft.iter().flat_map(|facet| &facet.nodes[..2]).copied();
-            let mut nodes: Vec<usize> = ends
-                .filter(|&node| (mesh.nodes[node][1] - z).abs() <= close)
-                .collect();
-            nodes.sort_unstable();
-            nodes.dedup();
-            nodes
-        };
-        let settle = stations.iter().enumerate().map(settle).collect();
+        let stations = stations([top, bottom], &shaft);
+        let settle = settle(mesh, &stations, &shaft, [&head, &base]);
         let special: HashSet<usize> = shaft
             .iter()
             .flat_map(|facet| facet.nodes)
@@ -230,30 +197,7 @@ impl Geometry {
             Analysis::Axisymmetric => 2.0 * right,
             Analysis::PlaneStrain => right - left,
         };
-        let on_head: HashSet<usize> = head.iter().copied().collect();
-        let mut head_sides = Vec::new();
-        let mut bodies = Vec::new();
-        for &group in &parts.groups {
-            let kinematics = &groups[group].kinematics;
-            let mut of_group = Vec::new();
-            for element in 0..kinematics.n_elements() {
-                let edges = sides(kinematics.nodes(element), false);
-                let outline = edges.iter().flat_map(|[a, _, middle]| [*a, *middle]);
-                let outline: Vec<[f64; 2]> = outline.map(|node| mesh.nodes[node]).collect();
-                of_group.push(Body::new(outline, problem.analysis));
-                for edge in edges {
-                    if edge.iter().all(|node| on_head.contains(node)) {
-                        let [a, b] = [edge[0], edge[1]].map(|node| mesh.nodes[node][0]);
-                        let area = match problem.analysis {
-                            Analysis::Axisymmetric => PI * (a * a - b * b).abs(),
-                            Analysis::PlaneStrain => (a - b).abs(),
-                        };
-                        head_sides.push((area, group, element));
-                    }
-                }
-            }
-            bodies.push((group, of_group));
-        }
+        let (bodies, head_sides) = bodies(problem.analysis, mesh, groups, &parts.groups, &head);
         Ok(Self {
             head,
             base,
@@ -346,6 +290,114 @@ fn volume(outline: &[[f64; 2]], analysis: Analysis) -> f64 {
     sum.abs()
 }
 
+/// Nodes of the pile at its base.
+fn base(
+    parts: &Parts,
+    groups: &[Group],
+    of_line: impl Fn(&str) -> Option<Vec<usize>>,
+    facets: impl Fn(&[usize]) -> Vec<Facet>,
+    by_side: &HashMap<usize, Vec<(usize, usize)>>,
+) -> Result<Vec<usize>, Misfit> {
+    match &parts.base {
+        super::Base::Group(group) => {
+            if !is_interface(&groups[*group]) {
+                return Err(Misfit::BaseNotAnInterface);
+            }
+            let facets = facets(&[*group]);
+            let mut nodes: Vec<usize> = facets.iter().flat_map(|f| f.nodes).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            Ok(nodes)
+        }
+        super::Base::Line(name) => {
+            let nodes = of_line(name).unwrap_or_default();
+            let is_inside = |node: &usize| by_side.get(node).is_some_and(|sides| sides.len() > 1);
+            if nodes.iter().any(is_inside) {
+                return Err(Misfit::BaseInside);
+            }
+            Ok(nodes)
+        }
+    }
+}
+
+/// The ends of the pile, and of the elements of its shaft between them, from the head down.
+fn stations([top, bottom]: [f64; 2], shaft: &[Facet]) -> Vec<f64> {
+    let close = SAME * (top - bottom);
+    let mut stations = vec![top];
+    let mut between: Vec<f64> = shaft.iter().flat_map(|facet| facet.z).collect();
+    between.sort_unstable_by(|a, b| b.total_cmp(a));
+    for z in between {
+        let last = stations.last().copied().unwrap_or(top);
+        if z < last - close && z > bottom + close {
+            stations.push(z);
+        }
+    }
+    stations.push(bottom);
+    stations
+}
+
+/// By station, the nodes whose settlement it has.
+fn settle(
+    mesh: &Mesh,
+    stations: &[f64],
+    shaft: &[Facet],
+    [head, base]: [&Vec<usize>; 2],
+) -> Vec<Vec<usize>> {
+    let last = stations.len() - 1;
+    let close = SAME * (stations[0] - stations[last]);
+    let of_station = |(number, &z): (usize, &f64)| {
+        if number == 0 {
+            return head.clone();
+        }
+        if number == last {
+            return base.clone();
+        }
+        let ends = shaft.iter().flat_map(|facet| &facet.nodes[..2]).copied();
+        let mut nodes: Vec<usize> = ends
+            .filter(|&node| (mesh.nodes[node][1] - z).abs() <= close)
+            .collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    };
+    stations.iter().enumerate().map(of_station).collect()
+}
+
+/// The elements of groups, by group, and the sides of the head: area, group and element.
+fn bodies(
+    analysis: Analysis,
+    mesh: &Mesh,
+    groups: &[Group],
+    of: &[usize],
+    head: &[usize],
+) -> (Vec<OfGroup>, Vec<Side>) {
+    let on_head: HashSet<usize> = head.iter().copied().collect();
+    let mut head_sides = Vec::new();
+    let mut bodies = Vec::new();
+    for &group in of {
+        let kinematics = &groups[group].kinematics;
+        let mut of_group = Vec::new();
+        for element in 0..kinematics.n_elements() {
+            let edges = sides(kinematics.nodes(element), false);
+            let outline = edges.iter().flat_map(|[a, _, middle]| [*a, *middle]);
+            let outline: Vec<[f64; 2]> = outline.map(|node| mesh.nodes[node]).collect();
+            of_group.push(Body::new(outline, analysis));
+            for edge in edges {
+                if edge.iter().all(|node| on_head.contains(node)) {
+                    let [a, b] = [edge[0], edge[1]].map(|node| mesh.nodes[node][0]);
+                    let area = match analysis {
+                        Analysis::Axisymmetric => PI * (a * a - b * b).abs(),
+                        Analysis::PlaneStrain => (a - b).abs(),
+                    };
+                    head_sides.push((area, group, element));
+                }
+            }
+        }
+        bodies.push((group, of_group));
+    }
+    (bodies, head_sides)
+}
+
 /// Elements of interface groups that touch the pile.
 fn facets(
     analysis: Analysis,
@@ -395,7 +447,8 @@ fn facets(
                 .flatten()
                 .copied()
                 .collect();
-            let colour = (0..)
+            let mut colours_left = 0..=taken.len();
+            let colour = colours_left
                 .find(|colour| !taken.contains(colour))
                 .unwrap_or_default();
             for &node in nodes {
@@ -405,6 +458,7 @@ fn facets(
                 group: number,
                 element,
                 nodes: side,
+                opposite: is_joint.then(|| sides[usize::from(is_minus)]),
                 sign: if is_minus { up } else { -up },
                 z: [ends[0][1].min(ends[1][1]), ends[0][1].max(ends[1][1])],
                 area,
