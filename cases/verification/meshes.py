@@ -115,8 +115,8 @@ def thick_sphere():
         lines = {"equator": row(n, 0), "axis": row(n, 2 * m), "inner": column(m, 0), "outer": column(m, 2 * n)}
         points = [("inner_end", (0, 0)), ("outer_end", (2 * n, 0))]
         write(f"thick_sphere/quads_{n}.msh", n, m, place, lambda a, b: "ground", lines, points=points)
-        if n == 4:
-            write("thick_sphere/triangles_4.msh", n, m, place, lambda a, b: "ground", lines, True, points)
+        if n > 2:
+            write(f"thick_sphere/triangles_{n}.msh", n, m, place, lambda a, b: "ground", lines, True, points)
 
 
 def ring(path, n, m, triangles):

@@ -41,7 +41,7 @@ fn thick_cylinder() {
 fn thick_sphere() {
     let results = run("thick_sphere");
     let (a, b, p, young) = (1.0_f64, 2.0_f64, 100.0, 3e4);
-    for (mesh, bound) in [("quads_2", 0.01), ("quads_4", 0.001), ("quads_8", 2e-4), ("triangles_4", 0.05)] {
+    for (mesh, bound) in [("quads_2", 0.01), ("quads_4", 0.001), ("quads_8", 2e-4), ("triangles_4", 0.03), ("triangles_8", 0.01)] {
         for nu in [0.3, 0.4999] {
             let scale = p * a.powi(3) / (young * (b.powi(3) - a.powi(3)));
             let u = |r: f64| scale * ((1.0 - 2.0 * nu) * r + (1.0 + nu) * b.powi(3) / (2.0 * r * r));
@@ -95,7 +95,7 @@ fn flexible_disc() {
     let (q, a, young, nu) = (100.0, 1.0_f64, 2.6e4, 0.3_f64);
     let centre = 2.0 * q * a * (1.0 - nu * nu) / young;
     let edge = centre * 2.0 / PI;
-    for (variant, bound, of_stress) in [("coarse", 0.02, 0.15), ("fine", 0.007, 0.04)] {
+    for (variant, bound, of_stress) in [("coarse", 0.02, 0.15), ("fine", 0.007, 0.01)] {
         // The ground ends at 200 radii: both settle less by about q π a² (1 − ν²)/(π E 200 a), 0.25 % of the centre's.
         results.near(&format!("{variant}, centre"), results.last(variant, "centre"), centre, centre, bound);
         results.near(&format!("{variant}, edge"), results.last(variant, "edge"), edge, edge, bound);
@@ -103,7 +103,7 @@ fn flexible_disc() {
         results.near(&format!("{variant}, difference"), difference, centre - edge, centre - edge, bound);
         // Below the middle, where what the points are beside the axis counts for little.
         let rows = results.rows(variant, "points.csv");
-        let near = rows.iter().filter(|row| number(row, "x") < 0.1 && (-6.0..-0.5).contains(&number(row, "y")));
+        let near = rows.iter().filter(|row| variant == "fine" && number(row, "x") < 0.1 && (-6.0..-0.5).contains(&number(row, "y")));
         let errors = near.map(|row| {
             let depth = -number(row, "y");
             let exact = -q * (1.0 - (1.0 + (a / depth).powi(2)).powf(-1.5));
