@@ -154,6 +154,17 @@ fn pile_in_clay() {
 }
 
 #[test]
+fn pile_in_sand() {
+    let results = run_some("pile_in_sand", &["first_centimetre"]);
+    let end = |probe| results.last("first_centimetre", probe);
+    let weight = 18.0 * 8.0 * PI * 0.25;
+    results.near("balance", end("head") + weight, end("shaft") + end("base"), 1e3, 1e-6);
+    // No more friction than tan 25° of the stress on the shaft, and nearly all of it slides.
+    let mobilised = end("shaft") / (end("normal") * 25.0_f64.to_radians().tan());
+    results.within("mobilised friction", mobilised - 1.0, -0.1, 1e-9);
+}
+
+#[test]
 fn course_of_loading() {
     let results = run("course_of_loading");
     let ground = Elastic { young: 1e4, poisson: 0.3 };
