@@ -50,9 +50,9 @@ fn cylinder_mohr_coulomb() {
 fn cavity_expansion() {
     let results = run("cavity_expansion");
     let (g, c, at_rest, b) = (1000.0, 10.0, 50.0, 30.0_f64);
-    // Without volume change u r is the same everywhere, and yields up to R² = G u a/c … twice the strain is 2u/a.
+    // Without volume change u r is the same everywhere: γ = 2 u a/r² is c/G at R² = 2 G u a/c.
     let pressure = |u: f64| {
-        let square = (2.0 * g * u / (2.0 * c) * 2.0).max(1.0);
+        let square = (2.0 * g * u / c).max(1.0);
         at_rest + c * (1.0 - square / (b * b)) + c * square.ln()
     };
     for (variant, bound) in [
