@@ -25,20 +25,38 @@ fn layers_with_water() {
     };
     for variant in ["quads", "plane"] {
         // Against the settlement that the weight would cause, some 2 cm.
-        results.near(&format!("{variant}, u_y"), results.last(variant, "u_y"), 0.0, 0.02, ROUND_OFF);
+        results.near(
+            &format!("{variant}, u_y"),
+            results.last(variant, "u_y"),
+            0.0,
+            0.02,
+            ROUND_OFF,
+        );
         let rows = results.rows(variant, "points.csv");
         let errors = rows.iter().map(|row| {
             let layer = layers.iter().find(|layer| layer.0 == row["group"]).unwrap();
             let vertical = -effective(number(row, "y"));
-            let errors = [("22", 1.0), ("11", layer.5), ("33", layer.5), ("12", 0.0)]
-                .map(|(component, ratio)| number(row, &format!("stress_{component}")) - ratio * vertical);
+            let errors = [("22", 1.0), ("11", layer.5), ("33", layer.5), ("12", 0.0)].map(
+                |(component, ratio)| number(row, &format!("stress_{component}")) - ratio * vertical,
+            );
             errors.into_iter().map(f64::abs).fold(0.0, f64::max)
         });
         // Of the 140 kPa at the bottom.
-        results.within(&format!("{variant}, stress"), errors.fold(0.0, f64::max) / 140.0, 0.0, 10.0 * ROUND_OFF);
+        results.within(
+            &format!("{variant}, stress"),
+            errors.fold(0.0, f64::max) / 140.0,
+            0.0,
+            10.0 * ROUND_OFF,
+        );
     }
     let weight = 6.0 * (-WATER * level.mul_add(-1.0, -12.0) + effective(-12.0));
-    results.near("plane, reaction", results.last("plane", "weight"), weight, weight, 10.0 * ROUND_OFF);
+    results.near(
+        "plane, reaction",
+        results.last("plane", "weight"),
+        weight,
+        weight,
+        10.0 * ROUND_OFF,
+    );
 }
 
 #[test]
@@ -57,7 +75,13 @@ fn earth_pressure_at_rest() {
         ("surcharge", one, none(0.0), 0.0, 40.0),
     ];
     for (variant, ocr, pop, nu, surcharge) in histories {
-        results.near(&format!("{variant}, u_y"), results.last(variant, "u_y"), 0.0, 0.02, ROUND_OFF);
+        results.near(
+            &format!("{variant}, u_y"),
+            results.last(variant, "u_y"),
+            0.0,
+            0.02,
+            ROUND_OFF,
+        );
         let rows = results.rows(variant, "points.csv");
         let errors = rows.iter().map(|row| {
             let z = number(row, "y");
@@ -68,27 +92,50 @@ fn earth_pressure_at_rest() {
                 .map(|(component, exact)| number(row, &format!("stress_{component}")) + exact);
             errors.into_iter().map(f64::abs).fold(0.0, f64::max)
         });
-        results.within(&format!("{variant}, stress"), errors.fold(0.0, f64::max) / 180.0, 0.0, 10.0 * ROUND_OFF);
+        results.within(
+            &format!("{variant}, stress"),
+            errors.fold(0.0, f64::max) / 180.0,
+            0.0,
+            10.0 * ROUND_OFF,
+        );
     }
 }
 
 #[test]
 fn excavation() {
     let results = run("excavation");
-    let ground = Elastic { young: 2e4, poisson: 0.3 };
+    let ground = Elastic {
+        young: 2e4,
+        poisson: 0.3,
+    };
     let heave = 18.0 * 4.0 * 6.0 / ground.oedometric();
     let end = |phase, probe| results.end("", phase, probe);
     results.near("heave", end("dig", "heave"), heave, heave, 10.0 * ROUND_OFF);
-    results.near("weight left", end("dig", "reaction"), 2.0 * 18.0 * 6.0, 216.0, 10.0 * ROUND_OFF);
+    results.near(
+        "weight left",
+        end("dig", "reaction"),
+        2.0 * 18.0 * 6.0,
+        216.0,
+        10.0 * ROUND_OFF,
+    );
     // The weight comes back, and with it the settlement.
     results.near("filled", end("fill", "heave"), 0.0, heave, 10.0 * ROUND_OFF);
-    results.near("weight back", end("fill", "reaction"), 360.0, 360.0, 10.0 * ROUND_OFF);
+    results.near(
+        "weight back",
+        end("fill", "reaction"),
+        360.0,
+        360.0,
+        10.0 * ROUND_OFF,
+    );
 }
 
 #[test]
 fn undrained_column() {
     let results = run("undrained_column");
-    let ground = Elastic { young: 4e3, poisson: 0.3 };
+    let ground = Elastic {
+        young: 4e3,
+        poisson: 0.3,
+    };
     let (q, height, nu_u) = (100.0, 5.0, 0.49);
     let pores = 2.0 * ground.shear() * (1.0 + nu_u) / (3.0 * (1.0 - 2.0 * nu_u)) - ground.bulk();
     let undrained = ground.oedometric() + pores;
@@ -98,7 +145,13 @@ fn undrained_column() {
             let settlement = q * height / modulus;
             let what = format!("{variant}, {phase}");
             // Poisson's ratio of 0.49 takes one digit more.
-            results.near(&format!("{what}, settlement"), end("settlement"), settlement, settlement, 1e-11);
+            results.near(
+                &format!("{what}, settlement"),
+                end("settlement"),
+                settlement,
+                settlement,
+                1e-11,
+            );
             // The excess pressure is what the skeleton does not carry.
             let effective = -q * ground.oedometric() / modulus;
             for probe in ["effective_min", "effective_max"] {
@@ -111,17 +164,42 @@ fn undrained_column() {
 #[test]
 fn water_table() {
     let results = run("water_table");
-    let ground = Elastic { young: 1e4, poisson: 0.3 };
+    let ground = Elastic {
+        young: 1e4,
+        poisson: 0.3,
+    };
     // Effective stress: + (γ_w − (γ_sat − γ)) for every metre between the levels.
     let rise = WATER - 3.0;
     let settlement = rise * 3.0 * (1.5 + 6.0) / ground.oedometric();
     // Where a level is inside an element, its load is not integrated exactly.
-    for (variant, bound) in [("levels_at_edges", 1e-11), ("levels_inside", 0.012), ("levels_inside_fine", 1e-3)] {
+    for (variant, bound) in [
+        ("levels_at_edges", 1e-11),
+        ("levels_inside", 0.012),
+        ("levels_inside_fine", 1e-3),
+    ] {
         let end = |phase, probe| results.end(variant, phase, probe);
-        results.near(&format!("{variant}, rest"), end("rest", "settlement"), 0.0, settlement, ROUND_OFF * 10.0);
-        results.near(variant, end("draw_down", "settlement"), settlement, settlement, bound);
+        results.near(
+            &format!("{variant}, rest"),
+            end("rest", "settlement"),
+            0.0,
+            settlement,
+            ROUND_OFF * 10.0,
+        );
+        results.near(
+            variant,
+            end("draw_down", "settlement"),
+            settlement,
+            settlement,
+            bound,
+        );
         let weight = 17.0 * 4.0 + 20.0 * 6.0;
-        results.near(&format!("{variant}, weight"), end("draw_down", "weight"), weight, weight, 10.0 * ROUND_OFF);
+        results.near(
+            &format!("{variant}, weight"),
+            end("draw_down", "weight"),
+            weight,
+            weight,
+            10.0 * ROUND_OFF,
+        );
     }
 }
 
@@ -131,7 +209,13 @@ fn lake() {
     for variant in ["quads", "triangles"] {
         for probe in ["u_x", "u_y"] {
             // Against the millimetre that the slope moved to come to equilibrium.
-            results.near(&format!("{variant}, {probe}"), results.last(variant, probe), 0.0, 1e-3, 1e-11);
+            results.near(
+                &format!("{variant}, {probe}"),
+                results.last(variant, probe),
+                0.0,
+                1e-3,
+                1e-11,
+            );
         }
         let rows = results.rows(variant, "points.csv");
         let of = |phase| rows.iter().filter(move |row| row["phase"] == phase);
@@ -140,7 +224,12 @@ fn lake() {
                 .map(|component| (number(before, component) - number(after, component)).abs())
         });
         // Effective stresses stay; of the 50 kPa of water that came.
-        results.within(&format!("{variant}, stress"), errors.fold(0.0, f64::max) / 50.0, 0.0, 1e-11);
+        results.within(
+            &format!("{variant}, stress"),
+            errors.fold(0.0, f64::max) / 50.0,
+            0.0,
+            1e-11,
+        );
     }
 }
 
@@ -159,6 +248,12 @@ fn law_swap() {
         ("swap_again", second),
         ("unload", third),
     ] {
-        results.near(phase, results.end("", phase, "settlement"), exact, first, 10.0 * ROUND_OFF);
+        results.near(
+            phase,
+            results.end("", phase, "settlement"),
+            exact,
+            first,
+            10.0 * ROUND_OFF,
+        );
     }
 }

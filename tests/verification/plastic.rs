@@ -39,10 +39,18 @@ fn cylinder_mohr_coulomb() {
         let outer = results.history(variant, "outer");
         let pairs = results.history(variant, "pressure").into_iter().zip(outer);
         let partly = pairs.filter(|(_, u)| (a + 1e-9..b - 1e-9).contains(&radius(*u)));
-        let worst = partly.map(|(p, u)| (p - pressure(radius(u))).abs() / limit).fold(0.0, f64::max);
+        let worst = partly
+            .map(|(p, u)| (p - pressure(radius(u))).abs() / limit)
+            .fold(0.0, f64::max);
         // The front of yielding lies inside an element.
         results.within(&format!("{variant}, course"), worst, 0.0, 10.0 * bound);
-        results.near(&format!("{variant}, limit"), results.last(variant, "pressure"), limit, limit, bound);
+        results.near(
+            &format!("{variant}, limit"),
+            results.last(variant, "pressure"),
+            limit,
+            limit,
+            bound,
+        );
     }
 }
 
@@ -62,7 +70,10 @@ fn cavity_expansion() {
         ("n16_reduced", 4e-3),
     ] {
         let displacements = results.history(variant, "inner");
-        let pairs = results.history(variant, "pressure").into_iter().zip(displacements);
+        let pairs = results
+            .history(variant, "pressure")
+            .into_iter()
+            .zip(displacements);
         // From where three radii yield: the front is inside an element.
         let late = pairs.filter(|(_, u)| *u > 0.02);
         let worst = late.map(|(p, u)| (p - pressure(u)).abs() / (pressure(u) - at_rest));
@@ -105,7 +116,12 @@ fn circular_footing() {
         ("rough_n6", 6.05, 0.14),
         ("rough_n12", 6.05, 0.03),
     ] {
-        results.within(variant, results.last(variant, "pressure") / exact - 1.0, 0.0, bound);
+        results.within(
+            variant,
+            results.last(variant, "pressure") / exact - 1.0,
+            0.0,
+            bound,
+        );
     }
 }
 
@@ -119,7 +135,12 @@ fn strip_on_friction() {
         ("n_c_20", n_c(20.0), 0.03),
         ("n_q_30", n_q(30.0), 0.03),
     ] {
-        results.within(variant, results.last(variant, "pressure") / exact - 1.0, 0.0, bound);
+        results.within(
+            variant,
+            results.last(variant, "pressure") / exact - 1.0,
+            0.0,
+            bound,
+        );
     }
 }
 
@@ -128,8 +149,17 @@ fn strip_n_gamma() {
     let variants = ["rough_n4", "rough_n8", "smooth_n8"];
     let results = run_some("strip_n_gamma", &variants);
     // Martin 2005, by characteristics. The strength under the edge grows from zero: the slowest to converge.
-    for (variant, exact, bound) in [("rough_n4", 14.754, 0.25), ("rough_n8", 14.754, 0.08), ("smooth_n8", 7.653, 0.05)] {
-        results.within(variant, results.last(variant, "pressure") / exact - 1.0, 0.0, bound);
+    for (variant, exact, bound) in [
+        ("rough_n4", 14.754, 0.25),
+        ("rough_n8", 14.754, 0.08),
+        ("smooth_n8", 7.653, 0.05),
+    ] {
+        results.within(
+            variant,
+            results.last(variant, "pressure") / exact - 1.0,
+            0.0,
+            bound,
+        );
     }
 }
 
@@ -148,9 +178,18 @@ fn pile_in_clay() {
     let factor = (base - weight) / (area * 40.0);
     results.within("N_c against 9, at 0.3 D", factor / 9.0 - 1.0, -0.02, 0.12);
     let history = results.rows("", "history.csv");
-    let early = history.iter().find(|row| number(row, "settlement") > 0.0999).unwrap();
+    let early = history
+        .iter()
+        .find(|row| number(row, "settlement") > 0.0999)
+        .unwrap();
     let textbook = shaft + 9.0 * 40.0 * area;
-    results.near("head against 1 087 kN, at 0.1 D", number(early, "head"), textbook, textbook, 0.06);
+    results.near(
+        "head against 1 087 kN, at 0.1 D",
+        number(early, "head"),
+        textbook,
+        textbook,
+        0.06,
+    );
 }
 
 #[test]
@@ -158,7 +197,13 @@ fn pile_in_sand() {
     let results = run_some("pile_in_sand", &["first_centimetre"]);
     let end = |probe| results.last("first_centimetre", probe);
     let weight = 18.0 * 8.0 * PI * 0.25;
-    results.near("balance", end("head") + weight, end("shaft") + end("base"), 1e3, 1e-6);
+    results.near(
+        "balance",
+        end("head") + weight,
+        end("shaft") + end("base"),
+        1e3,
+        1e-6,
+    );
     // No more friction than tan 25° of the stress on the shaft, and nearly all of it slides.
     let mobilised = end("shaft") / (end("normal") * 25.0_f64.to_radians().tan());
     results.within("mobilised friction", mobilised - 1.0, -0.1, 1e-9);
@@ -167,7 +212,10 @@ fn pile_in_sand() {
 #[test]
 fn course_of_loading() {
     let results = run("course_of_loading");
-    let ground = Elastic { young: 1e4, poisson: 0.3 };
+    let ground = Elastic {
+        young: 1e4,
+        poisson: 0.3,
+    };
     // Free sides, no strain out of the plane, where the stress is the middle one: a spring with a slider at 2c.
     let modulus = ground.young / (1.0 - ground.poisson.powi(2));
     let (limit, height) = (40.0, 2.0);

@@ -33,7 +33,10 @@ pub(crate) fn pilum(arguments: &[&str]) {
         .unwrap()
         .join(format!("pilum{}", std::env::consts::EXE_SUFFIX));
     let path = program.display();
-    assert!(program.is_file(), "{path} is missing: `cargo build -p host`");
+    assert!(
+        program.is_file(),
+        "{path} is missing: `cargo build -p host`"
+    );
     let output = Command::new(&program)
         .args(arguments)
         .env("PILUM_LAW_PATH", &deps)
@@ -56,7 +59,12 @@ pub(crate) fn run_some(case: &str, variants: &[&str]) -> Results {
     let path = cases().join(case);
     for variant in variants {
         let into = folder.path().join(variant);
-        let mut arguments = vec!["run", path.to_str().unwrap(), "--out", into.to_str().unwrap()];
+        let mut arguments = vec![
+            "run",
+            path.to_str().unwrap(),
+            "--out",
+            into.to_str().unwrap(),
+        ];
         if !variant.is_empty() {
             arguments.extend(["--variant", variant]);
         }
@@ -137,7 +145,6 @@ impl Elastic {
 
     /// Strain along one axis in plane strain, of the stresses along it and across.
     pub(crate) fn plane_strain(self, along: f64, across: f64) -> f64 {
-        (1.0 + self.poisson) / self.young
-            * ((1.0 - self.poisson) * along - self.poisson * across)
+        (1.0 + self.poisson) / self.young * ((1.0 - self.poisson) * along - self.poisson * across)
     }
 }
