@@ -29,6 +29,9 @@ def write(path, n, m, place, group, lines, triangles=False, points=()):
             tag = groups.setdefault(name, len(groups) + 1)
             p = lambda k, l: node(i + k, j + l)
             if triangles:
+                # The diagonal is straight, as inner sides of Gmsh's are.
+                ends = nodes[p(0, 0) - 1], nodes[p(2, 2) - 1]
+                nodes[p(1, 1) - 1] = tuple((u + v) / 2 for u, v in zip(*ends))
                 elements.append((9, tag, [p(0, 0), p(2, 0), p(2, 2), p(1, 0), p(2, 1), p(1, 1)]))
                 elements.append((9, tag, [p(0, 0), p(2, 2), p(0, 2), p(1, 1), p(1, 2), p(0, 1)]))
             else:
@@ -164,6 +167,21 @@ def activated_interface():
     write("activated_interface/wave.msh", n, m, place, group, lines, points=[("corner", (0, 0))])
 
 
+def level_ground():
+    """A square of level ground, elements with inclined sides or along a wave."""
+    n, m = 4, 4
+    for shape, middle in [("straight", lambda x: 0.5 + 0.3 * x), ("wave", lambda x: 0.5 + 0.2 * sin(radians(270 * x)))]:
+
+        def place(i, j):
+            x, t = i / (2 * n), j / m
+            at = middle(x)
+            return x, t * at if t <= 1 else at + (t - 1) * (1 - at)
+
+        lines = {"bottom": row(n, 0), "left": column(m, 0), "right": column(m, 2 * n)}
+        for name in ["quads", "triangles"]:
+            write(f"level_ground/{shape}_{name}.msh", n, m, place, lambda a, b: "ground", lines, name == "triangles")
+
+
 def lake():
     """Ground of 20 m with a slope of 1 in 2 from -2 m to -6 m."""
     n, m = 10, 4
@@ -185,6 +203,7 @@ if __name__ == "__main__":
         activated_interface,
         curved_interface,
         lake,
+        level_ground,
         thick_cylinder,
         thick_sphere,
     ]:

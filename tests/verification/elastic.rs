@@ -59,8 +59,8 @@ fn thick_sphere() {
         ("quads_2", 0.01),
         ("quads_4", 0.001),
         ("quads_8", 2e-4),
-        ("triangles_4", 0.03),
-        ("triangles_8", 0.01),
+        ("triangles_4", 0.015),
+        ("triangles_8", 0.005),
     ] {
         for nu in [0.3, 0.4999] {
             let scale = p * a.powi(3) / (young * (b.powi(3) - a.powi(3)));

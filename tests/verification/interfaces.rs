@@ -251,9 +251,9 @@ fn bar_pull_out() {
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if displacement(middle) < u {
-                low = middle
+                low = middle;
             } else {
-                high = middle
+                high = middle;
             }
         }
         2.0 * PI * a * tau * (low + (beta * (length - low)).tanh() / beta)
@@ -295,8 +295,8 @@ fn curved_interface() {
         ("quads_4", 0.01, 0.05),
         ("quads_2_full", 0.01, 0.01),
         ("quads_4_full", 0.001, 0.001),
-        ("triangles_2", 0.01, 0.03),
-        ("triangles_4", 0.002, 0.01),
+        ("triangles_2", 0.08, 0.6),
+        ("triangles_4", 0.02, 0.2),
     ] {
         results.near(
             &format!("{variant}, inner"),

@@ -1,4 +1,8 @@
 //! Running the cases of `cases/verification` with the program, and what the tests read from their results.
+#![allow(
+    clippy::print_stdout,
+    reason = "errors are printed for the tables of the manual"
+)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -92,6 +96,12 @@ impl Results {
         let rows = self.rows(variant, "history.csv");
         let row = rows.iter().rfind(|row| row["phase"] == phase).unwrap();
         number(row, probe)
+    }
+
+    /// `summary.json`.
+    pub(crate) fn summary(&self, variant: &str) -> serde_json::Value {
+        let path = self.folder.path().join(variant).join("summary.json");
+        serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
     }
 
     /// Rows of a table of the results.
