@@ -30,6 +30,15 @@ fn a_bored_pile_settles_alike_on_two_meshes() {
         let left = settlement(run, "unloading") / settlement(run, "load test");
         assert!((0.7..0.9).contains(&left), "{left}");
     }
+    let resistance = |run: &Run| {
+        let value = &run.summary["pile"]["resistance_10_percent_diameter"];
+        value.as_f64().unwrap()
+    };
+    let [q, r] = [&grid, &gmsh].map(|run| resistance(run));
+    assert!(
+        (q / r - 1.0).abs() < 0.02,
+        "{q} kN on the grid, {r} kN on triangles"
+    );
     let [a, b] = [&grid, &gmsh].map(|run| settlement(run, "load test"));
     assert!(
         (a / b - 1.0).abs() < 0.04,
@@ -93,7 +102,7 @@ fn a_pile_that_was_pushed_in_settles_less() {
         settlement(&without, "load test"),
         settlement(&pushed, "second test"),
     );
-    assert!(second < 0.5 * first, "{second} of {first} mm");
+    assert!(second < 0.6 * first, "{second} of {first} mm");
     let raised = finished("residual_stress", "given_profiles");
     assert!(settlement(&raised, "load test") < first);
 }
