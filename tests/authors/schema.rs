@@ -90,18 +90,15 @@ fn mistakes_do_not_follow_it() {
         ("title", "titel"),
         ("[mesh]\n", "[mesh]\ncolums = 1\n"),
         (
-            "formulation = \"solid\", integration = \"full\"",
-            "formulation = \"solid\", integration = \"full\"\nintegretion = \"full\"",
+            "formulation = \"solid\"",
+            "formulation = \"solid\"\nintegretion = \"full\"",
         ),
         ("increments = 10", "increment = 10"),
         ("value = 100.0", "valeu = 100.0"),
         // What is missing, and what is of another kind.
         ("analysis = \"plane_strain\"\n", ""),
-        ("formulation = \"solid\", integration = \"full\"\n", ""),
-        (
-            "formulation = \"solid\", integration = \"full\"",
-            "formulation = \"solids\"",
-        ),
+        ("formulation = \"solid\"\n", ""),
+        ("formulation = \"solid\"", "formulation = \"solids\""),
         ("increments = 10", "increments = \"ten\""),
         ("fixed = [\"x\", \"y\"]", "fixed = [\"x\", \"w\"]"),
     ] {

@@ -1,6 +1,6 @@
 //! Ground in a case file: profiles over the height, water, stress before the first phase.
 
-use crate::Error;
+use crate::{Error, schema};
 use mechanics::problem::{AtRest, InitialStress, Profile, Ratio, Water};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -25,6 +25,7 @@ pub enum ProfileInput {
 
 /// Values over the height.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
+#[schemars(transform = schema::height)]
 #[serde(deny_unknown_fields)]
 pub struct Over {
     /// Points (height, value), height rising: linear between, constant beyond.
@@ -115,6 +116,7 @@ impl WaterInput {
 /// Effective stress before the first phase, tension positive, kPa: components, constant or over the
 /// height; or earth pressure at rest under the weight of the ground, by `k_0` or by `friction_angle`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[schemars(transform = schema::components_alone)]
 #[serde(deny_unknown_fields, default)]
 pub struct StressInput {
     /// Along x (r).

@@ -159,6 +159,30 @@ pub(crate) fn radius_and_axis(schema: &mut Schema) {
     }
 }
 
+/// `11` as another name of `stress_11`, and so on.
+pub(crate) fn components_alone(schema: &mut Schema) {
+    let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) else {
+        return;
+    };
+    for other in ["11", "22", "33", "12"] {
+        if let Some(property) = properties.get(&format!("stress_{other}")).cloned() {
+            properties.insert(other.to_owned(), property);
+        }
+    }
+}
+
+/// `z` beside `y` for the height.
+pub(crate) fn height(schema: &mut Schema) {
+    let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) else {
+        return;
+    };
+    if let Some(property) = properties.get("z").cloned() {
+        properties.insert("y".to_owned(), property);
+    }
+    // Either of them.
+    schema.remove("required");
+}
+
 /// `r` and `z` as other values of `x` and `y`.
 pub(crate) fn radius_and_axis_names(schema: &mut Schema) {
     *schema = json_schema!({
