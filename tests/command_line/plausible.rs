@@ -398,7 +398,7 @@ fn warns_of_an_interface_that_ends_at_a_corner() {
         let text = edited(&[BLOCK, INTERFACE, BASE]);
         text.replace(
             "[groups.soil]",
-            &format!("[groups.block]\nformulation = \"solid\", integration = \"full\"\nlaw = \"{law}\"\n\n[groups.soil]"),
+            &format!("[groups.block]\nformulation = \"solid\"\nintegration = \"full\"\nlaw = \"{law}\"\n\n[groups.soil]"),
         )
         .replace(
             "[laws.joint]",

@@ -53,7 +53,6 @@ dilatancy_angle = 5.0
 
 [groups.soil]
 formulation = "solid"
-integration = "full"
 law = "soil"
 
 [groups.layer]
@@ -80,6 +79,7 @@ tau = { group = "layer", quantity = "traction_t" }
 half = { combine = { tau = 0.5 } }
 
 [solver]
+tolerated_residual = 0.0
 max_iterations = 20
 
 [output]

@@ -98,7 +98,7 @@ fn what_does_not_fit_is_said_at_its_place_in_the_setting() {
         (
             "phase.1.pressure.1.value=true",
             "1:26",
-            "`value`: found `true`, expected a number",
+            "`value`: expected a number, or values over the height",
         ),
         (
             "laws.joint.parameters.friction_angle=95",

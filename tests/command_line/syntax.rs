@@ -238,10 +238,7 @@ fn lists_the_choices_where_something_else_than_a_text_stands() {
             ),
             (
                 "a date, in a group",
-                &[(
-                    "formulation = \"solid\", integration = \"full\"",
-                    "formulation = ^2026-01-01",
-                )],
+                &[("formulation = \"solid\"", "formulation = ^2026-01-01")],
                 &["`formulation`: found a date", "solid", "zero_thickness"],
             ),
         ],

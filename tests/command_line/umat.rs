@@ -317,7 +317,7 @@ fn each_material_has_variables_of_its_own() {
         ),
         (
             "[groups.layer]\nformulation = \"thin_layer\"\nlaw = \"joint\"",
-            "[groups.layer]\nformulation = \"solid\", integration = \"full\"\nlaw = \"hard\"",
+            "[groups.layer]\nformulation = \"solid\"\nintegration = \"full\"\nlaw = \"hard\"",
         ),
         (
             "tau = { group = \"layer\", quantity = \"traction_t\" }",

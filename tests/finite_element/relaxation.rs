@@ -25,7 +25,10 @@ fn chamber(solver: &str) -> String {
             "law = \"mohr_coulomb\"\nparameters = { young_modulus = 34e3, poisson_ratio = 0.3, \
              cohesion = 0.0, friction_angle = 36.5, dilatancy_angle = 12.0 }",
         ),
-        ("integration = \"full\"", "integration = \"mean\""),
+        (
+            "\"thin_layer\"\nintegration = \"full\"",
+            "\"thin_layer\"\nintegration = \"mean\"",
+        ),
         ("increments = 1\n", "increments = 10\n"),
         // The law is swapped while the head is pushed: after a swap of its own nothing stands still.
         (
@@ -88,7 +91,7 @@ fn relaxation_finds_the_next_equilibrium() {
 #[test]
 fn a_standstill_is_explained() {
     // Smaller steps find a way round.
-    let solver = "\n[solver]\nrelaxation = false\nmax_halvings = 0\n";
+    let solver = "\n[solver]\nrelaxation = false\nmax_halvings = 0\ntolerated_residual = 0.0\n";
     let failed = fail(&chamber(solver));
     assert_eq!(failed.error.exit_code(), 2);
     let message = failed.error.to_string();

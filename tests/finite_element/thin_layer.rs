@@ -153,7 +153,7 @@ fn on_ground(t: f64, k_n: f64, k_t: f64, integration: &str) -> String {
         )
         .replace(
             "[groups.layer]",
-            "[groups.ground]\nformulation = \"solid\", integration = \"full\"\nlaw = \"ground\"\n[groups.layer]",
+            "[groups.ground]\nformulation = \"solid\"\nintegration = \"full\"\nlaw = \"ground\"\n[groups.layer]",
         )
 }
 

@@ -285,7 +285,7 @@ impl Model {
             }
         }
         line(format!(
-            "[solver]\nmethod = '{}'\nequations = '{}'\nmax_halvings = {}",
+            "[solver]\ntolerated_residual = 0.0\nmethod = '{}'\nequations = '{}'\nmax_halvings = {}",
             self.method, self.equations, self.halvings
         ));
         text

@@ -17,7 +17,7 @@ pub struct Settings {
     /// Largest correction, relative to the displacement increment (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub displacement_tolerance: f64,
-    /// Residual, relative as `force_tolerance`, that is tolerated where iterations and relaxation come to a
+    /// Residual, relative as `force_tolerance`, that is tolerated where Newton iterations and relaxation come to a
     /// standstill above the tolerance and displacements have settled to a tenth of the increment; each is
     /// said, and counted in the summary. 0 tolerates none.
     #[serde(deserialize_with = "tolerated")]

@@ -202,7 +202,8 @@ impl Control for LoadControl {
         else {
             return Ok(None);
         };
-        if largest > STILL_MOVES {
+        // Methods that keep their matrix are slow without having come to an end.
+        if largest > STILL_MOVES || !newton.settings.method.is_newton() {
             return Ok(None);
         }
         let at = (increment, self.task.period.1);
