@@ -184,6 +184,7 @@ impl Chamber {
         };
         let held = (0..n_dofs).filter(|&dof| prescribed[dof]);
         let loads = Loads {
+            leg: [0.0, 1.0],
             force_start: forces.clone(),
             force_end: forces,
             prescribed: held.map(|dof| (dof, 0.0, push(dof))).collect(),

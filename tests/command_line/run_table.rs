@@ -1,5 +1,4 @@
 //! `pilum table`: runs side by side as comma-separated values.
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, Place};
 

@@ -48,11 +48,11 @@ fn oedometric(e: f64, nu: f64) -> f64 {
     e * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu))
 }
 
-fn k_0(value: f64) -> Option<InitialStress> {
-    Some(InitialStress::AtRest(AtRest {
+fn k_0(value: f64) -> InitialStress {
+    InitialStress::AtRest(AtRest {
         ratio: Ratio::K0(value.into()),
         surcharge: 0.0,
-    }))
+    })
 }
 
 /// A mesh of a grid with its sides named; `moved` shifts inner nodes along x by rows, so that quads are
@@ -191,8 +191,8 @@ fn level_ground_at_rest_stays() {
                     (lower.unit_weight, lower.saturated_unit_weight) = (18.0, Some(18.0));
                     let mut upper = solid("upper", elastic(analysis, 0.3 * E, 0.2));
                     (upper.unit_weight, upper.saturated_unit_weight) = (16.0, Some(20.0));
-                    lower.initial_stress = k_0(0.5);
-                    upper.initial_stress = k_0(0.9);
+                    lower.initial_stress = Some(k_0(0.5));
+                    upper.initial_stress = Some(k_0(0.9));
                     problem.groups = vec![lower, upper];
                     for group in &mut problem.groups {
                         group.integration = integration;
@@ -275,7 +275,7 @@ fn sloping_layers_without_horizontal_stress_stay() {
         ];
         for (group, weight) in problem.groups.iter_mut().zip([20.0, 17.0]) {
             group.unit_weight = weight;
-            group.initial_stress = k_0(0.0);
+            group.initial_stress = Some(k_0(0.0));
         }
         problem.supports = roller_box();
         problem.phases = vec![Phase::new("rest", 1)];
@@ -302,7 +302,7 @@ fn an_excavation_heaves_by_what_it_weighed() {
             ];
             for group in &mut groups {
                 group.unit_weight = 20.0;
-                group.initial_stress = k_0(0.5);
+                group.initial_stress = Some(k_0(0.5));
             }
             problem.groups = groups;
             problem.mesh.name_line("floor", |edge| {
@@ -439,7 +439,7 @@ fn an_interface_appears_with_the_stress_beside_it() {
         let mut problem = Problem::new(analysis, mesh);
         let mut ground = solid("ground", elastic(analysis, E, NU));
         ground.unit_weight = 20.0;
-        ground.initial_stress = k_0(0.4);
+        ground.initial_stress = Some(k_0(0.4));
         problem.groups = vec![ground];
         for name in ["shaft", "base"] {
             let mut group = ElementGroup::new(name, Formulation::ZeroThickness, joint(1e6));

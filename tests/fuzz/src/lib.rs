@@ -77,7 +77,7 @@ fn mesh(data: &[u8]) {
     };
     for mesh in [mesh.refined(), mesh] {
         let n = mesh.nodes.len();
-        let mut nodes = mesh.solids.iter().flat_map(|solid| solid.nodes());
+        let mut nodes = mesh.solids.iter().flat_map(mechanics::mesh::Solid::nodes);
         assert!(nodes.all(|&node| node < n), "an element without a node");
         for line in mesh.lines.values() {
             let sides = line.edges.iter().map(|&edge| mesh.edge(edge)[2]);

@@ -24,7 +24,7 @@ pub(crate) fn case(source: Source) -> Result<Vec<Case>, Error> {
 /// name, more than any.
 pub(crate) fn elements(case: &Case) -> usize {
     let of = |parts: &Option<toml::Spanned<Vec<toml::Spanned<PartInput>>>>| {
-        let parts = parts.iter().flat_map(|parts| parts.get_ref());
+        let parts = parts.iter().flat_map(toml::Spanned::get_ref);
         parts.fold(0, |sum: usize, part| sum.saturating_add(part.get_ref().n))
     };
     let mesh = &case.file.mesh;

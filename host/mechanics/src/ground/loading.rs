@@ -344,7 +344,9 @@ pub fn pressure_on(
     if value.is_constant() {
         let mut unit = unit_pressure(analysis, mesh, edges);
         let value = value.at(0.0);
-        unit.iter_mut().for_each(|force| *force *= value);
+        for force in &mut unit {
+            *force *= value;
+        }
         return unit;
     }
     let kinks: Vec<f64> = value.points().iter().map(|&[y, _]| y).collect();

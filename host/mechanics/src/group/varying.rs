@@ -40,14 +40,13 @@ impl Varying {
                 .map(|(_, profile)| profile.at(height));
             let values: Vec<f64> = values.collect();
             let key = values.iter().map(|value| value.to_bits()).collect();
-            let number = match known.get(&key) {
-                Some(&number) => number,
-                None => {
-                    let built = with_values(material, &values)?;
-                    varying.laws.push(Arc::new(built));
-                    known.insert(key, varying.laws.len() - 1);
-                    varying.laws.len() - 1
-                }
+            let number = if let Some(&number) = known.get(&key) {
+                number
+            } else {
+                let built = with_values(material, &values)?;
+                varying.laws.push(Arc::new(built));
+                known.insert(key, varying.laws.len() - 1);
+                varying.laws.len() - 1
             };
             match varying.runs.last_mut() {
                 Some((run, of)) if *of == number => run.end = points.end,

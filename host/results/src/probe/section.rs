@@ -298,7 +298,10 @@ mod tests {
     fn triangles(n: usize) -> Mesh {
         let mut mesh = Mesh::default();
         let mut node = |x: f64, y: f64| {
-            let found = mesh.nodes.iter().position(|at| *at == [x, y]);
+            let found = mesh
+                .nodes
+                .iter()
+                .position(|at| at.map(f64::to_bits) == [x, y].map(f64::to_bits));
             found.unwrap_or_else(|| {
                 mesh.nodes.push([x, y]);
                 mesh.nodes.len() - 1
