@@ -59,7 +59,7 @@ pub enum Strains {
     AtPoints,
     /// Those at the points, with a volume strain that is linear in the coordinates.
     LinearVolume,
-    /// Their [projection](super::projection) on as many functions as there are points.
+    /// Their projection on as many functions as there are points (`projection.rs`).
     Projected,
 }
 
