@@ -235,7 +235,10 @@ fn refuses_keys_of_other_formulations() {
             ),
             (
                 "points of a joint in a solid",
-                &[("\"solid\"\n", "\"solid\"\nintegration = ^\"nodes\"\n")],
+                &[(
+                    "\"solid\"\nintegration = \"full\"\n",
+                    "\"solid\"\nintegration = ^\"nodes\"\n",
+                )],
                 &["`integration` does not go with the formulation `solid`"],
             ),
             (

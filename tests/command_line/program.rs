@@ -53,6 +53,7 @@ dilatancy_angle = 5.0
 
 [groups.soil]
 formulation = "solid"
+integration = "full"
 law = "soil"
 
 [groups.layer]
