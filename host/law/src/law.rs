@@ -206,6 +206,43 @@ impl Law {
         }
     }
 
+    /// What the law makes of a point that carries this flux and has no history, over an increment without
+    /// any gradient: its flux and its operator, row by row (empty if none is wanted).
+    ///
+    /// # Errors
+    /// The law cannot start from the flux, or cannot leave it as it is.
+    pub fn at_rest(
+        &self,
+        flux: &[f64],
+        operator: Operator,
+    ) -> Result<(Vec<f64>, Vec<f64>), BatchFailure> {
+        let n = self.n_components();
+        let rows = Strided::rows(n);
+        let zero = vec![0.0; n];
+        let state = self.initial_state(1, (flux, rows))?;
+        let (mut flux_end, mut state_end) = (flux.to_vec(), state.clone());
+        let wanted = if operator == Operator::None { 0 } else { n * n };
+        let mut written = vec![0.0; wanted];
+        let start = Start {
+            n_points: 1,
+            gradient: (&zero, rows),
+            gradient_end: (&zero, rows),
+            flux: (flux, rows),
+            state: &state,
+            time: 0.0,
+            time_increment: 0.0,
+            moment: Moment::default(),
+            sites: &[],
+        };
+        let end = End {
+            flux: (&mut flux_end, rows),
+            state: &mut state_end,
+            operator: &mut written,
+        };
+        self.integrate(&start, operator, end)?;
+        Ok((flux_end, written))
+    }
+
     /// Carries points over an increment.
     ///
     /// # Errors

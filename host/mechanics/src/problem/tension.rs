@@ -1,7 +1,7 @@
 //! Compression typed as a positive number: the law itself is asked.
 
 use crate::problem::Formulation;
-use law::{End, Law, Moment, Operator, Start, Strided};
+use law::{Law, Operator};
 
 /// A zero increment that changes a stress by more than this fraction of it does not stand it.
 const NOTABLE: f64 = 0.01;
@@ -38,40 +38,11 @@ pub(crate) fn turned(law: &Law, formulation: Formulation, stress: [f64; 4]) -> O
 
 /// Why a law does not leave a stress as it is over a zero increment.
 fn refused(law: &Law, stress: &[f64]) -> Option<String> {
-    let n = law.n_components();
-    let rows = Strided::rows(n);
-    let zero = vec![0.0; n];
-    let says = |message: String| {
-        if message.is_empty() {
-            "no reason given".to_owned()
-        } else {
-            message
-        }
+    let flux = match law.at_rest(stress, Operator::None) {
+        Ok((flux, _)) => flux,
+        Err(failure) if failure.message.is_empty() => return Some("no reason given".to_owned()),
+        Err(failure) => return Some(failure.message),
     };
-    let state = match law.initial_state(1, (stress, rows)) {
-        Ok(state) => state,
-        Err(failure) => return Some(says(failure.message)),
-    };
-    let (mut flux, mut state_end, mut operator) = (vec![0.0; n], state.clone(), vec![0.0; n * n]);
-    let start = Start {
-        n_points: 1,
-        gradient: (&zero, rows),
-        gradient_end: (&zero, rows),
-        flux: (stress, rows),
-        state: &state,
-        time: 0.0,
-        time_increment: 0.0,
-        moment: Moment::default(),
-        sites: &[],
-    };
-    let end = End {
-        flux: (&mut flux, rows),
-        state: &mut state_end,
-        operator: &mut operator,
-    };
-    if let Err(failure) = law.integrate(&start, Operator::None, end) {
-        return Some(says(failure.message));
-    }
     let size = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m: f64, v| m.max(v.abs()));
     let change = size(&mut stress.iter().zip(&flux).map(|(a, b)| b - a));
     let own = size(&mut stress.iter().copied());

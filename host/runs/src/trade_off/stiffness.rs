@@ -15,9 +15,7 @@ use crate::Error;
 use crate::run::begin;
 use input::Case;
 use input::material::ParameterValue;
-use law::BuiltLaw;
-use law::Stop;
-use law::{End, Law, Moment, Operator, Start, Strided};
+use law::{BuiltLaw, Law, Operator, Stop};
 use mechanics::Simulation;
 use mechanics::equilibrium::Reuse;
 use mechanics::group::Group;
@@ -329,32 +327,11 @@ fn csv(rows: &[(String, Tried)]) -> String {
 /// The elastic operator under an isotropic compression (an interface: a normal one), row-major.
 fn elastic_operator(law: &Law) -> Option<Vec<f64>> {
     let n = law.n_components();
-    let rows = Strided::rows(n);
     let normal = if n == 2 { 1 } else { 3 };
     let flux: Vec<f64> = (0..n)
         .map(|i| if i < normal { NORMAL_STRESS } else { 0.0 })
         .collect();
-    let zero = vec![0.0; n];
-    let state = law.initial_state(1, (&flux, rows)).ok()?;
-    let (mut flux_end, mut state_end) = (flux.clone(), state.clone());
-    let mut operator = vec![0.0; n * n];
-    let start = Start {
-        n_points: 1,
-        gradient: (&zero, rows),
-        gradient_end: (&zero, rows),
-        flux: (&flux, rows),
-        state: &state,
-        time: 0.0,
-        time_increment: 0.0,
-        moment: Moment::default(),
-        sites: &[],
-    };
-    let end = End {
-        flux: (&mut flux_end, rows),
-        state: &mut state_end,
-        operator: &mut operator,
-    };
-    law.integrate(&start, Operator::Elastic, end).ok()?;
+    let (_, operator) = law.at_rest(&flux, Operator::Elastic).ok()?;
     Some(operator)
 }
 
