@@ -3,6 +3,18 @@
 //!
 //! Strains have components 11 22 33 12 with γ = 2ε₁₂, in axes of the element; jumps have normal
 //! and tangential components.
+//!
+//! # Adding a solid element
+//! 1. Here: its shape functions and Gauss points in `shape`, and a file that makes of them a
+//!    [`Solid`] (as `tri6` does); what is not a displacement element with Gauss points implements
+//!    [`Kinematics`] itself. `tests` shows patch tests, round-off of level ground, volumes.
+//! 2. [`Shape`](crate::mesh::Shape): its edges. The compiler then names every place that tells
+//!    shapes apart: the model's builder, which chooses points and strains for an
+//!    [`Integration`](crate::problem::Integration), and uniform refinement.
+//! 3. Outside: number and order of its nodes in Gmsh's files (`input::gmsh::kind`) and VTK's number of
+//!    the kind (`results::fields`).
+//!
+//! An interface element in addition has the places where it is inserted (`mesh::insert`).
 
 mod joint6;
 mod mixed;

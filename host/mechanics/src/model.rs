@@ -2,10 +2,10 @@
 //! can be checked before the first increment.
 
 use crate::assembly::Tie;
-use crate::element::{Axes, Joint6, Kinematics, Mixed, Quad8, Strains, Tri6};
+use crate::element::{Axes, BadShape, Joint6, Kinematics, Mixed, Quad8, Strains, Tri6};
 use crate::ground::InitialStresses;
 use crate::group::{Group, PointFailure};
-use crate::mesh::{Mesh, Solid};
+use crate::mesh::{Mesh, Shape, Solid};
 use crate::problem::{
     Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item,
     Key, Material, Problem, Refusal, check, constraints, plausible, tension,
@@ -322,32 +322,34 @@ impl GroupBuilder<'_> {
         })
     }
 
-    /// Elements of one shape in global axes.
+    /// Elements of one shape, at least one, in global axes.
     fn of_one_shape(&self, solids: &[&Solid]) -> Result<Box<dyn Kinematics>, Refusal> {
         let integration = self.integration(Integration::Projected);
         let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
         let axes = vec![Axes::GLOBAL; solids.len()];
-        let nodes = |solid: &&Solid| solid.nodes().try_into().ok();
-        let triangles = solids.iter().map(nodes);
-        if let Some(nodes) = triangles.collect::<Option<Vec<[usize; 6]>>>() {
-            let (strains, n) = match integration {
-                Integration::BBar => (Strains::LinearVolume, 6),
-                Integration::Reduced => (Strains::AtPoints, 3),
-                _ => (Strains::Projected, 3),
-            };
-            let elements = Tri6::new(analysis, coordinates, nodes, axes, strains, n);
-            return Ok(Box::new(elements.map_err(|_| self.bad_shape())?));
-        }
-        let nodes = solids.iter().map(|solid| solid.nodes().try_into().ok());
-        let nodes: Vec<[usize; 8]> = nodes.flatten().collect();
-        let (strains, n) = match integration {
-            Integration::BBar => (Strains::LinearVolume, 3),
-            Integration::Reduced => (Strains::AtPoints, 2),
-            Integration::Projected => (Strains::Projected, 2),
-            _ => (Strains::AtPoints, 3),
+        let elements: Result<Box<dyn Kinematics>, BadShape> = match solids[0].shape() {
+            Shape::Triangle => {
+                let (strains, n) = match integration {
+                    Integration::BBar => (Strains::LinearVolume, 6),
+                    Integration::Reduced => (Strains::AtPoints, 3),
+                    _ => (Strains::Projected, 3),
+                };
+                Tri6::new(analysis, coordinates, nodes(solids), axes, strains, n)
+                    .map(|elements| Box::new(elements) as _)
+            }
+            Shape::Quad => {
+                let (strains, n) = match integration {
+                    Integration::BBar => (Strains::LinearVolume, 3),
+                    Integration::Reduced => (Strains::AtPoints, 2),
+                    Integration::Projected => (Strains::Projected, 2),
+                    _ => (Strains::AtPoints, 3),
+                };
+                let rule = |_| (n, n);
+                Quad8::new(analysis, coordinates, nodes(solids), axes, strains, rule)
+                    .map(|elements| Box::new(elements) as _)
+            }
         };
-        let elements = Quad8::new(analysis, coordinates, nodes, axes, strains, |_| (n, n));
-        Ok(Box::new(elements.map_err(|_| self.bad_shape())?))
+        elements.map_err(|_| self.bad_shape())
     }
 
     /// Elements in axes of the layer, and their thickness.
@@ -517,6 +519,12 @@ impl GroupBuilder<'_> {
         }
         stress
     }
+}
+
+/// Nodes of solids of one shape, which has `N`.
+fn nodes<const N: usize>(solids: &[&Solid]) -> Vec<[usize; N]> {
+    let nodes = solids.iter().map(|solid| solid.nodes().try_into());
+    nodes.flatten().collect()
 }
 
 /// Ties the two mid-thickness nodes of a quad to the corners on either side.
