@@ -579,7 +579,8 @@ pub struct PressureInput {
     pub value: Spanned<ProfileInput>,
 }
 
-/// A force on a line, spread evenly over it: kN over the whole turn, in plane strain kN/m.
+/// A force on a line, spread evenly over it: kN over the whole turn, in plane strain kN/m. Where an interface
+/// stands along the line, half of it acts on either face.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]

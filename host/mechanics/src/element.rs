@@ -45,6 +45,17 @@ pub struct Axes {
     pub across: [f64; 2],
 }
 
+/// The component of a direction that says whether coordinates increase along it: the larger one. Of
+/// equals it is the second one, in round-off too, so that the elements of a straight line agree.
+pub(crate) fn increase([x, y]: [f64; 2]) -> f64 {
+    const EQUAL: f64 = 1e-6;
+    if x.abs() > (1.0 + EQUAL) * y.abs() {
+        x
+    } else {
+        y
+    }
+}
+
 impl Axes {
     /// The global axes.
     pub const GLOBAL: Self = Self {
@@ -52,16 +63,12 @@ impl Axes {
         across: [0.0, 1.0],
     };
 
-    /// Axes of a facet in this direction. Both point towards increasing coordinates, so that the
-    /// shear stress of a horizontal or vertical facet is the global σ₁₂.
+    /// Axes of a facet in this direction. Both point towards increasing coordinates ([`increase`]), so that
+    /// the shear stress of a horizontal or vertical facet is the global σ₁₂.
     pub fn of_facet(direction: [f64; 2]) -> Self {
         let towards_increase = |v: [f64; 2]| {
-            let length = v[0].hypot(v[1]);
-            let dominant = if v[0].abs() > v[1].abs() { v[0] } else { v[1] };
-            [
-                v[0] / length.copysign(dominant),
-                v[1] / length.copysign(dominant),
-            ]
+            let length = v[0].hypot(v[1]).copysign(increase(v));
+            [v[0] / length, v[1] / length]
         };
         Self {
             along: towards_increase(direction),

@@ -12,11 +12,9 @@ mod acting;
 mod column;
 mod initial;
 mod loading;
-mod pores;
 
 pub use acting::Acting;
 pub use column::Columns;
 pub(crate) use initial::{InitialStresses, beside_joints};
 pub(crate) use loading::unit_pressure;
 pub use loading::{Loading, pressure_on};
-pub use pores::Pores;

@@ -243,6 +243,7 @@ impl GroupBuilder<'_> {
         }
         self.refuse_turned_signs(&material)?;
         let stress = self.initial_stress(&*kinematics);
+        self.refuse_tension_at_rest(&*kinematics)?;
         Group::new(name, formulation, kinematics, stress, thickness, material)
             .map_err(|failure| BuildError::CannotStart(Box::new(failure)))
     }
@@ -495,6 +496,23 @@ impl GroupBuilder<'_> {
         }
     }
 
+    /// Refuses an earth pressure at rest that pulls.
+    fn refuse_tension_at_rest(&self, kinematics: &dyn Kinematics) -> Result<(), Refusal> {
+        if !matches!(self.group.initial_stress, Some(InitialStress::AtRest(_))) {
+            return Ok(());
+        }
+        for point in 0..kinematics.n_points() {
+            let at = kinematics.position(point);
+            let [horizontal, vertical, ..] = self.initial.at(self.number, at).unwrap_or_default();
+            if horizontal > 0.0 {
+                let stress = [-horizontal, -vertical];
+                let cause = Cause::TensionAtRest { at, stress };
+                return Err(self.refuse_key(Key::InitialStress, cause));
+            }
+        }
+        Ok(())
+    }
+
     /// Initial stress of all points, in axes of the elements. A zero-thickness element without
     /// one of its own starts with that of the ground on its two sides, projected on its facet.
     fn initial_stress(&self, kinematics: &dyn Kinematics) -> Vec<f64> {
@@ -511,7 +529,7 @@ impl GroupBuilder<'_> {
                 let found = if is_given {
                     own()
                 } else {
-                    self.initial.beside([nodes[2], nodes[5]], at)
+                    self.initial.beside(self.number, [nodes[2], nodes[5]], at)
                 };
                 let [_, normal, _, shear] = axes.stress_from_global(found);
                 stress.extend([normal, shear]);

@@ -58,6 +58,14 @@ impl Problem {
         self.water.is_some() || self.phases.iter().any(|phase| phase.water_level.is_some())
     }
 
+    /// Whether pore water leaves a group in a phase, by their numbers: what was last said of it.
+    pub fn drainage(&self, group: usize, phase: usize) -> Drainage {
+        let said = self.phases.iter().take(phase + 1);
+        let said = said.flat_map(|phase| &phase.drainage);
+        let last = said.filter(|(of, _)| *of == group).last();
+        last.map_or(self.groups[group].drainage, |(_, drainage)| *drainage)
+    }
+
     /// Whether there are pressures in pores in any phase: of ground water, or of undrained ground.
     pub fn has_pore_pressure(&self) -> bool {
         let is_undrained = |drainage: &Drainage| *drainage == Drainage::Undrained;

@@ -24,7 +24,7 @@ pub use watch::{Increment, Part, Watch, When};
 use crate::assembly::Tie;
 use crate::equilibrium::{Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
-use crate::ground::{Acting, Loading, Pores};
+use crate::ground::{Acting, Loading};
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -64,8 +64,6 @@ pub struct Snapshot<'a> {
     /// Internal less external forces by degree of freedom: reactions where displacements are
     /// prescribed.
     pub reaction: &'a [f64],
-    /// Hydrostatic pore pressures.
-    pub pores: &'a Pores,
     /// Weights and pore water.
     pub acting: &'a Acting,
     /// The problem.
@@ -90,8 +88,9 @@ pub struct Simulation {
     prescribed: BTreeMap<usize, f64>,
     /// What acts at the start of the phase, and at its end.
     loading: [Loading; 2],
-    pores: Pores,
     acting: Acting,
+    /// Internal forces of the groups that the last phase to begin removed.
+    released: Vec<f64>,
     /// External forces.
     force: Vec<f64>,
     /// Internal less external forces of the last state that was completed.
@@ -169,9 +168,9 @@ impl Simulation {
             warnings,
             displacement: vec![0.0; n_dofs],
             prescribed: BTreeMap::new(),
-            pores: Pores::before(&problem),
             acting: Acting::before(&problem),
             loading: [Loading::before(&problem), Loading::before(&problem)],
+            released: vec![0.0; n_dofs],
             force: vec![0.0; n_dofs],
             reaction: vec![0.0; n_dofs],
             time: 0.0,
@@ -245,7 +244,6 @@ impl Simulation {
             ties: &self.ties,
             displacement: &self.displacement,
             reaction: &self.reaction,
-            pores: &self.pores,
             acting: &self.acting,
             problem: &self.problem,
         }

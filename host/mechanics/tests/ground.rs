@@ -4,7 +4,7 @@
 use law::{Hypothesis, SearchPath};
 use mechanics::mesh::{Along, Solid};
 use mechanics::problem::{
-    Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation,
+    Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation, Free,
     InitialStress, Integration, Phase, Pressure, Profile, Ratio, Support, Water,
 };
 use mechanics::{Material, Mesh, Problem, Simulation};
@@ -375,6 +375,239 @@ fn an_undrained_column_carries_by_its_water_and_then_settles() {
         assert!((top(&simulation) / (150.0 / oedometric(E, NU)) - 1.0).abs() < 1e-9);
         assert!(simulation.groups()[0].excess_pore_pressure(0).abs() < 1e-9);
     }
+}
+
+/// Undrained ground that a phase brings is undrained, whenever that was said of it.
+#[test]
+fn ground_that_appears_undrained_is_undrained() {
+    for said_by_phase in [false, true] {
+        let analysis = Analysis::PlaneStrain;
+        let mesh = grid(&[0.0, 1.0], &[0.0, 1.0, 3.0], |_, j| j, Shape::Rectangles);
+        let mut problem = Problem::new(analysis, mesh);
+        let mut fill = solid("fill", elastic(analysis, E, NU));
+        fill.is_active = false;
+        if !said_by_phase {
+            fill.drainage = Drainage::Undrained;
+        }
+        fill.undrained_poisson_ratio = 0.495;
+        problem.groups = vec![solid("ground", elastic(analysis, E, NU)), fill];
+        problem.supports = roller_box();
+        let mut before = Phase::new("before", 1);
+        if said_by_phase {
+            before.drainage = vec![(1, Drainage::Undrained)];
+        }
+        let mut appear = Phase::new("appear", 1);
+        appear.activate = vec![1];
+        let mut load = Phase::new("load", 1);
+        load.pressure = vec![Pressure {
+            line: "top".to_owned(),
+            value: 50.0.into(),
+        }];
+        problem.phases = vec![before, appear, load];
+        let simulation = run(problem);
+        let (g, k) = (E / (2.0 * (1.0 + NU)), E / (3.0 * (1.0 - 2.0 * NU)));
+        let k_w = 2.0 * g * 1.495 / (3.0 * 0.01) - k;
+        let strain = 50.0 / (oedometric(E, NU) + k_w);
+        let u = simulation.groups()[1].excess_pore_pressure(0);
+        assert!((u / (k_w * strain) - 1.0).abs() < 1e-9, "{u}");
+        let top = -simulation.displacement_of("top").unwrap()[1];
+        let expected = 2.0 * strain + 50.0 / oedometric(E, NU);
+        assert!((top / expected - 1.0).abs() < 1e-9, "{top} {expected}");
+    }
+}
+
+/// ν_u that does not exceed ν of the law leaves no stiffness to the water; an earth pressure at rest that
+/// would be tension is none. Both are refused with their numbers.
+#[test]
+fn ground_that_cannot_be_is_refused() {
+    let analysis = Analysis::PlaneStrain;
+    let pose = |change: &dyn Fn(&mut ElementGroup)| {
+        let mesh = grid(&[0.0, 1.0], &[0.0, 3.0], |_, _| 0, Shape::Rectangles);
+        let mut problem = Problem::new(analysis, mesh);
+        let mut clay = solid("clay", elastic(analysis, E, NU));
+        change(&mut clay);
+        problem.groups = vec![clay];
+        problem.supports = roller_box();
+        problem.phases = vec![Phase::new("load", 1)];
+        let result = Simulation::new(problem).and_then(|mut s| s.run(&mut ()));
+        result.map(|_| ()).map_err(|error| error.to_string())
+    };
+    let error = pose(&|clay| {
+        (clay.drainage, clay.undrained_poisson_ratio) = (Drainage::Undrained, 0.2);
+    });
+    assert!(
+        error
+            .as_ref()
+            .is_err_and(|e| e.contains("0.2 does not exceed Poisson's ratio of its law, 0.3000")),
+        "{error:?}"
+    );
+    // σ'_h = (1 − sin 40°) 8 σ'_v − 0.45/0.55 · 7 σ'_v = −2.87 σ'_v
+    let error = pose(&|clay| {
+        clay.unit_weight = 18.0;
+        clay.initial_stress = Some(InitialStress::AtRest(AtRest {
+            ratio: Ratio::Overconsolidated {
+                friction_angle: 40.0.into(),
+                ocr: 8.0.into(),
+                pop: 0.0.into(),
+                poisson_ratio: 0.45,
+            },
+            surcharge: 0.0,
+        }));
+    });
+    assert!(
+        error
+            .as_ref()
+            .is_err_and(|e| e.contains("the earth pressure at rest is tension")),
+        "{error:?}"
+    );
+}
+
+/// A side under water that is no longer held keeps the water's pressure: what holds the other side is
+/// ½ γ_w h².
+#[test]
+fn water_presses_on_a_side_that_is_freed() {
+    for freed in [false, true] {
+        let analysis = Analysis::PlaneStrain;
+        let mesh = grid(
+            &[0.0, 1.0, 2.0],
+            &[0.0, 2.0, 4.0],
+            |_, _| 0,
+            Shape::Rectangles,
+        );
+        let mut problem = Problem::new(analysis, mesh);
+        let mut ground = solid("ground", elastic(analysis, E, NU));
+        ground.unit_weight = 20.0;
+        ground.initial_stress = Some(k_0(0.5));
+        problem.groups = vec![ground];
+        problem.water = Some(Water {
+            level: 4.0.into(),
+            unit_weight: 10.0,
+        });
+        problem.supports = vec![
+            held("left", &[Axis::X]),
+            held("right", &[Axis::X, Axis::Y]),
+            held("bottom", &[Axis::Y]),
+        ];
+        let mut free = Phase::new("free", 2);
+        if freed {
+            // What holds it along itself holds it not against the water.
+            free.free = vec![Free {
+                line: "right".to_owned(),
+                components: vec![Axis::X],
+            }];
+        }
+        problem.phases = vec![Phase::new("rest", 1), free];
+        let simulation = run(problem);
+        let held = simulation.reaction_of("left").unwrap()[0];
+        // ½ γ_w h² of the water, and while both sides are held ½ K_0 γ' h² of the ground.
+        let expected = if freed { 80.0 } else { 80.0 + 40.0 };
+        assert!((held / expected - 1.0).abs() < 1e-9, "{freed}: {held}");
+    }
+}
+
+/// An interface that is there from the start between ground with water in its pores and concrete without
+/// carries what of the common total stress its own water leaves.
+#[test]
+fn an_interface_beside_dry_pores_starts_in_balance() {
+    for wet in [[true, false], [false, true]] {
+        for joint_is_wet in [true, false] {
+            let analysis = Analysis::PlaneStrain;
+            let mut mesh = grid(&[0.0, 1.0], &[0.0, 2.0, 4.0], |_, j| j, Shape::Rectangles);
+            mesh.name_line("cut", |e| e.iter().all(|n| (n[1] - 2.0).abs() < 1e-9));
+            let cut = Along {
+                line: "cut".to_owned(),
+                group: 2,
+                opens_ends: true,
+            };
+            mesh.insert_joints(&[cut]).unwrap();
+            let mut problem = Problem::new(analysis, mesh);
+            for (name, is_wet) in ["lower", "upper"].into_iter().zip(wet) {
+                let mut group = solid(name, elastic(analysis, E, NU));
+                group.unit_weight = 18.0;
+                group.initial_stress = Some(k_0(0.5));
+                group.pore_water = is_wet;
+                problem.groups.push(group);
+            }
+            let mut between = ElementGroup::new("cut", Formulation::ZeroThickness, joint(1e6));
+            between.pore_water = joint_is_wet;
+            problem.groups.push(between);
+            problem.water = Some(Water {
+                level: 3.5.into(),
+                unit_weight: 10.0,
+            });
+            problem.supports = roller_box();
+            problem.phases = vec![Phase::new("rest", 1)];
+            let simulation = run(problem);
+            let (_, [normal, _]) = simulation.groups()[2].jump_and_traction(0).unwrap();
+            let expected = if joint_is_wet { -36.0 + 15.0 } else { -36.0 };
+            assert!((normal - expected).abs() < 1e-9, "{wet:?}: {normal}");
+            let moved = largest(simulation.snapshot().displacement);
+            assert!(moved < 1e-12, "{wet:?} {joint_is_wet}: {moved}");
+        }
+    }
+}
+
+/// Ground is taken away from a block, which then slides: there is no equilibrium, and it is said so.
+#[test]
+fn no_equilibrium_beside_ground_that_is_gone() {
+    let analysis = Analysis::PlaneStrain;
+    let mut mesh = grid(
+        &[0.0, 1.0],
+        &[0.0, 1.0, 2.0, 3.0],
+        |_, j| j,
+        Shape::Rectangles,
+    );
+    for (name, y) in [("foot", 1.0), ("head", 2.0)] {
+        mesh.name_line(name, |e| e.iter().all(|n| (n[1] - y).abs() < 1e-9));
+    }
+    let along = |line: &str, group| Along {
+        line: line.to_owned(),
+        group,
+        opens_ends: true,
+    };
+    mesh.insert_joints(&[along("foot", 3), along("head", 4)])
+        .unwrap();
+    let mut problem = Problem::new(analysis, mesh);
+    for name in ["lower", "middle", "upper"] {
+        let mut group = solid(name, elastic(analysis, E, NU));
+        group.unit_weight = 20.0;
+        group.initial_stress = Some(k_0(0.0));
+        problem.groups.push(group);
+    }
+    let values = [
+        ("normal_stiffness", 1e5),
+        ("shear_stiffness", 1e5),
+        ("cohesion", 0.0),
+        ("friction_angle", 30.0),
+        ("dilatancy_angle", 0.0),
+    ];
+    for name in ["foot", "head"] {
+        let law = material("coulomb_joint", Hypothesis::Interface2d, &values);
+        problem
+            .groups
+            .push(ElementGroup::new(name, Formulation::ZeroThickness, law));
+    }
+    mesh_side(&mut problem);
+    problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
+    let mut dig = Phase::new("dig", 2);
+    dig.deactivate = vec![2, 4];
+    dig.force = vec![Force {
+        line: "side".to_owned(),
+        x: Some(100.0),
+        y: None,
+    }];
+    problem.phases = vec![Phase::new("rest", 1), dig];
+    let mut simulation = Simulation::new(problem).unwrap();
+    let error = simulation.run(&mut ()).unwrap_err().to_string();
+    assert!(error.contains("dig"), "{error}");
+}
+
+/// Names the left side of the middle block.
+fn mesh_side(problem: &mut Problem) {
+    problem.mesh.name_line("side", |e| {
+        e.iter()
+            .all(|n| n[0].abs() < 1e-9 && (0.99..=2.01).contains(&n[1]))
+    });
 }
 
 /// A stiffness that grows with depth: ∫ q/E_oed dz, element by element.

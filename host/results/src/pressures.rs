@@ -56,9 +56,8 @@ impl Pressure {
     pub(crate) fn at(self, snapshot: &Snapshot<'_>, group: usize, point: usize) -> Option<f64> {
         let of = &snapshot.groups[group];
         let pore = || {
-            snapshot
-                .pores
-                .pressure(group, of.kinematics.position(point))
+            let at = of.kinematics.position(point);
+            snapshot.acting.pore_pressure(group, snapshot.problem, at)
         };
         let excess = || of.excess_pore_pressure(point);
         match self {

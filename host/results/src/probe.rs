@@ -254,7 +254,8 @@ fn water_between(
         .iter()
         .flat_map(|&element| kinematics.points_of(element));
     let of_point = |point: usize| {
-        let pressure = snapshot.pores.pressure(number, kinematics.position(point));
+        let at = kinematics.position(point);
+        let pressure = snapshot.acting.pore_pressure(number, snapshot.problem, at);
         kinematics.weight(point) * kinematics.axes_at(point).across[component] * pressure
     };
     points.map(of_point).sum()

@@ -369,3 +369,19 @@ fn curved_triangles_have_the_area_of_a_disc() {
         assert_relative_eq!(pair[0] / pair[1], 16.0, max_relative = 0.05);
     }
 }
+
+/// Facets of one straight line at 45° have the same axes, whatever rounding makes of their coordinates.
+#[test]
+fn facets_of_a_straight_line_have_the_same_axes() {
+    for slope in [1.0, -1.0] {
+        let at = |i: i32| [0.1 * f64::from(i), 0.3 + slope * 0.1 * f64::from(i)];
+        for (start, end) in (0..40).map(|i| (at(i), at(i + 1))) {
+            let axes = Axes::of_facet([end[0] - start[0], end[1] - start[1]]);
+            let first = Axes::of_facet([1.0, slope]);
+            for (own, other) in [(axes.along, first.along), (axes.across, first.across)] {
+                let product = own[0] * other[0] + own[1] * other[1];
+                assert!((product - 1.0).abs() < 1e-12, "{start:?}: {axes:?}");
+            }
+        }
+    }
+}

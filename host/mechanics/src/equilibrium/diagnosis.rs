@@ -33,7 +33,7 @@ impl Snapshot {
     }
 }
 
-/// None of a linear group: it keeps no iteration from settling.
+/// None of a group that is gone or linear: it keeps no iteration from settling.
 fn states(group: &Group) -> impl Iterator<Item = PointState> {
     let n = group.kinematics.n_components();
     let state = move |point: usize| {
@@ -50,7 +50,7 @@ fn states(group: &Group) -> impl Iterator<Item = PointState> {
             tangent: tangents[within * n * n..][..n * n].to_vec(),
         }
     };
-    let n_points = if group.is_linear() {
+    let n_points = if group.is_linear() || !group.is_active {
         0
     } else {
         group.kinematics.n_points()

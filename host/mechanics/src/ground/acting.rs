@@ -2,7 +2,7 @@
 
 use super::Loading;
 use crate::group::Group;
-use crate::problem::Problem;
+use crate::problem::{Problem, Water};
 
 /// What acts at one time: a part of the way between two loadings, each with the groups that are there.
 #[derive(Clone, Debug, Default)]
@@ -10,22 +10,25 @@ pub struct Acting {
     start: Loading,
     end: Loading,
     share: f64,
+    /// The water of either loading.
+    water: [Option<Water>; 2],
 }
 
 impl Acting {
     /// Before the first phase.
     pub(crate) fn before(problem: &Problem) -> Self {
         let start = Loading::before(problem);
-        Self {
-            end: start.clone(),
-            start,
-            share: 1.0,
-        }
+        Self::between(problem, start.clone(), start, 1.0)
     }
 
     /// On the way from one loading to another.
-    pub(crate) fn between(start: Loading, end: Loading, share: f64) -> Self {
-        Self { start, end, share }
+    pub(crate) fn between(problem: &Problem, start: Loading, end: Loading, share: f64) -> Self {
+        Self {
+            water: [start.water(problem), end.water(problem)],
+            start,
+            end,
+            share,
+        }
     }
 
     /// The two loadings, each with its share.
@@ -54,12 +57,14 @@ impl Acting {
 
     /// Hydrostatic pressure in a group's pores at a place, compression positive, kPa.
     pub fn pore_pressure(&self, number: usize, problem: &Problem, at: [f64; 2]) -> f64 {
-        let of = |(loading, share): (&Loading, f64)| {
-            let fills = loading.active[number] && problem.groups[number].pore_water;
-            let water = loading.water(problem).filter(|_| fills);
+        if !problem.groups[number].pore_water {
+            return 0.0;
+        }
+        let of = |((loading, share), water): ((&Loading, f64), &Option<Water>)| {
+            let water = water.as_ref().filter(|_| loading.active[number]);
             share * water.map_or(0.0, |water| water.pressure(at))
         };
-        self.parts().into_iter().map(of).sum()
+        self.parts().into_iter().zip(&self.water).map(of).sum()
     }
 
     /// Nodal forces of weight and pore water in group `number`, or in some of its elements, by degree of

@@ -60,10 +60,14 @@ impl<'p> InitialStresses<'p> {
         })
     }
 
-    /// Stress of the ground on the two sides of a joint at a point of it: the mean of the sides that have
-    /// one. `faces`: the nodes in the middle of its two faces.
-    pub(crate) fn beside(&self, faces: [usize; 2], at: [f64; 2]) -> [f64; 4] {
+    /// Stress of the ground on the two sides of a joint of group `number` at a point of it: the mean of the
+    /// sides that have one, with as much of it in the water as there is between the faces. `faces`: the nodes
+    /// in the middle of its two faces.
+    pub(crate) fn beside(&self, number: usize, faces: [usize; 2], at: [f64; 2]) -> [f64; 4] {
         let mesh = &self.problem.mesh;
+        let has_water = |group: usize| self.problem.groups[group].pore_water;
+        let water = self.problem.water.as_ref();
+        let pressure = water.map_or(0.0, |water| water.pressure(at));
         let of_side = |face: &usize| {
             let solid = &mesh.solids[*self.beside.get(face)?];
             let n = solid.n_corners() as f64;
@@ -76,7 +80,14 @@ impl<'p> InitialStresses<'p> {
                     / n
             };
             let inside = [0, 1].map(|c| at[c] + INSIDE * (middle(c) - at[c]));
-            self.at(solid.group, inside)
+            let mut stress = self.at(solid.group, inside)?;
+            let excess = match (has_water(solid.group), has_water(number)) {
+                (true, false) => -pressure,
+                (false, true) => pressure,
+                _ => return Some(stress),
+            };
+            stress[..3].iter_mut().for_each(|normal| *normal += excess);
+            Some(stress)
         };
         let sides: Vec<[f64; 4]> = faces.iter().filter_map(of_side).collect();
         let n = sides.len().max(1) as f64;

@@ -3,7 +3,7 @@
 use crate::element::{depth, gauss, line_shape};
 use crate::group::Group;
 use crate::mesh::Mesh;
-use crate::problem::{Analysis, Formulation, Phase, Problem, Profile, Water};
+use crate::problem::{Analysis, Axis, Formulation, Phase, Problem, Profile, Water};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -20,6 +20,8 @@ pub struct Loading {
     pub water_level: Option<Profile>,
     /// Of every group, whether it is there.
     pub active: Vec<bool>,
+    /// Lines whose supports have been given up, with the components.
+    pub freed: BTreeMap<String, [bool; 2]>,
 }
 
 impl Loading {
@@ -57,6 +59,12 @@ impl Loading {
             let (line, value) = (pressure.line.clone(), pressure.value.clone());
             changed.pressure.insert(line, value);
         }
+        for free in &phase.free {
+            let freed = changed.freed.entry(free.line.clone()).or_default();
+            for axis in &free.components {
+                freed[usize::from(*axis == Axis::Y)] = true;
+            }
+        }
         for force in &phase.force {
             let total = changed.force.entry(force.line.clone()).or_default();
             total[0] = force.x.unwrap_or(total[0]);
@@ -90,6 +98,7 @@ impl Loading {
                 (_, level) => level.clone(),
             },
             active: other.active.clone(),
+            freed: other.freed.clone(),
         }
     }
 
@@ -212,7 +221,8 @@ impl Loading {
         }
     }
 
-    /// The water's pressure on the outline of what is there, but for supported lines.
+    /// The water's pressure on the outline of what is there, but for supported lines: where a support has
+    /// been given up, it acts unless another component holds the edge against it.
     fn add_outer_water(&self, problem: &Problem, water: &Water, force: &mut [f64]) {
         let mesh = &problem.mesh;
         let mut sides: HashMap<usize, (usize, (usize, usize))> = HashMap::new();
@@ -234,10 +244,26 @@ impl Loading {
                 sides.remove(&joint.plus[2]);
             }
         }
+        let lines = self.freed.iter();
+        let freed = lines.flat_map(|(line, freed)| {
+            let nodes = mesh.lines.get(line).into_iter().flat_map(|l| &l.nodes);
+            nodes.flat_map(move |&node| (0..2).filter(|&c| freed[c]).map(move |c| (node, c)))
+        });
+        let freed: HashSet<(usize, usize)> = freed.collect();
         for support in &problem.supports {
             let line = mesh.lines.get(&support.line);
             for &edge in line.iter().flat_map(|line| &line.edges) {
-                sides.remove(&mesh.edge(edge)[2]);
+                let [a, b, middle] = mesh.edge(edge);
+                let fixed = support.fixed.iter();
+                let fixed: Vec<usize> = fixed.map(|axis| usize::from(*axis == Axis::Y)).collect();
+                let is_freed = |c: &usize| freed.contains(&(middle, *c));
+                // The normal's component x is the edge's y.
+                let along = |c: usize| (mesh.nodes[b][c] - mesh.nodes[a][c]).abs();
+                let holds = |c: usize| along(1 - c) > 1e-9 * along(c);
+                let is_held = fixed.iter().any(|c| !is_freed(c) && holds(*c));
+                if is_held || !fixed.iter().any(is_freed) {
+                    sides.remove(&middle);
+                }
             }
         }
         let mut outline: Vec<(usize, usize)> = sides

@@ -27,17 +27,22 @@ pub(super) struct Pores {
 }
 
 impl Group {
-    /// Undrained from now on, or drained again.
+    /// Undrained from now on, or drained again. Inside: Poisson's ratio of the law where ν_u does not exceed
+    /// it, so that (2) leaves no stiffness to the water.
     ///
     /// # Errors
     /// The law has no elastic operator.
-    pub fn set_drainage(&mut self, drainage: Drainage, nu_u: f64) -> Result<(), PointFailure> {
+    pub(crate) fn set_drainage(
+        &mut self,
+        drainage: Drainage,
+        nu_u: f64,
+    ) -> Result<Result<(), f64>, PointFailure> {
         if drainage == Drainage::Drained {
             if let Some(pores) = &mut self.pores {
                 pores.drainage = drainage;
                 pores.stiffness = Vec::new();
             }
-            return Ok(());
+            return Ok(Ok(()));
         }
         let n = self.kinematics.n_points();
         // Its equations are no longer those of the law alone.
@@ -50,12 +55,18 @@ impl Group {
         self.run_law(Operator::Elastic, time, 0.0, &mut operator)
             .map_err(|failure| self.locate(&failure))?;
         self.forget_trial();
-        let stiffness = operator.chunks_exact(16).map(|d| {
+        let mut stiffness = Vec::with_capacity(n);
+        for d in operator.chunks_exact(16) {
             let bulk = (0..9).map(|i| d[4 * (i / 3) + i % 3]).sum::<f64>() / 9.0;
-            let undrained = 2.0 * d[15] * (1.0 + nu_u) / (3.0 * (1.0 - 2.0 * nu_u));
-            (undrained - bulk).max(0.0)
-        });
-        let stiffness = stiffness.collect();
+            let shear = d[15];
+            let undrained = 2.0 * shear * (1.0 + nu_u) / (3.0 * (1.0 - 2.0 * nu_u));
+            if undrained <= bulk {
+                return Ok(Err(
+                    (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
+                ));
+            }
+            stiffness.push(undrained - bulk);
+        }
         let excess = match self.pores.take() {
             Some(pores) => pores.excess,
             None => Field::new(vec![0.0; n]),
@@ -65,7 +76,7 @@ impl Group {
             excess,
             stiffness,
         });
-        Ok(())
+        Ok(Ok(()))
     }
 
     /// Whether pore water follows the deformation, or did.

@@ -9,6 +9,7 @@
 //! An edge is known by the node in its middle, which belongs to no other edge.
 
 use super::{Joint as Inserted, Line, Mesh, Solid};
+use crate::element::increase;
 use std::collections::{HashMap, HashSet};
 
 /// Where an edge with this middle stands among the nodes of an element.
@@ -44,7 +45,7 @@ impl Joint {
     /// axes of the facet point from the one to the other: towards increasing coordinates (see
     /// `Axes::of_facet`), whatever the direction of the line.
     fn near_and_far(&self, coordinates: &[[f64; 2]]) -> [[usize; 3]; 2] {
-        let increases = |[x, y]: [f64; 2]| (if x.abs() > y.abs() { x } else { y }) > 0.0;
+        let increases = |direction: [f64; 2]| increase(direction) > 0.0;
         let [a, b, _] = self.right.map(|node| coordinates[node]);
         let to_the_left = [a[1] - b[1], b[0] - a[0]];
         let mut sides = if increases(to_the_left) {

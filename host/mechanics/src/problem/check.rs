@@ -238,10 +238,20 @@ fn phases(problem: &Problem) -> Result<(), Refusal> {
         let there: HashMap<usize, usize> = edges_there(&problem.mesh, &active);
         pressures(problem, number, phase, &there, &faces)?;
         forces(problem, number, phase, &there)?;
-        for displacement in &phase.displacement {
+        for (place, displacement) in phase.displacement.iter().enumerate() {
             let values = [displacement.x, displacement.y];
             if values.into_iter().flatten().any(|value| !value.is_finite()) {
                 return refuse(Cause::NotFinite("a displacement"));
+            }
+            let line = problem.mesh.lines.get(&displacement.line);
+            let mut middles = line.iter().flat_map(|line| &line.edges).peekable();
+            let is_gone = |&edge: &_| !there.contains_key(&problem.mesh.edge(edge)[2]);
+            if middles.peek().is_some() && middles.all(is_gone) {
+                let item = Item::Displacement(number, place);
+                return Err(Refusal::new(
+                    item,
+                    Cause::NotThere(displacement.line.clone()),
+                ));
             }
         }
         for (place, line) in phase.rigid.iter().enumerate() {
@@ -252,7 +262,7 @@ fn phases(problem: &Problem) -> Result<(), Refusal> {
 }
 
 /// Of the middles of edges, how many active elements have them.
-fn edges_there(mesh: &Mesh, active: &[bool]) -> HashMap<usize, usize> {
+pub(super) fn edges_there(mesh: &Mesh, active: &[bool]) -> HashMap<usize, usize> {
     let mut there = HashMap::new();
     let solids = mesh.solids.iter().filter(|solid| active[solid.group]);
     for edge in solids.flat_map(Solid::edges) {

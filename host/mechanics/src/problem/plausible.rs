@@ -25,6 +25,8 @@ pub(crate) fn warnings(
 ) -> Vec<String> {
     let mesh = &problem.mesh;
     let mut warnings = far(problem);
+    warnings.extend(light(problem));
+    warnings.extend(lost(problem));
     for (number, group) in groups.iter().enumerate() {
         match group.formulation {
             Formulation::ThinLayer => {
@@ -70,6 +72,72 @@ pub(crate) fn implausible_stiffness(group: &Group) -> Option<String> {
         "group `{}`, law `{}`: its stiffness is {largest:.3e} kPa, {about} Units are kN, m, kPa",
         group.name, group.law.name
     ))
+}
+
+/// Wet ground that is lighter than dry ground or than water.
+fn light(problem: &Problem) -> Vec<String> {
+    let water = problem.water.as_ref().map(|water| water.unit_weight);
+    let light = problem.groups.iter().filter_map(|group| {
+        let wet = group.saturated_unit_weight?;
+        let than = if wet < group.unit_weight {
+            format!("`unit_weight` {}", group.unit_weight)
+        } else {
+            let water = water.filter(|&water| group.pore_water && wet < water)?;
+            format!("{water} of water")
+        };
+        Some(format!(
+            "group `{}`: `saturated_unit_weight` {wet} is less than {than}: it is the weight of ground and \
+             water together, not that under buoyancy",
+            group.name
+        ))
+    });
+    light.collect()
+}
+
+/// What is said of ground and has no effect, or loses it.
+fn lost(problem: &Problem) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let mut active: Vec<bool> = problem.groups.iter().map(|group| group.is_active).collect();
+    // Lines that carry a pressure or a force.
+    let mut loaded: Vec<(&'static str, &str)> = Vec::new();
+    for phase in &problem.phases {
+        for &number in &phase.activate {
+            let group = &problem.groups[number];
+            let is_solid = group.formulation != Formulation::ZeroThickness;
+            if is_solid && !group.is_active && group.initial_stress.is_some() {
+                warnings.push(format!(
+                    "phase `{}` activates group `{}`, which is free of stress as it appears: its \
+                     `initial_stress` is not used",
+                    phase.name, group.name
+                ));
+            }
+            active[number] = true;
+        }
+        for &number in &phase.deactivate {
+            active[number] = false;
+        }
+        let pressures = phase.pressure.iter().map(|input| ("pressure", &input.line));
+        let forces = phase.force.iter().map(|input| ("force", &input.line));
+        for (kind, line) in pressures.chain(forces) {
+            if !loaded.contains(&(kind, line)) {
+                loaded.push((kind, line));
+            }
+        }
+        let there = super::check::edges_there(&problem.mesh, &active);
+        loaded.retain(|(kind, name)| {
+            let line = problem.mesh.lines.get(*name);
+            let mut edges = line.iter().flat_map(|line| &line.edges);
+            let is_lost = edges.any(|&edge| !there.contains_key(&problem.mesh.edge(edge)[2]));
+            if is_lost {
+                warnings.push(format!(
+                    "phase `{}` removes ground that the {kind} on line `{name}` acts upon: it goes with it",
+                    phase.name
+                ));
+            }
+            !is_lost
+        });
+    }
+    warnings
 }
 
 /// Elements of a thin layer that lie upon one another, or do not agree on what is across it.

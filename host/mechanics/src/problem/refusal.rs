@@ -250,6 +250,22 @@ pub enum Cause {
         /// What the law makes of them.
         returned: [f64; 2],
     },
+    /// Earth pressure at rest that would be tension.
+    TensionAtRest {
+        /// Where.
+        at: [f64; 2],
+        /// σ'_h and σ'_v there, compression positive.
+        stress: [f64; 2],
+    },
+    /// ν_u of undrained ground does not exceed ν of its law.
+    NoPoreStiffness {
+        /// The group.
+        group: String,
+        /// ν_u.
+        undrained: f64,
+        /// ν of the law.
+        drained: f64,
+    },
     /// A joint in a group that is not one of zero-thickness elements, or a solid in one that is.
     OtherElements(String, Formulation),
     /// An element or a line refers to what there is not.
@@ -456,6 +472,23 @@ impl fmt::Display for Cause {
                  `{material}`: at ({x:.4}, {y:.4}) horizontal {h:.4}, vertical {v:.4} kPa, where the \
                  law returns {r_h:.4} and {r_v:.4}"
             ),
+            Self::TensionAtRest {
+                at: [x, y],
+                stress: [h, v],
+            } => write!(
+                f,
+                "the earth pressure at rest is tension: at ({x:.4}, {y:.4}) horizontal {h:.4}, vertical \
+                 {v:.4} kPa"
+            ),
+            Self::NoPoreStiffness {
+                group,
+                undrained,
+                drained,
+            } => write!(
+                f,
+                "group `{group}`: `undrained_poisson_ratio` {undrained} does not exceed Poisson's ratio of \
+                 its law, {drained:.4}, so its pore water would have no stiffness"
+            ),
             Self::OtherElements(group, formulation) => write!(
                 f,
                 "group `{group}` has elements that are not of its formulation `{}`",
@@ -514,6 +547,9 @@ impl Cause {
             }
             Self::AtRestOutsideStrength { .. } => {
                 "K_0 lies between active and passive pressure: at the surface cohesion, or another K_0"
+            }
+            Self::TensionAtRest { .. } => {
+                "with much unloading (`ocr`, `pop`) a smaller `poisson_ratio`, or give `k_0` itself"
             }
             Self::AlreadySo {
                 is_active: true, ..

@@ -129,11 +129,7 @@ impl Simulation {
         };
         let to = self.loading_at(f_1);
         let share = (course.lambda - t_0) / (t_1 - t_0);
-        if self.problem.water.is_some() {
-            self.pores
-                .are(from.water(&self.problem), to.water(&self.problem), share);
-        }
-        self.acting = Acting::between(from, to, share);
+        self.acting = Acting::between(&self.problem, from, to, share);
     }
 
     /// Takes note of what a phase ends with.

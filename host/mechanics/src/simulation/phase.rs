@@ -74,7 +74,10 @@ impl Simulation {
             .flatten()
             .any(|weight| *weight > 0.0);
         if number == 0 && has_weight && weight > 0.0 {
-            let rest = crate::equilibrium::norm(&loads.out_of_balance);
+            let parts = loads.out_of_balance.iter().zip(&self.released);
+            let own = parts.filter(|(rest, _)| **rest != 0.0);
+            let own: Vec<f64> = own.map(|(rest, released)| rest + released).collect();
+            let rest = crate::equilibrium::norm(&own);
             watch.at_rest(&name, rest / weight);
         }
         if imbalance > 1e-6 {
@@ -313,8 +316,8 @@ impl Simulation {
     }
 
     /// Internal less external forces at the start of a phase where nothing holds them (after a
-    /// swap of laws, a support given up, an initial stress). Returns their size relative to the
-    /// forces in play.
+    /// swap of laws, a support given up, an initial stress, ground removed). Returns the size, relative to
+    /// the forces in play, of those that nobody asked for: without what ground that is removed carried.
     fn out_of_balance(&mut self, unknowns: &[usize], loads: &mut Loads) -> f64 {
         let n_dofs = self.displacement.len();
         let mut internal = vec![0.0; n_dofs];
@@ -322,12 +325,14 @@ impl Simulation {
             group.kinematics.add_forces(&group.carried(), &mut internal);
         }
         fold(&self.tied, &mut internal);
+        let mut released = self.released.clone();
+        fold(&self.tied, &mut released);
         loads.out_of_balance = vec![0.0; n_dofs];
         let (mut rest, mut against_end, mut play) = (0.0, 0.0, 0.0);
         for &dof in unknowns {
             let difference = internal[dof] - loads.force_start[dof];
             loads.out_of_balance[dof] = difference;
-            rest += difference * difference;
+            rest += (difference + released[dof]).powi(2);
             against_end += (internal[dof] - loads.force_end[dof]).powi(2);
         }
         for (internal, external) in internal.iter().zip(&loads.force_start) {

@@ -8,7 +8,7 @@ use crate::error::{Error, Place};
 use crate::ground::beside_joints;
 use crate::group::Group;
 use crate::model::Model;
-use crate::problem::{Cause, Drainage, InitialStress, Item, Key, Refusal};
+use crate::problem::{Cause, InitialStress, Item, Key, Refusal};
 use law::Moment;
 
 /// Change of stress, relative to the largest of its group, that is worth a word.
@@ -39,7 +39,11 @@ impl Simulation {
             .iter()
             .map(|&g| self.stress_beside(g))
             .collect();
+        self.released.fill(0.0);
         for &group in &phase.deactivate {
+            let gone = &self.groups[group];
+            gone.kinematics
+                .add_forces(&gone.carried(), &mut self.released);
             self.groups[group].disappear();
         }
         for (group, law) in self.swaps[number].clone() {
@@ -61,18 +65,24 @@ impl Simulation {
         }
         for (number_of, group) in self.groups.iter_mut().enumerate() {
             let own = &self.problem.groups[number_of];
-            let changed = phase.drainage.iter().find(|(of, _)| *of == number_of);
-            let present = match changed {
-                Some((_, drainage)) => Some(*drainage),
-                None if number == 0 => Some(own.drainage),
-                // The stiffness of the pore water follows from that of the law.
-                None if starts[number_of] && group.is_undrained() => Some(Drainage::Undrained),
-                None => None,
-            };
-            if let Some(drainage) = present.filter(|_| group.is_active) {
+            let is_changed = phase.drainage.iter().any(|(of, _)| *of == number_of);
+            // The stiffness of the pore water follows from that of the law.
+            if group.is_active && (is_changed || starts[number_of]) {
                 group.moment = moment;
+                let drainage = self.problem.drainage(number_of, number);
                 let set = group.set_drainage(drainage, own.undrained_poisson_ratio);
-                set.map_err(cannot_start)?;
+                match set.map_err(cannot_start)? {
+                    Ok(()) => {}
+                    Err(ratio) => {
+                        let cause = Cause::NoPoreStiffness {
+                            group: own.name.clone(),
+                            undrained: own.undrained_poisson_ratio,
+                            drained: ratio,
+                        };
+                        let item = Item::GroupKey(number_of, Key::Drainage);
+                        return Err(Refusal::new(item, cause).into());
+                    }
+                }
             }
         }
         let prescribed = self.take_loads(number)?;

@@ -71,9 +71,13 @@ impl fmt::Display for Warning {
             Self::Note(note) => write!(f, "{note}"),
             Self::OutOfBalance(phase, share) => write!(
                 f,
-                "phase `{phase}` starts out of balance: {:.2} % of the forces in play, carried to \
+                "phase `{phase}` starts out of balance: {} % of the forces in play, carried to \
                  equilibrium in its course",
-                100.0 * share
+                if *share < 1e-4 {
+                    format!("{:.1e}", 100.0 * share)
+                } else {
+                    format!("{:.2}", 100.0 * share)
+                }
             ),
             Self::OtherMethod { law, method, asked } => write!(
                 f,
