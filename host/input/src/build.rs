@@ -124,7 +124,10 @@ impl Case {
                     .drainage
                     .as_ref()
                     .map_or_else(Default::default, |d| *d.get_ref()),
-                undrained_poisson_ratio: input.undrained_poisson_ratio.unwrap_or(0.495),
+                undrained_poisson_ratio: input
+                    .undrained_poisson_ratio
+                    .as_ref()
+                    .map_or(0.495, |ratio| *ratio.get_ref()),
             });
         }
         let supports = file.supports.iter().map(|support| Support {
@@ -252,6 +255,9 @@ impl Case {
                     Key::InitialStress => group.initial_stress.as_ref().map(Spanned::span),
                     Key::UnitWeight => group.unit_weight.as_ref().map(Spanned::span),
                     Key::Drainage => group.drainage.as_ref().map(Spanned::span),
+                    Key::UndrainedPoissonRatio => {
+                        group.undrained_poisson_ratio.as_ref().map(Spanned::span)
+                    }
                 };
                 span.or_else(|| Some(name.span()))
             }),

@@ -433,7 +433,8 @@ pub struct GroupInput {
     #[schemars(with = "Option<Drainage>")]
     pub drainage: Option<Spanned<Drainage>>,
     /// Undrained: Poisson's ratio with the pore water; 0.495 if left out.
-    pub undrained_poisson_ratio: Option<f64>,
+    #[schemars(with = "Option<f64>")]
+    pub undrained_poisson_ratio: Option<Spanned<f64>>,
 }
 
 /// Ends of a line along which elements are inserted.

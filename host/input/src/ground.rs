@@ -95,7 +95,8 @@ pub(crate) fn level(source: &Source, level: &Spanned<LevelInput>) -> Result<Prof
         LevelInput::Points(points) => points.clone(),
     };
     Profile::new(points).ok_or_else(|| {
-        let message = "a water table needs points [x, z] of finite numbers, from left to right";
+        let message = "a water table needs pairs of a distance x (r) and a level, finite numbers, with x \
+                       rising from each to the next: a step takes a small distance";
         source.error(level.span(), message).into()
     })
 }

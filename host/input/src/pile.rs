@@ -66,6 +66,13 @@ pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Err
             return Err(error.hint(suggestion(name, names)).into());
         }
     };
+    if let Base::Group(number) = base
+        && shaft.contains(&number)
+    {
+        let name = input.base.get_ref();
+        let message = format!("[pile]: group `{name}` cannot be both shaft and base");
+        return Err(source.error(input.base.span(), message).into());
+    }
     let diameter = input.diameter.as_ref();
     if let Some(diameter) = diameter
         && !(*diameter.get_ref() > 0.0 && diameter.get_ref().is_finite())
@@ -86,7 +93,7 @@ pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Err
                 &input.group.0[number],
                 "is an interface; a pile is made of `solid` groups",
             ),
-            Misfit::Head => (&input.head, "has no node of the pile's groups"),
+            Misfit::Head => (&input.head, "has no side of the pile's elements"),
             Misfit::NotAnInterface(number) => (
                 &input.shaft.0[number],
                 "is no interface; a shaft has `zero_thickness` or `thin_layer` groups",

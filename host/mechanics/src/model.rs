@@ -17,6 +17,10 @@ use std::collections::{HashMap, HashSet};
 /// A layer whose one side is so many times the other has no doubt about its normal.
 const CLEARLY: f64 = 2.0;
 
+/// An effective stress at rest that is less than this part of the weight and the water of which it is the
+/// difference is none.
+const ROUND_OFF_AT_REST: f64 = 1e-9;
+
 /// What a problem is made of once its elements stand.
 #[derive(Debug)]
 pub struct Model {
@@ -498,11 +502,17 @@ impl GroupBuilder<'_> {
 
     /// Refuses an earth pressure at rest that pulls.
     fn refuse_tension_at_rest(&self, kinematics: &dyn Kinematics) -> Result<(), Refusal> {
-        if !matches!(self.group.initial_stress, Some(InitialStress::AtRest(_))) {
+        let Some(InitialStress::AtRest(at_rest)) = &self.group.initial_stress else {
             return Ok(());
-        }
+        };
         for point in 0..kinematics.n_points() {
             let at = kinematics.position(point);
+            let [above, pore] = self.initial.on_a_plane(self.number, at);
+            let left = above + at_rest.surcharge - pore;
+            if left < -ROUND_OFF_AT_REST * (above.abs() + pore) {
+                let cause = Cause::LiftedAtRest { at, above, pore };
+                return Err(self.refuse_key(Key::InitialStress, cause));
+            }
             let [horizontal, vertical, ..] = self.initial.at(self.number, at).unwrap_or_default();
             if horizontal > 0.0 {
                 let stress = [-horizontal, -vertical];

@@ -610,6 +610,38 @@ fn mesh_side(problem: &mut Problem) {
     });
 }
 
+/// A pressure on the floor of a pit, and on ground upon which more will come.
+#[test]
+fn a_pressure_acts_on_a_surface_laid_bare() {
+    for dug in [true, false] {
+        let analysis = Analysis::PlaneStrain;
+        let mut mesh = grid(&[0.0, 1.0], &[0.0, 2.0, 3.0], |_, j| j, Shape::Rectangles);
+        mesh.name_line("floor", |e| e.iter().all(|n| (n[1] - 2.0).abs() < 1e-9));
+        let mut problem = Problem::new(analysis, mesh);
+        for name in ["lower", "upper"] {
+            let mut group = solid(name, elastic(analysis, E, NU));
+            group.unit_weight = 18.0;
+            group.initial_stress = Some(k_0(0.5));
+            problem.groups.push(group);
+        }
+        problem.groups[1].is_active = dug;
+        problem.supports = roller_box();
+        let mut dig = Phase::new("dig", 1);
+        if dug {
+            dig.deactivate = vec![1];
+        }
+        let mut load = Phase::new("load", 1);
+        load.pressure = vec![Pressure {
+            line: "floor".to_owned(),
+            value: 50.0.into(),
+        }];
+        problem.phases = vec![dig, load];
+        let simulation = run(problem);
+        let reaction = simulation.reaction_of("bottom").unwrap()[1];
+        assert!((reaction - 86.0).abs() < 1e-9, "{dug}: {reaction}");
+    }
+}
+
 /// A stiffness that grows with depth: ∫ q/E_oed dz, element by element.
 #[test]
 fn a_stiffness_that_grows_with_depth_is_that_of_each_element() {

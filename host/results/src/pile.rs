@@ -335,9 +335,11 @@ impl Pile {
         }
     }
 
-    /// What acts from outside on all solids but the pile, by degree of freedom.
+    /// What the pile exerts on all other solids, and what holds them, by degree of freedom: all that acts on
+    /// them from outside, less what acts on lines and as water on the outline.
     fn outer_of_ground(&self, snapshot: &Snapshot<'_>, n_dofs: usize) -> Vec<f64> {
-        let mut outer = vec![0.0; n_dofs];
+        let outline = snapshot.acting.on_outline(snapshot.problem);
+        let mut outer: Vec<f64> = outline.iter().map(|force| -force).collect();
         for (number, group) in snapshot.groups.iter().enumerate() {
             let is_joint = group.formulation == Formulation::ZeroThickness;
             if !group.is_active || is_joint || self.parts.groups.contains(&number) {

@@ -80,6 +80,13 @@ impl Acting {
         })
     }
 
+    /// Nodal forces of what acts on lines and, as water, on the outline, by degree of freedom, kN.
+    pub fn on_outline(&self, problem: &Problem) -> Vec<f64> {
+        self.forces(problem, |loading, force| {
+            loading.add_outline(problem, force);
+        })
+    }
+
     fn forces(&self, problem: &Problem, add: impl Fn(&Loading, &mut [f64])) -> Vec<f64> {
         let n = 2 * problem.mesh.nodes.len();
         let mut sum = vec![0.0; n];

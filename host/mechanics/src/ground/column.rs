@@ -94,16 +94,16 @@ impl<'m> Columns<'m> {
             if x < low[0] || x > high[0] || high[1] <= y {
                 continue;
             }
-            let Some([from, to]) = self.chord(&self.mesh.solids[number], x) else {
-                continue;
-            };
-            let from = from.max(y);
-            if to <= from {
-                continue;
+            let mut crossings = self.crossings(&self.mesh.solids[number], x);
+            for &[from, to] in crossings.chords() {
+                let from = from.max(y);
+                if to <= from {
+                    continue;
+                }
+                top = top.max(to);
+                let wet = level.map_or(from, |level| level.clamp(from, to));
+                sum += below_water * (wet - from) + above_water * (to - wet);
             }
-            top = top.max(to);
-            let wet = level.map_or(from, |level| level.clamp(from, to));
-            sum += below_water * (wet - from) + above_water * (to - wet);
         }
         let stands = self.water.zip(level);
         sum + stands.map_or(0.0, |(water, level)| {
@@ -111,31 +111,73 @@ impl<'m> Columns<'m> {
         })
     }
 
-    /// Where a vertical enters and leaves an element.
-    fn chord(&self, solid: &Solid, x: f64) -> Option<[f64; 2]> {
-        let mut ends: Option<[f64; 2]> = None;
-        let mut cross = |y: f64| {
-            let [low, high] = ends.get_or_insert([y, y]);
-            (*low, *high) = (low.min(y), high.max(y));
-        };
+    /// Where a vertical crosses the outline of an element.
+    fn crossings(&self, solid: &Solid, x: f64) -> Crossings {
+        let mut found = Crossings::default();
         for edge in solid.edges() {
             let [a, b, m] = edge.map(|node| self.mesh.nodes[node]);
             // x(t) = x_m + t (x_b − x_a)/2 + t² (x_a + x_b − 2 x_m)/2, t from −1 to 1, and y likewise.
             let half = [0, 1].map(|c| 0.5 * (b[c] - a[c]));
             let bend = [0, 1].map(|c| 0.5 * (a[c] + b[c]) - m[c]);
             let length = half[0].hypot(half[1]);
-            let roots: [Option<f64>; 2] = if bend[0].hypot(bend[1]) <= STRAIGHT * length {
-                // Of two edges that share an end the vertical through it crosses one.
-                let crosses = (a[0] <= x) != (b[0] <= x);
-                [crosses.then(|| (x - m[0]) / half[0]), None]
+            if bend[0].hypot(bend[1]) <= STRAIGHT * length {
+                if crosses(a[0], b[0], x) {
+                    found.add(m[1] + (x - m[0]) / half[0] * half[1]);
+                }
+                continue;
+            }
+            // Two pieces along which x only grows or only falls, or one.
+            let turn = -0.5 * half[0] / bend[0];
+            let is_one = turn.is_nan() || turn.abs() >= 1.0;
+            let turn = if is_one { 1.0 } else { turn };
+            let at_turn = if is_one {
+                b[0]
             } else {
-                solutions(bend[0], half[0], m[0] - x)
+                m[0] + turn * (half[0] + turn * bend[0])
             };
-            for t in roots.into_iter().flatten().filter(|t| t.abs() <= 1.0) {
-                cross(m[1] + t * half[1] + t * t * bend[1]);
+            for ([start, end], [from, to]) in [
+                ([a[0], at_turn], [-1.0, turn]),
+                ([at_turn, b[0]], [turn, 1.0]),
+            ] {
+                if !crosses(start, end, x) {
+                    continue;
+                }
+                let off = |t: f64| (t.clamp(from, to) - t).abs();
+                let roots = solutions(bend[0], half[0], m[0] - x);
+                let t = roots.into_iter().flatten();
+                let t = t.min_by(|a, b| off(*a).total_cmp(&off(*b)));
+                let t = t.unwrap_or(turn).clamp(from, to);
+                found.add(m[1] + t * half[1] + t * t * bend[1]);
             }
         }
-        ends
+        found
+    }
+}
+
+/// Whether the vertical at x crosses a piece of an outline between these. Of two pieces that share an end
+/// the vertical through it crosses both or none where they turn back there, and else one.
+fn crosses(start: f64, end: f64, x: f64) -> bool {
+    (start <= x) != (end <= x)
+}
+
+/// Heights at which a vertical crosses the outline of an element: twice for each of at most 4 sides.
+#[derive(Debug, Default)]
+struct Crossings {
+    heights: [f64; 8],
+    n: usize,
+}
+
+impl Crossings {
+    fn add(&mut self, height: f64) {
+        self.heights[self.n] = height;
+        self.n += 1;
+    }
+
+    /// Where the vertical is inside: every second interval between the crossings.
+    fn chords(&mut self) -> &[[f64; 2]] {
+        let heights = &mut self.heights[..self.n];
+        heights.sort_unstable_by(f64::total_cmp);
+        heights.as_chunks().0
     }
 }
 
@@ -199,6 +241,59 @@ mod tests {
                 (columns.above([x, 0.0]) - 10.0 * height).abs() < 1e-12,
                 "{x}"
             );
+        }
+    }
+
+    /// Ground around a circle: the elements outside are entered twice by verticals beside its springline,
+    /// and what stands above a point is the whole height all the same.
+    #[test]
+    fn a_concave_side_is_entered_twice() {
+        for n in [8, 12, 20, 28] {
+            let mut mesh = Mesh::default();
+            let angle = |i: usize| std::f64::consts::TAU * (i as f64 + 0.5) / n as f64;
+            let on = |radius: f64, phi: f64| [radius * phi.cos(), radius * phi.sin()];
+            // Rings of nodes: inner corners and middles, outer ones, and those between; the middle point.
+            let ring = |mesh: &mut Mesh, radius: f64| -> Vec<usize> {
+                (0..2 * n)
+                    .map(|i| {
+                        let phi = angle(0) + std::f64::consts::PI * i as f64 / n as f64;
+                        mesh.nodes.push(on(radius, phi));
+                        mesh.nodes.len() - 1
+                    })
+                    .collect()
+            };
+            let (middle, inner, outer) = (
+                ring(&mut mesh, 1.0),
+                ring(&mut mesh, 2.0),
+                ring(&mut mesh, 4.0),
+            );
+            let between = ring(&mut mesh, 3.0);
+            mesh.nodes.push([0.0, 0.0]);
+            let centre = mesh.nodes.len() - 1;
+            for i in 0..n {
+                let (a, m, b) = (2 * i, 2 * i + 1, (2 * i + 2) % (2 * n));
+                let sector = [centre, inner[a], inner[b], middle[a], inner[m], middle[b]];
+                mesh.solids.push(Solid::triangle(sector, 0));
+                let quad = [
+                    inner[a], outer[a], outer[b], inner[b], between[a], outer[m], between[b],
+                    inner[m],
+                ];
+                mesh.solids.push(Solid::quad(quad, 0));
+            }
+            let columns = Columns::new(&mesh, None, |_| Some([10.0, 10.0]));
+            for i in 0..400 {
+                let x = -2.2 + 4.4 * f64::from(i) / 399.0;
+                // The outline alone: what is there between it and a point does not depend on the circle.
+                let whole = columns.above([x, -4.0]);
+                let low = columns.above([x, 0.0]);
+                let height = 2.0 * low / 10.0;
+                assert!(
+                    (whole / 10.0 - height).abs() < 1e-9,
+                    "{n}, {x}: {whole} {height}"
+                );
+                let up = columns.above([x, 1.0]);
+                assert!((low - up - 10.0).abs() < 1e-9, "{n}, {x}: {low} {up}");
+            }
         }
     }
 }

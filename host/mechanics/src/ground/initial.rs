@@ -47,17 +47,23 @@ impl<'p> InitialStresses<'p> {
             InitialStress::Constant(stress) => *stress,
             InitialStress::Profiles(profiles) => [0, 1, 2, 3].map(|c| profiles[c].at(at[1])),
             InitialStress::AtRest(at_rest) => {
-                let total = self
-                    .columns
-                    .as_ref()
-                    .map_or(0.0, |columns| columns.above(at));
-                let water = self.problem.water.as_ref().filter(|_| group.pore_water);
-                let pore = water.map_or(0.0, |water| water.pressure(at));
+                let [total, pore] = self.on_a_plane(number, at);
                 let vertical = (total + at_rest.surcharge - pore).max(0.0);
                 let horizontal = at_rest.ratio.horizontal(vertical, at[1]);
                 [-horizontal, -vertical, -horizontal, 0.0]
             }
         })
+    }
+
+    /// What stands above a point of a group, and the pressure in its pores, compression positive, kPa.
+    pub(crate) fn on_a_plane(&self, number: usize, at: [f64; 2]) -> [f64; 2] {
+        let columns = self.columns.as_ref();
+        let has_water = self.problem.groups[number].pore_water;
+        let water = self.problem.water.as_ref().filter(|_| has_water);
+        [
+            columns.map_or(0.0, |columns| columns.above(at)),
+            water.map_or(0.0, |water| water.pressure(at)),
+        ]
     }
 
     /// Stress of the ground on the two sides of a joint of group `number` at a point of it: the mean of the

@@ -111,21 +111,8 @@ impl Loading {
 
     /// Nodal forces, by degree of freedom.
     pub fn forces(&self, problem: &Problem, groups: &[Group]) -> Vec<f64> {
-        let (mesh, analysis) = (&problem.mesh, problem.analysis);
-        let mut force = vec![0.0; 2 * mesh.nodes.len()];
-        for (line, value) in &self.pressure {
-            let Some(line) = mesh.lines.get(line) else {
-                continue;
-            };
-            let own = pressure_on(analysis, mesh, &line.edges, value);
-            force
-                .iter_mut()
-                .zip(own)
-                .for_each(|(force, own)| *force += own);
-        }
-        for (line, total) in &self.force {
-            add_spread(problem, line, *total, &mut force);
-        }
+        let mut force = vec![0.0; 2 * problem.mesh.nodes.len()];
+        self.add_lines(problem, &mut force);
         let water = self.water(problem);
         self.add_weights(problem, groups, water.as_ref(), &mut force);
         if let Some(water) = &water {
@@ -137,6 +124,35 @@ impl Loading {
             self.add_outer_water(problem, water, &mut force);
         }
         force
+    }
+
+    /// Adds the nodal forces of pressures and forces on lines.
+    fn add_lines(&self, problem: &Problem, force: &mut [f64]) {
+        let (mesh, analysis) = (&problem.mesh, problem.analysis);
+        for (line, value) in &self.pressure {
+            let Some(line) = mesh.lines.get(line) else {
+                continue;
+            };
+            // Beside ground that is not there the line has the edges of both sides.
+            let is_there = |(solid, _): &&(usize, usize)| self.active[mesh.solids[*solid].group];
+            let edges: Vec<(usize, usize)> = line.edges.iter().filter(is_there).copied().collect();
+            let own = pressure_on(analysis, mesh, &edges, value);
+            force
+                .iter_mut()
+                .zip(own)
+                .for_each(|(force, own)| *force += own);
+        }
+        for (line, total) in &self.force {
+            add_spread(problem, line, *total, force);
+        }
+    }
+
+    /// Adds the nodal forces of what acts on lines and, as water, on the outline.
+    pub(super) fn add_outline(&self, problem: &Problem, force: &mut [f64]) {
+        self.add_lines(problem, force);
+        if let Some(water) = self.water(problem) {
+            self.add_outer_water(problem, &water, force);
+        }
     }
 
     /// Weights of all solids that are there.

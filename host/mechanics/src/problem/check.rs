@@ -20,7 +20,12 @@ const BEYOND_AXIS: f64 = 1e-9;
 pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
     mesh(problem)?;
     for (number, group) in problem.groups.iter().enumerate() {
-        check_group(number, group)?;
+        let in_phases = problem.phases.iter().flat_map(|phase| &phase.drainage);
+        let is_undrained = group.drainage == Drainage::Undrained
+            || in_phases
+                .into_iter()
+                .any(|said| *said == (number, Drainage::Undrained));
+        check_group(number, group, is_undrained)?;
     }
     if let Some(water) = &problem.water {
         let refuse = |cause| Err(Refusal::new(Item::Water(None), cause));
@@ -113,7 +118,8 @@ fn mesh(problem: &Problem) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn check_group(number: usize, group: &ElementGroup) -> Result<(), Refusal> {
+/// `is_undrained`: in some phase.
+fn check_group(number: usize, group: &ElementGroup, is_undrained: bool) -> Result<(), Refusal> {
     let refuse = |key, cause| Err(Refusal::new(Item::GroupKey(number, key), cause));
     let weights = [Some(group.unit_weight), group.saturated_unit_weight];
     if let Some(weight) = weights
@@ -125,18 +131,28 @@ fn check_group(number: usize, group: &ElementGroup) -> Result<(), Refusal> {
         return refuse(Key::UnitWeight, cause);
     }
     let is_solid = group.formulation == Formulation::Solid;
-    if group.drainage == Drainage::Undrained {
-        if !is_solid {
-            let cause = Cause::Misplaced(Key::Drainage, group.formulation);
-            return refuse(Key::Drainage, cause);
+    if group.formulation == Formulation::ZeroThickness
+        && weights.into_iter().flatten().any(|weight| weight > 0.0)
+    {
+        let cause = Cause::Misplaced(Key::UnitWeight, group.formulation);
+        return refuse(Key::UnitWeight, cause);
+    }
+    if group.drainage == Drainage::Undrained && !is_solid {
+        let cause = Cause::Misplaced(Key::Drainage, group.formulation);
+        return refuse(Key::Drainage, cause);
+    }
+    if is_undrained && is_solid {
+        if !group.pore_water {
+            return refuse(
+                Key::Drainage,
+                Cause::UndrainedWithoutWater(group.name.clone()),
+            );
         }
         let nu = group.undrained_poisson_ratio;
         if !(nu > 0.0 && nu < 0.5) {
             let what = "`undrained_poisson_ratio`";
-            return refuse(
-                Key::Drainage,
-                Cause::OutOfBounds(what, nu, "more than 0, less than 0.5"),
-            );
+            let cause = Cause::OutOfBounds(what, nu, "more than 0, less than 0.5");
+            return refuse(Key::UndrainedPoissonRatio, cause);
         }
     }
     match &group.initial_stress {
@@ -204,12 +220,11 @@ fn phases(problem: &Problem) -> Result<(), Refusal> {
         return Err(Refusal::new(Item::Problem, Cause::NoPhase));
     }
     let mut active: Vec<bool> = problem.groups.iter().map(|group| group.is_active).collect();
-    let faces = problem
-        .mesh
-        .joints
-        .iter()
-        .flat_map(|joint| [joint.minus[2], joint.plus[2]]);
-    let faces: HashSet<usize> = faces.collect();
+    let faces = problem.mesh.joints.iter().flat_map(|joint| {
+        let (minus, plus) = (joint.minus[2], joint.plus[2]);
+        [(minus, plus), (plus, minus)]
+    });
+    let faces: HashMap<usize, usize> = faces.collect();
     let mut names: Vec<&str> = Vec::new();
     for (number, phase) in problem.phases.iter().enumerate() {
         let refuse = |cause| Err(Refusal::new(Item::Phase(number), cause));
@@ -255,7 +270,12 @@ fn phases(problem: &Problem) -> Result<(), Refusal> {
             }
         }
         for (place, line) in phase.rigid.iter().enumerate() {
-            constraints::line(&problem.mesh, line, &Item::Rigid(number, place))?;
+            let item = Item::Rigid(number, place);
+            let edges = &constraints::line(&problem.mesh, line, &item)?.edges;
+            let mut middles = edges.iter().map(|&edge| problem.mesh.edge(edge)[2]);
+            if middles.any(|middle| faces.contains_key(&middle)) {
+                return Err(Refusal::new(item, Cause::RigidInterface(line.clone())));
+            }
         }
     }
     Ok(())
@@ -356,7 +376,7 @@ fn pressures(
     number: usize,
     phase: &Phase,
     there: &HashMap<usize, usize>,
-    faces: &HashSet<usize>,
+    faces: &HashMap<usize, usize>,
 ) -> Result<(), Refusal> {
     let mesh = &problem.mesh;
     let mut lines: Vec<&str> = Vec::new();
@@ -373,7 +393,8 @@ fn pressures(
         }
         let line = constraints::line(mesh, name, &item)?;
         let middles = || line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
-        if middles().any(|middle| faces.contains(&middle)) {
+        let opposite = |middle: &usize| faces.get(middle).filter(|face| there.contains_key(*face));
+        if middles().any(|middle| there.contains_key(&middle) && opposite(&middle).is_some()) {
             return refuse(Cause::OnInterface(name.to_owned()));
         }
         if line.edges.is_empty()
@@ -381,7 +402,7 @@ fn pressures(
         {
             return refuse(Cause::NoBoundary(name.to_owned()));
         }
-        if middles().any(|middle| !there.contains_key(&middle)) {
+        if middles().any(|middle| !there.contains_key(&middle) && opposite(&middle).is_none()) {
             return refuse(Cause::NotThere(name.to_owned()));
         }
     }

@@ -1,7 +1,9 @@
 //! Whether supports and prescribed displacements fit together, phase by phase.
 
 use super::held::{Motion, Part, loose, parts};
-use super::{Analysis, Axis, Cause, Displacement, Free, Item, Phase, Pressure, Problem, Refusal};
+use super::{
+    Analysis, Axis, Cause, Displacement, Force, Free, Item, Phase, Pressure, Problem, Refusal,
+};
 use crate::assembly::Tie;
 use crate::ground::unit_pressure;
 use crate::mesh::{Line, Mesh};
@@ -81,6 +83,14 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
             let item = Item::Pressure(number, place);
             let warning = constraints.lost_pressure(item, phase, pressure, while_it_lasts)?;
             warnings.extend(warning);
+        }
+        for (place, force) in phase.force.iter().enumerate() {
+            let again = problem.phases[number + 1..].iter().position(|later| {
+                let mut lines = later.force.iter();
+                lines.any(|other| other.line == force.line)
+            });
+            let end = again.map_or(held.len(), |later| number + 1 + later);
+            constraints.refuse_lost_force(Item::Force(number, place), force, &held[number..end])?;
         }
     }
     Ok(warnings)
@@ -247,6 +257,28 @@ impl<'a> Constraints<'a> {
             100.0 * lost / all,
             largest * lost
         )))
+    }
+
+    /// A force on nodes that are held against it, as long as it lasts, changes nothing but their reactions.
+    fn refuse_lost_force(
+        &self,
+        item: Item,
+        input: &Force,
+        held: &[HashSet<usize>],
+    ) -> Result<(), Refusal> {
+        let nodes = &line(self.mesh, &input.line, &item)?.nodes;
+        let parts = [input.x, input.y].into_iter().enumerate();
+        let acting = parts.filter(|(_, force)| force.is_some_and(|force| force != 0.0));
+        let acting: Vec<usize> = acting.map(|(c, _)| c).collect();
+        let is_held = |c: &usize| {
+            let all =
+                |held: &HashSet<usize>| nodes.iter().all(|node| held.contains(&(2 * node + c)));
+            held.iter().all(all)
+        };
+        if !acting.is_empty() && acting.iter().all(is_held) {
+            return Err(Refusal::new(item, Cause::LostForce(input.line.clone())));
+        }
+        Ok(())
     }
 
     /// Nodes on the axis of symmetry have nowhere to go.

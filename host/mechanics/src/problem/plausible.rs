@@ -1,6 +1,7 @@
 //! Input that can be computed but is seldom meant, in words and with numbers.
 
 use super::{Formulation, Material, Problem};
+use crate::ground::beside_joints;
 use crate::group::Group;
 use crate::mesh::{Mesh, Shape, Solid};
 use law::ParameterDescription;
@@ -27,6 +28,7 @@ pub(crate) fn warnings(
     let mut warnings = far(problem);
     warnings.extend(light(problem));
     warnings.extend(lost(problem));
+    warnings.extend(beside_undrained(problem));
     for (number, group) in groups.iter().enumerate() {
         match group.formulation {
             Formulation::ThinLayer => {
@@ -136,8 +138,59 @@ fn lost(problem: &Problem) -> Vec<String> {
             }
             !is_lost
         });
+        loaded.retain(|(kind, name)| {
+            let line = problem.mesh.lines.get(*name);
+            let mut edges = line.iter().flat_map(|line| &line.edges);
+            let of_both = |&edge: &_| there.get(&problem.mesh.edge(edge)[2]) == Some(&2);
+            let is_covered = *kind == "pressure" && edges.any(of_both);
+            if is_covered {
+                warnings.push(format!(
+                    "phase `{}` brings ground upon line `{name}`: the pressure there ends",
+                    phase.name
+                ));
+            }
+            !is_covered
+        });
+    }
+    for (number, group) in problem.groups.iter().enumerate() {
+        let mut phases = problem.phases.iter();
+        if !group.is_active && !phases.any(|phase| phase.activate.contains(&number)) {
+            warnings.push(format!("group `{}` is active in no phase", group.name));
+        }
     }
     warnings
+}
+
+/// Interfaces beside undrained ground: their tractions are effective towards the hydrostatic pressure alone.
+fn beside_undrained(problem: &Problem) -> Vec<String> {
+    let mesh = &problem.mesh;
+    let is_undrained = |number: usize| {
+        (0..problem.phases.len())
+            .any(|phase| problem.drainage(number, phase) == super::Drainage::Undrained)
+    };
+    let undrained: Vec<bool> = (0..problem.groups.len()).map(is_undrained).collect();
+    if !undrained.contains(&true) {
+        return Vec::new();
+    }
+    let beside = beside_joints(mesh);
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    for joint in &mesh.joints {
+        let sides = [joint.minus[2], joint.plus[2]].into_iter();
+        for solid in sides.filter_map(|face| beside.get(&face)) {
+            let pair = (joint.group, mesh.solids[*solid].group);
+            if undrained[pair.1] && !found.contains(&pair) {
+                found.push(pair);
+            }
+        }
+    }
+    let say = |&(joint, ground): &(usize, usize)| {
+        format!(
+            "interface `{}` stands beside undrained `{}`: excess pore pressure counts as normal stress in it, so \
+             friction there should not depend on the normal stress (c = α c_u, friction angle 0)",
+            problem.groups[joint].name, problem.groups[ground].name
+        )
+    };
+    found.iter().map(say).collect()
 }
 
 /// Elements of a thin layer that lie upon one another, or do not agree on what is across it.

@@ -69,6 +69,8 @@ pub enum Key {
     UnitWeight,
     /// Whether pore water leaves.
     Drainage,
+    /// Poisson's ratio of ground whose water does not leave.
+    UndrainedPoissonRatio,
 }
 
 /// A part of a problem that does not fit.
@@ -257,6 +259,21 @@ pub enum Cause {
         /// σ'_h and σ'_v there, compression positive.
         stress: [f64; 2],
     },
+    /// Water lifts what stands at rest.
+    LiftedAtRest {
+        /// Where.
+        at: [f64; 2],
+        /// What stands above, kPa.
+        above: f64,
+        /// Pressure in the pores, kPa.
+        pore: f64,
+    },
+    /// Undrained ground without water in its pores.
+    UndrainedWithoutWater(String),
+    /// A rigid line along an interface would tie its two faces.
+    RigidInterface(String),
+    /// A force on a line that is held against it.
+    LostForce(String),
     /// ν_u of undrained ground does not exceed ν of its law.
     NoPoreStiffness {
         /// The group.
@@ -292,6 +309,7 @@ impl Key {
             Self::InitialStress => "`initial_stress`",
             Self::UnitWeight => "`unit_weight`",
             Self::Drainage => "`drainage`",
+            Self::UndrainedPoissonRatio => "`undrained_poisson_ratio`",
         }
     }
 }
@@ -480,6 +498,29 @@ impl fmt::Display for Cause {
                 "the earth pressure at rest is tension: at ({x:.4}, {y:.4}) horizontal {h:.4}, vertical \
                  {v:.4} kPa"
             ),
+            Self::LiftedAtRest {
+                at: [x, y],
+                above,
+                pore,
+            } => write!(
+                f,
+                "the vertical effective stress at rest is tension: at ({x:.4}, {y:.4}) {above:.4} kPa stand \
+                 above, and the pressure in the pores is {pore:.4} kPa"
+            ),
+            Self::UndrainedWithoutWater(group) => write!(
+                f,
+                "group `{group}` is undrained in some phase and has no water in its pores (`pore_water = false`)"
+            ),
+            Self::RigidInterface(line) => write!(
+                f,
+                "line `{line}`, along which zero-thickness elements stand, would be rigid on both of their \
+                 faces, and nothing could slip or open there"
+            ),
+            Self::LostForce(line) => write!(
+                f,
+                "the force on line `{line}` acts only where the displacement is held or prescribed: it would \
+                 change nothing but reactions"
+            ),
             Self::NoPoreStiffness {
                 group,
                 undrained,
@@ -547,6 +588,13 @@ impl Cause {
             }
             Self::AtRestOutsideStrength { .. } => {
                 "K_0 lies between active and passive pressure: at the surface cohesion, or another K_0"
+            }
+            Self::LiftedAtRest { .. } => {
+                "`unit_weight` and `saturated_unit_weight` are those of ground and water together, not under \
+                 buoyancy"
+            }
+            Self::LostForce(_) => {
+                "leave the force or the displacement out, or give the displacement up with [[phase.free]]"
             }
             Self::TensionAtRest { .. } => {
                 "with much unloading (`ocr`, `pop`) a smaller `poisson_ratio`, or give `k_0` itself"

@@ -74,11 +74,7 @@ impl Simulation {
             .flatten()
             .any(|weight| *weight > 0.0);
         if number == 0 && has_weight && weight > 0.0 {
-            let parts = loads.out_of_balance.iter().zip(&self.released);
-            let own = parts.filter(|(rest, _)| **rest != 0.0);
-            let own: Vec<f64> = own.map(|(rest, released)| rest + released).collect();
-            let rest = crate::equilibrium::norm(&own);
-            watch.at_rest(&name, rest / weight);
+            watch.at_rest(&name, imbalance * self.largest_force / weight);
         }
         if imbalance > 1e-6 {
             watch.warning(&Warning::OutOfBalance(name.clone(), imbalance));

@@ -79,7 +79,7 @@ impl Simulation {
                             undrained: own.undrained_poisson_ratio,
                             drained: ratio,
                         };
-                        let item = Item::GroupKey(number_of, Key::Drainage);
+                        let item = Item::GroupKey(number_of, Key::UndrainedPoissonRatio);
                         return Err(Refusal::new(item, cause).into());
                     }
                 }

@@ -230,9 +230,14 @@ fn davisson(points: &[[f64; 4]], compliance: f64, diameter: f64) -> Found {
 
 fn chin(points: &[[f64; 4]]) -> Found {
     let most = largest(points);
-    let last = points
-        .iter()
-        .filter(|[s, head, ..]| *s >= LAST * most && *s > 0.0 && *head > 0.0);
+    // Unloading and reloading are no part of the line.
+    let mut deepest = 0.0;
+    let first = points.iter().filter(|[s, ..]| {
+        let is_first = *s > deepest;
+        deepest = f64::max(deepest, *s);
+        is_first
+    });
+    let last = first.filter(|[s, head, ..]| *s >= LAST * most && *head > 0.0);
     let line: Vec<[f64; 2]> = last.map(|[s, head, ..]| [*s, s / head]).collect();
     let n = line.len();
     if n < FEWEST {

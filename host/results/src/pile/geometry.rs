@@ -17,7 +17,7 @@ const SAME: f64 = 1e-9;
 pub enum Misfit {
     /// A group of the pile (by its number in the list) is not of solids.
     NotSolid(usize),
-    /// No node of the head belongs to the pile.
+    /// No node of the head belongs to the pile, or no side of its line.
     Head,
     /// A group of the shaft (by its number in the list) is not an interface.
     NotAnInterface(usize),
@@ -198,6 +198,9 @@ impl Geometry {
             Analysis::PlaneStrain => right - left,
         };
         let (bodies, head_sides) = bodies(problem.analysis, mesh, groups, &parts.groups, &head);
+        if head_sides.is_empty() && line(&parts.head).is_some_and(|line| !line.edges.is_empty()) {
+            return Err(Misfit::Head);
+        }
         Ok(Self {
             head,
             base,
