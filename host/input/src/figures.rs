@@ -43,7 +43,7 @@ pub fn case_figures(case: &Case, names: &[&str]) -> Result<Vec<Figure>, Error> {
         match (&figure.points, &figure.along_pile) {
             (None, None) => check_columns(source, figure, "probe", names)?,
             (Some(_), None) => {
-                check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?
+                check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?;
             }
             (None, Some(_)) => check_columns(source, figure, "column of pile.csv", &OF_STATION)?,
             (Some(_), Some(along)) => {
