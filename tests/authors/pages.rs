@@ -329,7 +329,7 @@ fn pictures(page: &str) -> impl Iterator<Item = &str> {
     let after = page.split("![").skip(1);
     let targets = after.filter_map(|text| text.split_once("](")?.1.split_once(')'));
     let targets = targets.map(|(target, _)| target);
-    targets.filter(|target| target.ends_with(".svg") && !target.contains("cases/"))
+    targets.filter(|target| !target.contains("cases/"))
 }
 
 #[test]
