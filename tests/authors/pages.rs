@@ -11,7 +11,10 @@
 //! - A `text` block is neither run nor compared.
 //!
 //! Remarks at the top of a page: `<!-- needs: gfortran -->`, it is passed over where that program is
-//! missing; `<!-- files of: tutorial.md -->`, the files of that page are there from the start.
+//! missing; `<!-- files of: how-to/slice.md -->`, the files of that page are there from the start;
+//! `<!-- has: tutorial/my_pile.msh -->`, so is this file.
+//!
+//! A picture `![…](…/RUN/NAME.svg)` is `results/RUN/NAME.svg` at the end of the page; `PILUM_BLESS=1` rewrites it.
 
 use crate::compilers::repository;
 use crate::program::{pilum, shell};
@@ -22,6 +25,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
+use tests::figure::{alike, bless};
 
 /// A fenced block of a page.
 #[derive(Debug)]
@@ -276,6 +280,7 @@ fn follow(name: &str) -> usize {
             return 0;
         }
     }
+    let docs = repository("host/docs");
     let mut session = Session {
         page: name,
         folder: TempDir::new().unwrap(),
@@ -292,10 +297,39 @@ fn follow(name: &str) -> usize {
             session.follow(block);
         }
     }
+    for file in remarks(&text, "has") {
+        let to = Path::new(file).file_name().unwrap();
+        fs::copy(docs.join(file), session.folder.path().join(to)).unwrap();
+    }
     for block in blocks(&text) {
         session.follow(&block);
     }
+    for picture in pictures(&text) {
+        let shown = docs.join(name).with_file_name(picture);
+        let parts: Vec<&str> = picture.rsplitn(3, '/').collect();
+        let drawn = session
+            .folder
+            .path()
+            .join("results")
+            .join(parts[1])
+            .join(parts[0]);
+        let drawn = fs::read_to_string(&drawn).unwrap_or_else(|why| panic!("{picture}: {why}"));
+        if bless() {
+            fs::write(shown, drawn).unwrap();
+        } else {
+            let is_drawn = alike(&fs::read_to_string(&shown).unwrap_or_default(), &drawn);
+            assert!(is_drawn, "{name}: {picture} is not what its run draws");
+        }
+    }
     session.commands
+}
+
+/// Pictures of a page that a run draws.
+fn pictures(page: &str) -> impl Iterator<Item = &str> {
+    let after = page.split("![").skip(1);
+    let targets = after.filter_map(|text| text.split_once("](")?.1.split_once(')'));
+    let targets = targets.map(|(target, _)| target);
+    targets.filter(|target| !target.contains("cases/"))
 }
 
 #[test]
@@ -329,6 +363,8 @@ macro_rules! how_to {
 }
 
 how_to! {
+    how_to_lead_a_law_alone: "law-at-a-point",
+    how_to_compute_a_slice: "slice",
     how_to_swap_a_law: "swap-a-law",
     how_to_make_a_mesh: "mesh",
     how_to_take_a_mesh_of_gmsh: "gmsh",

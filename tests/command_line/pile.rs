@@ -536,3 +536,35 @@ fn a_pile_that_is_not_there_has_no_rows() {
             .all(|row| row["phase"] != "gone")
     );
 }
+
+#[test]
+fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
+    let figure = |along: &str, x: &str| {
+        format!("\n[[figure]]\nname = \"forces\"\nx = \"{x}\"\ny = [\"z\"]\n{along}\n")
+    };
+    let (place, _) = run(&(PILE.to_owned() + &figure("along_pile = {}", "axial_force")));
+    let drawn = std::fs::read_to_string(place.path("out/forces.svg")).unwrap();
+    assert!(drawn.contains("pull 4"), "a curve for the end of a phase");
+    let without = PILE[..PILE.rfind("[pile]").unwrap()].to_owned();
+    for (text, along, x, says) in [
+        (
+            PILE,
+            "along_pile = {}",
+            "traction_n",
+            "there is no column of pile.csv `traction_n`",
+        ),
+        (
+            PILE,
+            "along_pile = {}\npoints = {}",
+            "z",
+            "over points or along the pile, not both",
+        ),
+        (&without, "along_pile = {}", "z", "there is no pile"),
+    ] {
+        let place = Place::new();
+        place.write("pile.toml", text.to_owned() + &figure(along, x));
+        let outcome = place.run(&["run", "pile.toml"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
+        assert!(outcome.says(says), "{says}: {}", outcome.stderr);
+    }
+}

@@ -14,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::Silent;
+use tests::figure::{alike, bless};
 
 /// An input file in `cases/`; one of its variants, or nothing for all of them together; what the
 /// committed files are called, `*` standing for the figure; the figures.
@@ -25,6 +26,27 @@ type Committed = (
 );
 
 const COMMITTED: &[Committed] = &[
+    ("bored_pile/case.toml", "", "*", &["loads", "axial_force"]),
+    (
+        "textbook_pile/case.toml",
+        "",
+        "*",
+        &["loads", "axial_force"],
+    ),
+    ("tension_pile/case.toml", "", "*", &["loads", "axial_force"]),
+    (
+        "cyclic_head_load/case.toml",
+        "",
+        "*",
+        &["loads", "axial_force"],
+    ),
+    (
+        "residual_stress/case.toml",
+        "",
+        "*",
+        &["loads", "axial_force"],
+    ),
+    ("footing/case.toml", "", "*", &["bearing_capacity"]),
     (
         "aspect_ratio/case.toml",
         "",
@@ -172,20 +194,6 @@ fn draw(input: &str) -> TempDir {
     place
 }
 
-/// Equal, but for coordinates that another machine rounds to the next whole point.
-fn alike(a: &str, b: &str) -> bool {
-    let words = |text: &str| -> Vec<String> {
-        let words = text.split([' ', ',', '"']);
-        words.map(str::to_owned).collect()
-    };
-    let near = |(a, b): (&String, &String)| match (a.parse::<i64>(), b.parse::<i64>()) {
-        (Ok(a), Ok(b)) => a.abs_diff(b) <= 1,
-        _ => a == b,
-    };
-    let (a, b) = (words(a), words(b));
-    a.len() == b.len() && a.iter().zip(&b).all(near)
-}
-
 #[test]
 fn every_figure_has_its_case() {
     let named = COMMITTED.iter().flat_map(|(input, _, name, figures)| {
@@ -198,7 +206,6 @@ fn every_figure_has_its_case() {
 
 #[test]
 fn the_committed_figures_are_those_of_the_cases() {
-    let bless = std::env::var_os("PILUM_BLESS").is_some_and(|value| value == "1");
     let mut places: BTreeMap<&str, TempDir> = BTreeMap::new();
     let mut differing = Vec::new();
     for &(input, variant, name, figures) in COMMITTED {
@@ -212,7 +219,7 @@ fn the_committed_figures_are_those_of_the_cases() {
             if alike(&committed, &drawn) {
                 continue;
             }
-            if bless {
+            if bless() {
                 std::fs::write(path, drawn).unwrap();
             } else {
                 differing.push(path);

@@ -1,5 +1,6 @@
 //! What the tests share: running cases from a text, reading results, tolerances, programs of others.
 
 pub mod case;
+pub mod figure;
 pub mod needs;
 pub mod tolerance;

@@ -713,7 +713,8 @@ impl JsonSchema for GroupNames {
     }
 }
 
-/// Curves of probes over another probe, or of a stress over the integration points of a cut.
+/// Curves of probes over another probe, of a stress over the integration points of a cut, or of what
+/// holds along the pile.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FigureInput {
@@ -722,12 +723,12 @@ pub struct FigureInput {
     pub name: Spanned<String>,
     /// Title; the case's if left out.
     pub title: Option<String>,
-    /// Probe (of a cut: quantity of a point) along the horizontal axis.
+    /// Probe (of a cut: quantity of a point; along the pile: column of `pile.csv`) along the horizontal axis.
     #[schemars(with = "String")]
     pub x: Spanned<String>,
     /// Text of the horizontal axis.
     pub x_label: Option<String>,
-    /// Probes (quantities) along the vertical axis.
+    /// Probes (quantities, columns) along the vertical axis.
     #[schemars(with = "Vec<String>")]
     pub y: Vec<Spanned<String>>,
     /// Text of the vertical axis.
@@ -737,8 +738,20 @@ pub struct FigureInput {
     pub phase: Option<Spanned<String>>,
     /// A cut: the integration points in it instead of probes.
     pub points: Option<CutInput>,
+    /// Along the pile, instead of probes.
+    #[schemars(with = "Option<AlongInput>")]
+    pub along_pile: Option<Spanned<AlongInput>>,
     /// Measured points, drawn as markers.
     pub measured: Option<MeasuredTables>,
+}
+
+impl FigureInput {
+    /// Increments of its phase after which a figure over points or along the pile has a curve.
+    pub fn increments(&mut self) -> Option<&mut Vec<usize>> {
+        let of_cut = self.points.as_mut().map(|cut| &mut cut.increments);
+        let along = self.along_pile.as_mut();
+        of_cut.or(along.map(|along| &mut along.get_mut().increments))
+    }
 }
 
 /// Integration points inside extents (ends excluded), at chosen increments.
@@ -761,6 +774,15 @@ pub struct CutInput {
     /// Factor of what stands along the vertical axis.
     #[serde(default = "one")]
     pub scale: f64,
+}
+
+/// What holds along the pile, at chosen increments.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AlongInput {
+    /// After these increments of the phase, a curve for each; after the last one if left out.
+    #[serde(default)]
+    pub increments: Vec<usize>,
 }
 
 /// Measured points of a figure: one table of them, or several.

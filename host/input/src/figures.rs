@@ -2,6 +2,7 @@
 
 use crate::case::{Case, CutInput, FigureInput};
 use crate::{Error, measured};
+use results::pile::OF_STATION;
 use results::wanted::{Cut, Figure};
 use text::{Source, suggestion};
 use toml::Spanned;
@@ -39,9 +40,22 @@ pub fn case_figures(case: &Case, names: &[&str]) -> Result<Vec<Figure>, Error> {
         .collect();
     check_names(source, &case.file.figures)?;
     for figure in &case.file.figures {
-        match figure.points {
-            None => check_columns(source, figure, "probe", names)?,
-            Some(_) => check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?,
+        match (&figure.points, &figure.along_pile) {
+            (None, None) => check_columns(source, figure, "probe", names)?,
+            (Some(_), None) => {
+                check_columns(source, figure, "quantity of a point", &CUT_QUANTITIES)?;
+            }
+            (None, Some(_)) => check_columns(source, figure, "column of pile.csv", &OF_STATION)?,
+            (Some(_), Some(along)) => {
+                let message = "a figure is over points or along the pile, not both";
+                return Err(source.error(along.span(), message).into());
+            }
+        }
+        if let Some(along) = &figure.along_pile
+            && case.file.pile.is_none()
+        {
+            let message = "there is no pile: it is named under [pile]";
+            return Err(source.error(along.span(), message).into());
         }
         if let Some(group) = figure.points.as_ref().and_then(|cut| cut.group.as_ref())
             && !case.file.groups.contains_key(group.get_ref().as_str())
@@ -97,6 +111,10 @@ pub fn table_figures(
             let message = "a driver has one point, there is no cut through it";
             return Err(source.error(figure.name.span(), message).into());
         }
+        if let Some(along) = &figure.along_pile {
+            let message = "a driver has no pile";
+            return Err(source.error(along.span(), message).into());
+        }
     }
     let figures = figures.iter();
     figures.map(|figure| wanted(source, figure)).collect()
@@ -151,6 +169,10 @@ fn wanted(source: &Source, input: &FigureInput) -> Result<Figure, Error> {
         y_label: input.y_label.clone(),
         phase: input.phase.as_ref().map(|phase| phase.get_ref().clone()),
         points: input.points.as_ref().map(Cut::from),
+        along_pile: input
+            .along_pile
+            .as_ref()
+            .map(|along| along.get_ref().increments.clone()),
         measured: measured.collect::<Result<_, _>>()?,
     })
 }

@@ -1,5 +1,7 @@
-//! Curves of probes, or of stresses along a cut, and measured points beside them, as SVG.
+//! Curves of probes, of stresses along a cut or of what holds along a pile, and measured points beside
+//! them, as SVG.
 
+use crate::pile::Station;
 use crate::pressures::Pressure;
 use crate::wanted::{Cut, Figure, Measured};
 use mechanics::Place;
@@ -60,7 +62,7 @@ impl Figures {
     /// Figures whose curves are still empty. Values come in the order of `names`.
     pub fn new(title: &str, figures: &[Figure], names: Vec<String>) -> Self {
         let curves = |figure: &Figure| {
-            if figure.points.is_some() {
+            if !figure.is_of_columns() {
                 return Vec::new();
             }
             let named = |y: &String| Curve {
@@ -93,7 +95,7 @@ impl Figures {
 
     pub(crate) fn increment(&mut self, place: &Place, values: &[Option<f64>]) {
         self.add(values, |figure| {
-            figure.points.is_none() && drawn_in(figure, &place.phase)
+            figure.is_of_columns() && drawn_in(figure, &place.phase)
         });
     }
 
@@ -133,6 +135,26 @@ impl Figures {
                     name: format!("{y}, {phase} {increment}"),
                     points: cut_points(cut, [&figure.x, y], snapshot),
                 });
+            }
+        }
+    }
+
+    /// Takes what holds along the pile, where that is asked for after this increment, one of `of`.
+    pub(crate) fn along_pile(&mut self, place: &Place, of: usize, stations: &[Station]) {
+        let Place { phase, increment } = place;
+        for (figure, curves) in &mut self.drawn {
+            let increments = figure.along_pile.as_ref();
+            if !increments.is_some_and(|increments| asks(figure, increments, place, of)) {
+                continue;
+            }
+            for y in &figure.y {
+                let pair = |station: &Station| Some((station.named(&figure.x)?, station.named(y)?));
+                let name = match figure.y.len() {
+                    1 => format!("{phase} {increment}"),
+                    _ => format!("{y}, {phase} {increment}"),
+                };
+                let points = stations.iter().filter_map(pair).collect();
+                curves.push(Curve { name, points });
             }
         }
     }
@@ -188,9 +210,14 @@ fn drawn_in(figure: &Figure, phase: &str) -> bool {
 /// The cut that a figure takes after this increment, one of `of`.
 fn cut_at<'f>(figure: &'f Figure, place: &Place, of: usize) -> Option<&'f Cut> {
     let cut = figure.points.as_ref()?;
+    asks(figure, &cut.increments, place, of).then_some(cut)
+}
+
+/// Whether a figure asks for curves after this increment, one of `of`.
+fn asks(figure: &Figure, increments: &[usize], place: &Place, of: usize) -> bool {
     let Place { phase, increment } = place;
-    let last = cut.increments.is_empty() && *increment == of;
-    (drawn_in(figure, phase) && (last || cut.increments.contains(increment))).then_some(cut)
+    let last = increments.is_empty() && *increment == of;
+    drawn_in(figure, phase) && (last || increments.contains(increment))
 }
 
 /// Two quantities at the points of a cut, by increasing first one.

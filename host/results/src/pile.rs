@@ -104,6 +104,31 @@ pub struct Station {
     pub settlement: f64,
 }
 
+/// What is known of a [`Station`]: columns of `pile.csv`, and what figures along the pile may show.
+pub const OF_STATION: [&str; 6] = [
+    "z",
+    "axial_force",
+    "shaft_friction",
+    "normal_stress",
+    "slip",
+    "settlement",
+];
+
+impl Station {
+    /// One of [`OF_STATION`], if the station has it.
+    pub(crate) fn named(&self, name: &str) -> Option<f64> {
+        match name {
+            "z" => Some(self.z),
+            "axial_force" => Some(self.axial_force),
+            "shaft_friction" => self.shaft_friction,
+            "normal_stress" => self.normal_stress,
+            "slip" => self.slip,
+            "settlement" => Some(self.settlement),
+            _ => None,
+        }
+    }
+}
+
 /// A pile in one state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {

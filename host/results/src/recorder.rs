@@ -517,6 +517,7 @@ impl Recorder {
             && let Some(state) = pile
         {
             of_pile.stations.write(place, &state)?;
+            self.figures.along_pile(place, *of, &state.stations);
             if of_pile.curve.begins(&place.phase) {
                 let resets = of_pile.resets.contains(&place.phase);
                 let stiffness = of_pile.pile.stiffness(snapshot.groups);

@@ -117,16 +117,19 @@ impl Run {
     }
 }
 
-/// The paths of settings in which runs differ, in the order in which they first appear.
+/// The paths of settings in which runs differ, in the order in which they first appear; those of a law
+/// in which the runs that have this law differ.
 fn differing(runs: &[Run]) -> Vec<&str> {
     let paths: IndexSet<&str> = runs
         .iter()
         .flat_map(|run| run.settings.keys().map(String::as_str))
         .collect();
     let differs = |path: &&str| {
-        let mut values = runs.iter().map(|run| run.settings.get(*path));
-        let first = values.next().flatten();
-        values.any(|value| value != first)
+        let is_of_law = path.starts_with("laws.");
+        let values = runs.iter().map(|run| run.settings.get(*path));
+        let mut values = values.filter(|value| value.is_some() || !is_of_law);
+        let first = values.next();
+        values.any(|value| Some(value) != first)
     };
     paths.into_iter().filter(differs).collect()
 }
@@ -209,6 +212,30 @@ mod tests {
             pile.resistance_10_percent_diameter,pile.resistance_davisson,pile.resistance_chin\n\
             a,done,2,2,,2.1,,1234.5,\n\
             \"b, c\",unfinished,3,3,,3.1,,,\n";
+        assert_eq!(written(&names, &runs).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_law_that_only_one_run_has_takes_no_columns() {
+        let with = |law: &str, c: f64| {
+            let mut laws = json!({ "soil (solid_2d)": { "law": "l", "parameters": { "c": c } } });
+            let joint = json!({ "law": "j", "sha256": law, "parameters": { "k": 1.0 } });
+            laws[format!("{law} (interface_2d)")] = joint;
+            Run::of(json!({
+                "status": "done",
+                "laws": laws,
+                "case_files": [{
+                    "path": "case.toml",
+                    "text": format!("[groups.shaft]\nlaw = \"{law}\"\n"),
+                }],
+            }))
+        };
+        let runs = [with("smooth", 1.0), with("rough", 2.0)];
+        let names = ["a", "b"].map(str::to_owned);
+        let expected = "\
+            run,status,groups.shaft.law,laws.soil.parameters.c\n\
+            a,done,smooth,1\n\
+            b,done,rough,2\n";
         assert_eq!(written(&names, &runs).unwrap(), expected);
     }
 

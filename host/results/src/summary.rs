@@ -388,7 +388,7 @@ fn figures(figures: &[Figure]) -> Value {
             "measured": figure.measured.iter().map(measured).collect::<Vec<_>>(),
         })
     };
-    let of_probes = figures.iter().filter(|f| f.points.is_none());
+    let of_probes = figures.iter().filter(|f| f.is_of_columns());
     of_probes.map(figure).collect()
 }
 

@@ -30,14 +30,15 @@ impl Wanted {
     }
 }
 
-/// Curves of columns over another one, or of a stress over the integration points of a cut.
+/// Curves of columns over another one, of a stress over the integration points of a cut, or of what
+/// holds along a pile.
 #[derive(Clone, Debug, Default)]
 pub struct Figure {
     /// Name of the file, without `.svg`.
     pub name: String,
     /// Title, if not the common one.
     pub title: Option<String>,
-    /// Column (of a cut: quantity of a point) along the horizontal axis.
+    /// Column (of a cut: quantity of a point; along a pile: of a station) along the horizontal axis.
     pub x: String,
     /// Text of the horizontal axis; the name if left out.
     pub x_label: Option<String>,
@@ -49,8 +50,18 @@ pub struct Figure {
     pub phase: Option<String>,
     /// The integration points of a cut instead of columns.
     pub points: Option<Cut>,
+    /// The stations of the pile instead of columns, from the head down, after these increments of the
+    /// phase, a curve for each; after the last one if there is none.
+    pub along_pile: Option<Vec<usize>>,
     /// Measured points, drawn as markers.
     pub measured: Vec<Measured>,
+}
+
+impl Figure {
+    /// Whether its curves are columns, a point for each increment.
+    pub fn is_of_columns(&self) -> bool {
+        self.points.is_none() && self.along_pile.is_none()
+    }
 }
 
 /// Measured points with their name.

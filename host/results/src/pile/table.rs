@@ -1,6 +1,6 @@
 //! `pile.csv`: what holds along the pile.
 
-use super::State;
+use super::{OF_STATION, State};
 use crate::file::Extent;
 use crate::recorder::Table;
 use crate::table::number;
@@ -17,33 +17,17 @@ pub(crate) struct Stations {
 impl Stations {
     /// As [`Table::begin`].
     pub(crate) fn begin(folder: &Path, from: Option<Extent>) -> Result<Self, Error> {
-        let columns = [
-            "phase",
-            "increment",
-            "z",
-            "axial_force",
-            "shaft_friction",
-            "normal_stress",
-            "slip",
-            "settlement",
-        ];
+        let columns = ["phase", "increment"].into_iter().chain(OF_STATION);
         let table = Table::begin(folder.join("pile.csv"), columns, from)?;
         Ok(Self { table })
     }
 
     pub(crate) fn write(&mut self, place: &Place, state: &State) -> Result<(), Error> {
         for station in &state.stations {
-            let optional = |value: Option<f64>| value.map(number).unwrap_or_default();
-            self.table.row([
-                place.phase.clone(),
-                place.increment.to_string(),
-                number(station.z),
-                number(station.axial_force),
-                optional(station.shaft_friction),
-                optional(station.normal_stress),
-                optional(station.slip),
-                number(station.settlement),
-            ])?;
+            let cell = |name: &str| station.named(name).map(number).unwrap_or_default();
+            let place = [place.phase.clone(), place.increment.to_string()];
+            self.table
+                .row(place.into_iter().chain(OF_STATION.map(cell)))?;
         }
         self.table.flush()
     }

@@ -126,13 +126,13 @@ impl Settings {
             let n = *phase.increments.get_ref();
             let scaled = scaled(n, self.increments);
             *phase.increments.get_mut() = scaled;
-            let cuts = file.figures.iter_mut().filter(|figure| {
+            let figures = file.figures.iter_mut().filter(|figure| {
                 let named = figure.phase.as_ref();
                 named.is_none_or(|p| p.get_ref() == phase.name.get_ref())
             });
-            for cut in cuts.filter_map(|figure| figure.points.as_mut()) {
+            for increments in figures.filter_map(|figure| figure.increments()) {
                 let moved = |k: &mut usize| *k = (*k * scaled).div_ceil(n);
-                cut.increments.iter_mut().for_each(moved);
+                increments.iter_mut().for_each(moved);
             }
         }
         if let Some(tolerance) = self.tolerance {
