@@ -29,6 +29,8 @@ const SHARES: [f64; 2] = [0.85, 0.1];
 const MARGIN: f64 = 0.7;
 /// Another scheme than the file's has to be cheaper by this factor.
 const WORTH_A_CHANGE: f64 = 0.8;
+/// CPU seconds of a run below which no other scheme is looked for: looking costs more than it saves.
+const QUICK: f64 = 0.5;
 /// Bounds of the order that is extrapolated with. A larger one is not relied on.
 const ORDERS: [f64; 2] = [0.3, 1.0];
 
@@ -123,14 +125,20 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Of the file's scheme and the others, the cheapest that is good enough.
+    /// Of the file's scheme and the others, the cheapest that is good enough. Others are not looked for
+    /// where the file's is good enough and quick.
     fn best(&mut self) -> Result<(Settings, Found), Error> {
-        let schemes: Vec<(String, Scheme)> = law_schemes(self.case, self.scratch)?;
+        let aim = SHARES[0] * self.asked;
+        let good = |found: &Found| found.error <= aim;
         let plain = Settings::default();
-        let mut best = (
-            plain.clone(),
-            self.with(&plain, FACTORS[FACTORS.len() - 1])?,
-        );
+        let found = self.with(&plain, FACTORS[FACTORS.len() - 1], None)?;
+        let mut best = (plain, found);
+        let schemes: Vec<(String, Scheme)> = if good(&best.1) && best.1.trial.seconds < QUICK {
+            Vec::new()
+        } else {
+            (self.say)(&format!("{STUDY}: which schemes of the laws there are"));
+            law_schemes(self.case, self.scratch)?
+        };
         let others = schemes.iter().filter(|(_, s)| s.is_finest && !s.is_default);
         for (law, scheme) in others {
             let settings = Settings {
@@ -138,13 +146,14 @@ impl Search<'_> {
                 ..Settings::default()
             };
             // More increments than the file's scheme needs do not pay.
-            let found = self.with(&settings, f64::max(best.1.factor, 1.0));
+            let cheap = WORTH_A_CHANGE * best.1.trial.seconds;
+            let limit = good(&best.1).then_some(cheap);
+            let found = self.with(&settings, f64::max(best.1.factor, 1.0), limit);
             self.scratch.stop.check(STUDY)?;
             let Ok(found) = found else {
                 continue;
             };
-            let good = |found: &Found| found.error <= SHARES[0] * self.asked;
-            let is_cheaper = found.trial.seconds < WORTH_A_CHANGE * best.1.trial.seconds;
+            let is_cheaper = found.trial.seconds < cheap;
             if good(&found) && (is_cheaper || !good(&best.1)) {
                 best = (settings, found);
             }
@@ -157,8 +166,9 @@ impl Search<'_> {
         Ok((settings, found))
     }
 
-    /// Doubles increments until the finest run is good enough.
-    fn with(&mut self, settings: &Settings, most: f64) -> Result<Found, Error> {
+    /// Doubles increments until the finest run is good enough, or the coarsest takes more seconds than the
+    /// limit.
+    fn with(&mut self, settings: &Settings, most: f64, limit: Option<f64>) -> Result<Found, Error> {
         let mut levels: Vec<(f64, Trial)> = Vec::new();
         let mut last_increments = Vec::new();
         let mut failure = None;
@@ -191,7 +201,13 @@ impl Search<'_> {
             let outcome = trial(self.case, &settings, self.scratch, false);
             last = Some((factor, started.elapsed().as_secs_f64()));
             match outcome {
-                Ok(trial) => levels.push((factor, trial)),
+                Ok(trial) => {
+                    let is_dear = limit.is_some_and(|limit| trial.seconds > limit);
+                    levels.push((factor, trial));
+                    if levels.len() == 1 && is_dear {
+                        break;
+                    }
+                }
                 Err(error) if error.kind() == Kind::NoEquilibrium => {
                     // Finer runs are not compared with coarser ones across a gap.
                     levels.clear();
