@@ -10,7 +10,10 @@
 //!
 //!   α K_e u̇ = r(u),    an implicit step of unit time: (K + α K_e) δ = r,
 //!
-//! from the elastic answer to the step on, the residual growing where it must. It leaves
+//! from the elastic answer to the step on, the residual growing where it must; if that leads nowhere,
+//! from where Newton iterations stood still. α follows the residual: steps of time grow longer as the
+//! motion slows down (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal.
+//! 35, 1998). The motion leaves
 //! equilibria that are not stable and ends at one that is. Newton iterations are tried whenever
 //! the residual has fallen; they alone decide on convergence, by the same tolerances. The motion
 //! changes the path within the step only: laws still see one increment from the last equilibrium.
@@ -22,14 +25,18 @@ use super::residual::{Balance, Task};
 use crate::settings::{Control, Settings};
 use law::Operator;
 
-/// α. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
+/// α at first. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
 /// of D + α D_e is positive definite for α above (1/cos θ − 1)/2. This value was found by trial:
 /// the chambers with Mohr–Coulomb sand settle with it; 0.1 and 1 are much slower there.
 const VISCOSITY: f64 = 0.05;
+/// Largest α.
+const MOST: f64 = 0.2;
+/// Least and largest factor by which α follows the residual from one viscous step to the next.
+const FOLLOWS: [f64; 2] = [0.3, 2.0];
 /// Newton iterations are tried each time the residual has fallen to this fraction.
 const FALL: f64 = 0.1;
-/// Viscous steps within one step of the load.
-const MAX_STEPS: usize = 200;
+/// Viscous steps of one motion.
+const MAX_STEPS: usize = 40;
 /// Newton iterations without a new least residual that count as a standstill.
 const STANDSTILL: usize = 6;
 /// Iterations before a standstill is looked for.
@@ -66,6 +73,8 @@ struct Motion {
     elastic: Vec<f64>,
     /// Displacement increments reached.
     increment: Vec<f64>,
+    /// It started where Newton iterations stood still, as the one from the elastic answer led nowhere.
+    is_second: bool,
     /// Viscous steps so far.
     steps: usize,
 }
@@ -125,11 +134,18 @@ impl Relaxation {
             let motion = newton.start_motion(task);
             self.course = motion.map_or(Course::InVain, Course::UnderWay);
         }
-        if let Course::UnderWay(motion) = &mut self.course
-            && let Ok(relaxed) = newton.relax(motion, task, iterations)
-        {
-            self.first = iterations.len() - 1;
-            return Ok(Some(relaxed));
+        while let Course::UnderWay(motion) = &mut self.course {
+            if let Ok(relaxed) = newton.relax(motion, task, iterations) {
+                self.first = iterations.len() - 1;
+                return Ok(Some(relaxed));
+            }
+            newton.may_go_on()?;
+            if motion.is_second {
+                break;
+            }
+            motion.increment.clone_from(&self.standstill.0);
+            motion.is_second = true;
+            motion.steps = 0;
         }
         newton.may_go_on()?;
         // Newton iterations go on where they stood, for as many as are left to them.
@@ -168,6 +184,7 @@ impl Newton<'_> {
         Some(Motion {
             elastic,
             increment: self.answer_to(&before.residual, task).ok()?,
+            is_second: false,
             steps: 0,
         })
     }
@@ -184,20 +201,22 @@ impl Newton<'_> {
     ) -> Result<(Vec<f64>, Balance), StepFailure> {
         let mut balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
         let mut largest = balance.relative;
+        let mut viscosity = VISCOSITY;
         while motion.steps < MAX_STEPS {
             self.may_go_on()?;
             motion.steps += 1;
-            let correction = self.viscous_correction(&balance.residual, &motion.elastic)?;
+            let correction =
+                self.viscous_correction(&balance.residual, (viscosity, &motion.elastic))?;
             for (u, d) in motion.increment.iter_mut().zip(&correction) {
                 *u += d;
             }
             let before = balance.relative;
             balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
             let taken = self.took_to(&balance, &correction, &motion.increment, 1.0);
-            iterations.push(Iteration {
-                viscosity: VISCOSITY,
-                ..taken
-            });
+            iterations.push(Iteration { viscosity, ..taken });
+            let [least, most] = FOLLOWS;
+            let factor = (balance.relative / before).clamp(least, most);
+            viscosity = (factor * viscosity).min(MOST);
             largest = largest.max(balance.relative);
             if balance.relative < before && balance.relative <= FALL * largest {
                 return Ok((motion.increment.clone(), balance));
@@ -212,13 +231,13 @@ impl Newton<'_> {
     fn viscous_correction(
         &mut self,
         residual: &[f64],
-        elastic: &[f64],
+        (viscosity, elastic): (f64, &[f64]),
     ) -> Result<Vec<f64>, StepFailure> {
         let mut values = self.stiffness();
         for (value, elastic) in values.iter_mut().zip(elastic) {
-            *value += VISCOSITY * elastic;
+            *value += viscosity * elastic;
         }
-        self.factorise(values, 1.0 + VISCOSITY)?;
+        self.factorise(values, 1.0 + viscosity)?;
         self.solve(residual, None)
     }
 }
