@@ -94,16 +94,15 @@ impl<'m> Columns<'m> {
             if x < low[0] || x > high[0] || high[1] <= y {
                 continue;
             }
-            let Some([from, to]) = self.chord(&self.mesh.solids[number], x) else {
-                continue;
-            };
-            let from = from.max(y);
-            if to <= from {
-                continue;
+            for part in self.crossings(&self.mesh.solids[number], x).chunks_exact(2) {
+                let (from, to) = (part[0].max(y), part[1]);
+                if to <= from {
+                    continue;
+                }
+                top = top.max(to);
+                let wet = level.map_or(from, |level| level.clamp(from, to));
+                sum += below_water * (wet - from) + above_water * (to - wet);
             }
-            top = top.max(to);
-            let wet = level.map_or(from, |level| level.clamp(from, to));
-            sum += below_water * (wet - from) + above_water * (to - wet);
         }
         let stands = self.water.zip(level);
         sum + stands.map_or(0.0, |(water, level)| {
@@ -111,31 +110,43 @@ impl<'m> Columns<'m> {
         })
     }
 
-    /// Where a vertical enters and leaves an element.
-    fn chord(&self, solid: &Solid, x: f64) -> Option<[f64; 2]> {
-        let mut ends: Option<[f64; 2]> = None;
-        let mut cross = |y: f64| {
-            let [low, high] = ends.get_or_insert([y, y]);
-            (*low, *high) = (low.min(y), high.max(y));
-        };
+    /// Where a vertical enters an element and leaves it, in turn from below: more than once where sides are
+    /// hollow.
+    fn crossings(&self, solid: &Solid, x: f64) -> Vec<f64> {
+        let mut all = Vec::with_capacity(2);
         for edge in solid.edges() {
             let [a, b, m] = edge.map(|node| self.mesh.nodes[node]);
             // x(t) = x_m + t (x_b − x_a)/2 + t² (x_a + x_b − 2 x_m)/2, t from −1 to 1, and y likewise.
             let half = [0, 1].map(|c| 0.5 * (b[c] - a[c]));
             let bend = [0, 1].map(|c| 0.5 * (a[c] + b[c]) - m[c]);
-            let length = half[0].hypot(half[1]);
-            let roots: [Option<f64>; 2] = if bend[0].hypot(bend[1]) <= STRAIGHT * length {
-                // Of two edges that share an end the vertical through it crosses one.
-                let crosses = (a[0] <= x) != (b[0] <= x);
-                [crosses.then(|| (x - m[0]) / half[0]), None]
-            } else {
-                solutions(bend[0], half[0], m[0] - x)
-            };
-            for t in roots.into_iter().flatten().filter(|t| t.abs() <= 1.0) {
-                cross(m[1] + t * half[1] + t * t * bend[1]);
+            let is_straight = bend[0].hypot(bend[1]) <= STRAIGHT * half[0].hypot(half[1]);
+            // Where x turns round.
+            let turn = -0.5 * half[0] / bend[0];
+            let turn = (!is_straight && turn.abs() < 1.0).then_some(turn);
+            let at_turn = turn.map(|t| (t, m[0] + t * half[0] + t * t * bend[0]));
+            let ends = [(-1.0, a[0])].into_iter().chain(at_turn);
+            let ends: Vec<(f64, f64)> = ends.chain([(1.0, b[0])]).collect();
+            for piece in ends.windows(2) {
+                let [(t_0, x_0), (t_1, x_1)] = [piece[0], piece[1]];
+                // Of two pieces that share an end the vertical through it crosses one, or both or neither
+                // where it only touches them.
+                if (x_0 <= x) == (x_1 <= x) {
+                    continue;
+                }
+                let t = if is_straight {
+                    (x - m[0]) / half[0]
+                } else {
+                    let middle = f64::midpoint(t_0, t_1);
+                    let off = |t: &f64| (t - middle).abs();
+                    let found = solutions(bend[0], half[0], m[0] - x).into_iter().flatten();
+                    let nearest = found.min_by(|a, b| off(a).total_cmp(&off(b)));
+                    nearest.unwrap_or(middle).clamp(t_0, t_1)
+                };
+                all.push(m[1] + t * half[1] + t * t * bend[1]);
             }
         }
-        ends
+        all.sort_unstable_by(f64::total_cmp);
+        all
     }
 }
 
@@ -184,6 +195,28 @@ mod tests {
             (group == 0).then_some([18.0, 19.0])
         });
         assert!((only.above([0.1, 3.0]) - (10.0 + 19.0)).abs() < 1e-12);
+    }
+
+    /// Two columns of 2 m, 20 and 10 kN/m³, between them a side that is hollow: x = 1 + 0.6 η (1 − η) with y = 2 η.
+    #[test]
+    fn a_vertical_may_cross_an_element_twice() {
+        let mut mesh = Mesh::grid(&[0.0, 1.0, 2.0], &[0.0, 2.0], |column, _| column);
+        let middle = mesh.solids[0].nodes()[5];
+        mesh.nodes[middle][0] = 1.15;
+        let weight = |group: usize| Some([[20.0, 10.0][group]; 2]);
+        let columns = Columns::new(&mesh, None, weight);
+        // x = 1.1 lies left of the side from η = 0.211 to 0.789.
+        let root = (0.25_f64 - 0.1 / 0.6).sqrt();
+        let light = 2.0 * (1.0 - 2.0 * root);
+        let exact = 10.0 * light + 20.0 * (2.0 - light);
+        assert!((columns.above([1.1, 0.0]) - exact).abs() < 1e-12);
+        // Through the ends of the side, on both sides of it.
+        assert!((columns.above([0.5, 0.0]) - 40.0).abs() < 1e-12);
+        assert!((columns.above([1.5, 0.0]) - 20.0).abs() < 1e-12);
+        let uniform = Columns::new(&mesh, None, |_| Some([10.0; 2]));
+        for x in [1.0, 1.05, 1.15, 1.15 + 1e-12] {
+            assert!((uniform.above([x, 0.0]) - 20.0).abs() < 1e-6, "{x}");
+        }
     }
 
     #[test]
