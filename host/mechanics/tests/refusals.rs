@@ -110,7 +110,7 @@ fn an_interface_does_not_outlive_the_ground_beside_it() {
         problem.phases[0].activate = vec![2];
     });
     gone(Item::Group(2), |problem| {
-        problem.groups[1].is_active = false
+        problem.groups[1].is_active = false;
     });
     // Both go together.
     let mut problem = blocks();
