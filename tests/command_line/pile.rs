@@ -568,3 +568,26 @@ fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
         assert!(outcome.says(says), "{says}: {}", outcome.stderr);
     }
 }
+
+/// A part of the pile is taken away and its interface is not: this ended in singular equations.
+#[test]
+fn an_interface_does_not_outlive_its_pile() {
+    let place = Place::new();
+    let taken = "name = \"push\"\ndeactivate = [\"foot\"]\n";
+    place.write("pile.toml", PILE.replace("name = \"push\"\n", taken));
+    let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    let line = 1
+        + PILE
+            .lines()
+            .position(|line| line == "name = \"push\"")
+            .unwrap()
+        + 1;
+    for said in [
+        "interface `lower` is active and the ground on one of its sides, group `foot`, is not",
+        &format!("pile.toml:{line}:"),
+        "`deactivate` has `lower` too",
+    ] {
+        assert!(outcome.says(said), "{said}: {}", outcome.stderr);
+    }
+}

@@ -99,10 +99,11 @@ fn whole_rows(place: &Place) -> usize {
     rows.iter().filter(|row| whole(row)).count()
 }
 
-/// Kills the run at this many different moments, resumes it, and compares.
-fn killed_and_resumed(solver: &str, kills: u32) {
+/// Kills the run of a case at this many different moments, resumes it, and compares. `rows`: of its
+/// history.
+fn killed_and_resumed(text: &str, rows: usize, kills: u32) {
     let undisturbed = Place::new();
-    undisturbed.write("block.toml", long_case(solver));
+    undisturbed.write("block.toml", text);
     let started = Instant::now();
     let outcome = undisturbed.run(&["run", "block.toml", "--out", "out", "--checkpoint", "0"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
@@ -110,7 +111,7 @@ fn killed_and_resumed(solver: &str, kills: u32) {
     let expected = results(&undisturbed.path("out"));
 
     let place = Place::new();
-    place.write("block.toml", long_case(solver));
+    place.write("block.toml", text);
     let run = [
         "run",
         "block.toml",
@@ -128,8 +129,8 @@ fn killed_and_resumed(solver: &str, kills: u32) {
         std::thread::sleep(Duration::from_secs_f64(0.9 * share * length.as_secs_f64()));
         child.kill().unwrap();
         child.wait().unwrap();
-        on_the_way += usize::from((1..2 * INCREMENTS).contains(&whole_rows(&place)));
-        if whole_rows(&place) == 2 * INCREMENTS {
+        on_the_way += usize::from((1..rows).contains(&whole_rows(&place)));
+        if whole_rows(&place) == rows {
             // Resumed often enough to have come to its end: the next run starts anew.
             // The process that did the work may take a moment to follow the one that was killed, and
             // writes until then.
@@ -146,7 +147,7 @@ fn killed_and_resumed(solver: &str, kills: u32) {
     );
     let outcome = place.run(&run);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert_same(&place.path("out"), &expected, solver);
+    assert_same(&place.path("out"), &expected, "killed and resumed");
 }
 
 #[test]
@@ -301,8 +302,24 @@ fn interrupt(process: u32) {
 
 #[test]
 fn two_hundred_kills_lose_nothing() {
-    killed_and_resumed("", 100);
-    killed_and_resumed("equations = \"sparse\"", 100);
+    killed_and_resumed(&long_case(""), 2 * INCREMENTS, 100);
+    killed_and_resumed(&long_case("equations = \"sparse\""), 2 * INCREMENTS, 100);
+}
+
+/// Interfaces that appear, a swap of laws, a load test with what it counts: on a coarse mesh.
+#[test]
+fn a_pile_that_is_killed_goes_on_to_the_same_tables() {
+    let text = include_str!("../../cases/bored_pile/case.toml")
+        .replace("{ n = 5, to = 1.5", "{ n = 2, to = 1.5")
+        .replace(
+            "{ n = 10, to = 25.0, ratio = 1.35 }",
+            "{ n = 4, to = 25.0, ratio = 2.0 }",
+        )
+        .replace("{ n = 8, to = -17.0", "{ n = 3, to = -17.0")
+        .replace("{ n = 8, to = -15.0", "{ n = 2, to = -15.0")
+        .replace("{ n = 20, to = -5.0", "{ n = 6, to = -5.0")
+        .replace("{ n = 8, to = 0.0 }", "{ n = 3, to = 0.0 }");
+    killed_and_resumed(&text, 1 + 5 + 30 + 7, 12);
 }
 
 #[test]

@@ -9,4 +9,5 @@
 
 mod cases;
 mod drivers;
+mod ground;
 mod seeds;

@@ -499,7 +499,8 @@ pub struct PhaseInput {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub activate: Vec<Spanned<String>>,
-    /// Groups that are gone from this phase on; what they carried is released in its course.
+    /// Groups that are gone from this phase on; what they carried is released in its course. An interface
+    /// goes with the ground beside it, and is named as well.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub deactivate: Vec<Spanned<String>>,
@@ -515,8 +516,8 @@ pub struct PhaseInput {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, Drainage>")]
     pub drainage: Named<Drainage>,
-    /// Lines whose nodes move alike from this phase on, without turning; where a line reaches the axis of
-    /// symmetry, not radially.
+    /// Lines whose nodes move alike from this phase on to the end, without turning; where a line reaches the
+    /// axis of symmetry, not radially. No later phase gives it up.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub rigid: Vec<Spanned<String>>,

@@ -113,6 +113,36 @@ pub struct BatchFailure {
     pub call: Option<Box<PointCall>>,
 }
 
+impl BatchFailure {
+    /// The worse of two failures of one group: this one if they are alike. If both only ask for smaller
+    /// steps, with the smaller one of the two.
+    #[must_use]
+    pub fn or_worse(self, other: Self) -> Self {
+        let severity = |failure: &Self| match failure.outcome {
+            Outcome::Ok => 0,
+            Outcome::Unreliable => 1,
+            Outcome::CutStep => 2,
+            Outcome::Argument => 3,
+            Outcome::Parameter => 4,
+            Outcome::Unsupported => 5,
+            Outcome::Domain => 6,
+            Outcome::Numeric => 7,
+            Outcome::Internal => 8,
+            Outcome::Unknown(_) => 9,
+        };
+        let factor = match (self.factor, other.factor) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            _ => None,
+        };
+        let worse = if severity(&other) > severity(&self) {
+            other
+        } else {
+            self
+        };
+        Self { factor, ..worse }
+    }
+}
+
 /// What a call asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {

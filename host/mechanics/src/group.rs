@@ -714,10 +714,19 @@ impl Group {
         self.stress.trial = flux_end;
         self.internal.trial = states_end;
         let mut all = BatchSuccess::default();
+        let mut worst: Option<BatchFailure> = None;
         for outcome in outcomes {
-            all.unreliable = all.unreliable.or(outcome?.unreliable);
+            match outcome {
+                Ok(success) => all.unreliable = all.unreliable.or(success.unreliable),
+                Err(failure) => {
+                    worst = Some(match worst {
+                        Some(worst) => worst.or_worse(failure),
+                        None => failure,
+                    });
+                }
+            }
         }
-        Ok(all)
+        worst.map_or(Ok(all), Err)
     }
 
     fn locate(&self, failure: &BatchFailure) -> PointFailure {

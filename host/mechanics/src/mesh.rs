@@ -22,7 +22,7 @@ const TRIANGLE: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
 
 impl Shape {
     /// Edges: first corner, second corner, mid-side, counter-clockwise.
-    pub fn edges(self) -> &'static [[usize; 3]] {
+    pub const fn edges(self) -> &'static [[usize; 3]] {
         match self {
             Self::Triangle => &TRIANGLE,
             Self::Quad => &QUAD,
@@ -129,8 +129,12 @@ pub struct Mesh {
 
 impl Mesh {
     /// Quads between the lines of a grid, row by row from the smallest coordinates. `group` gives the
-    /// group of each by its column and row. Both lists rise, m.
+    /// group of each by its column and row. Both lists rise, m; of a list with less than two there is no
+    /// element between them, and no node.
     pub fn grid(x: &[f64], y: &[f64], group: impl Fn(usize, usize) -> usize) -> Self {
+        if x.len() < 2 || y.len() < 2 {
+            return Self::default();
+        }
         let (n_columns, n_rows) = (x.len() - 1, y.len() - 1);
         let with_middles = |grid: &[f64]| -> Vec<f64> {
             let pairs = grid
@@ -162,7 +166,7 @@ impl Mesh {
         mesh
     }
 
-    /// The longer side of the rectangle that holds the mesh, in m.
+    /// The longer side of the rectangle that holds the mesh, in m; 0 without nodes.
     pub fn longer_side(&self) -> f64 {
         let extent = |c: usize| {
             let at = self.nodes.iter().map(|node| node[c]);
@@ -171,7 +175,7 @@ impl Mesh {
             });
             ends[1] - ends[0]
         };
-        extent(0).max(extent(1))
+        extent(0).max(extent(1)).max(0.0)
     }
 
     /// Nodes of an edge: first end, second end, middle.

@@ -10,7 +10,7 @@ mod refusal;
 pub(crate) mod tension;
 
 pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
-pub use refusal::{Cause, Item, Key, Refusal};
+pub use refusal::{Cause, Item, JointFault, Key, Refusal};
 
 use crate::mesh::Mesh;
 use crate::settings::Settings;

@@ -38,7 +38,40 @@ pub struct Settings {
     pub equations: Equations,
 }
 
+/// Bounds of the settings that are numbers: of tolerances, not below what double precision reaches, and not
+/// above the quantity itself; a step halved more often hardly moves the load factor in double precision.
+const TOLERANCE: [f64; 2] = [1e-14, 1.0];
+const TOLERATED: [f64; 2] = [0.0, 0.1];
+const ITERATIONS: [usize; 2] = [1, 10_000];
+const HALVINGS: [u32; 2] = [0, 40];
+
 impl Settings {
+    /// The first number that is outside its bounds: its name in files, its value, the bounds.
+    pub fn outside(&self) -> Option<(&'static str, f64, [f64; 2])> {
+        let iterations = self.max_iterations.unwrap_or(ITERATIONS[0]);
+        [
+            ("force_tolerance", self.force_tolerance, TOLERANCE),
+            (
+                "displacement_tolerance",
+                self.displacement_tolerance,
+                TOLERANCE,
+            ),
+            ("tolerated_residual", self.tolerated_residual, TOLERATED),
+            (
+                "max_iterations",
+                iterations as f64,
+                ITERATIONS.map(|n| n as f64),
+            ),
+            (
+                "max_halvings",
+                f64::from(self.max_halvings),
+                HALVINGS.map(f64::from),
+            ),
+        ]
+        .into_iter()
+        .find(|(_, value, [least, most])| !(least..=most).contains(&value))
+    }
+
     /// Iterations after which an increment is cut back.
     pub fn max_iterations(&self) -> usize {
         self.max_iterations
@@ -135,25 +168,26 @@ pub enum Equations {
     Sparse,
 }
 
-/// A tolerance: not below what double precision reaches, and not above the quantity itself.
 fn tolerance<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
-    within(f64::deserialize(input)?, 1e-14, 1.0)
+    within(f64::deserialize(input)?, TOLERANCE)
 }
 
 fn tolerated<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
-    within(f64::deserialize(input)?, 0.0, 0.1)
+    within(f64::deserialize(input)?, TOLERATED)
 }
 
 fn iterations<'de, D: Deserializer<'de>>(input: D) -> Result<Option<usize>, D::Error> {
-    within(usize::deserialize(input)?, 1, 10_000).map(Some)
+    within(usize::deserialize(input)?, ITERATIONS).map(Some)
 }
 
-/// A step halved more often than this hardly moves the load factor in double precision.
 fn halvings<'de, D: Deserializer<'de>>(input: D) -> Result<u32, D::Error> {
-    within(u32::deserialize(input)?, 0, 40)
+    within(u32::deserialize(input)?, HALVINGS)
 }
 
-fn within<T: Copy + PartialOrd + Debug, E: de::Error>(value: T, least: T, most: T) -> Result<T, E> {
+fn within<T: Copy + PartialOrd + Debug, E: de::Error>(
+    value: T,
+    [least, most]: [T; 2],
+) -> Result<T, E> {
     if value >= least && value <= most {
         return Ok(value);
     }

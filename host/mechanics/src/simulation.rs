@@ -466,7 +466,10 @@ impl Simulation {
                 Ok(success) => {
                     if success.relaxed {
                         phase.record.relaxed += 1;
-                        watch.warning(&Warning::Relaxed(place.clone()));
+                        // The phase's end says how many there were.
+                        if phase.record.relaxed == 1 {
+                            watch.warning(&Warning::Relaxed(place.clone()));
+                        }
                     }
                     if success.iterations.len() as f64 <= easy {
                         phase.course.step = (REGROWTH * step).min(1.0 / n as f64);
@@ -533,11 +536,13 @@ impl Simulation {
         if success.tolerated > 0.0 {
             record.tolerated += 1;
             record.tolerated_residual = record.tolerated_residual.max(success.tolerated);
-            watch.warning(&Warning::Tolerated {
-                place: place.clone(),
-                residual: success.tolerated,
-                tolerance: self.problem.settings.force_tolerance,
-            });
+            if record.tolerated == 1 {
+                watch.warning(&Warning::Tolerated {
+                    place: place.clone(),
+                    residual: success.tolerated,
+                    tolerance: self.problem.settings.force_tolerance,
+                });
+            }
         }
         if let Some(why) = &success.unreliable {
             record.unreliable += 1;

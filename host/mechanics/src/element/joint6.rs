@@ -26,22 +26,30 @@ struct Point {
     axes: Axes,
 }
 
+/// An end is on the axis of symmetry within this part of the element's length.
+const ON_AXIS: f64 = 1e-9;
 /// A side whose middle lies off its chord by less than this part of it is straight.
 const STRAIGHT: f64 = 1e-12;
 
 impl Joint6 {
-    /// Elements with Gauss points, or with the nodes as points.
+    /// Elements with Gauss points, or with the nodes as points; those that reach the axis of symmetry have
+    /// three Gauss points instead of the nodes.
     pub fn new(
         analysis: Analysis,
         coordinates: &[[f64; 2]],
         joints: &[Joint],
         integration: Integration,
     ) -> Self {
-        let (xi, weights): (&[f64], &[f64]) = match integration {
-            Integration::Full => gauss(3),
-            Integration::Reduced => gauss(2),
-            // Simpson's rule.
-            _ => (&[-1.0, 1.0, 0.0], &[1.0 / 3.0, 1.0 / 3.0, 4.0 / 3.0]),
+        type Rule = (&'static [f64], &'static [f64]);
+        let rule = |reaches_axis: bool| -> Rule {
+            match integration {
+                Integration::Full => gauss(3),
+                Integration::Reduced => gauss(2),
+                // A node on the axis stands for no area: nothing would hold its two sides together.
+                _ if reaches_axis => gauss(3),
+                // Simpson's rule.
+                _ => (&[-1.0, 1.0, 0.0], &[1.0 / 3.0, 1.0 / 3.0, 4.0 / 3.0]),
+            }
         };
         let mut points = Vec::new();
         let mut axes = Vec::new();
@@ -56,6 +64,9 @@ impl Joint6 {
             let rise = [0, 1].map(|c| at[2][c] - f64::midpoint(at[0][c], at[1][c]));
             let off = (rise[0] * chord.across[0] + rise[1] * chord.across[1]).abs();
             let is_straight = off <= STRAIGHT * chord_length;
+            let reaches_axis = analysis == Analysis::Axisymmetric
+                && at[0][0].min(at[1][0]) <= ON_AXIS * chord_length;
+            let (xi, weights) = rule(reaches_axis);
             for (&xi, weight) in xi.iter().zip(weights) {
                 let (n, d) = line_shape(xi);
                 let sum = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * at[i][c]).sum() };
@@ -83,7 +94,7 @@ impl Joint6 {
             nodes,
             axes,
             lengths,
-            points_per_element: xi.len(),
+            points_per_element: rule(false).0.len(),
             points,
         }
     }

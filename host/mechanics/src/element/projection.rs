@@ -3,8 +3,8 @@
 //! With few points an element follows plastic flow and the incompressible without locking, but few points
 //! do not integrate exactly what is weighted with the radius: stresses that are in equilibrium with a
 //! weight would leave nodal forces over. Here the law's points q carry functions ψ_q, one at their own
-//! point and zero at the others (bilinear between 2 × 2 points of a quad, linear between 3 of a triangle),
-//! and the stress of the element is
+//! point and zero at the others, made of 1, x, y, and of quads ξη (so where sides are straight, bilinear
+//! between the 2 × 2 points of a quad, linear between the 3 of a triangle), and the stress of the element is
 //!
 //! - σ(x) = Σ_q ψ_q(x) σ_q (1)
 //!
@@ -14,11 +14,14 @@
 //! - ε_q = ∫ ψ_q B dV u / W_q, W_q = ∫ ψ_q dV (2)
 //!
 //! so that Σ_q W_q σ_q · ε_q = ∫ σ · B dV u: the virtual work of (1). (1) contains every stress that is
-//! linear in the coordinates (straight sides), so that weight and earth pressure at rest balance to
+//! linear in the coordinates, on curved sides too, so that weight and earth pressure at rest balance to
 //! round-off. In plane strain, and in rectangles, (2) is the strain at the point itself.
 
 use super::Axes;
 use super::solid::Point;
+
+/// A pivot below this: the points of an element do not tell functions of size 1 apart.
+const SINGULAR: f64 = 1e-9;
 
 /// Gives points the mean strains (2). `fine`: points that integrate exactly; `value`: ψ of a point at one
 /// of them. `None` if a point stands for no volume.
@@ -50,6 +53,48 @@ pub(super) fn project<const N: usize>(
         };
     }
     Some(())
+}
+
+/// Values at some places of the functions that are one at their own point and zero at the others, place by
+/// place: a sum of as many given functions, whose values at the points (`own`) and at the places (`fine`)
+/// are known. `None` if the points do not tell them apart.
+pub(super) fn cardinal(own: &[Vec<f64>], fine: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let n = own.len();
+    // Σ_q ψ_q(x) φ_k(x_q) = φ_k(x): rows k, a column for each point, then one for each place. Coordinates
+    // are taken from the first point, in parts of the farthest one's.
+    let moved = |values: &[f64], k: usize| match k {
+        1 | 2 => {
+            let away = own.iter().map(|at| (at[k] - own[0][k]).abs());
+            (values[k] - own[0][k]) / away.fold(0.0, f64::max)
+        }
+        _ => values[k],
+    };
+    let mut rows: Vec<Vec<f64>> = (0..n)
+        .map(|k| own.iter().chain(fine).map(|at| moved(at, k)).collect())
+        .collect();
+    for column in 0..n {
+        let size = |row: &usize| rows[*row][column].abs();
+        let pivot = (column..n).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        if size(&pivot).is_nan() || size(&pivot) < SINGULAR {
+            return None;
+        }
+        rows.swap(column, pivot);
+        let own = rows[column].clone();
+        for (number, row) in rows.iter_mut().enumerate() {
+            let factor = row[column] / own[column];
+            if number == column {
+                for value in row {
+                    *value /= own[column];
+                }
+            } else {
+                for (value, own) in row.iter_mut().zip(&own) {
+                    *value -= factor * own;
+                }
+            }
+        }
+    }
+    let at = |place: usize| rows.iter().map(|row| row[n + place]).collect();
+    Some((0..fine.len()).map(at).collect())
 }
 
 /// Gives strains of an element's points the volume strain that is linear in the coordinates and nearest to

@@ -107,12 +107,31 @@ impl<const N: usize> Solid<N> {
                 points: rule,
                 strains,
             } = rule(element);
-            let exact = (reference.exact)();
+            let curved = strains == Strains::Projected && reference.is_curved(&places);
+            let exact = if curved {
+                (reference.exact_curved)()
+            } else {
+                (reference.exact)()
+            };
             let fine = at(&exact).ok_or(bad)?;
             let mut own = at(&rule).ok_or(bad)?;
             match strains {
                 Strains::AtPoints => {}
                 Strains::LinearVolume => has_linear_volume = true,
+                Strains::Projected if curved => {
+                    let beyond = |point: &RulePoint| Some((reference.beyond_linear?)(point.at));
+                    let basis = |rule: &[RulePoint], points: &[Point<N>]| -> Vec<Vec<f64>> {
+                        let both = rule.iter().zip(points);
+                        both.map(|(at, point)| {
+                            let linear = [1.0, point.position[0], point.position[1]];
+                            linear.into_iter().chain(beyond(at)).collect()
+                        })
+                        .collect()
+                    };
+                    let (at_own, at_fine) = (basis(&rule, &own), basis(&exact, &fine));
+                    let values = projection::cardinal(&at_own, &at_fine).ok_or(bad)?;
+                    projection::project(&mut own, &fine, |q, fine| values[fine][q]).ok_or(bad)?;
+                }
                 Strains::Projected => {
                     let of_point = |q: usize, at: [f64; 2]| (reference.function)(rule[q].at, at);
                     let value = |q: usize, fine: usize| of_point(q, exact[fine].at);

@@ -385,3 +385,57 @@ fn facets_of_a_straight_line_have_the_same_axes() {
         }
     }
 }
+
+/// A zero-thickness element from the axis outward. With r = L s its shape functions have the moments
+/// ∫ N s ds = 0, 1/6, 1/3 and ∫ N s² ds = −1/60, 3/20, 1/5 (axis, outer end, middle), and the axis's own
+/// ∫ N² s ds = 1/60.
+#[test]
+fn an_interface_on_the_axis_carries_a_linear_traction_and_holds_the_node_there() {
+    use super::Joint6;
+    use crate::mesh::Joint;
+    use crate::problem::Integration;
+    let length = 0.4;
+    let places = [[0.0, 1.0], [length, 1.0], [0.5 * length, 1.0]];
+    let coordinates: Vec<[f64; 2]> = places.into_iter().chain(places).collect();
+    let joint = Joint {
+        minus: [0, 1, 2],
+        plus: [3, 4, 5],
+        group: 0,
+    };
+    let element = Joint6::new(
+        Analysis::Axisymmetric,
+        &coordinates,
+        &[joint],
+        Integration::Nodes,
+    );
+    let (a, b) = (-3.0, 40.0);
+    let traction = |r: f64| a + b * r;
+    let flux = (0..3).flat_map(|point| [traction(element.position(point)[0]), 0.0]);
+    let mut force = vec![0.0; 12];
+    element.add_forces(&flux.collect::<Vec<_>>(), &mut force);
+    let turn = 2.0 * std::f64::consts::PI * length * length;
+    let moments = [(0.0, -1.0 / 60.0), (1.0 / 6.0, 0.15), (1.0 / 3.0, 0.2)];
+    for (node, (constant, linear)) in moments.into_iter().enumerate() {
+        let exact = turn * (a * constant + b * length * linear);
+        assert_relative_eq!(
+            force[2 * (node + 3) + 1],
+            exact,
+            max_relative = 1e-13,
+            epsilon = 1e-14
+        );
+        assert_relative_eq!(
+            force[2 * node + 1],
+            -exact,
+            max_relative = 1e-13,
+            epsilon = 1e-14
+        );
+    }
+    let mut stiffness = vec![0.0; 144];
+    element.stiffness(0, &[1.0, 0.0, 0.0, 1.0].repeat(3), &mut stiffness);
+    assert_relative_eq!(stiffness[12 * 7 + 7], turn / 60.0, max_relative = 1e-12);
+    // Away from the axis its points are its nodes.
+    let moved: Vec<[f64; 2]> = coordinates.iter().map(|[r, z]| [r + 1.0, *z]).collect();
+    let element = Joint6::new(Analysis::Axisymmetric, &moved, &[joint], Integration::Nodes);
+    let radii = [0, 1, 2].map(|point| element.position(point)[0]);
+    assert_relative_eq!(radii[..], [1.0, 1.4, 1.2][..], max_relative = 1e-15);
+}

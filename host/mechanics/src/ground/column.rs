@@ -228,6 +228,28 @@ mod tests {
         assert!((only.above([0.1, 3.0]) - (10.0 + 19.0)).abs() < 1e-12);
     }
 
+    /// Two columns of 2 m, 20 and 10 kN/m³, between them a side that is hollow: x = 1 + 0.6 η (1 − η) with y = 2 η.
+    #[test]
+    fn a_vertical_may_cross_an_element_twice() {
+        let mut mesh = Mesh::grid(&[0.0, 1.0, 2.0], &[0.0, 2.0], |column, _| column);
+        let middle = mesh.solids[0].nodes()[5];
+        mesh.nodes[middle][0] = 1.15;
+        let weight = |group: usize| Some([[20.0, 10.0][group]; 2]);
+        let columns = Columns::new(&mesh, None, weight);
+        // x = 1.1 lies left of the side from η = 0.211 to 0.789.
+        let root = (0.25_f64 - 0.1 / 0.6).sqrt();
+        let light = 2.0 * (1.0 - 2.0 * root);
+        let exact = 10.0 * light + 20.0 * (2.0 - light);
+        assert!((columns.above([1.1, 0.0]) - exact).abs() < 1e-12);
+        // Through the ends of the side, on both sides of it.
+        assert!((columns.above([0.5, 0.0]) - 40.0).abs() < 1e-12);
+        assert!((columns.above([1.5, 0.0]) - 20.0).abs() < 1e-12);
+        let uniform = Columns::new(&mesh, None, |_| Some([10.0; 2]));
+        for x in [1.0, 1.05, 1.15, 1.15 + 1e-12] {
+            assert!((uniform.above([x, 0.0]) - 20.0).abs() < 1e-6, "{x}");
+        }
+    }
+
     #[test]
     fn curved_sides_are_followed() {
         // A quad whose upper side is the parabola y = 1 + x (1 − x).

@@ -11,6 +11,7 @@
 use super::{Joint as Inserted, Line, Mesh, Solid};
 use crate::element::increase;
 use std::collections::{HashMap, HashSet};
+use std::fmt;
 
 /// Where an edge with this middle stands among the nodes of an element.
 fn edge_at(element: &Solid, middle: usize) -> Option<[usize; 3]> {
@@ -119,6 +120,29 @@ pub struct CannotInsert {
     /// Middle of that edge, m.
     pub at: Option<[f64; 2]>,
 }
+
+impl fmt::Display for CannotInsert {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}: ", self.number + 1)?;
+        match self.reason {
+            None => write!(f, "there is no such line, or it is a point"),
+            Some(Reason::NoEdge) => write!(f, "no element has a side on it"),
+            Some(Reason::OnBoundary) => write!(f, "it lies on the boundary: nothing to split"),
+            Some(Reason::TakenBy(other)) => {
+                write!(f, "line {} has the same side of an element", other + 1)
+            }
+            Some(Reason::Overlapping) => {
+                write!(f, "elements overlap on it: it does not have two sides")
+            }
+        }?;
+        match self.at {
+            Some([x, y]) => write!(f, ", at ({x}, {y})"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for CannotInsert {}
 
 impl Mesh {
     /// Inserts zero-thickness elements along lines of any course, by splitting nodes: with corners,

@@ -1,15 +1,19 @@
 //! What can be seen of a problem without its laws: references, counts, bounds, what is there in which phase.
 
 use super::{
-    Cause, Drainage, ElementGroup, Formulation, InitialStress, Item, Key, Phase, Problem, Ratio,
-    Refusal, constraints,
+    Cause, Drainage, ElementGroup, Formulation, InitialStress, Item, JointFault, Key, Phase,
+    Problem, Ratio, Refusal, constraints,
 };
+use crate::element::Axes;
+use crate::ground::beside_joints;
 use crate::mesh::{Mesh, Solid};
 use crate::settings::Control;
 use std::collections::{HashMap, HashSet};
 
 /// Most increments of a phase.
 const MOST_INCREMENTS: usize = 10_000_000;
+/// The two faces of a zero-thickness element are at the same places within this part of its length.
+const APART: f64 = 1e-6;
 /// A node lies beyond the axis if its radius is less than this fraction of the mesh's longer side below 0.
 const BEYOND_AXIS: f64 = 1e-9;
 
@@ -18,7 +22,19 @@ const BEYOND_AXIS: f64 = 1e-9;
 /// # Errors
 /// The first part that does not fit.
 pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
+    if let Some((name, value, bounds)) = problem.settings.outside() {
+        let cause = Cause::Setting(name, value, bounds);
+        return Err(Refusal::new(Item::Problem, cause));
+    }
     mesh(problem)?;
+    let mut names = HashSet::new();
+    for (number, group) in problem.groups.iter().enumerate() {
+        if !names.insert(group.name.as_str()) {
+            let cause = Cause::TwoGroups(group.name.clone());
+            return Err(Refusal::new(Item::Group(number), cause));
+        }
+    }
+    let faces = joints(problem)?;
     for (number, group) in problem.groups.iter().enumerate() {
         let in_phases = problem.phases.iter().flat_map(|phase| &phase.drainage);
         let is_undrained = group.drainage == Drainage::Undrained
@@ -52,7 +68,108 @@ pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
             return refuse(Cause::WaterBelow(highest, lowest));
         }
     }
-    phases(problem)
+    phases(problem, &faces)
+}
+
+/// A face of a zero-thickness element: its group, the solid beside it, its middle.
+struct Face {
+    interface: usize,
+    solid: usize,
+    middle: usize,
+}
+
+/// Refuses zero-thickness elements that are none. Returns the faces beside which a solid stands.
+fn joints(problem: &Problem) -> Result<Vec<Face>, Refusal> {
+    let mesh = &problem.mesh;
+    let beside = beside_joints(mesh);
+    let mut faces = Vec::new();
+    for joint in &mesh.joints {
+        let place = |node: usize| mesh.nodes[node];
+        let apart = |a: usize, b: usize| {
+            let ([x_a, y_a], [x_b, y_b]) = (place(a), place(b));
+            (x_b - x_a).hypot(y_b - y_a)
+        };
+        let [a, b, middle] = joint.minus;
+        let refuse = |fault| {
+            let group = problem.groups[joint.group].name.clone();
+            let at = place(middle);
+            let cause = Cause::BadJoint { group, at, fault };
+            Err(Refusal::new(Item::Group(joint.group), cause))
+        };
+        let length = apart(a, b);
+        if length <= 0.0 {
+            return refuse(JointFault::NoLength);
+        }
+        let mut pairs = joint.minus.into_iter().zip(joint.plus);
+        if pairs.any(|(minus, plus)| apart(minus, plus) > APART * length) {
+            return refuse(JointFault::Apart);
+        }
+        let radii = joint.minus.map(|node| place(node)[0]);
+        let on_axis = radii.into_iter().all(|r| r <= BEYOND_AXIS * length);
+        if problem.analysis == super::Analysis::Axisymmetric && on_axis {
+            return refuse(JointFault::OnAxis);
+        }
+        let chord = [0, 1].map(|c| place(b)[c] - place(a)[c]);
+        let across = Axes::of_facet(chord).across;
+        // Close to 45° the last bit of the coordinates says which side is that of the greater ones.
+        let is_told = (chord[0].abs() - chord[1].abs()).abs() > APART * length;
+        for (middle, side) in [(joint.minus[2], -1.0), (joint.plus[2], 1.0)] {
+            let Some(&solid) = beside.get(&middle) else {
+                continue;
+            };
+            // Edges run counter-clockwise: (−dy, dx) points into the solid.
+            let edge = mesh.solids[solid].edges().find(|edge| edge[2] == middle);
+            let inward = edge.map(|[a, b, _]| {
+                let ([x_a, y_a], [x_b, y_b]) = (place(a), place(b));
+                [y_a - y_b, x_b - x_a]
+            });
+            let towards = inward.map_or(0.0, |[x, y]| x * across[0] + y * across[1]);
+            if is_told && side * towards < 0.0 {
+                return refuse(JointFault::Turned);
+            }
+            faces.push(Face {
+                interface: joint.group,
+                solid: mesh.solids[solid].group,
+                middle,
+            });
+        }
+    }
+    Ok(faces)
+}
+
+/// An interface of which one side is not there has nothing to hold it.
+fn refuse_gone(
+    problem: &Problem,
+    number: usize,
+    phase: &Phase,
+    faces: &[Face],
+    active: &[bool],
+) -> Result<(), Refusal> {
+    let gone = faces
+        .iter()
+        .find(|face| active[face.interface] && !active[face.solid]);
+    let Some(face) = gone else {
+        return Ok(());
+    };
+    let changed = |group: usize, is_activated: bool| Item::Activation {
+        phase: number,
+        group,
+        is_activated,
+    };
+    let item = if phase.deactivate.contains(&face.solid) {
+        changed(face.solid, false)
+    } else if phase.activate.contains(&face.interface) {
+        changed(face.interface, true)
+    } else {
+        Item::Group(face.interface)
+    };
+    let name = |group: usize| problem.groups[group].name.clone();
+    let cause = Cause::FaceGone {
+        interface: name(face.interface),
+        solid: name(face.solid),
+        at: problem.mesh.nodes[face.middle],
+    };
+    Err(Refusal::new(item, cause))
 }
 
 fn mesh(problem: &Problem) -> Result<(), Refusal> {
@@ -215,7 +332,7 @@ fn unlikely(ratio: &Ratio) -> Option<Cause> {
     }
 }
 
-fn phases(problem: &Problem) -> Result<(), Refusal> {
+fn phases(problem: &Problem, sides: &[Face]) -> Result<(), Refusal> {
     if problem.phases.is_empty() {
         return Err(Refusal::new(Item::Problem, Cause::NoPhase));
     }
@@ -247,7 +364,9 @@ fn phases(problem: &Problem) -> Result<(), Refusal> {
         if let Some(group) = named.find(|&&group| group >= n) {
             return refuse(Cause::NoGroup(*group));
         }
+        given_twice(problem, number, phase)?;
         activation(problem, number, phase, &mut active)?;
+        refuse_gone(problem, number, phase, sides, &active)?;
         ground(problem, number, phase)?;
         course(problem, number, phase)?;
         let there: HashMap<usize, usize> = edges_there(&problem.mesh, &active);
@@ -276,6 +395,29 @@ fn phases(problem: &Problem) -> Result<(), Refusal> {
             if middles.any(|middle| faces.contains_key(&middle)) {
                 return Err(Refusal::new(item, Cause::RigidInterface(line.clone())));
             }
+        }
+    }
+    Ok(())
+}
+
+/// A phase gives a group one material, one weight, one drainage.
+fn given_twice(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal> {
+    let second = |groups: Vec<usize>| {
+        let mut seen = HashSet::new();
+        groups.into_iter().find(|group| !seen.insert(*group))
+    };
+    let materials = phase.materials.iter().map(|(group, _)| *group);
+    let weights = phase.unit_weight.iter().map(|(group, _)| *group);
+    let drainage = phase.drainage.iter().map(|(group, _)| *group);
+    let lists: [(&'static str, Vec<usize>); 3] = [
+        ("a law", materials.collect()),
+        ("a unit weight", weights.collect()),
+        ("a drainage", drainage.collect()),
+    ];
+    for (what, groups) in lists {
+        if let Some(group) = second(groups) {
+            let cause = Cause::GivenTwice(what, problem.groups[group].name.clone());
+            return Err(Refusal::new(Item::Phase(number), cause));
         }
     }
     Ok(())

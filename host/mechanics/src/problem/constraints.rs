@@ -26,6 +26,7 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
         mesh: &problem.mesh,
         parts: parts(&problem.mesh, &|group| active[group]),
         held: HashMap::new(),
+        values: HashMap::new(),
     };
     for (number, support) in problem.supports.iter().enumerate() {
         let item = Item::Support(number);
@@ -55,6 +56,9 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
                 .for_each(|&group| active[group] = false);
             constraints.parts = parts(&problem.mesh, &|group| active[group]);
         }
+        if phase.reset_displacements {
+            constraints.values.clear();
+        }
         let mut released = Vec::new();
         for (place, free) in phase.free.iter().enumerate() {
             constraints.release(free, Item::Free(number, place), &mut released)?;
@@ -66,7 +70,9 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
         }
         constraints.refuse_free_for_nothing(&released, &values)?;
         constraints.refuse_loose(number, phase)?;
-        constraints.refuse_tied(number, phase, ties, &values)?;
+        let given = values.iter().map(|(&dof, &(value, _))| (dof, value));
+        constraints.values.extend(given);
+        constraints.refuse_tied(number, phase, ties)?;
         if warnings.is_empty() {
             warnings.extend(constraints.free_axis(phase));
         }
@@ -127,6 +133,8 @@ struct Constraints<'a> {
     mesh: &'a Mesh,
     parts: Vec<Part>,
     held: HashMap<usize, Holder>,
+    /// What is prescribed where something holds, if it is not zero, m.
+    values: HashMap<usize, f64>,
 }
 
 impl<'a> Constraints<'a> {
@@ -168,6 +176,9 @@ impl<'a> Constraints<'a> {
             let dofs: Vec<usize> = self.dofs(&free.line, axis, &item)?.collect();
             let holders = dofs.iter().filter_map(|dof| self.held.remove(dof));
             let holders: Vec<Holder> = holders.collect();
+            for dof in &dofs {
+                self.values.remove(dof);
+            }
             // A support that is given up lets its line be moved in the same phase.
             if !holders.contains(&Holder::Support) {
                 released.push(Released {
@@ -346,14 +357,8 @@ impl<'a> Constraints<'a> {
 
     /// A mid-thickness node of a layer with mean strain follows the two faces: it can be held only
     /// where they are, and with them.
-    fn refuse_tied(
-        &self,
-        number: usize,
-        phase: &Phase,
-        ties: &[Tie],
-        values: &HashMap<usize, (f64, &str)>,
-    ) -> Result<(), Refusal> {
-        let value = |dof: usize| values.get(&dof).map_or(0.0, |(value, _)| *value);
+    fn refuse_tied(&self, number: usize, phase: &Phase, ties: &[Tie]) -> Result<(), Refusal> {
+        let value = |dof: usize| self.values.get(&dof).copied().unwrap_or(0.0);
         for tie in ties.iter().filter(|tie| self.held.contains_key(&tie.dof)) {
             let masters = tie.masters;
             let mean: f64 = masters

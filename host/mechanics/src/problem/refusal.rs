@@ -88,6 +88,19 @@ impl Refusal {
     }
 }
 
+/// What is wrong with a zero-thickness element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointFault {
+    /// Its ends are one.
+    NoLength,
+    /// Its faces are not at the same places.
+    Apart,
+    /// Minus is on the side of greater coordinates.
+    Turned,
+    /// It lies along the axis of symmetry.
+    OnAxis,
+}
+
 /// Why a part of a problem does not fit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cause {
@@ -214,6 +227,30 @@ pub enum Cause {
     },
     /// Displacements that move alike are prescribed to move differently: a node, and two increments, m.
     MovesAlike([f64; 2], [f64; 2]),
+    /// Two groups have one name.
+    TwoGroups(String),
+    /// A phase gives a group this twice.
+    GivenTwice(&'static str, String),
+    /// A setting outside its bounds: its name, its value, and they.
+    Setting(&'static str, f64, [f64; 2]),
+    /// A zero-thickness element that cannot be one, and its middle.
+    BadJoint {
+        /// The group.
+        group: String,
+        /// Where.
+        at: [f64; 2],
+        /// What is wrong with it.
+        fault: JointFault,
+    },
+    /// An interface is there and the ground on one of its sides is not.
+    FaceGone {
+        /// The interface.
+        interface: String,
+        /// The group that is not there.
+        solid: String,
+        /// Where, m.
+        at: [f64; 2],
+    },
     /// A number that is none, or infinite.
     NotFinite(&'static str),
     /// A number outside its bounds, and what they are.
@@ -437,6 +474,38 @@ impl fmt::Display for Cause {
                 "the node at ({x}, {y}) moves alike with others that are prescribed differently: by \
                  {a} and {b} m in this phase"
             ),
+            Self::TwoGroups(name) => write!(f, "two groups are called `{name}`"),
+            Self::GivenTwice(what, group) => {
+                write!(f, "group `{group}` gets {what} twice in this phase")
+            }
+            Self::Setting(name, value, [least, most]) => {
+                write!(f, "`{name}` is {value:?}, outside [{least:?}, {most:?}]")
+            }
+            Self::BadJoint {
+                group,
+                at: [x, y],
+                fault,
+            } => write!(
+                f,
+                "a zero-thickness element of group `{group}` at ({x:.6}, {y:.6}) {}",
+                match fault {
+                    JointFault::NoLength => "has no length",
+                    JointFault::Apart => "has faces that are not at the same places",
+                    JointFault::Turned =>
+                        "is turned: its minus side has the element of greater coordinates",
+                    JointFault::OnAxis =>
+                        "lies along the axis of symmetry, where nothing is on its other side",
+                }
+            ),
+            Self::FaceGone {
+                interface,
+                solid,
+                at: [x, y],
+            } => write!(
+                f,
+                "interface `{interface}` is active and the ground on one of its sides, group `{solid}`, \
+                 is not: nothing holds that side, at ({x:.4}, {y:.4})"
+            ),
             Self::NotFinite(what) => write!(f, "{what} is not a finite number"),
             Self::OutOfBounds(what, value, bounds) => {
                 write!(f, "{what} is {value}, expected {bounds}")
@@ -572,6 +641,12 @@ impl Cause {
             Self::LostPressure(_) => {
                 "leave the pressure or the displacement out; `reaction_…` of the line is what it \
                  takes to hold it"
+            }
+            Self::FaceGone { interface, .. } => {
+                return Some(format!(
+                    "an interface goes with the ground beside it: `deactivate` has `{interface}` too, or \
+                     `activate` has it with the ground"
+                ));
             }
             Self::NormalAlong { other, .. } => {
                 let other = other.name(Analysis::PlaneStrain);

@@ -162,6 +162,16 @@ impl Simulation {
         let UnderWay {
             equations, record, ..
         } = phase;
+        if record.relaxed > 1 {
+            watch.warning(&Warning::RelaxedOften(record.name.clone(), record.relaxed));
+        }
+        if record.tolerated > 1 {
+            watch.warning(&Warning::ToleratedOften {
+                phase: record.name.clone(),
+                steps: record.tolerated,
+                largest: record.tolerated_residual,
+            });
+        }
         let of_domain = equations
             .domain
             .as_ref()

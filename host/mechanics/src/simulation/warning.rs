@@ -30,9 +30,21 @@ pub enum Warning {
         /// What is left.
         left: f64,
     },
-    /// Viscous relaxation led to the equilibrium of this increment.
+    /// Viscous relaxation led to the equilibrium of this increment, the first one of its phase.
     Relaxed(Place),
-    /// Iterations came to a standstill above the tolerance; the residual is tolerated.
+    /// It did so in so many steps of a phase.
+    RelaxedOften(String, usize),
+    /// Residuals were tolerated in so many steps of a phase.
+    ToleratedOften {
+        /// The phase.
+        phase: String,
+        /// How many.
+        steps: usize,
+        /// The largest of them, relative.
+        largest: f64,
+    },
+    /// Iterations came to a standstill above the tolerance; the residual is tolerated. Said of the first
+    /// time in a phase.
     Tolerated {
         /// The increment.
         place: Place,
@@ -100,6 +112,18 @@ impl fmt::Display for Warning {
                  equilibrium; others may lie near, and which one is found depends on the course of \
                  the relaxation: run it with other increments, or in another unit of stress, and hold \
                  the results against each other"
+            ),
+            Self::RelaxedOften(phase, steps) => write!(
+                f,
+                "phase `{phase}`: viscous relaxation led to the next equilibrium in {steps} steps in all"
+            ),
+            Self::ToleratedOften {
+                phase,
+                steps,
+                largest,
+            } => write!(
+                f,
+                "phase `{phase}`: a residual was tolerated in {steps} steps in all, at most {largest:.1e}"
             ),
             Self::Tolerated {
                 place,

@@ -288,3 +288,51 @@ pub(super) fn modulus(operator: &[f64]) -> Option<f64> {
     let strain = rows[1][4] / rows[1][1];
     (strain > 0.0).then(|| 1.0 / strain)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chin's own curve: Q = s/(a + b s), whose limit is 1/b, at n settlements up to this many m.
+    fn hyperbola(n: u32, most: f64, [a, b]: [f64; 2]) -> Vec<[f64; 4]> {
+        let at = |i: u32| {
+            let s = most * f64::from(i) / f64::from(n);
+            [s, s / (a + b * s), 0.0, 0.0]
+        };
+        (0..=n).map(at).collect()
+    }
+
+    #[test]
+    fn chin_finds_the_limit_of_a_hyperbola_at_any_settlement() {
+        for most in [0.01, 0.1, 2.0] {
+            let found = chin(&hyperbola(20, most, [2e-6, 4e-4])).unwrap_or(f64::NAN);
+            assert!((found / 2500.0 - 1.0).abs() < 1e-11, "{most}: {found}");
+        }
+    }
+
+    #[test]
+    fn chin_looks_at_the_second_half_of_the_settlement() {
+        // The first half is that of a stiffer pile.
+        let mut points = hyperbola(20, 0.1, [2e-6, 4e-4]);
+        for point in &mut points[1..10] {
+            point[1] *= 1.5;
+        }
+        let found = chin(&points).unwrap_or(f64::NAN);
+        assert!((found / 2500.0 - 1.0).abs() < 1e-11, "{found}");
+    }
+
+    #[test]
+    fn chin_says_why_there_is_no_limit() {
+        let few = chin(&hyperbola(5, 0.1, [2e-6, 4e-4])).unwrap_err();
+        assert!(few.starts_with("3 points"), "{few}");
+        // An elastic pile.
+        let straight = chin(&hyperbola(20, 0.1, [2e-6, 0.0])).unwrap_err();
+        assert!(
+            straight.contains("line") || straight.contains("proportion"),
+            "{straight}"
+        );
+        // A load that grows faster than the settlement: s/Q falls.
+        let stiffening = chin(&hyperbola(20, 0.1, [2e-6, -1e-6])).unwrap_err();
+        assert!(stiffening.contains("no rising line"), "{stiffening}");
+    }
+}
