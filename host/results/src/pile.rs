@@ -159,6 +159,29 @@ impl Pile {
         self.parts.diameter.unwrap_or(self.geometry.width)
     }
 
+    /// What it is, in words.
+    pub fn description(&self, groups: &[Group]) -> String {
+        let names = |numbers: &[usize]| {
+            let names = numbers
+                .iter()
+                .map(|&number| format!("`{}`", groups[number].name));
+            names.collect::<Vec<_>>().join(", ")
+        };
+        let base = match &self.parts.base {
+            Base::Group(group) => names(&[*group]),
+            Base::Line(line) => format!("line `{line}`"),
+        };
+        format!(
+            "pile {}: shaft {}, base {base}, head line `{}`; length {:.4} m, diameter {:.4} m for the criteria \
+             of its resistance",
+            names(&self.parts.groups),
+            names(&self.parts.shaft),
+            self.parts.head,
+            self.length(),
+            self.diameter()
+        )
+    }
+
     /// Its length, m.
     pub fn length(&self) -> f64 {
         self.geometry.length()

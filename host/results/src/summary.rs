@@ -346,12 +346,29 @@ fn groups(about: &About, simulation: &Simulation) -> Value {
             "name": group.name,
             "formulation": group.formulation.name(),
             "elements": group.kinematics.n_elements(),
-            "points_per_element": group.kinematics.points_of(0).len(),
+            "points_per_element": points_per_element(group),
             "law": law,
             "laws_from_phase": swaps,
         })
     };
     groups.map(describe).collect()
+}
+
+/// Points of an element; in words where there are triangles and quads.
+fn points_per_element(group: &Group) -> Value {
+    let elements = 0..group.kinematics.n_elements();
+    let mut counts: Vec<usize> = elements
+        .map(|element| group.kinematics.points_of(element).len())
+        .collect();
+    counts.sort_unstable();
+    counts.dedup();
+    match counts[..] {
+        [n] => json!(n),
+        _ => {
+            let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
+            json!(counts.join(" or "))
+        }
+    }
 }
 
 fn solver(solver: &Settings) -> Value {

@@ -76,7 +76,8 @@ impl Simulation {
         if number == 0 && has_weight && weight > 0.0 {
             watch.at_rest(&name, imbalance * self.largest_force / weight);
         }
-        if imbalance > 1e-6 {
+        // What an earlier phase left within its tolerance is nothing new.
+        if imbalance > f64::max(1e-6, self.settings().force_tolerance) {
             watch.warning(&Warning::OutOfBalance(name.clone(), imbalance));
         }
         let record = PhaseRecord {

@@ -349,7 +349,10 @@ fn group(group: &Value) -> Template {
         name => text(&group["name"]),
         formulation => text(&group["formulation"]).replace('_', " "),
         elements => group["elements"].as_u64(),
-        points => group["points_per_element"].as_u64(),
+        points => match &group["points_per_element"] {
+            Value::String(several) => several.clone(),
+            one => one.to_string(),
+        },
         law => text(&group["law"]),
         swaps => swaps.join(", "),
     }

@@ -279,7 +279,10 @@ impl Run {
         let text = unstructured_grid(&simulation.snapshot(), has_pressures);
         let groups = simulation.groups().iter().map(|group| group.name.clone());
         let groups: Vec<String> = groups.collect();
-        let mut notes = Vec::new();
+        let pile = wanted.pile.iter();
+        let mut notes: Vec<String> = pile
+            .map(|pile| pile.description(simulation.groups()))
+            .collect();
         let called = (&groups[..], "before the first phase");
         Self {
             pile: None,
