@@ -65,7 +65,7 @@ macro_rules! export_laws {
 #[macro_export]
 macro_rules! export_rust_layout {
     () => {
-        #[unsafe(export_name = "pilum_rust_layout")]
+        #[unsafe(export_name = "pilum_rust_layout_1_1")]
         pub static RUST_LAYOUT: $crate::export::Shared<$crate::raw::RustLayout> =
             $crate::export::Shared::new($crate::layout::RUST_LAYOUT);
     };

@@ -85,6 +85,9 @@ pub struct SolidPoint<const N: usize, S> {
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
+    /// Time at the start, counted from the start of the phase or segment; 0 where the host is of
+    /// version 1.0.
+    pub step_time: f64,
 }
 
 /// The same point at the end of the increment.
@@ -115,6 +118,9 @@ pub struct InterfacePoint<S> {
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
+    /// Time at the start, counted from the start of the phase or segment; 0 where the host is of
+    /// version 1.0.
+    pub step_time: f64,
 }
 
 /// The same point at the end of the increment.

@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 49] = [
+const GALLERY: [(&str, &str, &str, Point); 50] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -101,6 +101,12 @@ const GALLERY: [(&str, &str, &str, Point); 49] = [
     (
         "bad_empty_batch",
         "empty-batch-is-accepted",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_earlier_batch",
+        "earlier-hosts-are-served",
         "failed",
         CannotTell,
     ),

@@ -161,6 +161,7 @@ fn update_solid<L: ContinuumLaw, const N: usize, const PACKED: bool>(
         state: start.state,
         time: access.batch.time,
         time_increment: access.batch.time_increment,
+        step_time: access.batch.step_time,
     };
     let SolidResponse {
         stress,
@@ -238,6 +239,7 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
             state: start.state,
             time: access.batch.time,
             time_increment: access.batch.time_increment,
+            step_time: access.batch.step_time,
         };
         let end = self.0.update(&point, tangent)?;
         access.put(

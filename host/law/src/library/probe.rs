@@ -261,6 +261,8 @@ pub struct CreateForm<'a> {
     pub message: Option<usize>,
     /// Bytes of the host's description beyond those this version knows.
     pub more_host: usize,
+    /// Minor version that the host says it has.
+    pub host_minor: u16,
     /// Components of gradient and flux, for later calls.
     pub n_components: usize,
     /// Internal variables, for later calls.
@@ -285,9 +287,9 @@ impl Created {
     }
 }
 
-/// The host's description with bytes at its end that this version does not know. It stays for the
-/// life of the process.
-fn longer_host(more: usize) -> io::Result<*const Host> {
+/// The host's description with another minor version, or with bytes at its end that this version does
+/// not know. It stays for the life of the process.
+fn other_host(more: usize, abi_minor: u16) -> io::Result<*const Host> {
     let size = size_of::<Host>() + more;
     let mut pages = Pages::new(size, Fence::After)?;
     pages.bytes_mut().fill(0xa5);
@@ -302,6 +304,7 @@ fn longer_host(more: usize) -> io::Result<*const Host> {
     let at: *const Host = match (before, hosts) {
         ([], [host, ..]) => host.write(Host {
             struct_size: size as u32,
+            abi_minor,
             ..HOST.0
         }),
         _ => {
@@ -323,9 +326,9 @@ pub(crate) fn create(law: LawHandle, form: &CreateForm<'_>) -> io::Result<Create
     let Some(create) = law.known.create else {
         return Err(io::Error::other("`create` is null"));
     };
-    let host = match form.more_host {
-        0 => &raw const HOST.0,
-        more => longer_host(more)?,
+    let host = match (form.more_host, form.host_minor) {
+        (0, raw::PILUM_ABI_MINOR) => &raw const HOST.0,
+        (more, minor) => other_host(more, minor)?,
     };
     let values = form
         .values
@@ -501,6 +504,8 @@ impl Probe {
             },
             message: message.as_ref().map_or(null_mut(), |m| m.pointer().cast()),
             message_capacity: form.message.unwrap_or(0),
+            step_time: 0.0,
+            rates: null(),
         };
         let letter = in_pages(&batch, form.batch_bytes)?;
         // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
@@ -590,7 +595,7 @@ pub fn enter(path: &Path) -> Result<[usize; 3], String> {
     // SAFETY: contract, "Entry": may be called with any valid host block, from any thread.
     let call = move || unsafe { entry(&raw const HOST.0) }.addr();
     let other = move || -> io::Result<usize> {
-        let host = longer_host(64)?;
+        let host = other_host(64, raw::PILUM_ABI_MINOR)?;
         // SAFETY: as above.
         Ok(unsafe { entry(host) }.addr())
     };
