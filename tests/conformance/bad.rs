@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 50] = [
+const GALLERY: [(&str, &str, &str, Point); 51] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -125,6 +125,12 @@ const GALLERY: [(&str, &str, &str, Point); 50] = [
     (
         "bad_request",
         "unknown-requests-are-refused",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_no_tangent",
+        "missing-tangent-is-refused",
         "failed",
         CannotTell,
     ),

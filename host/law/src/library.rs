@@ -506,7 +506,14 @@ fn describe_formulation(
         hypothesis: name,
         index,
         symmetric: formulation.flags & raw::PILUM_T_SYMMETRIC != 0,
-        tangent: Tangent::default(),
+        tangent: if formulation.flags & raw::PILUM_T_NO_TANGENT != 0 {
+            Tangent::None
+        } else if formulation.flags & raw::PILUM_T_TANGENT_APPROXIMATE != 0 {
+            Tangent::Approximate
+        } else {
+            Tangent::Consistent
+        },
+        rates: formulation.flags & raw::PILUM_T_RATES != 0,
         linear: formulation.flags & raw::PILUM_T_LINEAR != 0 && internal_variables.is_empty(),
         local_axes: formulation.flags & raw::PILUM_T_LOCAL_AXES != 0,
         internal_variables,

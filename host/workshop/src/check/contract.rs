@@ -53,6 +53,14 @@ pub(super) const CHECKS: &[Check] = &[
         run: unknown_requests_are_refused,
     },
     Check {
+        id: "missing-tangent-is-refused",
+        family: Family::Contract,
+        description: "Where PILUM_T_NO_TANGENT is set, a request of the consistent tangent is \
+                      answered with PILUM_E_UNSUPPORTED.",
+        needs: &["integrate-works"],
+        run: missing_tangent_is_refused,
+    },
+    Check {
         id: "empty-batch-is-accepted",
         family: Family::Contract,
         description: "A batch without points succeeds.",
@@ -320,7 +328,9 @@ fn unknown_requests_are_refused(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "requests");
     for specimen in subject.specimens(1, &mut random)? {
         let points = specimen.points(3, &mut random)?;
-        for bit in [3, 17, 31] {
+        // A law knows of rates, and may refuse them as unknown or as what it does not offer.
+        let rates = (!specimen.formulation.rates).then_some(3);
+        for bit in rates.into_iter().chain([4, 17, 31]) {
             let answer = specimen.call(&points, raw::PILUM_REQ_FLUX | 1 << bit)?;
             if answer.status != raw::PILUM_E_UNSUPPORTED {
                 return Err(specimen.fails(format!(
@@ -332,6 +342,33 @@ fn unknown_requests_are_refused(subject: &Subject) -> Found {
                 return Err(specimen.fails("a call that is refused as a whole wrote outcomes"));
             }
         }
+    }
+    Ok(String::new())
+}
+
+fn missing_tangent_is_refused(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "no tangent");
+    let mut n = 0;
+    for specimen in subject.specimens(1, &mut random)? {
+        if specimen.formulation.tangent != law::Tangent::None {
+            continue;
+        }
+        let points = specimen.points(3, &mut random)?;
+        let form = Form {
+            verbatim: true,
+            ..Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT)
+        };
+        let answer = specimen.probe.integrate(&points, &form)?;
+        if answer.status != raw::PILUM_E_UNSUPPORTED {
+            return Err(specimen.fails(format!(
+                "it declares no tangent, but asked for one `integrate` returned {}",
+                status_name(answer.status)
+            )));
+        }
+        n += 1;
+    }
+    if n == 0 {
+        return Err(super::skipped("all laws have a tangent"));
     }
     Ok(String::new())
 }

@@ -79,6 +79,7 @@ pub(super) fn create_form<'a>(
         host_minor: raw::PILUM_ABI_MINOR,
         n_components: hypothesis.n_components(),
         n_states: formulation.internal_variables.len(),
+        lacks_tangent: formulation.tangent == law::Tangent::None,
     }
 }
 
