@@ -1,8 +1,8 @@
 ! For authors of laws in Fortran: the contract of pilum_law.h as a module, and what every law does
 ! alike. The first part mirrors the structs; a test compares sizes and offsets with the header. The
-! second part describes one law, checks its parameters, walks the batch, and writes outcomes and
-! the message; what is left to the author is a description and a subroutine that carries one point
-! over one increment.
+! second part describes laws, checks their parameters, walks the batch, and writes outcomes and the
+! message; what is left to the author is a description and a subroutine that carries one point over
+! one increment.
 !
 ! `stop`, `error stop` and failing I/O end the host: return a status and a reason instead. Compile
 ! with -frecursive, so that no local variable is shared between threads.
@@ -17,8 +17,8 @@ module pilum
 
   integer(c_int32_t), parameter :: PILUM_MAGIC_NUMBER = int(z'50494C4D', c_int32_t)
   integer(c_int16_t), parameter :: PILUM_ABI_MAJOR = 1
-  integer(c_int16_t), parameter :: PILUM_ABI_MINOR = 0
-  integer(c_int64_t), parameter :: PILUM_LAYOUT_HASH = int(z'35BE1D04C1C21612', c_int64_t)
+  integer(c_int16_t), parameter :: PILUM_ABI_MINOR = 1
+  integer(c_int64_t), parameter :: PILUM_LAYOUT_HASH = int(z'B8583DA8C195E927', c_int64_t)
 
   integer(c_int32_t), parameter :: PILUM_OK = 0
   integer(c_int32_t), parameter :: PILUM_OK_UNRELIABLE = 1
@@ -46,9 +46,13 @@ module pilum
   integer(c_int32_t), parameter :: PILUM_T_SYMMETRIC = 1
   integer(c_int32_t), parameter :: PILUM_T_LINEAR = 2
   integer(c_int32_t), parameter :: PILUM_T_LOCAL_AXES = 4
+  integer(c_int32_t), parameter :: PILUM_T_RATES = 8
+  integer(c_int32_t), parameter :: PILUM_T_TANGENT_APPROXIMATE = 16
+  integer(c_int32_t), parameter :: PILUM_T_NO_TANGENT = 32
   integer(c_int32_t), parameter :: PILUM_REQ_FLUX = 1
   integer(c_int32_t), parameter :: PILUM_REQ_TANGENT = 2
   integer(c_int32_t), parameter :: PILUM_REQ_ELASTIC = 4
+  integer(c_int32_t), parameter :: PILUM_REQ_RATES = 8
 
   type, bind(C) :: pilum_magic_block
     integer(c_int32_t) :: struct_size, magic
@@ -96,6 +100,16 @@ module pilum
     type(pilum_view_mut) :: flux1, state1, tangent
     type(c_ptr) :: status, step_factor, message
     integer(c_size_t) :: message_capacity
+    ! Since version 1.1.
+    real(c_double) :: step_time
+    type(c_ptr) :: rates
+  end type
+
+  type, bind(C) :: pilum_rates
+    integer(c_int32_t) :: struct_size, reserved
+    type(c_ptr) :: parameter
+    type(pilum_view) :: gradient0, gradient1, flux0, state0
+    type(pilum_view_mut) :: flux1, state1
   end type
 
   type, bind(C) :: pilum_host
@@ -119,21 +133,27 @@ module pilum
 
   ! ---- what an author writes ---------------------------------------------------------------------
 
-  integer, parameter :: MAX_COMPONENTS = 6, MAX_PARAMETERS = 64, MAX_STATES = 64
-  integer, parameter :: MAX_FORMULATIONS = 4
+  ! What this module has room for; more is refused with a message as soon as parameters are given.
+  integer, parameter :: MAX_COMPONENTS = 6, MAX_PARAMETERS = 256, MAX_STATES = 256
+  integer, parameter :: MAX_FORMULATIONS = 4, MAX_LAWS = 16, MAX_CHOICES = 32
 
   ! Which operator the host wants beside the update.
   integer, parameter :: TANGENT_NONE = 0, TANGENT_ELASTIC = 1, TANGENT_CONSISTENT = 2
 
   ! One integration point at the start of an increment, and the increment.
   type :: point_type
-    ! Number of components: 2 for interfaces, 4 for solids in the plane, 6 in space.
-    integer :: n
-    ! Strain or jump at the start, its increment, stress or traction at the start (kPa).
+    ! Number of components: 2 for interfaces, 4 for solids in the plane, 6 in space; and of internal
+    ! variables.
+    integer :: n, n_states
+    ! Strain or jump at the start, its increment, stress or traction at the start (kPa); components
+    ! beyond n are zero.
     real(dp) :: gradient(MAX_COMPONENTS), increment(MAX_COMPONENTS), flux(MAX_COMPONENTS)
     ! Internal variables at the start.
     real(dp) :: state(MAX_STATES)
     real(dp) :: time, time_increment
+    ! Time at the start, counted from the start of the phase or segment; 0 where the host is of
+    ! version 1.0.
+    real(dp) :: step_time
   end type
 
   ! The same point at the end of the increment; all zero when the author receives it.
@@ -157,6 +177,16 @@ module pilum
       character(len=*), intent(inout) :: refusal
     end subroutine
 
+    ! Initial internal variables of a point that carries this flux before anything has happened;
+    ! components beyond those of the hypothesis are zero, `state` is all zero at first.
+    subroutine initial_interface(p, flux, state, reason, status)
+      import :: dp, c_int32_t
+      real(dp), intent(in) :: p(:), flux(:)
+      real(dp), intent(inout) :: state(:)
+      character(len=*), intent(inout) :: reason
+      integer(c_int32_t), intent(inout) :: status
+    end subroutine
+
     ! Carries one point over one increment; `p` is what `prepare` left. A pure function of its
     ! arguments: no saved variables, no I/O, no allocation.
     subroutine update_interface(p, point, tangent, end, status)
@@ -169,13 +199,13 @@ module pilum
     end subroutine
   end interface
 
-  ! ---- the one law of this library ---------------------------------------------------------------
+  ! ---- the laws of this library ------------------------------------------------------------------
 
   integer(c_int64_t), parameter, private :: NAN_BITS = int(z'7FF8000000000000', c_int64_t)
   integer(c_int64_t), parameter, private :: INFINITY_BITS = int(z'7FF0000000000000', c_int64_t)
   real(dp), parameter, private :: NAN = transfer(NAN_BITS, 1.0_dp)
   real(dp), parameter, private :: INFINITY = transfer(INFINITY_BITS, 1.0_dp)
-  character(len=*), parameter, private :: SDK_NAME = 'pilum-fortran 1.0'
+  character(len=*), parameter, private :: SDK_NAME = 'pilum-fortran 1.1'
   integer, private :: sdk_letter
 
   type(pilum_magic_block), bind(C, name='pilum_magic'), target, save :: pilum_magic = &
@@ -186,87 +216,165 @@ module pilum
 
   ! Static: the host keeps pointers into all of it. It is filled by the first call of the entry,
   ! which must be over before another begins; the Pilum host opens libraries one at a time.
-  character(kind=c_char), target, save, private :: texts(16384)
+  character(kind=c_char), target, save, private :: texts(65536)
   integer, save, private :: n_texts = 0
-  type(pilum_parameter), target, save, private :: parameters(MAX_PARAMETERS)
-  type(pilum_variable), target, save, private :: states(MAX_STATES)
-  type(pilum_variable), target, save, private :: gradients(MAX_FORMULATIONS)
-  type(pilum_variable), target, save, private :: fluxes(MAX_FORMULATIONS)
-  type(c_ptr), target, save, private :: component_names(MAX_COMPONENTS, MAX_FORMULATIONS)
-  type(pilum_formulation), target, save, private :: formulations(MAX_FORMULATIONS)
-  type(pilum_law), target, save, private :: the_law
-  type(c_ptr), target, save, private :: the_laws(1)
+
+  ! A law as its author describes it. Without initial values, which would fill the library's file.
+  type, private :: described_type
+    type(pilum_parameter) :: parameters(MAX_PARAMETERS)
+    type(c_ptr) :: choices(MAX_CHOICES, MAX_PARAMETERS)
+    type(pilum_variable) :: states(MAX_STATES)
+    type(pilum_variable) :: gradients(MAX_FORMULATIONS), fluxes(MAX_FORMULATIONS)
+    type(c_ptr) :: component_names(MAX_COMPONENTS, MAX_FORMULATIONS)
+    type(pilum_formulation) :: formulations(MAX_FORMULATIONS)
+    type(pilum_law) :: law
+    procedure(prepare_interface), pointer, nopass :: prepare
+    procedure(update_interface), pointer, nopass :: update
+    procedure(initial_interface), pointer, nopass :: initial
+    ! What there was no room for.
+    character(len=80) :: excess
+  end type
+
+  type(described_type), target, save, private :: described_laws(MAX_LAWS)
+  integer, save, private :: n_laws = 0
+  type(c_ptr), target, save, private :: the_laws(MAX_LAWS)
   type(pilum_plugin), target, save, private :: the_plugin
-  procedure(prepare_interface), pointer, save, private :: the_prepare => null()
-  procedure(update_interface), pointer, save, private :: the_update => null()
   logical, save, private :: is_described = .false.
 
   ! What an instance holds.
   type, private :: instance_type
     real(dp) :: p(MAX_PARAMETERS)
     integer :: n_parameters, n_components, n_states
+    procedure(update_interface), pointer, nopass :: update
+    procedure(initial_interface), pointer, nopass :: initial
   end type
 
-  private :: text, say, point_says, create, integrate, destroy, element, is_finite, is_worse
+  private :: text, say, point_says, create, integrate, init_state, destroy, element, put, locate, &
+    is_finite, is_worse, exceed, tell
 
 contains
 
-  ! Whether the description is complete: the entry describes the law once.
+  ! Whether the description is complete: the entry describes the laws once.
   logical function described()
     described = is_described
   end function
 
-  ! Names the law and its subroutines; its parameters, internal variables and formulations follow.
-  subroutine describe_law(id, name, version, author, licence, doc, references, prepare, update)
+  ! Begins the description of a law, one of several perhaps: its name and subroutines. Its parameters,
+  ! internal variables and formulations follow. Without `initial` each internal variable starts from
+  ! the value it is declared with.
+  subroutine describe_law(id, name, version, author, licence, doc, references, prepare, update, &
+    initial)
     character(len=*), intent(in) :: id, name, version, author, licence, doc, references
     procedure(prepare_interface) :: prepare
     procedure(update_interface) :: update
-    the_prepare => prepare
-    the_update => update
-    the_law = pilum_law(int(c_sizeof(the_law), c_int32_t), 0, 0, 0, text(id), text(name), &
-      text(version), text(author), text(licence), text(doc), text(references), &
-      c_loc(parameters), c_loc(formulations), c_funloc(create), c_null_funptr, &
-      c_funloc(integrate), c_funloc(destroy))
+    procedure(initial_interface), optional :: initial
+    type(c_funptr) :: init
+    if (n_laws == MAX_LAWS) then
+      call exceed('more laws than MAX_LAWS')
+      return
+    end if
+    n_laws = n_laws + 1
+    init = c_null_funptr
+    associate (new => described_laws(n_laws))
+      new%prepare => prepare
+      new%update => update
+      nullify (new%initial)
+      new%excess = ''
+      if (present(initial)) then
+        new%initial => initial
+        init = c_funloc(init_state)
+      end if
+      new%law = pilum_law(int(c_sizeof(new%law), c_int32_t), 0, 0, 0, text(id), text(name), &
+        text(version), text(author), text(licence), text(doc), text(references), &
+        c_loc(new%parameters), c_loc(new%formulations), c_funloc(create), init, &
+        c_funloc(integrate), c_funloc(destroy))
+    end associate
+  end subroutine
+
+  ! Remembers what there is no room for; the law then refuses its parameters.
+  subroutine exceed(what)
+    character(len=*), intent(in) :: what
+    described_laws(n_laws)%excess = what//', see pilum_law.f90'
   end subroutine
 
   ! Declares the next parameter. Bounds are inclusive: `lower <= value <= upper`; `above`, `below`
-  ! exclude the bound itself. Values outside `usual` draw a warning.
-  subroutine add_parameter(id, symbol, unit, doc, lower, upper, above, below, usual, default)
+  ! exclude the bound itself. Values outside `usual` draw a warning. With `choices` the value is the
+  ! number of a label, from 0. An `optional` one may be left out and is then NaN.
+  subroutine add_parameter(id, symbol, unit, doc, lower, upper, above, below, usual, default, &
+    choices, optional)
     character(len=*), intent(in) :: id, symbol, unit, doc
     real(dp), intent(in), optional :: lower, upper, above, below, usual(2), default
+    character(len=*), intent(in), optional :: choices(:)
+    logical, intent(in), optional :: optional
     type(pilum_parameter) :: new
-    if (the_law%n_parameters >= MAX_PARAMETERS) return
-    new = pilum_parameter(int(c_sizeof(new), c_int32_t), 0, text(id), text(symbol), text(unit), &
-      text(doc), NAN, -INFINITY, INFINITY, -INFINITY, INFINITY, c_null_ptr)
-    if (present(lower)) new%lower = lower
-    if (present(upper)) new%upper = upper
-    if (present(above)) then
-      new%lower = above
-      new%flags = ior(new%flags, PILUM_P_OPEN_LOWER)
-    end if
-    if (present(below)) then
-      new%upper = below
-      new%flags = ior(new%flags, PILUM_P_OPEN_UPPER)
-    end if
-    if (present(usual)) then
-      new%usual_lower = usual(1)
-      new%usual_upper = usual(2)
-    end if
-    if (present(default)) new%default_value = default
-    the_law%n_parameters = the_law%n_parameters + 1
-    parameters(the_law%n_parameters) = new
+    integer :: n, k
+    associate (law => described_laws(n_laws))
+      n = law%law%n_parameters + 1
+      if (n > MAX_PARAMETERS) then
+        call exceed('more parameters than MAX_PARAMETERS')
+        return
+      end if
+      new = pilum_parameter(int(c_sizeof(new), c_int32_t), 0, text(id), text(symbol), text(unit), &
+        text(doc), NAN, -INFINITY, INFINITY, -INFINITY, INFINITY, c_null_ptr)
+      if (present(lower)) new%lower = lower
+      if (present(upper)) new%upper = upper
+      if (present(above)) then
+        new%lower = above
+        new%flags = ior(new%flags, PILUM_P_OPEN_LOWER)
+      end if
+      if (present(below)) then
+        new%upper = below
+        new%flags = ior(new%flags, PILUM_P_OPEN_UPPER)
+      end if
+      if (present(usual)) then
+        new%usual_lower = usual(1)
+        new%usual_upper = usual(2)
+      end if
+      if (present(default)) new%default_value = default
+      if (present(optional)) then
+        if (optional) new%flags = ior(new%flags, PILUM_P_OPTIONAL)
+      end if
+      if (present(choices)) then
+        if (size(choices) >= MAX_CHOICES) then
+          call exceed('more labels of '//id//' than MAX_CHOICES')
+          return
+        end if
+        do k = 1, size(choices)
+          law%choices(k, n) = text(trim(choices(k)))
+        end do
+        law%choices(size(choices) + 1, n) = c_null_ptr
+        new%choices = c_loc(law%choices(1, n))
+        new%lower = 0
+        new%upper = size(choices) - 1
+      end if
+      law%law%n_parameters = n
+      law%parameters(n) = new
+    end associate
   end subroutine
 
-  ! Declares the internal variables, all numbers, before the formulations. 0 at first.
-  subroutine add_state(number, id, symbol, unit, doc)
+  ! Declares the internal variables, all numbers, before the formulations. They start from `initial`,
+  ! 0 if it is left out; an `output_only` one is a result that the law does not read back.
+  subroutine add_state(number, id, symbol, unit, doc, initial, output_only)
     integer, intent(in) :: number
     character(len=*), intent(in) :: id, symbol, unit, doc
-    if (number < 1 .or. number > MAX_STATES) return
-    states(number) = pilum_variable(int(c_sizeof(states(1)), c_int32_t), 0, text(id), &
-      text(symbol), text(unit), text(doc), PILUM_SCALAR, 1, c_null_ptr, 0.0_dp)
+    real(dp), intent(in), optional :: initial
+    logical, intent(in), optional :: output_only
+    type(pilum_variable) :: new
+    if (number < 1 .or. number > MAX_STATES) then
+      call exceed('internal variable '//id//' is not within 1 and MAX_STATES')
+      return
+    end if
+    new = pilum_variable(int(c_sizeof(new), c_int32_t), 0, text(id), text(symbol), text(unit), &
+      text(doc), PILUM_SCALAR, 1, c_null_ptr, 0.0_dp)
+    if (present(initial)) new%initial_value = initial
+    if (present(output_only)) then
+      if (output_only) new%flags = PILUM_V_OUTPUT_ONLY
+    end if
+    described_laws(n_laws)%states(number) = new
   end subroutine
 
-  ! Declares a hypothesis that the law offers, with its first `n_states` internal variables.
+  ! Declares a hypothesis that the law offers, with its first `n_states` internal variables, which
+  ! may be none.
   subroutine add_formulation(hypothesis, n_states, flags)
     integer(c_int32_t), intent(in) :: hypothesis
     integer, intent(in) :: n_states
@@ -275,32 +383,38 @@ contains
     character(len=1), parameter :: interface(2) = ['n', 't']
     type(c_ptr) :: names
     integer :: f, c, n
-    if (the_law%n_formulations >= MAX_FORMULATIONS) return
-    the_law%n_formulations = the_law%n_formulations + 1
-    f = the_law%n_formulations
-    names = c_loc(component_names(1, f))
-    if (hypothesis == PILUM_H_INTERFACE_2D) then
-      n = 2
-      do c = 1, n
-        component_names(c, f) = text(interface(c))
-      end do
-      gradients(f) = variable('jump', '[u]', 'm', &
-        'Relative displacement across the interface, opening positive.', PILUM_VECTOR)
-      fluxes(f) = variable('traction', 't', 'kPa', 'Traction on the interface, tension positive.', &
-        PILUM_VECTOR)
-    else
-      n = merge(6, 4, hypothesis == PILUM_H_3D)
-      do c = 1, n
-        component_names(c, f) = text(solid(c))
-      end do
-      gradients(f) = variable('strain', 'eps', '-', 'Strain, engineering shear.', &
-        PILUM_SYMMETRIC_TENSOR)
-      fluxes(f) = variable('stress', 'sigma', 'kPa', 'Stress, tension positive.', &
-        PILUM_SYMMETRIC_TENSOR)
-    end if
-    formulations(f) = pilum_formulation(int(c_sizeof(formulations(1)), c_int32_t), hypothesis, 0, &
-      1, 1, n_states, c_loc(gradients(f)), c_loc(fluxes(f)), c_loc(states))
-    if (present(flags)) formulations(f)%flags = flags
+    associate (law => described_laws(n_laws))
+      f = law%law%n_formulations + 1
+      if (f > MAX_FORMULATIONS .or. n_states > MAX_STATES) then
+        call exceed('more formulations or internal variables than there is room for')
+        return
+      end if
+      law%law%n_formulations = f
+      names = c_loc(law%component_names(1, f))
+      if (hypothesis == PILUM_H_INTERFACE_2D) then
+        n = 2
+        do c = 1, n
+          law%component_names(c, f) = text(interface(c))
+        end do
+        law%gradients(f) = variable('jump', '[u]', 'm', &
+          'Relative displacement across the interface, opening positive.', PILUM_VECTOR)
+        law%fluxes(f) = variable('traction', 't', 'kPa', &
+          'Traction on the interface, tension positive.', PILUM_VECTOR)
+      else
+        n = merge(6, 4, hypothesis == PILUM_H_3D)
+        do c = 1, n
+          law%component_names(c, f) = text(solid(c))
+        end do
+        law%gradients(f) = variable('strain', 'eps', '-', 'Strain, engineering shear.', &
+          PILUM_SYMMETRIC_TENSOR)
+        law%fluxes(f) = variable('stress', 'sigma', 'kPa', 'Stress, tension positive.', &
+          PILUM_SYMMETRIC_TENSOR)
+      end if
+      law%formulations(f) = pilum_formulation(int(c_sizeof(law%formulations(1)), c_int32_t), &
+        hypothesis, 0, 1, 1, n_states, c_loc(law%gradients(f)), c_loc(law%fluxes(f)), &
+        c_loc(law%states))
+      if (present(flags)) law%formulations(f)%flags = flags
+    end associate
 
   contains
 
@@ -314,12 +428,64 @@ contains
 
   ! What the entry returns once everything is described.
   type(c_ptr) function the_library()
-    the_laws(1) = c_loc(the_law)
-    the_plugin = pilum_plugin(int(c_sizeof(the_plugin), c_int32_t), 1, c_loc(the_laws), &
+    integer :: k
+    do k = 1, n_laws
+      the_laws(k) = c_loc(described_laws(k)%law)
+    end do
+    the_plugin = pilum_plugin(int(c_sizeof(the_plugin), c_int32_t), n_laws, c_loc(the_laws), &
       c_null_funptr)
     is_described = .true.
     the_library = c_loc(the_plugin)
   end function
+
+  ! The consistent tangent by central differences, for a law that has written none: two more updates
+  ! for each component. `size` is a strain or jump over which the response bends, such as strength
+  ! over stiffness; where the response is smooth over 1e-5 of it and the update is good to round-off,
+  ! the error is about 1e-10 of the stiffness. At a kink the result lies between those of its sides.
+  ! `update` is called with TANGENT_NONE; what fails there is the outcome.
+  subroutine differentiate(p, point, update, size, end, status)
+    real(dp), intent(in) :: p(:), size
+    type(point_type), intent(in) :: point
+    procedure(update_interface) :: update
+    type(response_type), intent(inout) :: end
+    integer(c_int32_t), intent(inout) :: status
+    type(point_type) :: moved
+    type(response_type) :: trial
+    real(dp) :: flux(MAX_COMPONENTS, 2), increment(2)
+    integer(c_int32_t) :: outcome
+    integer :: n, column, side
+    n = point%n
+    moved = point
+    do column = 1, n
+      do side = 1, 2
+        moved%increment(column) = point%increment(column) + (2*side - 3)*6e-6_dp*size
+        increment(side) = moved%increment(column)
+        call clear(point, trial)
+        outcome = PILUM_OK
+        call update(p, moved, TANGENT_NONE, trial, outcome)
+        if (outcome /= PILUM_OK .and. outcome /= PILUM_OK_UNRELIABLE) then
+          end%reason = trial%reason
+          end%step_factor = trial%step_factor
+          status = outcome
+          return
+        end if
+        flux(:n, side) = trial%flux(:n)
+      end do
+      moved%increment(column) = point%increment(column)
+      end%tangent(:n, column) = (flux(:n, 2) - flux(:n, 1))/(increment(2) - increment(1))
+    end do
+  end subroutine
+
+  ! The response as the author receives it.
+  subroutine clear(point, end)
+    type(point_type), intent(in) :: point
+    type(response_type), intent(inout) :: end
+    end%flux = 0
+    end%state(:point%n_states) = 0
+    end%tangent = 0
+    end%reason = 'the law gives no reason'
+    end%step_factor = NAN
+  end subroutine
 
   ! ---- the host's calls --------------------------------------------------------------------------
 
@@ -332,16 +498,26 @@ contains
     real(c_double), pointer :: values(:)
     type(c_ptr), pointer :: written
     type(instance_type), pointer :: instance
+    type(described_type), pointer :: mine
     character(len=200) :: refusal
     logical :: is_inside
     integer :: i, error
     call say(message, capacity, '')
+    nullify (mine)
+    do i = 1, n_laws
+      if (c_associated(law, c_loc(described_laws(i)%law))) mine => described_laws(i)
+    end do
     status = PILUM_E_ARGUMENT
-    if (number < 0 .or. number >= the_law%n_formulations) then
+    if (.not. associated(mine)) then
+      call say(message, capacity, 'there is no such law')
+    else if (number < 0 .or. number >= mine%law%n_formulations) then
       call say(message, capacity, 'there is no such formulation')
-    else if (n_parameters /= the_law%n_parameters .or. .not. c_associated(out) .or. &
+    else if (n_parameters /= mine%law%n_parameters .or. .not. c_associated(out) .or. &
       (n_parameters > 0 .and. .not. c_associated(parameter))) then
       call say(message, capacity, 'wrong number of parameters')
+    else if (mine%excess /= '') then
+      call say(message, capacity, trim(mine%excess))
+      status = PILUM_E_INTERNAL
     else
       status = PILUM_OK
     end if
@@ -349,10 +525,13 @@ contains
     ! Read as an array only where there is one.
     if (n_parameters > 0) call c_f_pointer(parameter, values, [n_parameters])
     do i = 1, n_parameters
-      associate (declared => parameters(i), x => values(i))
+      associate (declared => mine%parameters(i), x => values(i))
+        if (iand(declared%flags, PILUM_P_OPTIONAL) /= 0 .and. is_nan(x)) cycle
         is_inside = is_finite(x) .and. x >= declared%lower .and. x <= declared%upper
         if (iand(declared%flags, PILUM_P_OPEN_LOWER) /= 0) is_inside = is_inside .and. x > declared%lower
         if (iand(declared%flags, PILUM_P_OPEN_UPPER) /= 0) is_inside = is_inside .and. x < declared%upper
+        if (is_inside .and. c_associated(declared%choices)) &
+          is_inside = .not. (x < nint(x) .or. x > nint(x))
         if (.not. is_inside) then
           call say(message, capacity, name_of(declared%id)//': the value is not admissible')
           status = PILUM_E_PARAMETER
@@ -369,10 +548,12 @@ contains
     instance%p = 0
     if (n_parameters > 0) instance%p(:n_parameters) = values
     instance%n_parameters = n_parameters
-    instance%n_states = formulations(number + 1)%n_states
-    instance%n_components = fluxes(number + 1)%n_components
+    instance%n_states = mine%formulations(number + 1)%n_states
+    instance%n_components = mine%fluxes(number + 1)%n_components
+    instance%update => mine%update
+    instance%initial => mine%initial
     refusal = ''
-    call the_prepare(instance%p(:n_parameters), refusal)
+    call mine%prepare(instance%p(:n_parameters), refusal)
     if (refusal /= '') then
       call say(message, capacity, trim(refusal))
       deallocate (instance)
@@ -392,6 +573,86 @@ contains
     deallocate (instance, stat=error)
   end subroutine
 
+  ! Instance and batch of a call, and a message that ends; `status` says if they can be used.
+  subroutine open_call(opaque, call_of_host, known, instance, batch, knows_step_time, status)
+    type(c_ptr), intent(in) :: opaque, call_of_host
+    integer(c_int32_t), intent(in) :: known
+    type(instance_type), pointer, intent(out) :: instance
+    type(pilum_batch), pointer, intent(out) :: batch
+    logical, intent(out) :: knows_step_time
+    integer(c_int32_t), intent(out) :: status
+    ! Sizes of the batch in version 1.0, and with the first field that came later.
+    integer(c_int32_t), parameter :: SIZE_1_0 = 240, SIZE_WITH_STEP_TIME = 248
+    integer(c_int32_t), pointer :: struct_size
+    status = PILUM_E_ARGUMENT
+    nullify (instance, batch)
+    knows_step_time = .false.
+    if (.not. c_associated(call_of_host)) return
+    call c_f_pointer(call_of_host, struct_size)
+    if (struct_size < SIZE_1_0) return
+    knows_step_time = struct_size >= SIZE_WITH_STEP_TIME
+    call c_f_pointer(call_of_host, batch)
+    call say(batch%message, batch%message_capacity, '')
+    if (iand(batch%request, not(known)) /= 0) then
+      call say(batch%message, batch%message_capacity, 'an unknown request')
+      status = PILUM_E_UNSUPPORTED
+    else if (.not. c_associated(opaque)) then
+      call say(batch%message, batch%message_capacity, 'the instance is null')
+    else
+      call c_f_pointer(opaque, instance)
+      status = PILUM_OK
+    end if
+  end subroutine
+
+  function init_state(opaque, call_of_host) result(worst) bind(C, name='')
+    type(c_ptr), value :: opaque, call_of_host
+    integer(c_int32_t) :: worst, status
+    type(pilum_batch), pointer :: batch
+    type(instance_type), pointer :: instance
+    real(dp) :: flux(MAX_COMPONENTS), state(MAX_STATES)
+    character(len=120) :: reason
+    integer(c_int64_t) :: i
+    integer :: c, m
+    logical :: are_finite, is_null, knows_step_time
+    call open_call(opaque, call_of_host, 0, instance, batch, knows_step_time, worst)
+    if (worst /= PILUM_OK) return
+    m = instance%n_states
+    is_null = .not. c_associated(batch%flux0%p)
+    if (m > 0) is_null = is_null .or. .not. c_associated(batch%state1%p)
+    if (is_null .and. batch%n_points > 0) then
+      call say(batch%message, batch%message_capacity, 'a view that is needed is null')
+      worst = PILUM_E_ARGUMENT
+      return
+    end if
+    do i = 0, batch%n_points - 1
+      flux = 0
+      state(:m) = 0
+      are_finite = .true.
+      do c = 1, instance%n_components
+        flux(c) = element(batch%flux0%p, batch%flux0%point, batch%flux0%component, i, c)
+        are_finite = are_finite .and. is_finite(flux(c))
+      end do
+      status = PILUM_E_NUMERIC
+      reason = 'an input is not finite'
+      if (are_finite) then
+        status = PILUM_OK
+        reason = 'the law gives no reason'
+        call instance%initial(instance%p(:instance%n_parameters), flux, state(:m), reason, status)
+      end if
+      if (status == PILUM_OK) then
+        do c = 1, m
+          call put(batch%state1, i, c, state(c), are_finite)
+        end do
+        if (.not. are_finite) then
+          reason = 'a result is not finite'
+          status = PILUM_E_NUMERIC
+        end if
+      end if
+      call tell(batch, i, status, reason, worst)
+      if (status == PILUM_E_INTERNAL) exit
+    end do
+  end function
+
   function integrate(opaque, call_of_host) result(worst) bind(C, name='')
     type(c_ptr), value :: opaque, call_of_host
     integer(c_int32_t) :: worst, status
@@ -400,28 +661,12 @@ contains
     type(instance_type), pointer :: instance
     type(point_type) :: point
     type(response_type) :: end
-    integer(c_int32_t), pointer :: struct_size, statuses(:)
     real(c_double), pointer :: step_factors(:)
     integer(c_int64_t) :: i
     integer :: tangent, n, m, c, row
-    logical :: are_finite, is_null
-    worst = PILUM_E_ARGUMENT
-    if (.not. c_associated(call_of_host)) return
-    call c_f_pointer(call_of_host, struct_size)
-    ! The size of version 1.0; later fields are of no use here.
-    if (struct_size < 240) return
-    call c_f_pointer(call_of_host, batch)
-    call say(batch%message, batch%message_capacity, '')
-    if (iand(batch%request, not(KNOWN)) /= 0) then
-      call say(batch%message, batch%message_capacity, 'an unknown request')
-      worst = PILUM_E_UNSUPPORTED
-      return
-    end if
-    if (.not. c_associated(opaque)) then
-      call say(batch%message, batch%message_capacity, 'the instance is null')
-      return
-    end if
-    call c_f_pointer(opaque, instance)
+    logical :: are_finite, is_null, knows_step_time
+    call open_call(opaque, call_of_host, KNOWN, instance, batch, knows_step_time, worst)
+    if (worst /= PILUM_OK) return
     n = instance%n_components
     m = instance%n_states
     tangent = TANGENT_NONE
@@ -434,15 +679,18 @@ contains
     if (tangent /= TANGENT_NONE) is_null = is_null .or. .not. c_associated(batch%tangent%p)
     if (is_null .and. batch%n_points > 0) then
       call say(batch%message, batch%message_capacity, 'a view that is needed is null')
+      worst = PILUM_E_ARGUMENT
       return
     end if
-    nullify (statuses, step_factors)
-    if (c_associated(batch%status)) call c_f_pointer(batch%status, statuses, [batch%n_points])
+    nullify (step_factors)
     if (c_associated(batch%step_factor)) &
       call c_f_pointer(batch%step_factor, step_factors, [batch%n_points])
-    worst = PILUM_OK
     do i = 0, batch%n_points - 1
       point%n = n
+      point%n_states = m
+      point%gradient = 0
+      point%increment = 0
+      point%flux = 0
       are_finite = .true.
       do c = 1, n
         point%gradient(c) = element(batch%gradient0%p, batch%gradient0%point, batch%gradient0%component, i, c)
@@ -458,30 +706,28 @@ contains
       end do
       point%time = batch%time
       point%time_increment = batch%time_increment
-      end%flux = 0
-      end%state(:m) = 0
-      end%tangent = 0
-      end%step_factor = NAN
+      point%step_time = 0
+      if (knows_step_time) point%step_time = batch%step_time
+      call clear(point, end)
       if (are_finite) then
-        end%reason = 'the law gives no reason'
         status = PILUM_OK
-        call the_update(instance%p(:instance%n_parameters), point, tangent, end, status)
+        call instance%update(instance%p(:instance%n_parameters), point, tangent, end, status)
       else
         end%reason = 'an input is not finite'
         status = PILUM_E_NUMERIC
       end if
       if (status == PILUM_OK .or. status == PILUM_OK_UNRELIABLE) then
         do c = 1, n
-          call put(batch%flux1, i, c, end%flux(c))
+          call put(batch%flux1, i, c, end%flux(c), are_finite)
         end do
         do c = 1, m
-          call put(batch%state1, i, c, end%state(c))
+          call put(batch%state1, i, c, end%state(c), are_finite)
         end do
         if (tangent /= TANGENT_NONE) then
           ! Row by row, where Fortran stores columns.
           do row = 1, n
             do c = 1, n
-              call put(batch%tangent, i, (row - 1)*n + c, end%tangent(row, c))
+              call put(batch%tangent, i, (row - 1)*n + c, end%tangent(row, c), are_finite)
             end do
           end do
         end if
@@ -492,36 +738,55 @@ contains
       end if
       if (status == PILUM_CUT_STEP .and. associated(step_factors)) &
         step_factors(i + 1) = end%step_factor
-      if (is_worse(status, worst)) then
-        worst = status
-        call point_says(batch, i, end%reason)
-      end if
-      if (associated(statuses)) statuses(i + 1) = status
-      ! A defect of the law is the outcome of all points from there on.
-      if (status == PILUM_E_INTERNAL) then
-        if (associated(statuses)) statuses(i + 1:) = status
-        exit
-      end if
+      call tell(batch, i, status, end%reason, worst)
+      if (status == PILUM_E_INTERNAL) exit
     end do
-
-  contains
-
-    subroutine put(view, i, c, x)
-      type(pilum_view_mut), intent(in) :: view
-      integer(c_int64_t), intent(in) :: i
-      integer, intent(in) :: c
-      real(dp), intent(in) :: x
-      real(dp), pointer :: at
-      call locate(view%p, view%point, view%component, i, c, at)
-      at = x
-      are_finite = are_finite .and. is_finite(x)
-    end subroutine
   end function
+
+  ! Tells the outcome of point i; `worst` is the most severe one. A defect of the law is the outcome
+  ! of all points from there on.
+  subroutine tell(batch, i, status, reason, worst)
+    type(pilum_batch), intent(in) :: batch
+    integer(c_int64_t), intent(in) :: i
+    integer(c_int32_t), intent(in) :: status
+    character(len=*), intent(in) :: reason
+    integer(c_int32_t), intent(inout) :: worst
+    integer(c_int32_t), pointer :: statuses(:)
+    if (c_associated(batch%status)) then
+      call c_f_pointer(batch%status, statuses, [batch%n_points])
+      statuses(i + 1) = status
+      if (status == PILUM_E_INTERNAL) statuses(i + 1:) = status
+    end if
+    if (.not. is_worse(status, worst)) return
+    worst = status
+    call point_says(batch, i, reason)
+  end subroutine
+
+  ! Writes component c of point i, and notes if it is not finite.
+  subroutine put(view, i, c, x, are_finite)
+    type(pilum_view_mut), intent(in) :: view
+    integer(c_int64_t), intent(in) :: i
+    integer, intent(in) :: c
+    real(dp), intent(in) :: x
+    logical, intent(inout) :: are_finite
+    real(dp), pointer :: at
+    call locate(view%p, view%point, view%component, i, c, at)
+    at = x
+    are_finite = are_finite .and. is_finite(x)
+  end subroutine
 
   ! Whether `a` is a more severe outcome than `b`.
   logical function is_worse(a, b)
     integer(c_int32_t), intent(in) :: a, b
     is_worse = merge(a < b, a > b, a < 0 .or. b < 0)
+  end function
+
+  ! Whether a parameter was left out. By its bits, so that no compiler option can have it otherwise.
+  logical function is_nan(x)
+    real(dp), intent(in) :: x
+    integer(c_int64_t) :: bits
+    bits = iand(transfer(x, bits), huge(bits))
+    is_nan = bits > INFINITY_BITS
   end function
 
   logical function is_finite(x)
@@ -558,6 +823,7 @@ contains
     character(len=*), intent(in) :: given
     integer :: i, start
     if (n_texts + len(given) + 1 > size(texts)) then
+      call exceed('more text than there is room for')
       text = c_loc(texts(n_texts))
       return
     end if

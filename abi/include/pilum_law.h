@@ -33,7 +33,7 @@ typedef struct pilum_instance pilum_instance;
 /* Major version of the contract. Different majors never work together. */
 #define PILUM_ABI_MAJOR 1
 /* Minor version of the contract. Minors only append; any two of one major work together. */
-#define PILUM_ABI_MINOR 0
+#define PILUM_ABI_MINOR 1
 
 /* Outcome of a call, one of the `PILUM_OK` ... `PILUM_E_INTERNAL` values. */
 typedef int32_t pilum_status;
@@ -195,6 +195,14 @@ typedef struct pilum_formulation {
 /* Components are in axes of the material (1 along the layer, 2 normal to it, 3 out of plane), so
  * the law only makes sense in an element that has such axes. */
 #define PILUM_T_LOCAL_AXES (1u << 2)
+/* Offers rates, `PILUM_REQ_RATES`. Since 1.1. */
+#define PILUM_T_RATES (1u << 3)
+/* What it gives as its consistent tangent is near the derivative of the update, but not equal to
+ * it. Since 1.1. */
+#define PILUM_T_TANGENT_APPROXIMATE (1u << 4)
+/* Offers the elastic operator only; asked for the consistent tangent, it answers
+ * `PILUM_E_UNSUPPORTED`. Since 1.1. */
+#define PILUM_T_NO_TANGENT (1u << 5)
 
 /* Read access to values of many points: component `c` of point `i` is
  * `p[i * point + c * component]`. A `point` stride of 0 gives all points the same values. */
@@ -216,6 +224,30 @@ typedef struct pilum_view_mut {
     /* Stride from component to component, in doubles. */
     ptrdiff_t component;
 } pilum_view_mut;
+
+/* Rates of what an update depends on, and of what it gives: the derivative of the update in one
+ * direction. Since 1.1. */
+typedef struct pilum_rates {
+    /* Size of this struct. */
+    uint32_t struct_size;
+    /* Zero. */
+    uint32_t reserved;
+    /* Rates of the parameters, one for each in declared order, the same for all points; null: all
+     * zero. */
+    const double *parameter;
+    /* Rates of the gradients at the start of the increment. */
+    struct pilum_view gradient0;
+    /* Rates of the gradients at the end of the increment. */
+    struct pilum_view gradient1;
+    /* Rates of the fluxes at the start. */
+    struct pilum_view flux0;
+    /* Rates of the internal variables at the start. */
+    struct pilum_view state0;
+    /* Rates of the fluxes at the end (written). */
+    struct pilum_view_mut flux1;
+    /* Rates of the internal variables at the end (written). */
+    struct pilum_view_mut state1;
+} pilum_rates;
 
 /* One call: a batch of integration points over one increment. All pointers are valid until the
  * call returns, and none may be kept. */
@@ -255,6 +287,11 @@ typedef struct pilum_batch {
     char *message;
     /* Size of the buffer in bytes. */
     size_t message_capacity;
+    /* Time at the start of the increment, counted from the start of the phase or segment that it
+     * belongs to. Since 1.1. */
+    double step_time;
+    /* Rates; null unless `PILUM_REQ_RATES` is set. Since 1.1. */
+    const struct pilum_rates *rates;
 } pilum_batch;
 
 /* Compute fluxes and internal variables at the end of the increment. */
@@ -263,6 +300,8 @@ typedef struct pilum_batch {
 #define PILUM_REQ_TANGENT (1u << 1)
 /* Compute the elastic operator instead of the consistent tangent. */
 #define PILUM_REQ_ELASTIC (1u << 2)
+/* Compute rates too, see `pilum_batch.rates`. Since 1.1. */
+#define PILUM_REQ_RATES (1u << 3)
 
 /* What the host tells a library. */
 typedef struct pilum_host {
@@ -345,7 +384,7 @@ typedef struct pilum_plugin {
 } pilum_plugin;
 
 /* Offsets and sizes of all public fields, for the handshake. */
-#define PILUM_LAYOUT_HASH UINT64_C(0x35be1d04c1c21612)
+#define PILUM_LAYOUT_HASH UINT64_C(0xb8583da8c195e927)
 
 /* Before a definition: makes the symbol visible outside the library. */
 #if defined(_WIN32)
@@ -410,7 +449,8 @@ PILUM_SIZE(pilum_variable, 64);
 PILUM_SIZE(pilum_formulation, 48);
 PILUM_SIZE(pilum_view, 24);
 PILUM_SIZE(pilum_view_mut, 24);
-PILUM_SIZE(pilum_batch, 240);
+PILUM_SIZE(pilum_batch, 256);
+PILUM_SIZE(pilum_rates, 160);
 PILUM_SIZE(pilum_host, 32);
 PILUM_SIZE(pilum_law, 120);
 PILUM_SIZE(pilum_plugin, 24);

@@ -18,9 +18,13 @@
 extern "C" {
 #endif
 
-/* Most components of a gradient or flux, and most internal variables, that this header carries. */
+/* Most components of a gradient or flux, and most values of internal variables, that this header
+ * carries. A law with more values defines PILUM_MAX_STATES before it includes the header; else its
+ * parameters are refused with a message, and C++ does not compile it. */
 #define PILUM_MAX_COMPONENTS 6
-#define PILUM_MAX_STATES 64
+#ifndef PILUM_MAX_STATES
+#define PILUM_MAX_STATES 256
+#endif
 
 /* Which operator the host wants beside the update. */
 typedef enum pilum_tangent {
@@ -36,7 +40,9 @@ typedef enum pilum_tangent {
 typedef struct pilum_point {
     /* Number of components: 2 for interfaces, 4 for solids in the plane, 6 in space. */
     uint32_t n;
-    /* Strain or jump at the start. */
+    /* Number of values of internal variables. */
+    uint32_t n_states;
+    /* Strain or jump at the start; components from n on are zero, here and below. */
     double gradient[PILUM_MAX_COMPONENTS];
     /* Its increment. */
     double increment[PILUM_MAX_COMPONENTS];
@@ -46,6 +52,9 @@ typedef struct pilum_point {
     double state[PILUM_MAX_STATES];
     /* Time at the start, and its increment. */
     double time, time_increment;
+    /* Time at the start, counted from the start of the phase or segment; 0 where the host is of
+     * version 1.0. */
+    double step_time;
 } pilum_point;
 
 /* The same point at the end of the increment; all zero when the author receives it. */
@@ -62,6 +71,13 @@ typedef struct pilum_response {
      * which it is at first, leaves the choice to the host. */
     double step_factor;
 } pilum_response;
+
+/* Initial internal variables of a point that carries this flux before anything has happened; `flux`
+ * has PILUM_MAX_COMPONENTS entries, zero beyond those of the hypothesis, and `state`
+ * is all zero when the author receives it. With any other outcome than PILUM_OK, `reason` is a
+ * static text. A pure function of its arguments. */
+typedef pilum_status (*pilum_initial)(const pilum_instance *instance, const double *flux,
+                                      double *state, const char **reason);
 
 /* Carries one point over one increment. A pure function of its arguments. */
 typedef pilum_status (*pilum_update)(const pilum_instance *instance, const pilum_point *point,
@@ -80,6 +96,15 @@ static inline void pilum_say(char *message, size_t capacity, const char *format,
     }
 }
 
+/* Number of values of the internal variables of a formulation. */
+static inline uint32_t pilum_count_states(const pilum_formulation *formulation) {
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < formulation->n_states; i++) {
+        n += formulation->state[i].n_components;
+    }
+    return n;
+}
+
 /* Refuses what `create` must refuse before it looks at the law: a wrong number of parameters, and
  * values outside their declared bounds. PILUM_OK: everything is as declared. */
 static inline pilum_status pilum_check_parameters(const pilum_law *law, uint32_t formulation,
@@ -95,6 +120,14 @@ static inline pilum_status pilum_check_parameters(const pilum_law *law, uint32_t
         pilum_say(message, capacity, "%" PRIu32 " parameters given, %" PRIu32 " expected",
                   n_parameters, law->n_parameters);
         return PILUM_E_ARGUMENT;
+    }
+    uint32_t n_states = pilum_count_states(&law->formulation[formulation]);
+    if (n_states > PILUM_MAX_STATES) {
+        pilum_say(message, capacity,
+                  "the law has %" PRIu32 " values of internal variables and was compiled for %d: "
+                  "define PILUM_MAX_STATES",
+                  n_states, PILUM_MAX_STATES);
+        return PILUM_E_INTERNAL;
     }
     for (uint32_t i = 0; i < n_parameters; i++) {
         const pilum_parameter *declared = &law->parameter[i];
@@ -121,7 +154,86 @@ static inline int pilum_is_worse(pilum_status a, pilum_status b) {
     return a < 0 || b < 0 ? a < b : a > b;
 }
 
-/* Does `integrate` for a law with these numbers of components and internal variables. */
+/* Tells the outcome of point `i`, and returns the most severe one so far. A defect of the law is the
+ * outcome of all points from there on. */
+static inline pilum_status pilum_tell(const pilum_batch *batch, uint64_t i, pilum_status status,
+                                      pilum_status worst, const char *reason) {
+    uint64_t end = status == PILUM_E_INTERNAL ? batch->n_points : i + 1;
+    for (uint64_t k = i; batch->status && k < end; k++) {
+        batch->status[k] = status;
+    }
+    if (!pilum_is_worse(status, worst)) {
+        return worst;
+    }
+    pilum_say(batch->message, batch->message_capacity, "point %" PRIu64 ": %s",
+              batch->first_point + i, reason);
+    return status;
+}
+
+/* Does `init_state` for a law with these numbers of components and values of internal variables. */
+static inline pilum_status pilum_each_start(const pilum_instance *instance,
+                                            const pilum_batch *batch, uint32_t n_components,
+                                            uint32_t n_states, pilum_initial initial) {
+    if (!batch || !PILUM_HAS(batch, pilum_batch, message_capacity)) {
+        return PILUM_E_ARGUMENT;
+    }
+    pilum_say(batch->message, batch->message_capacity, "%s", "");
+    if (batch->request != 0) {
+        pilum_say(batch->message, batch->message_capacity, "an unknown request");
+        return PILUM_E_UNSUPPORTED;
+    }
+    int is_null = !batch->flux0.p || (n_states > 0 && !batch->state1.p);
+    if (!instance || n_states > PILUM_MAX_STATES || (batch->n_points > 0 && is_null)) {
+        pilum_say(batch->message, batch->message_capacity, "%s",
+                  instance ? "a view that is needed is null" : "the instance is null");
+        return PILUM_E_ARGUMENT;
+    }
+    pilum_status worst = PILUM_OK;
+    for (uint64_t i = 0; i < batch->n_points; i++) {
+        double flux[PILUM_MAX_COMPONENTS] = {0.0}, state[PILUM_MAX_STATES];
+        int is_finite = 1;
+        for (uint32_t c = 0; c < n_components; c++) {
+            flux[c] = PILUM_AT(batch->flux0, i, c);
+            is_finite = is_finite && isfinite(flux[c]);
+        }
+        for (uint32_t s = 0; s < n_states; s++) {
+            state[s] = 0.0;
+        }
+        const char *reason = is_finite ? "the law gives no reason" : "an input is not finite";
+        pilum_status status =
+            is_finite ? initial(instance, flux, state, &reason) : PILUM_E_NUMERIC;
+        for (uint32_t s = 0; status == PILUM_OK && s < n_states; s++) {
+            PILUM_AT(batch->state1, i, s) = state[s];
+            is_finite = is_finite && isfinite(state[s]);
+        }
+        if (status == PILUM_OK && !is_finite) {
+            status = PILUM_E_NUMERIC;
+            reason = "a result is not finite";
+        }
+        worst = pilum_tell(batch, i, status, worst, reason);
+        if (status == PILUM_E_INTERNAL) {
+            break;
+        }
+    }
+    return worst;
+}
+
+/* The response as the author receives it: as many zeros as the point has components and values. */
+static inline void pilum_clear(const pilum_point *point, pilum_response *end) {
+    for (uint32_t c = 0; c < point->n; c++) {
+        end->flux[c] = 0.0;
+    }
+    for (uint32_t s = 0; s < point->n_states; s++) {
+        end->state[s] = 0.0;
+    }
+    for (uint32_t k = 0; k < point->n * point->n; k++) {
+        end->tangent[k] = 0.0;
+    }
+    end->reason = "the law gives no reason";
+    end->step_factor = (double)NAN;
+}
+
+/* Does `integrate` for a law with these numbers of components and values of internal variables. */
 static inline pilum_status pilum_each_point(const pilum_instance *instance,
                                             const pilum_batch *batch, uint32_t n_components,
                                             uint32_t n_states, pilum_update update) {
@@ -140,7 +252,7 @@ static inline pilum_status pilum_each_point(const pilum_instance *instance,
     int is_null = !batch->gradient0.p || !batch->gradient1.p || !batch->flux0.p ||
                   !batch->flux1.p || (n_states > 0 && (!batch->state0.p || !batch->state1.p)) ||
                   (tangent != PILUM_TANGENT_NONE && !batch->tangent.p);
-    if (!instance || (batch->n_points > 0 && is_null)) {
+    if (!instance || n_states > PILUM_MAX_STATES || (batch->n_points > 0 && is_null)) {
         pilum_say(batch->message, batch->message_capacity, "%s",
                   instance ? "a view that is needed is null" : "the instance is null");
         return PILUM_E_ARGUMENT;
@@ -151,26 +263,28 @@ static inline pilum_status pilum_each_point(const pilum_instance *instance,
         pilum_response end;
         int is_finite = 1;
         point.n = n_components;
+        point.n_states = n_states;
+        pilum_clear(&point, &end);
         for (uint32_t c = 0; c < n_components; c++) {
             point.gradient[c] = PILUM_AT(batch->gradient0, i, c);
             point.increment[c] = PILUM_AT(batch->gradient1, i, c) - point.gradient[c];
             point.flux[c] = PILUM_AT(batch->flux0, i, c);
-            end.flux[c] = 0.0;
             is_finite = is_finite && isfinite(point.gradient[c]) && isfinite(point.increment[c]) &&
                         isfinite(point.flux[c]);
         }
+        for (uint32_t c = n_components; c < PILUM_MAX_COMPONENTS; c++) {
+            point.gradient[c] = point.increment[c] = point.flux[c] = 0.0;
+        }
         for (uint32_t s = 0; s < n_states; s++) {
             point.state[s] = PILUM_AT(batch->state0, i, s);
-            end.state[s] = 0.0;
             is_finite = is_finite && isfinite(point.state[s]);
-        }
-        for (uint32_t k = 0; k < n_components * n_components; k++) {
-            end.tangent[k] = 0.0;
         }
         point.time = batch->time;
         point.time_increment = batch->time_increment;
-        end.reason = is_finite ? "the law gives no reason" : "an input is not finite";
-        end.step_factor = (double)NAN;
+        point.step_time = PILUM_HAS(batch, pilum_batch, step_time) ? batch->step_time : 0.0;
+        if (!is_finite) {
+            end.reason = "an input is not finite";
+        }
         pilum_status status =
             is_finite ? update(instance, &point, tangent, &end) : PILUM_E_NUMERIC;
         if (status == PILUM_OK || status == PILUM_OK_UNRELIABLE) {
@@ -196,21 +310,49 @@ static inline pilum_status pilum_each_point(const pilum_instance *instance,
         if (status == PILUM_CUT_STEP && batch->step_factor) {
             batch->step_factor[i] = end.step_factor;
         }
-        if (pilum_is_worse(status, worst)) {
-            worst = status;
-            pilum_say(batch->message, batch->message_capacity, "point %" PRIu64 ": %s",
-                      batch->first_point + i, end.reason);
-        }
-        /* A defect of the law is the outcome of all points from there on. */
-        int is_defect = status == PILUM_E_INTERNAL;
-        for (uint64_t k = i; batch->status && k < (is_defect ? batch->n_points : i + 1); k++) {
-            batch->status[k] = status;
-        }
-        if (is_defect) {
+        worst = pilum_tell(batch, i, status, worst, end.reason);
+        if (status == PILUM_E_INTERNAL) {
             break;
         }
     }
     return worst;
+}
+
+/* The consistent tangent by central differences, for a law that has written none: two more updates
+ * for each component. `size` is a strain or jump over which the response bends, such as strength
+ * over stiffness; where the response is smooth over 1e-5 of it and the update is good to round-off,
+ * the error is about 1e-10 of the stiffness. At a kink the result lies between those of its sides.
+ * `update` is called with PILUM_TANGENT_NONE. Its outcome, if one of the updates fails. */
+static inline pilum_status pilum_differentiate(const pilum_instance *instance,
+                                               const pilum_point *point, pilum_update update,
+                                               double size, pilum_response *end) {
+    const double step = 6e-6 * size;
+    const uint32_t n = point->n;
+    pilum_point moved = *point;
+    for (uint32_t column = 0; column < n; column++) {
+        double flux[2][PILUM_MAX_COMPONENTS], increment[2];
+        for (int side = 0; side < 2; side++) {
+            pilum_response trial;
+            pilum_clear(point, &trial);
+            moved.increment[column] = point->increment[column] + (side == 0 ? -step : step);
+            increment[side] = moved.increment[column];
+            pilum_status status = update(instance, &moved, PILUM_TANGENT_NONE, &trial);
+            if (status != PILUM_OK && status != PILUM_OK_UNRELIABLE) {
+                end->reason = trial.reason;
+                end->step_factor = trial.step_factor;
+                return status;
+            }
+            for (uint32_t row = 0; row < n; row++) {
+                flux[side][row] = trial.flux[row];
+            }
+        }
+        moved.increment[column] = point->increment[column];
+        for (uint32_t row = 0; row < n; row++) {
+            end->tangent[row * n + column] =
+                (flux[1][row] - flux[0][row]) / (increment[1] - increment[0]);
+        }
+    }
+    return PILUM_OK;
 }
 
 /* A gradient or flux: a tensor in Voigt order, or with `PILUM_VECTOR` normal first. */
@@ -219,6 +361,9 @@ static inline pilum_status pilum_each_point(const pilum_instance *instance,
 /* An internal variable that is one number, 0 at first. */
 #define PILUM_STATE(name, sign, in, sentence)                                                      \
     PILUM_VARIABLE(name, sign, in, sentence, PILUM_SCALAR, 1, 0)
+/* The same with another initial value. */
+#define PILUM_STATE_FROM(name, sign, in, sentence, initial)                                        \
+    { sizeof(pilum_variable), 0, name, sign, in, sentence, PILUM_SCALAR, 1, 0, initial }
 
 #ifdef __GNUC__
 #define PILUM_UNUSED __attribute__((unused))

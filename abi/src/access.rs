@@ -9,8 +9,8 @@
 
 use crate::descriptor::{InternalVariables, Parameter};
 use crate::law::{Failure, Tangent};
-use crate::raw::{self, Batch, Status, View, ViewMut};
-use crate::version::BATCH_SIZE_1_0;
+use crate::raw::{self, Batch, Rates, Status, View, ViewMut};
+use crate::version::{BATCH_SIZE_1_0, RATES_SIZE_1_1};
 use std::any::Any;
 use std::ffi::{CStr, c_char};
 use std::fmt::{self, Write};
@@ -113,13 +113,7 @@ impl<'a, const PACKED: bool> Access<'a, PACKED> {
 
     #[inline]
     pub(crate) fn put_state<S: InternalVariables>(&self, i: usize, state: &S) {
-        let view = &self.batch.state1;
-        let stride = if PACKED { 1 } else { view.component };
-        state.write(|v, value| {
-            assert_declared::<S>(v);
-            // SAFETY: as in `put_row`; `v` is declared.
-            unsafe { *view.p.offset(i as isize * view.point + v as isize * stride) = value };
-        });
+        put_values(&self.batch.state1, i, PACKED, state);
     }
 
     #[inline]
@@ -169,6 +163,99 @@ impl<'a, const PACKED: bool> Access<'a, PACKED> {
     }
 }
 
+/// The rates of a checked batch.
+#[derive(Debug)]
+pub struct Directions<'a> {
+    rates: &'a Rates,
+    parameter: Option<&'a [f64]>,
+}
+
+impl<'a> Directions<'a> {
+    /// Rates that have been checked, of a law with so many parameters.
+    ///
+    /// # Safety
+    /// `parameter` is null or holds that many values as long as the rates live.
+    pub(crate) unsafe fn new(rates: &'a Rates, n_parameters: usize) -> Self {
+        let parameter = (!rates.parameter.is_null() && n_parameters > 0).then(|| {
+            // SAFETY: passed on to the caller.
+            unsafe { std::slice::from_raw_parts(rates.parameter, n_parameters) }
+        });
+        Self { rates, parameter }
+    }
+
+    /// Rates of the parameters; none: all zero.
+    pub(crate) fn parameter(&self) -> Option<&'a [f64]> {
+        self.parameter
+    }
+
+    fn row<const N: usize>(view: &View, i: usize) -> Result<[f64; N], Failure> {
+        let row = Access::<false>::row(view, i);
+        if defect(&row) == 0.0 {
+            Ok(row)
+        } else {
+            Err(INPUT_NOT_FINITE)
+        }
+    }
+
+    pub(crate) fn gradient0<const N: usize>(&self, i: usize) -> Result<[f64; N], Failure> {
+        Self::row(&self.rates.gradient0, i)
+    }
+
+    pub(crate) fn gradient1<const N: usize>(&self, i: usize) -> Result<[f64; N], Failure> {
+        Self::row(&self.rates.gradient1, i)
+    }
+
+    pub(crate) fn flux0<const N: usize>(&self, i: usize) -> Result<[f64; N], Failure> {
+        Self::row(&self.rates.flux0, i)
+    }
+
+    pub(crate) fn state0<S: InternalVariables>(&self, i: usize) -> Result<S, Failure> {
+        let view = &self.rates.state0;
+        let value = |v: usize| {
+            assert_declared::<S>(v);
+            // SAFETY: contract of `View`; `v` is declared.
+            unsafe {
+                *view
+                    .p
+                    .offset(i as isize * view.point + v as isize * view.component)
+            }
+        };
+        if (0..S::TABLE.len()).map(|v| 0.0 * value(v)).sum::<f64>() != 0.0 {
+            return Err(INPUT_NOT_FINITE);
+        }
+        Ok(S::read(value))
+    }
+
+    pub(crate) fn put<const N: usize, S: InternalVariables>(
+        &self,
+        i: usize,
+        flux: Option<&[f64; N]>,
+        state: &S,
+    ) -> Result<(), Failure> {
+        let mut defects = flux.map_or(0.0, |flux| defect(flux));
+        state.write(|_, value| defects += 0.0 * value);
+        if defects != 0.0 {
+            return Err(Failure::Numeric("a rate is not finite"));
+        }
+        if let Some(flux) = flux {
+            Access::<false>::put_row(&self.rates.flux1, i, flux);
+        }
+        put_values(&self.rates.state1, i, false, state);
+        Ok(())
+    }
+}
+
+/// Writes the internal variables of point `i`.
+#[inline]
+fn put_values<S: InternalVariables>(view: &ViewMut, i: usize, is_packed: bool, state: &S) {
+    let stride = if is_packed { 1 } else { view.component };
+    state.write(|v, value| {
+        assert_declared::<S>(v);
+        // SAFETY: as in `put_row`; `v` is declared.
+        unsafe { *view.p.offset(i as isize * view.point + v as isize * stride) = value };
+    });
+}
+
 /// Whether the components of each point stand one after the other, in all views that are there.
 pub(crate) fn is_packed(batch: &Batch) -> bool {
     let read = [
@@ -193,28 +280,45 @@ pub(crate) fn requested(batch: &Batch) -> Tangent {
     }
 }
 
-/// The batch as far as its writer knew it: the rule of growing structs in one place. `struct_size`
-/// is read before anything else, and no reference to the caller's struct is made, since one would
-/// promise all of today's fields. A field later than version 1.0 reads as zero if the writer did
-/// not know it. `None`: null, or shorter than version 1.0.
+/// The batch as far as its writer knew it. `None`: null, or shorter than version 1.0.
 ///
 /// # Safety
 /// `batch` is null or as [`Batch`] promises, for as many bytes as its `struct_size` says.
 pub(crate) unsafe fn known(batch: *const Batch) -> Option<Batch> {
-    if batch.is_null() {
+    // SAFETY: passed on to the caller; all-zero is a valid `Batch`.
+    unsafe { known_part(batch, BATCH_SIZE_1_0) }
+}
+
+/// The rates as far as their writer knew them. `None`: null, or shorter than version 1.1.
+///
+/// # Safety
+/// `rates` is null or as [`Rates`] promises, for as many bytes as its `struct_size` says.
+pub(crate) unsafe fn known_rates(rates: *const Rates) -> Option<Rates> {
+    // SAFETY: passed on to the caller; all-zero is a valid `Rates`.
+    unsafe { known_part(rates, RATES_SIZE_1_1) }
+}
+
+/// A struct as far as its writer knew it: the rule of growing structs in one place. `struct_size`
+/// is read before anything else, and no reference to the caller's struct is made, since one would
+/// promise all of today's fields. A field that the writer did not know reads as zero. `None`: null,
+/// or shorter than `least`.
+///
+/// # Safety
+/// `p` is null or valid for as many bytes as the size that it starts with; all-zero is a valid `T`.
+unsafe fn known_part<T>(p: *const T, least: usize) -> Option<T> {
+    if p.is_null() {
         return None;
     }
     // SAFETY: contract, "Growing structs": every struct starts with its size as `u32`.
-    let size = unsafe { batch.cast::<u32>().read() } as usize;
-    if size < BATCH_SIZE_1_0 {
+    let size = unsafe { p.cast::<u32>().read() } as usize;
+    if size < least {
         return None;
     }
-    let mut copy = MaybeUninit::<Batch>::zeroed();
-    // SAFETY: both sides hold that many bytes; all-zero is a valid `Batch`.
+    let mut copy = MaybeUninit::<T>::zeroed();
+    // SAFETY: both sides hold that many bytes; all-zero is a valid `T`.
     unsafe {
-        batch
-            .cast::<u8>()
-            .copy_to_nonoverlapping(copy.as_mut_ptr().cast(), size.min(size_of::<Batch>()));
+        p.cast::<u8>()
+            .copy_to_nonoverlapping(copy.as_mut_ptr().cast(), size.min(size_of::<T>()));
         Some(copy.assume_init())
     }
 }

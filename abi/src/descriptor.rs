@@ -170,6 +170,24 @@ impl InternalVariables for () {
 /// ```
 #[macro_export]
 macro_rules! parameters {
+    ($(#[$meta:meta])* pub struct $name:ident<T> {
+        $( $(#[doc = $doc:literal])+ $field:ident : $spec:expr ),* $(,)?
+    }) => {
+        $crate::numbers!($(#[$meta])* $name { $( [$($doc)+] $field )* });
+        impl $crate::Parameters for $name<f64> {
+            const TABLE: &'static [$crate::Parameter] = &[ $(
+                $spec.called(
+                    $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
+                    $crate::descriptor::c_str(concat!($($doc),+, "\0")),
+                ),
+            )* ];
+            fn read(values: &[f64]) -> Self {
+                <Self as $crate::dual::Values<f64>>::collect(|i| {
+                    values.get(i).copied().unwrap_or(f64::NAN)
+                })
+            }
+        }
+    };
     ($(#[$meta:meta])* pub struct $name:ident { $($items:tt)* }) => {
         $crate::parameters!(@sorted [$(#[$meta])* $name] [] $($items)*);
     };
@@ -212,6 +230,28 @@ macro_rules! parameters {
                     $( $inner: $crate::descriptor::read_table(&mut rest), )?
                     $( $field: rest.split_off_first().copied().unwrap_or(f64::NAN), )?
                 )* }
+            }
+        }
+    };
+}
+
+/// A struct of numbers of any kind.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! numbers {
+    ($(#[$meta:meta])* $name:ident { $( [$($doc:literal)+] $field:ident )* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name<T = f64> { $( $(#[doc = $doc])+ pub $field: T, )* }
+        impl<T: Copy + Send + Sync> $crate::dual::Values<T> for $name<T> {
+            fn collect(value: impl Fn(usize) -> T) -> Self {
+                let mut numbers = 0usize..;
+                Self { $( $field: value(numbers.next().unwrap_or_default()), )* }
+            }
+            fn hand_out(&self, mut put: impl FnMut(usize, T)) {
+                for (i, value) in [$( self.$field ),*].into_iter().enumerate() {
+                    put(i, value);
+                }
             }
         }
     };
@@ -268,6 +308,25 @@ pub fn read_table<T: Parameters>(rest: &mut &[f64]) -> T {
 /// ```
 #[macro_export]
 macro_rules! internal_variables {
+    ($(#[$meta:meta])* pub struct $name:ident<T> {
+        $( $(#[doc = $doc:literal])+ $field:ident : $spec:expr ),* $(,)?
+    }) => {
+        $crate::numbers!($(#[$meta])* $name { $( [$($doc)+] $field )* });
+        impl $crate::InternalVariables for $name<f64> {
+            const TABLE: &'static [$crate::Variable] = &[ $(
+                $spec.called(
+                    $crate::descriptor::c_str(concat!(stringify!($field), "\0")),
+                    $crate::descriptor::c_str(concat!($($doc),+, "\0")),
+                ),
+            )* ];
+            fn read(value: impl Fn(usize) -> f64) -> Self {
+                <Self as $crate::dual::Values<f64>>::collect(value)
+            }
+            fn write(&self, put: impl FnMut(usize, f64)) {
+                <Self as $crate::dual::Values<f64>>::hand_out(self, put);
+            }
+        }
+    };
     ($(#[$meta:meta])* pub struct $name:ident {
         $( $(#[doc = $doc:literal])+ $field:ident : $spec:expr ),* $(,)?
     }) => {

@@ -8,14 +8,15 @@ mod adapter;
 
 pub use adapter::{Continuum, Exported, Interface};
 
-use crate::access::{Access, Message, is_packed, known, panic_text, requested, within_bounds};
+use crate::access::{Access, Directions, Message, is_packed, known, known_rates, panic_text};
+use crate::access::{requested, within_bounds};
 use crate::descriptor::{Description, Hypothesis, Parameters};
 use crate::law::{Failure, Tangent};
-use crate::raw::{self, Batch, Host, Instance, Status};
+use crate::raw::{self, Batch, Host, Instance, Rates, Status};
 use crate::status::most_severe;
 use std::cell::Cell;
 use std::ffi::c_char;
-use std::mem::{forget, size_of};
+use std::mem::{forget, offset_of, size_of};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -65,7 +66,7 @@ macro_rules! export_laws {
 #[macro_export]
 macro_rules! export_rust_layout {
     () => {
-        #[unsafe(export_name = "pilum_rust_layout")]
+        #[unsafe(export_name = "pilum_rust_layout_1_1")]
         pub static RUST_LAYOUT: $crate::export::Shared<$crate::raw::RustLayout> =
             $crate::export::Shared::new($crate::layout::RUST_LAYOUT);
     };
@@ -170,6 +171,9 @@ struct Boxed<L> {
     law: L,
     n_components: usize,
     n_states: usize,
+    n_parameters: usize,
+    /// `PILUM_T_*` flags of the formulation.
+    flags: u32,
     /// A panic was caught: the law is defective and is not called again.
     poisoned: AtomicBool,
 }
@@ -218,6 +222,8 @@ unsafe extern "C" fn create<L: Exported>(
                 n_components: Hypothesis::from_code(formulation.hypothesis)
                     .map_or(0, Hypothesis::n_components),
                 n_states: formulation.n_states as usize,
+                n_parameters: table.len(),
+                flags: formulation.flags,
                 poisoned: AtomicBool::new(false),
             };
             // SAFETY: contract of `create`: `out` is valid for one pointer.
@@ -269,6 +275,20 @@ enum Work {
 }
 
 impl Work {
+    /// Computes rates at one point.
+    fn rates_at<L: Exported, const PACKED: bool>(
+        self,
+        law: &L,
+        access: &Access<'_, PACKED>,
+        rates: &Directions<'_>,
+        i: usize,
+    ) -> Result<(), Failure> {
+        match self {
+            Self::Init => law.initial_rates(access, rates, i),
+            Self::Integrate => law.rates(access, rates, i),
+        }
+    }
+
     /// Does the work at one point. With the request as a constant, what it does not ask for costs
     /// nothing.
     #[inline]
@@ -304,10 +324,21 @@ unsafe fn run<L: Exported>(instance: *const Instance, batch: *const Batch, work:
         message.write(format_args!("the instance is null"));
         return raw::PILUM_E_ARGUMENT;
     };
-    if let Err((status, why)) = check(&batch, boxed.n_states, work) {
+    let rates = if batch.request & raw::PILUM_REQ_RATES == 0 {
+        None
+    } else {
+        // SAFETY: contract of `Batch::rates`: null or valid; null in a batch of version 1.0.
+        unsafe { known_rates(batch.rates) }
+    };
+    if let Err((status, why)) = check(&batch, rates.as_ref(), boxed, work) {
         message.write(format_args!("{why}"));
         return status;
     }
+    // SAFETY: contract of `Rates::parameter`: null, or as many values as parameters are declared.
+    let rates = rates
+        .as_ref()
+        .map(|rates| unsafe { Directions::new(rates, boxed.n_parameters) });
+    let rates = rates.as_ref();
     if boxed.poisoned.load(Ordering::Relaxed) {
         message.write(format_args!(
             "the law panicked before and is not called again"
@@ -318,6 +349,7 @@ unsafe fn run<L: Exported>(instance: *const Instance, batch: *const Batch, work:
         run_points(
             boxed,
             &Access::<true>::new(&batch, boxed.n_components),
+            rates,
             work,
             message,
         )
@@ -325,6 +357,7 @@ unsafe fn run<L: Exported>(instance: *const Instance, batch: *const Batch, work:
         run_points(
             boxed,
             &Access::<false>::new(&batch, boxed.n_components),
+            rates,
             work,
             message,
         )
@@ -335,6 +368,7 @@ unsafe fn run<L: Exported>(instance: *const Instance, batch: *const Batch, work:
 fn run_points<L: Exported, const PACKED: bool>(
     boxed: &Boxed<L>,
     access: &Access<'_, PACKED>,
+    rates: Option<&Directions<'_>>,
     work: Work,
     mut message: Message,
 ) -> Status {
@@ -344,7 +378,12 @@ fn run_points<L: Exported, const PACKED: bool>(
         let mut worst = raw::PILUM_OK;
         for i in 0..batch.n_points as usize {
             current.set(i);
-            let outcome = work.at(&boxed.law, access, i);
+            let mut outcome = work.at(&boxed.law, access, i);
+            if let (Ok(_), Some(rates)) = (outcome, rates)
+                && let Err(failure) = work.rates_at(&boxed.law, access, rates, i)
+            {
+                outcome = Err(failure);
+            }
             if let Ok(None) = outcome {
                 access.put_status(i, raw::PILUM_OK);
                 continue;
@@ -388,11 +427,30 @@ fn code(failure: Failure) -> Status {
 }
 
 /// Refuses a batch that cannot be worked on.
-fn check(batch: &Batch, n_states: usize, work: Work) -> Result<(), (Status, &'static str)> {
-    const KNOWN: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC;
+fn check<L>(
+    batch: &Batch,
+    rates: Option<&Rates>,
+    boxed: &Boxed<L>,
+    work: Work,
+) -> Result<(), (Status, &'static str)> {
+    const KNOWN: u32 = raw::PILUM_REQ_FLUX
+        | raw::PILUM_REQ_TANGENT
+        | raw::PILUM_REQ_ELASTIC
+        | raw::PILUM_REQ_RATES;
     if batch.request & !KNOWN != 0 {
         return Err((raw::PILUM_E_UNSUPPORTED, "an unknown request"));
     }
+    let wants_rates = batch.request & raw::PILUM_REQ_RATES != 0;
+    let knows_rates = batch.struct_size as usize >= offset_of!(Batch, rates) + size_of::<usize>();
+    if wants_rates && (boxed.flags & raw::PILUM_T_RATES == 0 || !knows_rates) {
+        return Err((raw::PILUM_E_UNSUPPORTED, "rates are not offered"));
+    }
+    let has_tangent = boxed.flags & raw::PILUM_T_NO_TANGENT == 0;
+    if requested(batch) == Tangent::Consistent && !has_tangent {
+        let why = "the law has the elastic operator only";
+        return Err((raw::PILUM_E_UNSUPPORTED, why));
+    }
+    let n_states = boxed.n_states;
     let integrating = work == Work::Integrate;
     let null = batch.n_points > 0
         && (batch.flux0.p.is_null()
@@ -403,7 +461,18 @@ fn check(batch: &Batch, n_states: usize, work: Work) -> Result<(), (Status, &'st
                     || batch.flux1.p.is_null()
                     || (n_states > 0 && batch.state0.p.is_null())
                     || (requested(batch) != Tangent::None && batch.tangent.p.is_null()))));
-    if null {
+    let no_rates = wants_rates
+        && rates.is_none_or(|rates| {
+            batch.n_points > 0
+                && (rates.flux0.p.is_null()
+                    || (n_states > 0 && rates.state1.p.is_null())
+                    || (integrating
+                        && (rates.gradient0.p.is_null()
+                            || rates.gradient1.p.is_null()
+                            || rates.flux1.p.is_null()
+                            || (n_states > 0 && rates.state0.p.is_null()))))
+        });
+    if null || no_rates {
         return Err((raw::PILUM_E_ARGUMENT, "a view that is needed is null"));
     }
     Ok(())

@@ -70,6 +70,17 @@ pub enum Tangent {
     Consistent,
 }
 
+/// What a law has for a consistent tangent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HasTangent {
+    /// The derivative of the update.
+    Consistent,
+    /// Something near it.
+    Approximate,
+    /// Nothing but the elastic operator: `update` is never asked for [`Tangent::Consistent`].
+    No,
+}
+
 /// One integration point of a solid at the start of an increment, and the increment.
 #[derive(Clone, Copy, Debug)]
 pub struct SolidPoint<const N: usize, S> {
@@ -85,6 +96,9 @@ pub struct SolidPoint<const N: usize, S> {
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
+    /// Time at the start, counted from the start of the phase or segment; 0 where the host is of
+    /// version 1.0.
+    pub step_time: f64,
 }
 
 /// The same point at the end of the increment.
@@ -100,21 +114,25 @@ pub struct SolidResponse<const N: usize, S> {
     pub unreliable: Option<&'static str>,
 }
 
-/// One integration point of an interface at the start of an increment, and the increment.
+/// One integration point of an interface at the start of an increment, and the increment; in real
+/// numbers, or in [others](crate::dual).
 #[derive(Clone, Copy, Debug)]
-pub struct InterfacePoint<S> {
+pub struct InterfacePoint<S, T = f64> {
     /// Relative displacement u⁺ − u⁻ at the start, normal first, m.
-    pub jump: [f64; 2],
+    pub jump: [T; 2],
     /// Increment of the relative displacement, m.
-    pub jump_increment: [f64; 2],
+    pub jump_increment: [T; 2],
     /// Traction at the start, kPa.
-    pub traction: [f64; 2],
+    pub traction: [T; 2],
     /// Internal variables at the start.
     pub state: S,
     /// Time at the start.
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
+    /// Time at the start, counted from the start of the phase or segment; 0 where the host is of
+    /// version 1.0.
+    pub step_time: f64,
 }
 
 /// The same point at the end of the increment.
@@ -142,6 +160,22 @@ impl<S> InterfaceResponse<S> {
     }
 }
 
+/// Rates of what an update depends on. In [`InterfaceLaw::initial_rates`] only those of parameters
+/// and traction are in use.
+#[derive(Clone, Copy, Debug)]
+pub struct InterfaceRates<'a, S> {
+    /// Of the parameters, in declared order; none: all zero.
+    pub parameter: Option<&'a [f64]>,
+    /// Of the jump at the start.
+    pub jump: [f64; 2],
+    /// Of its increment.
+    pub jump_increment: [f64; 2],
+    /// Of the traction at the start.
+    pub traction: [f64; 2],
+    /// Of the internal variables at the start.
+    pub state: S,
+}
+
 /// A law for solids. Immutable once built; `update` is a pure function of its arguments.
 pub trait ContinuumLaw: Sized + Send + Sync + 'static {
     /// What the law is called.
@@ -157,6 +191,8 @@ pub trait ContinuumLaw: Sized + Send + Sync + 'static {
     const SYMMETRIC: bool = false;
     /// The response is linear: one constant tangent, no internal variables.
     const LINEAR: bool = false;
+    /// What it has for a consistent tangent.
+    const TANGENT: HasTangent = HasTangent::Consistent;
     /// Components are in axes of the material: 1 along the layer, 2 normal to it.
     const LOCAL_AXES: bool = false;
     /// Declared with [`parameters!`](crate::parameters).
@@ -201,6 +237,10 @@ pub trait InterfaceLaw: Sized + Send + Sync + 'static {
     const SYMMETRIC: bool = false;
     /// The response is linear: one constant tangent, no internal variables.
     const LINEAR: bool = false;
+    /// What it has for a consistent tangent.
+    const TANGENT: HasTangent = HasTangent::Consistent;
+    /// Offers [`rates`](Self::rates).
+    const RATES: bool = false;
     /// Declared with [`parameters!`](crate::parameters).
     type Parameters: Parameters;
     /// Declared with [`internal_variables!`](crate::internal_variables), or `()`.
@@ -232,4 +272,33 @@ pub trait InterfaceLaw: Sized + Send + Sync + 'static {
         point: &InterfacePoint<Self::State>,
         tangent: Tangent,
     ) -> Result<InterfaceResponse<Self::State>, Failure>;
+
+    /// The derivative of [`update`](Self::update) in one direction: rates of traction and internal
+    /// variables at the end. Called only where [`RATES`](Self::RATES) is set.
+    /// [`ByDuals`](crate::dual::ByDuals) does it for laws that are written for any number.
+    ///
+    /// # Errors
+    /// As [`update`](Self::update).
+    fn rates(
+        &self,
+        point: &InterfacePoint<Self::State>,
+        rates: &InterfaceRates<'_, Self::State>,
+    ) -> Result<([f64; 2], Self::State), Failure> {
+        let _ = (point, rates);
+        Err(Failure::Numeric("the law offers no rates"))
+    }
+
+    /// The derivative of [`initial_state`](Self::initial_state) in one direction. Called only where
+    /// [`RATES`](Self::RATES) is set.
+    ///
+    /// # Errors
+    /// As [`initial_state`](Self::initial_state).
+    fn initial_rates(
+        &self,
+        traction: &[f64; 2],
+        rates: &InterfaceRates<'_, Self::State>,
+    ) -> Result<Self::State, Failure> {
+        let _ = (traction, rates);
+        Err(Failure::Numeric("the law offers no rates"))
+    }
 }

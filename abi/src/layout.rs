@@ -9,13 +9,18 @@ use abi_stable::type_layout::TypeLayout;
 use std::ffi::CStr;
 use std::mem::size_of;
 
+/// Name of the symbol under which a Rust library exports [`RUST_LAYOUT`]. It carries the minor
+/// version: `abi_stable` takes types that have grown for others, so only equal minors are compared,
+/// and hosts of version 1.0 compare whatever stands under `pilum_rust_layout`.
+pub const SYMBOL: &str = "pilum_rust_layout_1_1";
+
 /// Version of `abi_stable` whose description of layouts is used.
 pub const ABI_STABLE_VERSION: &CStr = c_str("0.11.3\0");
 
 /// What this crate's build of the contract looks like to `abi_stable`.
 pub const LAYOUT: &TypeLayout = <Plugin as StableAbi>::LAYOUT;
 
-/// The block that a Rust library exports as `pilum_rust_layout`.
+/// The block that a Rust library exports as [`SYMBOL`].
 pub const RUST_LAYOUT: RustLayout = RustLayout {
     struct_size: size_of::<RustLayout>() as u32,
     reserved: 0,
@@ -34,6 +39,12 @@ pub fn check(theirs: &'static TypeLayout) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_symbol_carries_the_version() {
+        let (major, minor) = (crate::raw::PILUM_ABI_MAJOR, crate::raw::PILUM_ABI_MINOR);
+        assert_eq!(SYMBOL, format!("pilum_rust_layout_{major}_{minor}"));
+    }
 
     #[test]
     fn the_layout_agrees_with_itself() {

@@ -2,6 +2,8 @@
 
 pub mod access;
 pub mod descriptor;
+pub mod differences;
+pub mod dual;
 pub mod export;
 pub mod friction;
 pub mod law;
@@ -15,6 +17,6 @@ pub mod version;
 
 pub use descriptor::{Description, Hypothesis, InternalVariables, Parameter, Parameters, Variable};
 pub use law::{
-    ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Refusal, SolidPoint,
-    SolidResponse, Tangent,
+    ContinuumLaw, Failure, HasTangent, InterfaceLaw, InterfacePoint, InterfaceRates,
+    InterfaceResponse, Refusal, SolidPoint, SolidResponse, Tangent,
 };

@@ -15,7 +15,7 @@ pub const PILUM_MAGIC: u32 = 0x5049_4C4D;
 /// Major version of the contract. Different majors never work together.
 pub const PILUM_ABI_MAJOR: u16 = 1;
 /// Minor version of the contract. Minors only append; any two of one major work together.
-pub const PILUM_ABI_MINOR: u16 = 0;
+pub const PILUM_ABI_MINOR: u16 = 1;
 
 /// Outcome of a call, one of the `PILUM_OK` … `PILUM_E_INTERNAL` values.
 pub type Status = i32;
@@ -183,6 +183,14 @@ pub const PILUM_T_LINEAR: u32 = 1 << 1;
 /// Components are in axes of the material (1 along the layer, 2 normal to it, 3 out of plane), so
 /// the law only makes sense in an element that has such axes.
 pub const PILUM_T_LOCAL_AXES: u32 = 1 << 2;
+/// Offers rates, [`PILUM_REQ_RATES`]. Since 1.1.
+pub const PILUM_T_RATES: u32 = 1 << 3;
+/// What it gives as its consistent tangent is near the derivative of the update, but not equal to
+/// it. Since 1.1.
+pub const PILUM_T_TANGENT_APPROXIMATE: u32 = 1 << 4;
+/// Offers the elastic operator only; asked for the consistent tangent, it answers
+/// [`PILUM_E_UNSUPPORTED`]. Since 1.1.
+pub const PILUM_T_NO_TANGENT: u32 = 1 << 5;
 
 /// Read access to values of many points: component `c` of point `i` is
 /// `p[i * point + c * component]`. A `point` stride of 0 gives all points the same values.
@@ -209,6 +217,33 @@ pub struct ViewMut {
     pub point: isize,
     /// Stride from component to component, in doubles.
     pub component: isize,
+}
+
+/// Rates of what an update depends on, and of what it gives: the derivative of the update in one
+/// direction. Since 1.1.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "abi_stable", derive(abi_stable::StableAbi))]
+pub struct Rates {
+    /// Size of this struct.
+    pub struct_size: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Rates of the parameters, one for each in declared order, the same for all points; null: all
+    /// zero.
+    pub parameter: *const f64,
+    /// Rates of the gradients at the start of the increment.
+    pub gradient0: View,
+    /// Rates of the gradients at the end of the increment.
+    pub gradient1: View,
+    /// Rates of the fluxes at the start.
+    pub flux0: View,
+    /// Rates of the internal variables at the start.
+    pub state0: View,
+    /// Rates of the fluxes at the end (written).
+    pub flux1: ViewMut,
+    /// Rates of the internal variables at the end (written).
+    pub state1: ViewMut,
 }
 
 /// One call: a batch of integration points over one increment. All pointers are valid until the
@@ -252,6 +287,11 @@ pub struct Batch {
     pub message: *mut c_char,
     /// Size of the buffer in bytes.
     pub message_capacity: usize,
+    /// Time at the start of the increment, counted from the start of the phase or segment that it
+    /// belongs to. Since 1.1.
+    pub step_time: f64,
+    /// Rates; null unless [`PILUM_REQ_RATES`] is set. Since 1.1.
+    pub rates: *const Rates,
 }
 /// Compute fluxes and internal variables at the end of the increment.
 pub const PILUM_REQ_FLUX: u32 = 1 << 0;
@@ -259,6 +299,8 @@ pub const PILUM_REQ_FLUX: u32 = 1 << 0;
 pub const PILUM_REQ_TANGENT: u32 = 1 << 1;
 /// Compute the elastic operator instead of the consistent tangent.
 pub const PILUM_REQ_ELASTIC: u32 = 1 << 2;
+/// Compute rates too, see [`Batch::rates`]. Since 1.1.
+pub const PILUM_REQ_RATES: u32 = 1 << 3;
 
 /// What the host tells a library.
 #[repr(C)]
@@ -367,7 +409,7 @@ pub struct Plugin {
 /// static description every time; null refuses the host.
 pub type Entry = unsafe extern "C" fn(host: *const Host) -> *const Plugin;
 
-/// Optional data symbol `pilum_rust_layout` of libraries written in Rust: the description that
+/// Optional data symbol `pilum_rust_layout_1_1` of libraries written in Rust: the description that
 /// `abi_stable` derives from these types, to be compared with the host's own.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]

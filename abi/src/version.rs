@@ -39,6 +39,9 @@ pub const PLUGIN_SIZE_1_0: usize = 24;
 /// Size of [`RustLayout`](raw::RustLayout) in version 1.0.
 pub const RUST_LAYOUT_SIZE_1_0: usize = 24;
 
+/// Size of [`Rates`](raw::Rates) in version 1.1, which has it first.
+pub const RATES_SIZE_1_1: usize = 160;
+
 /// Name (`Struct.field`, or `Struct` for the whole), offset and size in bytes.
 pub type FieldLayout = (&'static str, usize, usize);
 
@@ -56,7 +59,9 @@ pub const LAYOUT: &[&[FieldLayout]] = &[
     fields!(ViewMut: p, point, component),
     fields!(Batch: struct_size, request, n_points, first_point, time, time_increment, gradient0,
         gradient1, flux0, state0, flux1, state1, tangent, status, step_factor, message,
-        message_capacity),
+        message_capacity, step_time, rates),
+    fields!(Rates: struct_size, reserved, parameter, gradient0, gradient1, flux0, state0, flux1,
+        state1),
     fields!(Host: struct_size, abi_major, abi_minor, name, version, get_extension),
     fields!(Law: struct_size, flags, n_parameters, n_formulations, id, name, version, author,
         licence, doc, references, parameter, formulation, create, init_state, integrate, destroy),
@@ -250,6 +255,7 @@ mod tests {
             Law.destroy: LAW_SIZE_1_0,
             Plugin.get_extension: PLUGIN_SIZE_1_0,
             RustLayout.layout: RUST_LAYOUT_SIZE_1_0,
+            Rates.state1: RATES_SIZE_1_1,
         );
     }
 

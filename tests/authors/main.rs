@@ -4,17 +4,21 @@
 //! remark, or fails where nothing may be passed over (`tests::needs`). What CI leaves out is listed.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests panic to fail")]
 
+mod cam_clay;
 mod compilers;
 mod foreign;
 mod guides;
+mod helpers;
 mod laws;
 mod links;
 mod names;
 mod on_request;
 mod pages;
 mod program;
+mod rates;
 mod reference;
 mod rooms;
 mod schema;
 mod supply_chain;
+mod tangents;
 mod validator;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Where `unsafe` may stand, and what for. A folder has the name of the file it belongs to.
-const UNSAFE: [(&str, &str); 9] = [
+const UNSAFE: [(&str, &str); 10] = [
     ("abi/src/raw.rs", "types of C functions"),
     (
         "abi/src/access.rs",
@@ -34,6 +34,10 @@ const UNSAFE: [(&str, &str); 9] = [
     (
         "host/law/src/library",
         "foreign routines, memory shared with workers, calls of `pilum check`",
+    ),
+    (
+        "tests/fixtures/contract_1_0",
+        "the contract as it was in version 1.0, and a host of it",
     ),
     (
         "tests/fuzz/src/description.rs",

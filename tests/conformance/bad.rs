@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 49] = [
+const GALLERY: [(&str, &str, &str, Point); 51] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -105,6 +105,12 @@ const GALLERY: [(&str, &str, &str, Point); 49] = [
         CannotTell,
     ),
     (
+        "bad_earlier_batch",
+        "earlier-hosts-are-served",
+        "failed",
+        CannotTell,
+    ),
+    (
         "bad_short_batch",
         "shorter-batch-is-refused",
         "crashed",
@@ -119,6 +125,12 @@ const GALLERY: [(&str, &str, &str, Point); 49] = [
     (
         "bad_request",
         "unknown-requests-are-refused",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_no_tangent",
+        "missing-tangent-is-refused",
         "failed",
         CannotTell,
     ),

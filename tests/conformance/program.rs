@@ -44,17 +44,23 @@ pub(crate) fn folder() -> TempDir {
 /// Compiles a fixture. `None`, with a remark, where there is no compiler.
 pub(crate) fn compiled(fixture: &str, folder: &Path) -> Option<PathBuf> {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
-    compiled_from(&tests.join(format!("fixtures/{fixture}.c")), folder)
+    compiled_from(
+        &tests.join(format!("fixtures/{fixture}.c")),
+        &tests.join("../abi/include"),
+        folder,
+    )
 }
 
 /// Compiles the law of the fixtures with these definitions, which make `name` of it.
 pub(crate) fn compiled_with(definitions: &str, name: &str, folder: &Path) -> Option<PathBuf> {
     let source = folder.join(format!("{name}.c"));
     std::fs::write(&source, format!("{definitions}\n#include \"law.h\"\n")).unwrap();
-    compiled_from(&source, folder)
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    compiled_from(&source, &tests.join("../abi/include"), folder)
 }
 
-fn compiled_from(source: &Path, folder: &Path) -> Option<PathBuf> {
+/// Compiles a source file with the headers of this folder.
+pub(crate) fn compiled_from(source: &Path, headers: &Path, folder: &Path) -> Option<PathBuf> {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
     let fixture = source.file_stem().unwrap().to_str().unwrap();
     let library = folder.join(format!("{DLL_PREFIX}{fixture}{DLL_SUFFIX}"));
@@ -62,7 +68,7 @@ fn compiled_from(source: &Path, folder: &Path) -> Option<PathBuf> {
     compiler
         .args(["-std=gnu11", "-O1", "-Wall", "-Werror", "-shared", "-fPIC"])
         .args(["-fvisibility=hidden", "-I"])
-        .arg(tests.join("../abi/include"))
+        .arg(headers)
         .arg("-I")
         .arg(tests.join("fixtures"))
         .arg(source)

@@ -135,6 +135,7 @@ unsafe fn carried<L: ContinuumLaw>(
             state1: call.xstate.offset(place),
             time: or(call.ttime, 0.0) + or(call.time, 0.0) - dtime,
             time_increment: dtime,
+            step_time: or(call.time, 0.0) - dtime,
         };
         (given, point)
     };

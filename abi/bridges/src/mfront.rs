@@ -717,6 +717,7 @@ unsafe fn carry<L: Carried>(
             },
             time: 0.0,
             time_increment: data.dt,
+            step_time: 0.0,
         }
     };
     let mut factor = 0.25;

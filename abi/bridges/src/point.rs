@@ -26,6 +26,8 @@ pub struct Point {
     pub(crate) time: f64,
     /// Time increment.
     pub(crate) time_increment: f64,
+    /// Time at the start, counted from the start of the step.
+    pub(crate) step_time: f64,
 }
 
 /// The point at the end of the increment; the internal variables are written where it says.
@@ -133,6 +135,7 @@ fn carry_solid<L: ContinuumLaw, const N: usize>(
         state: start(point, || law.initial_state::<N>(&stress))?,
         time: point.time,
         time_increment: point.time_increment,
+        step_time: point.step_time,
     };
     let SolidResponse {
         stress,
@@ -155,6 +158,7 @@ impl<L: InterfaceLaw> Carried for Interface<L> {
             state: start(point, || law.initial_state(&traction))?,
             time: point.time,
             time_increment: point.time_increment,
+            step_time: point.step_time,
         };
         let response = law.update(&interface, tangent)?;
         let operator = (tangent != Tangent::None).then_some(&response.tangent);

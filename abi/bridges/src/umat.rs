@@ -291,6 +291,7 @@ unsafe fn carried<L: ContinuumLaw>(
                 *call.time.add(1)
             },
             time_increment: or(call.dtime, 0.0),
+            step_time: or(call.time, 0.0),
         }
     };
     let tangent = if call.ddsdde.is_null() {

@@ -1,9 +1,10 @@
 //! The two traits of [`law`](crate::law) as one, which is what the boundary calls.
 
-use crate::access::Access;
+use crate::access::{Access, Directions};
 use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameters, Variable};
 use crate::law::{
-    ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, SolidPoint, SolidResponse, Tangent,
+    ContinuumLaw, Failure, HasTangent, InterfaceLaw, InterfacePoint, InterfaceRates, SolidPoint,
+    SolidResponse, Tangent,
 };
 use crate::raw::{self, Formulation};
 use std::marker::PhantomData;
@@ -49,6 +50,51 @@ pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
         i: usize,
         tangent: Tangent,
     ) -> Result<Option<&'static str>, Failure>;
+    /// Rates of point `i` at the end of the increment.
+    ///
+    /// # Errors
+    /// Why there are none.
+    fn rates<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        rates: &Directions<'_>,
+        i: usize,
+    ) -> Result<(), Failure> {
+        let _ = (access, rates, i);
+        Err(NO_RATES)
+    }
+    /// Rates of the initial internal variables of point `i`.
+    ///
+    /// # Errors
+    /// Why there are none.
+    fn initial_rates<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        rates: &Directions<'_>,
+        i: usize,
+    ) -> Result<(), Failure> {
+        let _ = (access, rates, i);
+        Err(NO_RATES)
+    }
+}
+
+/// The boundary asks only laws that declare rates.
+const NO_RATES: Failure = Failure::Numeric("the law offers no rates");
+
+/// Flags of what a law has for a consistent tangent.
+///
+/// # Panics
+/// A law with `LINEAR` has none but a consistent one; at compile time, where it is exported.
+const fn flags_of_tangent(tangent: HasTangent, is_linear: bool) -> u32 {
+    assert!(
+        !is_linear || matches!(tangent, HasTangent::Consistent),
+        "a law with `LINEAR` has its consistent tangent"
+    );
+    match tangent {
+        HasTangent::Consistent => 0,
+        HasTangent::Approximate => raw::PILUM_T_TANGENT_APPROXIMATE,
+        HasTangent::No => raw::PILUM_T_NO_TANGENT,
+    }
 }
 
 /// Adapter for laws of solids.
@@ -64,7 +110,8 @@ struct ContinuumFormulations<L>(PhantomData<L>);
 impl<L: ContinuumLaw> ContinuumFormulations<L> {
     const FLAGS: u32 = flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC)
         | flag(L::LINEAR, raw::PILUM_T_LINEAR)
-        | flag(L::LOCAL_AXES, raw::PILUM_T_LOCAL_AXES);
+        | flag(L::LOCAL_AXES, raw::PILUM_T_LOCAL_AXES)
+        | flags_of_tangent(L::TANGENT, L::LINEAR);
     const TABLE: [Formulation; 3] = {
         assert_solid(L::HYPOTHESES);
         let state = <L::State as InternalVariables>::TABLE;
@@ -161,6 +208,7 @@ fn update_solid<L: ContinuumLaw, const N: usize, const PACKED: bool>(
         state: start.state,
         time: access.batch.time,
         time_increment: access.batch.time_increment,
+        step_time: access.batch.step_time,
     };
     let SolidResponse {
         stress,
@@ -192,8 +240,10 @@ impl<L> Interface<L> {
 }
 
 impl<L: InterfaceLaw> Interface<L> {
-    const FLAGS: u32 =
-        flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC) | flag(L::LINEAR, raw::PILUM_T_LINEAR);
+    const FLAGS: u32 = flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC)
+        | flag(L::LINEAR, raw::PILUM_T_LINEAR)
+        | flag(L::RATES, raw::PILUM_T_RATES)
+        | flags_of_tangent(L::TANGENT, L::LINEAR);
     const TABLE: [Formulation; 1] = [Formulation::new(
         Hypothesis::Interface2d,
         Self::FLAGS,
@@ -230,15 +280,7 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
         i: usize,
         tangent: Tangent,
     ) -> Result<Option<&'static str>, Failure> {
-        let start = access.start(i)?;
-        let point = InterfacePoint {
-            jump: start.gradient,
-            jump_increment: start.gradient_increment,
-            traction: start.flux,
-            state: start.state,
-            time: access.batch.time,
-            time_increment: access.batch.time_increment,
-        };
+        let point = interface_point::<L::State, PACKED>(access, i)?;
         let end = self.0.update(&point, tangent)?;
         access.put(
             i,
@@ -248,6 +290,60 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
         )?;
         Ok(end.unreliable)
     }
+
+    fn rates<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        rates: &Directions<'_>,
+        i: usize,
+    ) -> Result<(), Failure> {
+        let point = interface_point::<L::State, PACKED>(access, i)?;
+        let [jump, end]: [[f64; 2]; 2] = [rates.gradient0(i)?, rates.gradient1(i)?];
+        let given = InterfaceRates {
+            parameter: rates.parameter(),
+            jump,
+            jump_increment: [end[0] - jump[0], end[1] - jump[1]],
+            traction: rates.flux0(i)?,
+            state: rates.state0(i)?,
+        };
+        let (traction, state) = self.0.rates(&point, &given)?;
+        rates.put(i, Some(&traction), &state)
+    }
+
+    fn initial_rates<const PACKED: bool>(
+        &self,
+        access: &Access<'_, PACKED>,
+        rates: &Directions<'_>,
+        i: usize,
+    ) -> Result<(), Failure> {
+        let given = InterfaceRates {
+            parameter: rates.parameter(),
+            jump: [0.0; 2],
+            jump_increment: [0.0; 2],
+            traction: rates.flux0(i)?,
+            state: L::State::read(|_| 0.0),
+        };
+        let state = self.0.initial_rates(&access.flux0(i)?, &given)?;
+        rates.put::<2, _>(i, None, &state)
+    }
+}
+
+/// Point `i` as a law for interfaces receives it.
+#[inline]
+fn interface_point<S: InternalVariables, const PACKED: bool>(
+    access: &Access<'_, PACKED>,
+    i: usize,
+) -> Result<InterfacePoint<S>, Failure> {
+    let start = access.start(i)?;
+    Ok(InterfacePoint {
+        jump: start.gradient,
+        jump_increment: start.gradient_increment,
+        traction: start.flux,
+        state: start.state,
+        time: access.batch.time,
+        time_increment: access.batch.time_increment,
+        step_time: access.batch.step_time,
+    })
 }
 
 /// What a law for solids may not declare stops the compiler; the same law with a solid's

@@ -209,6 +209,8 @@ fn integrated(instance: *mut Instance, state: f64, shape: impl FnOnce(&mut Batch
         step_factor: &raw mut factor,
         message: message.0.as_mut_ptr(),
         message_capacity: message.0.len(),
+        step_time: 0.0,
+        rates: null(),
     };
     shape(&mut batch);
     // SAFETY: contract of `integrate`: the views are one point long, the instance is alive.
@@ -423,6 +425,8 @@ fn a_call_does_not_allocate() {
                 step_factor: &raw mut factor,
                 message: message.0.as_mut_ptr(),
                 message_capacity: message.0.len(),
+                step_time: 0.0,
+                rates: null(),
             };
             let before = ALLOCATIONS.get();
             // SAFETY: contract of `integrate`: the instance lives, the batch is true.

@@ -124,6 +124,8 @@ pub enum Tangent {
     Consistent,
     /// They are near them, such as elastic ones: Newton's method gains nothing by renewing them.
     Approximate,
+    /// There are none: where one is wanted, the elastic operator stands in.
+    None,
 }
 
 impl Tangent {
@@ -138,6 +140,7 @@ impl Tangent {
 type HypothesisName = &'static str;
 
 /// What a law offers under one hypothesis.
+#[expect(clippy::struct_excessive_bools, reason = "flags of the contract")]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FormulationDescription {
     /// Name of the hypothesis.
@@ -153,10 +156,18 @@ pub struct FormulationDescription {
     /// What its tangents are worth.
     #[serde(default, skip_serializing_if = "Tangent::is_consistent")]
     pub tangent: Tangent,
+    /// It gives rates of its updates, by parameters too.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub rates: bool,
     /// Components are in axes of the layer.
     pub local_axes: bool,
     /// Internal variables in the order of their values, one entry per component.
     pub internal_variables: Vec<InternalVariable>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 fn hypothesis<'de, D: Deserializer<'de>>(input: D) -> Result<&'static str, D::Error> {

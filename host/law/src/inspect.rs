@@ -17,7 +17,12 @@ use std::path::{Path, PathBuf};
 use text::file;
 
 /// Symbols of the contract.
-const CONTRACT: [&str; 3] = ["pilum_magic", "pilum_entry", "pilum_rust_layout"];
+const CONTRACT: [&str; 4] = [
+    "pilum_magic",
+    "pilum_entry",
+    "pilum_rust_layout",
+    "pilum_rust_layout_1_1",
+];
 /// Symbols that linkers add.
 const LINKER: [&str; 6] = [
     "_init",

@@ -7,7 +7,7 @@ use crate::isolate;
 use crate::library::{Call, OwnedInstance, Strided};
 use crate::{
     BatchFailure, BatchSuccess, End, FormulationDescription, LawDescription, Library, LoadedLaw,
-    Moment, Operator, PointCall, Request, Site, Start,
+    Moment, Operator, PointCall, Request, Site, Start, Tangent,
 };
 use abi::Hypothesis;
 use abi::raw::{self, Status};
@@ -243,7 +243,8 @@ impl Law {
         Ok((flux_end, written))
     }
 
-    /// Carries points over an increment.
+    /// Carries points over an increment. Of a law without a consistent tangent the elastic operator
+    /// stands in for it.
     ///
     /// # Errors
     /// A point asks for a smaller step, or fails; also if it claims success with a result that
@@ -290,6 +291,9 @@ impl Law {
             request: raw::PILUM_REQ_FLUX
                 | match operator {
                     Operator::None => 0,
+                    Operator::Consistent if self.formulation.tangent == Tangent::None => {
+                        raw::PILUM_REQ_ELASTIC
+                    }
                     Operator::Consistent => raw::PILUM_REQ_TANGENT,
                     Operator::Elastic => raw::PILUM_REQ_ELASTIC,
                 },

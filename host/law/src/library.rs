@@ -176,12 +176,14 @@ unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
     unsafe { libloading::Library::new(path) }
 }
 
-/// The second check, for libraries written in Rust with the same `abi_stable`.
+/// The second check, for libraries written in Rust with the same minor version and `abi_stable`:
+/// the symbol carries the minor, so others are not found.
 #[cfg(feature = "abi_stable")]
 fn check_rust_layout(library: &'static libloading::Library) -> Result<(), String> {
+    use abi::layout;
     use abi::raw::RustLayout;
     // SAFETY: contract, "abi_stable": the symbol is a `RustLayout` where it exists.
-    let Ok(block) = (unsafe { library.get::<*const RustLayout>(b"pilum_rust_layout\0") }) else {
+    let Ok(block) = (unsafe { library.get::<*const RustLayout>(layout::SYMBOL.as_bytes()) }) else {
         return Ok(());
     };
     // SAFETY: as above; the block is static.
@@ -191,13 +193,13 @@ fn check_rust_layout(library: &'static libloading::Library) -> Result<(), String
     };
     let allowance = Allowance::default();
     if text(block.abi_stable_version, "abi_stable_version", &allowance)?
-        != abi::layout::ABI_STABLE_VERSION.to_string_lossy()
+        != layout::ABI_STABLE_VERSION.to_string_lossy()
     {
         return Ok(());
     }
     // SAFETY: equal versions of `abi_stable` describe layouts by the same type.
     let theirs = unsafe { &*block.layout.cast::<abi_stable::type_layout::TypeLayout>() };
-    abi::layout::check(theirs)
+    layout::check(theirs)
         .map_err(|difference| format!("`abi_stable` finds another layout: {difference}"))
 }
 
@@ -504,7 +506,14 @@ fn describe_formulation(
         hypothesis: name,
         index,
         symmetric: formulation.flags & raw::PILUM_T_SYMMETRIC != 0,
-        tangent: Tangent::default(),
+        tangent: if formulation.flags & raw::PILUM_T_NO_TANGENT != 0 {
+            Tangent::None
+        } else if formulation.flags & raw::PILUM_T_TANGENT_APPROXIMATE != 0 {
+            Tangent::Approximate
+        } else {
+            Tangent::Consistent
+        },
+        rates: formulation.flags & raw::PILUM_T_RATES != 0,
         linear: formulation.flags & raw::PILUM_T_LINEAR != 0 && internal_variables.is_empty(),
         local_axes: formulation.flags & raw::PILUM_T_LOCAL_AXES != 0,
         internal_variables,
@@ -782,6 +791,8 @@ impl OwnedInstance {
             step_factor: call.step_factor.as_mut_ptr(),
             message: message.as_mut_ptr(),
             message_capacity: message.len(),
+            step_time: call.time - call.moment.step_start,
+            rates: null(),
         };
         // SAFETY: contract, "Batch": every view was checked against its slice above, and the
         // borrows of `call` last until the call has returned.

@@ -5,7 +5,7 @@ use abi::Hypothesis;
 use law::adapter::conventions;
 use law::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw,
-    ParameterDescription, SearchPath,
+    ParameterDescription, SearchPath, Tangent,
 };
 use serde::Serialize;
 use std::fmt::Write;
@@ -143,6 +143,12 @@ fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
         "unsymmetric"
     };
     let linear = if formulation.linear { ", linear" } else { "" };
+    let tangent = match formulation.tangent {
+        Tangent::Consistent => format!("tangent {symmetric}{linear}"),
+        Tangent::Approximate => format!("tangent {symmetric}, approximate"),
+        Tangent::None => "no tangent but the elastic operator".to_owned(),
+    };
+    let rates = if formulation.rates { "; rates" } else { "" };
     let axes = if formulation.local_axes {
         "; axes of the layer: 1 along it, 2 across it"
     } else {
@@ -150,7 +156,7 @@ fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
     };
     let _ = writeln!(
         text,
-        "  {:14}{pair}, components {components}; tangent {symmetric}{linear}{axes}",
+        "  {:14}{pair}, components {components}; {tangent}{rates}{axes}",
         formulation.hypothesis
     );
 }

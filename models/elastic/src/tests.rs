@@ -24,6 +24,7 @@ fn response<const N: usize>(
         state: (),
         time: 0.0,
         time_increment: 1.0,
+        step_time: 0.0,
     };
     law.update(&point, Tangent::Consistent).unwrap()
 }

@@ -189,6 +189,7 @@ impl<'a, L: InterfaceLaw<State = State>> Walker<'a, L> {
             state: self.state,
             time: 0.0,
             time_increment: 1.0,
+            step_time: 0.0,
         };
         self.law.update(&point, tangent)
     }

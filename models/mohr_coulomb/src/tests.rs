@@ -54,6 +54,7 @@ fn rested<const N: usize>(stress: [f64; N], strain_increment: [f64; N]) -> Solid
         },
         time: 0.0,
         time_increment: 1.0,
+        step_time: 0.0,
     }
 }
 

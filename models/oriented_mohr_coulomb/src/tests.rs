@@ -39,6 +39,7 @@ fn rested(stress: [f64; 4], strain_increment: [f64; 4]) -> SolidPoint<4, State> 
         },
         time: 0.0,
         time_increment: 1.0,
+        step_time: 0.0,
     }
 }
 

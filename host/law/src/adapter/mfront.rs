@@ -343,6 +343,7 @@ impl Reader<'_> {
         }
         let formulation = FormulationDescription {
             tangent: Tangent::default(),
+            rates: false,
             hypothesis: hypothesis.name(),
             index,
             symmetric: false,

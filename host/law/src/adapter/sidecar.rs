@@ -45,7 +45,7 @@ struct File {
     #[serde(default)]
     symmetric: bool,
     #[serde(default)]
-    tangent: Tangent,
+    tangent: Given,
     #[serde(default)]
     tangent_order: Order,
     externals: Option<Externals>,
@@ -96,6 +96,15 @@ pub(super) enum Order {
     Columns,
     /// As C keeps them.
     Rows,
+}
+
+/// What DDSDDE is: a routine always writes one.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Given {
+    #[default]
+    Consistent,
+    Approximate,
 }
 
 /// What a sidecar says.
@@ -162,7 +171,11 @@ impl Sidecar {
                 index: formulations.len() as u32,
                 symmetric: file.symmetric,
                 linear: false,
-                tangent: file.tangent,
+                tangent: match file.tangent {
+                    Given::Consistent => Tangent::Consistent,
+                    Given::Approximate => Tangent::Approximate,
+                },
+                rates: false,
                 local_axes: false,
                 internal_variables: variables.clone(),
             });

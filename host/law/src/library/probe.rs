@@ -5,7 +5,7 @@
 mod pages;
 
 use super::{HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, load};
-use abi::raw::{self, Batch, Host, Instance, MagicBlock, Status, View, ViewMut};
+use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};
 use abi::version;
 pub use pages::Fence;
 use pages::Pages;
@@ -111,7 +111,26 @@ pub struct Form {
     pub first_point: u64,
     /// Length of the increment in time.
     pub time_increment: f64,
+    /// Ask for the consistent tangent even of a law that declares none; else its elastic operator
+    /// stands in, as in a run.
+    pub verbatim: bool,
 }
+
+/// Rates of what a point's update starts from.
+#[derive(Clone, Debug)]
+pub struct PointRates {
+    /// Of the gradient at the start.
+    pub gradient0: Vec<f64>,
+    /// Of the gradient at the end.
+    pub gradient1: Vec<f64>,
+    /// Of the flux at the start.
+    pub flux0: Vec<f64>,
+    /// Of the internal variables at the start.
+    pub state0: Vec<f64>,
+}
+
+/// Rates that a law has written for a point: of its flux, and of its internal variables.
+pub type EndRates = (Vec<f64>, Vec<f64>);
 
 impl Form {
     /// An ordinary call with these requests, whose arrays have room to spare around them.
@@ -127,6 +146,7 @@ impl Form {
             batch_bytes: BATCH_BYTES,
             first_point: 0,
             time_increment: 1.0,
+            verbatim: false,
         }
     }
 }
@@ -246,6 +266,7 @@ pub struct Probe {
     instance: OwnedInstance,
     n_components: usize,
     n_states: usize,
+    lacks_tangent: bool,
 }
 
 /// Arguments of `create`.
@@ -261,10 +282,14 @@ pub struct CreateForm<'a> {
     pub message: Option<usize>,
     /// Bytes of the host's description beyond those this version knows.
     pub more_host: usize,
+    /// Minor version that the host says it has.
+    pub host_minor: u16,
     /// Components of gradient and flux, for later calls.
     pub n_components: usize,
     /// Internal variables, for later calls.
     pub n_states: usize,
+    /// The formulation declares no consistent tangent, for later calls.
+    pub lacks_tangent: bool,
 }
 
 /// What `create` has left behind.
@@ -285,9 +310,9 @@ impl Created {
     }
 }
 
-/// The host's description with bytes at its end that this version does not know. It stays for the
-/// life of the process.
-fn longer_host(more: usize) -> io::Result<*const Host> {
+/// The host's description with another minor version, or with bytes at its end that this version does
+/// not know. It stays for the life of the process.
+fn other_host(more: usize, abi_minor: u16) -> io::Result<*const Host> {
     let size = size_of::<Host>() + more;
     let mut pages = Pages::new(size, Fence::After)?;
     pages.bytes_mut().fill(0xa5);
@@ -302,6 +327,7 @@ fn longer_host(more: usize) -> io::Result<*const Host> {
     let at: *const Host = match (before, hosts) {
         ([], [host, ..]) => host.write(Host {
             struct_size: size as u32,
+            abi_minor,
             ..HOST.0
         }),
         _ => {
@@ -323,9 +349,9 @@ pub(crate) fn create(law: LawHandle, form: &CreateForm<'_>) -> io::Result<Create
     let Some(create) = law.known.create else {
         return Err(io::Error::other("`create` is null"));
     };
-    let host = match form.more_host {
-        0 => &raw const HOST.0,
-        more => longer_host(more)?,
+    let host = match (form.more_host, form.host_minor) {
+        (0, raw::PILUM_ABI_MINOR) => &raw const HOST.0,
+        (more, minor) => other_host(more, minor)?,
     };
     let values = form
         .values
@@ -361,6 +387,7 @@ pub(crate) fn create(law: LawHandle, form: &CreateForm<'_>) -> io::Result<Create
             instance: OwnedInstance { law, instance },
             n_components: form.n_components,
             n_states: form.n_states,
+            lacks_tangent: form.lacks_tangent,
         }),
     })
 }
@@ -422,7 +449,8 @@ impl Probe {
                 state0: Vec::new(),
             })
             .collect();
-        self.call(Function::InitState, &starts, form).map(Some)
+        let answer = self.call(Function::InitState, &starts, None, form)?;
+        Ok(Some(answer.0))
     }
 
     /// Calls `integrate`.
@@ -430,10 +458,60 @@ impl Probe {
     /// # Errors
     /// There is no memory.
     pub fn integrate(&self, starts: &[PointStart], form: &Form) -> io::Result<Answer> {
-        self.call(Function::Integrate, starts, form)
+        Ok(self.call(Function::Integrate, starts, None, form)?.0)
     }
 
-    fn call(&self, function: Function, starts: &[PointStart], form: &Form) -> io::Result<Answer> {
+    /// Calls `integrate` for an update with its rates, point by point; `parameter` are those of the
+    /// parameters.
+    ///
+    /// # Errors
+    /// There is no memory.
+    pub fn rates(
+        &self,
+        starts: &[PointStart],
+        rates: &[PointRates],
+        parameter: &[f64],
+    ) -> io::Result<(Answer, Vec<EndRates>)> {
+        let form = Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_RATES);
+        self.call(Function::Integrate, starts, Some((rates, parameter)), &form)
+    }
+
+    /// Calls `init_state` for initial internal variables with their rates; of `rates` only those of the
+    /// flux are in use. `None` if the law has no `init_state`.
+    ///
+    /// # Errors
+    /// There is no memory.
+    pub fn initial_rates(
+        &self,
+        starts: &[PointStart],
+        rates: &[PointRates],
+        parameter: &[f64],
+    ) -> io::Result<Option<(Answer, Vec<EndRates>)>> {
+        if self.instance.law.known.init_state.is_none() {
+            return Ok(None);
+        }
+        let form = Form::of(raw::PILUM_REQ_RATES);
+        self.call(Function::InitState, starts, Some((rates, parameter)), &form)
+            .map(Some)
+    }
+
+    /// What the call asks for: of a law without a consistent tangent the elastic operator instead.
+    fn asked(&self, form: &Form) -> u32 {
+        let consistent = raw::PILUM_REQ_TANGENT;
+        if self.lacks_tangent && !form.verbatim && form.request & consistent != 0 {
+            form.request & !consistent | raw::PILUM_REQ_ELASTIC
+        } else {
+            form.request
+        }
+    }
+
+    fn call(
+        &self,
+        function: Function,
+        starts: &[PointStart],
+        rates: Option<(&[PointRates], &[f64])>,
+        form: &Form,
+    ) -> io::Result<(Answer, Vec<EndRates>)> {
         let known = &self.instance.law.known;
         let Some(called) = (match function {
             Function::InitState => known.init_state,
@@ -469,6 +547,10 @@ impl Probe {
         let flux1 = output(n_gradient)?;
         let state1 = output(self.n_states)?;
         let tangent = output(n_tangent)?;
+        let directions = rates
+            .map(|(rates, parameter)| Directions::new(self, rates, parameter))
+            .transpose()?;
+        let given = directions.as_ref().map(Directions::raw);
         let step_factor = output_of_one(n, form)?;
         let mut status = Pages::new(n * size_of::<Status>(), form.around_outputs)?;
         for four in status.bytes_mut().chunks_exact_mut(size_of::<Status>()) {
@@ -477,7 +559,7 @@ impl Probe {
         let message = message_buffer(form.message)?;
         let batch = Batch {
             struct_size: form.batch_bytes as u32,
-            request: form.request,
+            request: self.asked(form),
             n_points: n as u64,
             first_point: form.first_point,
             time: 0.0,
@@ -501,6 +583,8 @@ impl Probe {
             },
             message: message.as_ref().map_or(null_mut(), |m| m.pointer().cast()),
             message_capacity: form.message.unwrap_or(0),
+            step_time: 0.0,
+            rates: given.as_ref().map_or(null(), std::ptr::from_ref),
         };
         let letter = in_pages(&batch, form.batch_bytes)?;
         // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
@@ -520,12 +604,73 @@ impl Probe {
                 tangent: tangent.row(i),
             })
             .collect();
-        Ok(Answer {
+        let answer = Answer {
             status: returned,
             message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
             points,
             stray: [flux1, state1, tangent].iter().any(Array::stray),
+        };
+        Ok((
+            answer,
+            directions.map_or(Vec::new(), |written| written.rows()),
+        ))
+    }
+}
+
+/// The arrays of rates of one call.
+struct Directions {
+    parameter: Array,
+    gradient0: Array,
+    gradient1: Array,
+    flux0: Array,
+    state0: Array,
+    flux1: Array,
+    state1: Array,
+}
+
+impl Directions {
+    fn new(probe: &Probe, rates: &[PointRates], parameter: &[f64]) -> io::Result<Self> {
+        let n = rates.len();
+        let input = |n_components, values: fn(&PointRates) -> &[f64]| -> io::Result<Array> {
+            let mut array = Array::new(Order::Points, true, n, n_components, Fence::Far)?;
+            for (i, one) in rates.iter().enumerate() {
+                array.put(i, values(one));
+            }
+            Ok(array)
+        };
+        let output = |n_components| Array::new(Order::Points, false, n, n_components, Fence::Far);
+        let mut of_parameters = Array::new(Order::Points, true, 1, parameter.len(), Fence::After)?;
+        of_parameters.put(0, parameter);
+        Ok(Self {
+            parameter: of_parameters,
+            gradient0: input(probe.n_components, |one| &one.gradient0)?,
+            gradient1: input(probe.n_components, |one| &one.gradient1)?,
+            flux0: input(probe.n_components, |one| &one.flux0)?,
+            state0: input(probe.n_states, |one| &one.state0)?,
+            flux1: output(probe.n_components)?,
+            state1: output(probe.n_states)?,
         })
+    }
+
+    /// What the law has written.
+    fn rows(&self) -> Vec<EndRates> {
+        let n = self.flux1.n_points;
+        let row = |i| (self.flux1.row(i), self.state1.row(i));
+        (0..n).map(row).collect()
+    }
+
+    fn raw(&self) -> Rates {
+        Rates {
+            struct_size: size_of::<Rates>() as u32,
+            reserved: 0,
+            parameter: self.parameter.view().p,
+            gradient0: self.gradient0.view(),
+            gradient1: self.gradient1.view(),
+            flux0: self.flux0.view(),
+            state0: self.state0.view(),
+            flux1: self.flux1.view_mut(),
+            state1: self.state1.view_mut(),
+        }
     }
 }
 
@@ -590,7 +735,7 @@ pub fn enter(path: &Path) -> Result<[usize; 3], String> {
     // SAFETY: contract, "Entry": may be called with any valid host block, from any thread.
     let call = move || unsafe { entry(&raw const HOST.0) }.addr();
     let other = move || -> io::Result<usize> {
-        let host = longer_host(64)?;
+        let host = other_host(64, raw::PILUM_ABI_MINOR)?;
         // SAFETY: as above.
         Ok(unsafe { entry(host) }.addr())
     };

@@ -25,5 +25,5 @@ pub(super) fn other(asked: Method, groups: &[Group]) -> Option<Warning> {
 
 /// Whether Newton's method would iterate on tangents that are none.
 fn is_approximate(group: &Group) -> bool {
-    group.law.built.law.formulation().tangent == Tangent::Approximate
+    group.law.built.law.formulation().tangent != Tangent::Consistent
 }

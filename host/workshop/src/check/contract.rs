@@ -5,6 +5,7 @@ use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses}
 use super::{Check, Family, Found, Subject, Verdict, failed, refusal, status_name};
 use abi::raw;
 use abi::status::{Outcome, most_severe};
+use abi::version::BATCH_SIZE_1_0;
 use law::LoadedLaw;
 use law::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME};
 
@@ -45,10 +46,19 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "unknown-requests-are-refused",
         family: Family::Contract,
-        description: "A request that version 1.0 does not know is refused with \
-                      PILUM_E_UNSUPPORTED, and no outcomes are written.",
+        description: "A request that the contract does not know, or one of rates to a law that \
+                      does not offer them, is refused with PILUM_E_UNSUPPORTED, and no outcomes are \
+                      written.",
         needs: &["integrate-works"],
         run: unknown_requests_are_refused,
+    },
+    Check {
+        id: "missing-tangent-is-refused",
+        family: Family::Contract,
+        description: "Where PILUM_T_NO_TANGENT is set, a request of the consistent tangent is \
+                      answered with PILUM_E_UNSUPPORTED.",
+        needs: &["integrate-works"],
+        run: missing_tangent_is_refused,
     },
     Check {
         id: "empty-batch-is-accepted",
@@ -79,6 +89,14 @@ pub(super) const CHECKS: &[Check] = &[
                       nothing.",
         needs: &["repeatable"],
         run: longer_structs_are_accepted,
+    },
+    Check {
+        id: "earlier-hosts-are-served",
+        family: Family::Contract,
+        description: "To a host of version 1.0, whose batch ends sooner, results have the same \
+                      bits; forbidden memory stands after its last byte.",
+        needs: &["repeatable"],
+        run: earlier_hosts_are_served,
     },
     Check {
         id: "shorter-batch-is-refused",
@@ -310,7 +328,9 @@ fn unknown_requests_are_refused(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "requests");
     for specimen in subject.specimens(1, &mut random)? {
         let points = specimen.points(3, &mut random)?;
-        for bit in [3, 17, 31] {
+        // A law knows of rates, and may refuse them as unknown or as what it does not offer.
+        let rates = (!specimen.formulation.rates).then_some(3);
+        for bit in rates.into_iter().chain([4, 17, 31]) {
             let answer = specimen.call(&points, raw::PILUM_REQ_FLUX | 1 << bit)?;
             if answer.status != raw::PILUM_E_UNSUPPORTED {
                 return Err(specimen.fails(format!(
@@ -322,6 +342,33 @@ fn unknown_requests_are_refused(subject: &Subject) -> Found {
                 return Err(specimen.fails("a call that is refused as a whole wrote outcomes"));
             }
         }
+    }
+    Ok(String::new())
+}
+
+fn missing_tangent_is_refused(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "no tangent");
+    let mut n = 0;
+    for specimen in subject.specimens(1, &mut random)? {
+        if specimen.formulation.tangent != law::Tangent::None {
+            continue;
+        }
+        let points = specimen.points(3, &mut random)?;
+        let form = Form {
+            verbatim: true,
+            ..Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT)
+        };
+        let answer = specimen.probe.integrate(&points, &form)?;
+        if answer.status != raw::PILUM_E_UNSUPPORTED {
+            return Err(specimen.fails(format!(
+                "it declares no tangent, but asked for one `integrate` returned {}",
+                status_name(answer.status)
+            )));
+        }
+        n += 1;
+    }
+    if n == 0 {
+        return Err(super::skipped("all laws have a tangent"));
     }
     Ok(String::new())
 }
@@ -438,11 +485,48 @@ fn longer_structs_are_accepted(subject: &Subject) -> Found {
     Ok(String::new())
 }
 
+fn earlier_hosts_are_served(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "earlier");
+    for specimen in subject.specimens(1, &mut random)? {
+        let points = specimen.points(16, &mut random)?;
+        let form = Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT);
+        let usual = specimen.probe.integrate(&points, &form)?;
+        let earlier = Form {
+            batch_bytes: BATCH_SIZE_1_0,
+            ..form
+        };
+        let first_host = CreateForm {
+            host_minor: 0,
+            ..create_form(&specimen.formulation, specimen.hypothesis, &specimen.values)
+        };
+        let created = specimen.law.probe(&first_host)?;
+        let Some(probe) = created.probe else {
+            return Err(specimen.fails(format!(
+                "`create` returned {} to a host of version 1.0",
+                status_name(created.status)
+            )));
+        };
+        let answer = probe.integrate(&points, &earlier)?;
+        if answer.status != usual.status {
+            return Err(specimen.fails(format!(
+                "a batch of {BATCH_SIZE_1_0} bytes, as version 1.0 has it: `integrate` returned {}",
+                status_name(answer.status)
+            )));
+        }
+        if let Some(i) = first_difference(&usual.points, &answer.points) {
+            return Err(specimen.fails(format!(
+                "to a host of version 1.0 the results of point {i} differ"
+            )));
+        }
+    }
+    Ok(String::new())
+}
+
 fn shorter_batch_is_refused(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "shorter");
     for specimen in subject.specimens(1, &mut random)? {
         let points = specimen.points(3, &mut random)?;
-        for batch_bytes in [BATCH_BYTES - 8, 64, 8] {
+        for batch_bytes in [BATCH_SIZE_1_0 - 8, 64, 8] {
             let form = Form {
                 batch_bytes,
                 ..Form::of(raw::PILUM_REQ_FLUX)

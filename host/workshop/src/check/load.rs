@@ -135,7 +135,12 @@ fn exports_are_hidden(subject: &Subject) -> Found {
         .filter_map(|name| Some(format!("{}_", name.strip_suffix("_mfront_ept")?)))
         .collect();
     let is_known = |name: &str| {
-        let ours = ["pilum_magic", "pilum_entry", "pilum_rust_layout"];
+        let ours = [
+            "pilum_magic",
+            "pilum_entry",
+            "pilum_rust_layout",
+            "pilum_rust_layout_1_1",
+        ];
         let theirs = ["umat", "umat_", "UMAT", "CALCULIX"];
         ours.contains(&name.trim_start_matches('_'))
             || theirs.contains(&name)

@@ -76,8 +76,10 @@ pub(super) fn create_form<'a>(
         n_values: values.len(),
         message: Some(512),
         more_host: 0,
+        host_minor: raw::PILUM_ABI_MINOR,
         n_components: hypothesis.n_components(),
         n_states: formulation.internal_variables.len(),
+        lacks_tangent: formulation.tangent == law::Tangent::None,
     }
 }
 

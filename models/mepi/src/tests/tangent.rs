@@ -112,6 +112,7 @@ fn random_point(random: &mut Random, k: [f64; 2], slips: &[f64]) -> InterfacePoi
         state,
         time: 0.0,
         time_increment: 1.0,
+        step_time: 0.0,
     }
 }
 

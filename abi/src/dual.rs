@@ -1,0 +1,641 @@
+//! Derivatives without algebra, exact to round-off: a law written once for any [`Number`] gets its
+//! consistent tangent and its rates from dual numbers, which carry derivatives along with values.
+//!
+//! [`tangent`] serves a law that keeps its form; a [`DualInterfaceLaw`] is exported as
+//! [`ByDuals`] and offers `PILUM_REQ_RATES` too:
+//!
+//! ```
+//! use abi::dual::{ByDuals, DualInterfaceLaw, InterfaceEnd, Number};
+//! use abi::{Description, Failure, InterfacePoint, Parameter, Refusal, Variable};
+//!
+//! abi::parameters! {
+//!     /// Parameters of the law.
+//!     pub struct Parameters<T> {
+//!         /// Stiffness at the start.
+//!         stiffness: Parameter::new(c"k", c"kPa/m").above(0.0),
+//!         /// Strength, which is approached.
+//!         strength: Parameter::new(c"c", c"kPa").above(0.0),
+//!     }
+//! }
+//! abi::internal_variables! {
+//!     /// Internal variables of the law.
+//!     pub struct State<T> {
+//!         /// Sum of all slip.
+//!         slip: Variable::scalar(c"s", c"m"),
+//!     }
+//! }
+//!
+//! struct Joint;
+//!
+//! impl DualInterfaceLaw for Joint {
+//!     const DESCRIPTION: Description =
+//!         abi::describe! { id: "joint", name: "", doc: "", references: "" };
+//!     type Parameters<T: Number> = Parameters<T>;
+//!     type State<T: Number> = State<T>;
+//!     type Fixed<T: Number> = Parameters<T>;
+//!
+//!     fn new<T: Number>(p: Parameters<T>) -> Result<Parameters<T>, Refusal> {
+//!         Ok(p)
+//!     }
+//!
+//!     fn update<T: Number>(
+//!         p: &Parameters<T>,
+//!         point: &InterfacePoint<State<T>, T>,
+//!     ) -> Result<InterfaceEnd<State<T>, T>, Failure> {
+//!         let slip = point.state.slip + point.jump_increment[1].abs();
+//!         let jump = point.jump[1] + point.jump_increment[1];
+//!         Ok(InterfaceEnd {
+//!             traction: [
+//!                 point.traction[0] + p.stiffness * point.jump_increment[0],
+//!                 p.strength * (p.stiffness * jump / p.strength).tanh(),
+//!             ],
+//!             state: State { slip },
+//!         })
+//!     }
+//!
+//!     fn elastic(p: &Parameters<f64>, _: &State<f64>) -> [[f64; 2]; 2] {
+//!         [[p.stiffness, 0.0], [0.0, p.stiffness]]
+//!     }
+//! }
+//! const _: abi::raw::Law = abi::export::law::<abi::export::Interface<ByDuals<Joint>>>();
+//! ```
+
+use crate::descriptor::{Description, InternalVariables, Parameters};
+use crate::law::{
+    Failure, InterfaceLaw, InterfacePoint, InterfaceRates, InterfaceResponse, Refusal, Tangent,
+};
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// What a law computes with: a real number, or a [`Dual`]. Comparisons look at values only, so that
+/// branches are those of the real numbers.
+pub trait Number:
+    Copy
+    + Debug
+    + PartialOrd
+    + PartialOrd<f64>
+    + Send
+    + Sync
+    + 'static
+    + From<f64>
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Add<f64, Output = Self>
+    + Sub<f64, Output = Self>
+    + Mul<f64, Output = Self>
+    + Div<f64, Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// The value without derivatives.
+    fn value(self) -> f64;
+    /// A function of this number with this value and this derivative.
+    #[must_use]
+    fn chained(self, value: f64, derivative: f64) -> Self;
+    /// |x|; at 0 the derivative is that of x.
+    #[must_use]
+    fn abs(self) -> Self {
+        if self.value() < 0.0 { -self } else { self }
+    }
+    /// The larger one; `self` if they are equal.
+    #[must_use]
+    fn max(self, other: Self) -> Self {
+        if other.value() > self.value() {
+            other
+        } else {
+            self
+        }
+    }
+    /// The smaller one; `self` if they are equal.
+    #[must_use]
+    fn min(self, other: Self) -> Self {
+        if other.value() < self.value() {
+            other
+        } else {
+            self
+        }
+    }
+    /// √x.
+    #[must_use]
+    fn sqrt(self) -> Self {
+        let root = self.value().sqrt();
+        self.chained(root, 0.5 / root)
+    }
+    /// eˣ.
+    #[must_use]
+    fn exp(self) -> Self {
+        let power = self.value().exp();
+        self.chained(power, power)
+    }
+    /// ln x.
+    #[must_use]
+    fn ln(self) -> Self {
+        self.chained(self.value().ln(), 1.0 / self.value())
+    }
+    /// sin x, in radians.
+    #[must_use]
+    fn sin(self) -> Self {
+        let (sin, cos) = self.value().sin_cos();
+        self.chained(sin, cos)
+    }
+    /// cos x, in radians.
+    #[must_use]
+    fn cos(self) -> Self {
+        let (sin, cos) = self.value().sin_cos();
+        self.chained(cos, -sin)
+    }
+    /// tan x, in radians.
+    #[must_use]
+    fn tan(self) -> Self {
+        let tan = self.value().tan();
+        self.chained(tan, 1.0 + tan * tan)
+    }
+    /// tanh x.
+    #[must_use]
+    fn tanh(self) -> Self {
+        let tanh = self.value().tanh();
+        self.chained(tanh, 1.0 - tanh * tanh)
+    }
+    /// xⁿ for a constant n.
+    #[must_use]
+    fn powf(self, n: f64) -> Self {
+        let x = self.value();
+        self.chained(x.powf(n), n * x.powf(n - 1.0))
+    }
+    /// From degrees to radians.
+    #[must_use]
+    fn to_radians(self) -> Self {
+        self * (std::f64::consts::PI / 180.0)
+    }
+}
+
+impl Number for f64 {
+    #[inline]
+    fn value(self) -> f64 {
+        self
+    }
+    #[inline]
+    fn chained(self, value: f64, _: f64) -> f64 {
+        value
+    }
+}
+
+/// A value with its derivatives in `N` directions.
+#[derive(Clone, Copy, Debug)]
+pub struct Dual<const N: usize> {
+    /// Value.
+    pub value: f64,
+    /// Derivatives.
+    pub rates: [f64; N],
+}
+
+impl<const N: usize> Dual<N> {
+    /// A value that depends on nothing.
+    pub const fn constant(value: f64) -> Self {
+        Self {
+            value,
+            rates: [0.0; N],
+        }
+    }
+
+    /// The variable of one direction: its own derivative is 1.
+    pub const fn variable(value: f64, direction: usize) -> Self {
+        let mut rates = [0.0; N];
+        rates[direction] = 1.0;
+        Self { value, rates }
+    }
+
+    /// A value, and rates a·a′ + b·b′ of a function of two numbers.
+    #[inline]
+    fn of_two(value: f64, by_a: f64, a: &Self, by_b: f64, b: &Self) -> Self {
+        Self {
+            value,
+            rates: std::array::from_fn(|k| by_a * a.rates[k] + by_b * b.rates[k]),
+        }
+    }
+}
+
+impl<const N: usize> Number for Dual<N> {
+    #[inline]
+    fn value(self) -> f64 {
+        self.value
+    }
+    #[inline]
+    fn chained(self, value: f64, derivative: f64) -> Self {
+        Self {
+            value,
+            rates: self.rates.map(|rate| derivative * rate),
+        }
+    }
+}
+
+impl<const N: usize> From<f64> for Dual<N> {
+    fn from(value: f64) -> Self {
+        Self::constant(value)
+    }
+}
+
+impl<const N: usize> PartialEq for Dual<N> {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
+    }
+}
+
+impl<const N: usize> PartialOrd for Dual<N> {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        self.value.partial_cmp(&other.value)
+    }
+}
+
+impl<const N: usize> PartialEq<f64> for Dual<N> {
+    fn eq(&self, other: &f64) -> bool {
+        self.value == *other
+    }
+}
+
+impl<const N: usize> PartialOrd<f64> for Dual<N> {
+    fn partial_cmp(&self, other: &f64) -> Option<std::cmp::Ordering> {
+        self.value.partial_cmp(other)
+    }
+}
+
+impl<const N: usize> Neg for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        self.chained(-self.value, -1.0)
+    }
+}
+
+/// An operation of two duals, and of a dual and a real number, from the value and the derivatives by
+/// both.
+macro_rules! operation {
+    ($trait:ident $function:ident: |$a:ident, $b:ident| $value:expr, $by_a:expr, $by_b:expr) => {
+        impl<const N: usize> $trait for Dual<N> {
+            type Output = Self;
+            #[inline]
+            fn $function(self, other: Self) -> Self {
+                let ($a, $b) = (self.value, other.value);
+                Self::of_two($value, $by_a, &self, $by_b, &other)
+            }
+        }
+        impl<const N: usize> $trait<f64> for Dual<N> {
+            type Output = Self;
+            #[inline]
+            fn $function(self, $b: f64) -> Self {
+                let $a = self.value;
+                let _ = $a;
+                self.chained($value, $by_a)
+            }
+        }
+    };
+}
+operation!(Add add: |a, b| a + b, 1.0, 1.0);
+operation!(Sub sub: |a, b| a - b, 1.0, -1.0);
+operation!(Mul mul: |a, b| a * b, b, a);
+operation!(Div div: |a, b| a / b, 1.0 / b, -a / (b * b));
+
+impl<const N: usize> AddAssign for Dual<N> {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<const N: usize> SubAssign for Dual<N> {
+    #[inline]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+/// The derivative of an update by its increment, row by row, and the flux: one evaluation with
+/// numbers that carry `N` derivatives.
+///
+/// # Errors
+/// What `update` fails with.
+#[inline]
+pub fn tangent<const N: usize>(
+    increment: &[f64; N],
+    update: impl FnOnce([Dual<N>; N]) -> Result<[Dual<N>; N], Failure>,
+) -> Result<([f64; N], [[f64; N]; N]), Failure> {
+    let moved = std::array::from_fn(|k| Dual::variable(increment[k], k));
+    let flux = update(moved)?;
+    Ok((flux.map(|row| row.value), flux.map(|row| row.rates)))
+}
+
+/// A struct of numbers of one kind, made by [`parameters!`](crate::parameters) or
+/// [`internal_variables!`](crate::internal_variables) with `struct Name<T>`.
+pub trait Values<T>: Copy + Send + Sync {
+    /// Collects the values, number by number.
+    fn collect(value: impl Fn(usize) -> T) -> Self;
+    /// Hands out the values, number by number.
+    fn hand_out(&self, put: impl FnMut(usize, T));
+}
+
+impl<T> Values<T> for () {
+    fn collect(_: impl Fn(usize) -> T) -> Self {}
+    fn hand_out(&self, _: impl FnMut(usize, T)) {}
+}
+
+/// The end of an increment, for any number.
+#[derive(Clone, Copy, Debug)]
+pub struct InterfaceEnd<S, T> {
+    /// Traction, kPa.
+    pub traction: [T; 2],
+    /// Internal variables.
+    pub state: S,
+}
+
+/// A law for interfaces in two dimensions that is written for any number. [`ByDuals`] makes an
+/// [`InterfaceLaw`] of it.
+pub trait DualInterfaceLaw: Sized + Send + Sync + 'static {
+    /// What the law is called.
+    const DESCRIPTION: Description;
+    /// The tangent is symmetric in every state.
+    const SYMMETRIC: bool = false;
+    /// Declared with [`parameters!`](crate::parameters) as `struct Name<T>`.
+    type Parameters<T: Number>: Values<T>;
+    /// Declared with [`internal_variables!`](crate::internal_variables) as `struct Name<T>`, or `()`.
+    type State<T: Number>: Values<T>;
+    /// What updates need of the parameters.
+    type Fixed<T: Number>: Send + Sync + 'static;
+
+    /// Fixes the parameters, each within its bounds.
+    ///
+    /// # Errors
+    /// Names the parameter to change.
+    fn new<T: Number>(parameters: Self::Parameters<T>) -> Result<Self::Fixed<T>, Refusal>;
+
+    /// Internal variables of a point that carries this traction before anything has happened;
+    /// `declared` are the declared initial values.
+    ///
+    /// # Errors
+    /// [`Failure::Domain`] if the law cannot start from this traction.
+    fn initial_state<T: Number>(
+        fixed: &Self::Fixed<T>,
+        traction: &[T; 2],
+        declared: Self::State<T>,
+    ) -> Result<Self::State<T>, Failure> {
+        let _ = (fixed, traction);
+        Ok(declared)
+    }
+
+    /// Carries one point over an increment.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    fn update<T: Number>(
+        fixed: &Self::Fixed<T>,
+        point: &InterfacePoint<Self::State<T>, T>,
+    ) -> Result<InterfaceEnd<Self::State<T>, T>, Failure>;
+
+    /// The elastic operator in a state, row by row, kPa/m.
+    fn elastic(fixed: &Self::Fixed<f64>, state: &Self::State<f64>) -> [[f64; 2]; 2];
+}
+
+/// A [`DualInterfaceLaw`] as a law: its consistent tangent by duals with two derivatives, its rates
+/// by duals with one.
+pub struct ByDuals<L: DualInterfaceLaw> {
+    parameters: L::Parameters<f64>,
+    fixed: L::Fixed<f64>,
+    fixed_2: L::Fixed<Dual<2>>,
+}
+
+impl<L: DualInterfaceLaw> Debug for ByDuals<L> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("ByDuals").field(&L::DESCRIPTION.id).finish()
+    }
+}
+
+/// The values of a struct as duals, the `k`-th with the rates that `rates` gives.
+fn lifted<const N: usize, V: Values<f64>, D: Values<Dual<N>>>(
+    values: &V,
+    rates: impl Fn(usize) -> [f64; N],
+) -> D {
+    D::collect(|k| {
+        let mut value = f64::NAN;
+        values.hand_out(|i, x| {
+            if i == k {
+                value = x;
+            }
+        });
+        Dual {
+            value,
+            rates: rates(k),
+        }
+    })
+}
+
+/// The values of duals.
+fn dropped<const N: usize, D: Values<Dual<N>>, V: Values<f64>>(duals: &D) -> V {
+    of_one(duals, |dual| dual.value)
+}
+
+/// One number of each dual.
+fn of_one<const N: usize, D: Values<Dual<N>>, V: Values<f64>>(
+    duals: &D,
+    number: impl Fn(Dual<N>) -> f64,
+) -> V {
+    V::collect(|k| {
+        let mut found = f64::NAN;
+        duals.hand_out(|i, dual| {
+            if i == k {
+                found = number(dual);
+            }
+        });
+        found
+    })
+}
+
+/// The point of an interface as duals with one derivative.
+fn with_rates<L: DualInterfaceLaw>(
+    point: &InterfacePoint<L::State<f64>>,
+    rates: &InterfaceRates<'_, L::State<f64>>,
+) -> InterfacePoint<L::State<Dual<1>>, Dual<1>> {
+    let both = |values: &[f64; 2], rates: &[f64; 2]| {
+        std::array::from_fn(|k| Dual {
+            value: values[k],
+            rates: [rates[k]],
+        })
+    };
+    InterfacePoint {
+        jump: both(&point.jump, &rates.jump),
+        jump_increment: both(&point.jump_increment, &rates.jump_increment),
+        traction: both(&point.traction, &rates.traction),
+        state: lifted(&point.state, |k| [value_of(&rates.state, k)]),
+        time: point.time,
+        time_increment: point.time_increment,
+        step_time: point.step_time,
+    }
+}
+
+/// One value of a struct.
+fn value_of<V: Values<f64>>(values: &V, number: usize) -> f64 {
+    let mut found = 0.0;
+    values.hand_out(|i, x| {
+        if i == number {
+            found = x;
+        }
+    });
+    found
+}
+
+impl<L: DualInterfaceLaw> ByDuals<L> {
+    /// The law with parameters that have these rates.
+    fn with_parameter_rates(&self, rates: Option<&[f64]>) -> Result<L::Fixed<Dual<1>>, Failure> {
+        let rate = |k: usize| [rates.and_then(|all| all.get(k)).copied().unwrap_or(0.0)];
+        L::new(lifted(&self.parameters, rate))
+            .map_err(|_| Failure::Numeric("the parameters are refused with their rates"))
+    }
+}
+
+impl<L> InterfaceLaw for ByDuals<L>
+where
+    L: DualInterfaceLaw,
+    L::Parameters<f64>: Parameters,
+    L::State<f64>: InternalVariables,
+{
+    const DESCRIPTION: Description = L::DESCRIPTION;
+    const SYMMETRIC: bool = L::SYMMETRIC;
+    const RATES: bool = true;
+    type Parameters = L::Parameters<f64>;
+    type State = L::State<f64>;
+
+    fn new(parameters: Self::Parameters) -> Result<Self, Refusal> {
+        Ok(Self {
+            parameters,
+            fixed: L::new(parameters)?,
+            fixed_2: L::new(lifted(&parameters, |_| [0.0; 2]))?,
+        })
+    }
+
+    fn initial_state(&self, traction: &[f64; 2]) -> Result<Self::State, Failure> {
+        L::initial_state(&self.fixed, traction, Self::State::initial())
+    }
+
+    #[inline]
+    fn update(
+        &self,
+        point: &InterfacePoint<Self::State>,
+        tangent: Tangent,
+    ) -> Result<InterfaceResponse<Self::State>, Failure> {
+        let without = |end: InterfaceEnd<Self::State, f64>, tangent| InterfaceResponse {
+            traction: end.traction,
+            state: end.state,
+            tangent,
+            unreliable: None,
+        };
+        match tangent {
+            Tangent::None => Ok(without(L::update(&self.fixed, point)?, [[0.0; 2]; 2])),
+            Tangent::Elastic => {
+                let end = L::update(&self.fixed, point)?;
+                Ok(without(end, L::elastic(&self.fixed, &end.state)))
+            }
+            Tangent::Consistent => {
+                let lift = |values: &[f64; 2]| values.map(Dual::constant);
+                let start = InterfacePoint {
+                    jump: lift(&point.jump),
+                    jump_increment: std::array::from_fn(|k| {
+                        Dual::variable(point.jump_increment[k], k)
+                    }),
+                    traction: lift(&point.traction),
+                    state: lifted(&point.state, |_| [0.0; 2]),
+                    time: point.time,
+                    time_increment: point.time_increment,
+                    step_time: point.step_time,
+                };
+                let end = L::update(&self.fixed_2, &start)?;
+                Ok(InterfaceResponse {
+                    traction: end.traction.map(|row| row.value),
+                    state: dropped(&end.state),
+                    tangent: end.traction.map(|row| row.rates),
+                    unreliable: None,
+                })
+            }
+        }
+    }
+
+    fn rates(
+        &self,
+        point: &InterfacePoint<Self::State>,
+        rates: &InterfaceRates<'_, Self::State>,
+    ) -> Result<([f64; 2], Self::State), Failure> {
+        let fixed = self.with_parameter_rates(rates.parameter)?;
+        let end = L::update(&fixed, &with_rates::<L>(point, rates))?;
+        let rate = |dual: Dual<1>| dual.rates[0];
+        Ok((end.traction.map(rate), of_one(&end.state, rate)))
+    }
+
+    fn initial_rates(
+        &self,
+        traction: &[f64; 2],
+        rates: &InterfaceRates<'_, Self::State>,
+    ) -> Result<Self::State, Failure> {
+        let fixed = self.with_parameter_rates(rates.parameter)?;
+        let traction = std::array::from_fn(|k| Dual {
+            value: traction[k],
+            rates: [rates.traction[k]],
+        });
+        let declared = lifted(&Self::State::initial(), |_| [0.0; 1]);
+        let state = L::initial_state(&fixed, &traction, declared)?;
+        Ok(of_one(&state, |dual| dual.rates[0]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every function against central differences; the bound is what those can tell.
+    #[test]
+    fn derivatives_are_those_of_the_functions() {
+        fn all<T: Number>(x: T) -> [T; 12] {
+            [
+                x.sqrt(),
+                x.exp(),
+                x.ln(),
+                x.sin(),
+                x.cos(),
+                x.tan(),
+                x.tanh(),
+                x.powf(2.5),
+                x.to_radians(),
+                -x.abs() * 3.0 + x.max(T::from(2.0)),
+                (x * x + 1.0) / (x - 5.0),
+                (x / 2.0 - x) * x.min(T::from(0.5)),
+            ]
+        }
+        for x in [0.3, 0.9, 1.4] {
+            let exact = all(Dual::<1>::variable(x, 0));
+            let h = 6e-6;
+            let (above, below) = (all(x + h), all(x - h));
+            for (k, dual) in exact.iter().enumerate() {
+                assert_eq!(dual.value.to_bits(), all(x)[k].to_bits(), "function {k}");
+                let difference = (above[k] - below[k]) / (2.0 * h);
+                let error = (dual.rates[0] - difference).abs();
+                assert!(
+                    error < 1e-8 * difference.abs().max(1.0),
+                    "function {k}: {error:e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    #[expect(clippy::float_cmp, reason = "small whole numbers are exact")]
+    fn a_tangent_is_exact() {
+        let (flux, operator) = tangent(&[2.0, 3.0], |[x, y]| {
+            let mut sum = x * y;
+            sum += x;
+            sum -= y * y;
+            Ok([sum, x / y])
+        })
+        .unwrap();
+        assert_eq!(flux, [-1.0, 2.0 / 3.0]);
+        assert_eq!(operator, [[4.0, -4.0], [1.0 / 3.0, -2.0 / 9.0]]);
+    }
+}

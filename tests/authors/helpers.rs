@@ -1,0 +1,153 @@
+//! What the helpers for C, C++ and Fortran offer beside one law with internal variables: several laws
+//! in a library, laws without parameters or internal variables, choices, optional parameters,
+//! initial values, and what happens with more internal variables than they have room for.
+
+use crate::compilers::{library, repository};
+use crate::program::pilum;
+use abi::Hypothesis;
+use law::{SearchPath, Strided};
+use std::process::Command;
+use tempfile::TempDir;
+use tests::needs::compiler;
+
+#[test]
+fn a_library_holds_several_laws() {
+    for suffix in ["cpp", "f90"] {
+        let folder = TempDir::new().unwrap();
+        let language = if suffix == "cpp" { "cpp" } else { "fortran" };
+        let (spring, counter) = (format!("spring_{language}"), format!("counter_{language}"));
+        let source = repository(&format!("tests/authors/two_laws.{suffix}"));
+        // A library without a manifest is found by its name alone, so it is there under both.
+        let Some(file) = library(&source, &spring, folder.path()) else {
+            continue;
+        };
+        let other = file.to_str().unwrap().replace(&spring, &counter);
+        std::fs::copy(&file, other).unwrap();
+        let search = SearchPath::new(&[folder.path().to_owned()]);
+        let law = search.law(&spring).unwrap();
+        let kind = &law.description().parameters[0];
+        assert_eq!(kind.choices, ["soft", "stiff"]);
+        assert_eq!(kind.default, Some(0.0));
+        assert!(law.description().parameters[1].optional);
+        let built = law
+            .build(Hypothesis::Interface2d, &[1.0, f64::NAN])
+            .unwrap();
+        assert_eq!(built.n_states(), 0);
+        let refused = law.build(Hypothesis::Interface2d, &[0.5, 1.0]).unwrap_err();
+        assert!(refused.reason.contains("kind"), "{refused:?}");
+        let law = search.law(&counter).unwrap();
+        assert!(law.description().parameters.is_empty());
+        let built = law.build(Hypothesis::Interface2d, &[]).unwrap();
+        let state = built.initial_state(1, (&[0.0; 2], Strided::rows(2)));
+        assert_eq!(state.unwrap(), [7.0]);
+        let outcome = pilum(folder.path(), &["check", file.to_str().unwrap()]);
+        assert_eq!(
+            outcome.code,
+            Some(0),
+            "{}{}",
+            outcome.stdout,
+            outcome.stderr
+        );
+    }
+}
+
+/// More internal variables than there is room for: refused with a hint, and carried once there is.
+#[test]
+fn many_internal_variables_are_refused_or_carried() {
+    let source = repository("tests/authors/many_states.c");
+    let Some(cc) = compiler("CC", "cc") else {
+        return;
+    };
+    for (room, says) in [(None, Some("define PILUM_MAX_STATES")), (Some(400), None)] {
+        let folder = TempDir::new().unwrap();
+        let to = folder.path().join("libmany_states.so");
+        let mut command = Command::new(&cc);
+        command.args(["-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden"]);
+        command.args(room.map(|n| format!("-DPILUM_MAX_STATES={n}")));
+        command.arg("-I").arg(repository("abi/include"));
+        crate::compilers::run(command.arg(&source).arg("-o").arg(&to).arg("-lm"));
+        let outcome = pilum(folder.path(), &["check", "./libmany_states.so"]);
+        assert_eq!(
+            outcome.code == Some(0),
+            says.is_none(),
+            "{}",
+            outcome.stdout
+        );
+        if let Some(says) = says {
+            assert!(outcome.stdout.contains(says), "{}", outcome.stdout);
+        }
+    }
+}
+
+/// The same law in C++ does not compile.
+#[test]
+fn a_class_with_too_many_internal_variables_does_not_compile() {
+    let Some(cxx) = compiler("CXX", "c++") else {
+        return;
+    };
+    let text = std::fs::read_to_string(repository("tests/authors/two_laws.cpp")).unwrap();
+    for (room, compiles) in [("256", true), ("0", false)] {
+        let folder = TempDir::new().unwrap();
+        std::fs::write(folder.path().join("two_laws.cpp"), &text).unwrap();
+        let mut command = Command::new(&cxx);
+        command.args(["-std=c++17", "-fsyntax-only", "-w", "two_laws.cpp", "-I"]);
+        command
+            .arg(repository("abi/include"))
+            .current_dir(folder.path());
+        let output = command
+            .arg(format!("-DPILUM_MAX_STATES={room}"))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.success(), compiles, "{said}");
+        assert!(compiles || said.contains("more internal variables than PILUM_MAX_STATES"));
+    }
+}
+
+/// In Fortran the law is refused as soon as it gets parameters.
+#[test]
+fn too_many_of_anything_in_fortran_is_said() {
+    let text = std::fs::read_to_string(repository("tests/authors/two_laws.f90")).unwrap();
+    for (statement, says) in [
+        (
+            "call add_state(257, 'x', 'x', '-', 'X.')",
+            "not within 1 and MAX_STATES",
+        ),
+        (
+            "do k = 1, 300; call add_parameter('x', 'x', '-', 'X.'); end do",
+            "more parameters than MAX_PARAMETERS",
+        ),
+        (
+            "call add_parameter('x', 'x', '-', 'X.', choices=[('a', k=1, 40)])",
+            "more labels of x than MAX_CHOICES",
+        ),
+    ] {
+        let folder = TempDir::new().unwrap();
+        let source = folder.path().join("two_laws.f90");
+        let changed = text
+            .replace(
+                "subroutine describe()",
+                "subroutine describe()\n    integer :: k",
+            )
+            .replace(
+                "    call add_state(1,",
+                &format!("    {statement}\n    call add_state(1,"),
+            );
+        assert_ne!(changed, text);
+        std::fs::write(&source, changed).unwrap();
+        let Some(compiler) = compiler("FC", "gfortran") else {
+            return;
+        };
+        let mut command = Command::new(compiler);
+        command.args(["-frecursive", "-shared", "-fPIC", "-fvisibility=hidden"]);
+        command.arg(repository("abi/include/pilum_law.f90"));
+        command.args(["two_laws.f90", "-o", "libtwo_laws.so"]);
+        crate::compilers::run(command.current_dir(folder.path()));
+        let outcome = pilum(
+            folder.path(),
+            &["check", "./libtwo_laws.so", "--only=create-works"],
+        );
+        assert_eq!(outcome.code, Some(3), "{}", outcome.stdout);
+        assert!(outcome.stdout.contains(says), "{}", outcome.stdout);
+    }
+}

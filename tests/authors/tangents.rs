@@ -1,0 +1,185 @@
+//! Laws without a consistent tangent, and with one by differences.
+//!
+//! Goal        a law may say that its tangent is approximate, or that it has none, and is solved all
+//!             the same; differences are as good as the derivative
+//! Set-up      the joint of `models/foreign` in C, with what it writes as its tangent changed
+//!             (derivative, differences, elastic operator, none), between two blocks, pressed and pushed
+//!             into slip with dilatancy
+//! Asserts     the same shear traction to the tolerance of the solver; iterations of differences as of the
+//!             derivative; the method that the declaration chooses; `pilum check` passes
+
+use crate::compilers::{library, repository};
+use crate::program::pilum;
+use serde_json::Value;
+use std::path::Path;
+use tempfile::TempDir;
+
+const CASE: &str = r#"
+law_path = ["."]
+analysis = "plane_strain"
+[mesh]
+columns = [{ n = 4, to = 1.0 }]
+rows = [{ n = 2, to = 0.5 }, { n = 2, to = 1.0 }]
+lines = { bottom = { y = 0.0 }, joint = { y = 0.5 }, top = { y = 1.0 } }
+[[mesh.region]]
+group = "blocks"
+[laws.block]
+law = "elastic"
+parameters = { young_modulus = 1e5, poisson_ratio = 0.2 }
+[laws.joint]
+law = "coulomb_joint_c"
+parameters = { normal_stiffness = 1e6, shear_stiffness = 4e5, cohesion = 2.0, friction_angle = 30.0, dilatancy_angle = 10.0 }
+[groups.blocks]
+formulation = "solid"
+law = "block"
+[groups.joint]
+formulation = "zero_thickness"
+line = "joint"
+law = "joint"
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[probes]
+shear = { group = "joint", quantity = "traction_t" }
+[solver]
+force_tolerance = 1e-9
+displacement_tolerance = 1e-9
+[[phase]]
+name = "press"
+increments = 2
+displacement = [{ line = "top", x = 0.0, y = -1e-3 }]
+[[phase]]
+name = "push"
+increments = 10
+displacement = [{ line = "top", x = 6e-3, y = -1e-3 }]
+"#;
+
+/// What the law writes as its tangent: a change of its source, and of its flags.
+struct Variant {
+    name: &'static str,
+    flags: &'static str,
+    tangent: &'static str,
+}
+
+const VARIANTS: [Variant; 4] = [
+    Variant {
+        name: "derivative",
+        flags: "0",
+        tangent: "",
+    },
+    Variant {
+        name: "differences",
+        flags: "0",
+        tangent: "if (tangent == PILUM_TANGENT_CONSISTENT) {\n\
+                  carry(joint, point, end);\n\
+                  double size = (fabs(point->flux[0]) + 1.0) / fmax(joint->k_n, joint->k_t);\n\
+                  return pilum_differentiate(joint, point, update, size, end);\n}\n",
+    },
+    Variant {
+        name: "approximate",
+        flags: "PILUM_T_TANGENT_APPROXIMATE",
+        tangent: "if (tangent == PILUM_TANGENT_CONSISTENT) { tangent = PILUM_TANGENT_ELASTIC; }\n",
+    },
+    Variant {
+        name: "none",
+        flags: "PILUM_T_NO_TANGENT",
+        tangent: "if (tangent == PILUM_TANGENT_CONSISTENT) { return PILUM_E_UNSUPPORTED; }\n",
+    },
+];
+
+/// Builds a variant as `coulomb_joint_c` in a folder. `None`: there is no compiler.
+fn built(variant: &Variant, folder: &Path) -> Option<std::path::PathBuf> {
+    let text = std::fs::read_to_string(repository("models/foreign/coulomb_joint.c")).unwrap();
+    let hypothesis = "    .hypothesis = PILUM_H_INTERFACE_2D,\n";
+    let begin = "pilum_tangent tangent, pilum_response *end) {\n    carry(";
+    assert!(text.contains(hypothesis) && text.contains(begin));
+    let changed = text
+        .replace(
+            hypothesis,
+            &format!("{hypothesis}    .flags = {},\n", variant.flags),
+        )
+        .replace(
+            begin,
+            &begin.replace("    carry(", &format!("{}    carry(", variant.tangent)),
+        );
+    let source = folder.join("coulomb_joint.c");
+    std::fs::write(&source, changed).unwrap();
+    library(&source, "coulomb_joint_c", folder)
+}
+
+/// The mean shear traction at the end, iterations of all phases, the method of the last, and what was said.
+fn solved(folder: &Path) -> (f64, u64, String, String) {
+    std::fs::write(folder.join("case.toml"), CASE).unwrap();
+    let outcome = pilum(folder, &["run", "case.toml", "--out", "results"]);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let history = std::fs::read_to_string(folder.join("results/history.csv")).unwrap();
+    let mut lines = history.lines();
+    let column = lines
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|name| name == "shear");
+    let last = lines
+        .last()
+        .unwrap()
+        .split(',')
+        .nth(column.unwrap())
+        .unwrap();
+    let summary = std::fs::read_to_string(folder.join("results/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let phases = summary["phases"].as_array().unwrap();
+    let iterations = phases
+        .iter()
+        .map(|phase| phase["iterations"].as_u64().unwrap())
+        .sum();
+    let method = phases.last().unwrap()["method"]
+        .as_str()
+        .unwrap_or("auto")
+        .to_owned();
+    (last.parse().unwrap(), iterations, method, outcome.stderr)
+}
+
+#[test]
+fn every_kind_of_tangent_is_solved() {
+    let mut expected: Option<(f64, u64)> = None;
+    for variant in &VARIANTS {
+        let name = variant.name;
+        let folder = TempDir::new().unwrap();
+        let Some(file) = built(variant, folder.path()) else {
+            return;
+        };
+        let (shear, iterations, method, said) = solved(folder.path());
+        println!("{name}: shear traction {shear:.9e}, {iterations} iterations by {method}");
+        let (of_derivative, few) = *expected.get_or_insert((shear, iterations));
+        assert!(
+            (shear - of_derivative).abs() <= 1e-6 * of_derivative.abs(),
+            "{name}: {shear}, by the derivative {of_derivative}"
+        );
+        let is_exact = variant.flags == "0";
+        assert_eq!(method == "quasi_newton", !is_exact, "{name}: {method}");
+        assert_eq!(said.contains("stands for"), !is_exact, "{name}: {said}");
+        assert!(!said.contains("differs"), "{name}: {said}");
+        if is_exact {
+            assert!(iterations <= few + 1, "{name}: {iterations}, {few}");
+        }
+        let path = file.to_str().unwrap();
+        let outcome = pilum(folder.path(), &["check", path]);
+        assert_eq!(
+            outcome.code,
+            Some(0),
+            "{}{}",
+            outcome.stdout,
+            outcome.stderr
+        );
+        let page = pilum(
+            folder.path(),
+            &["laws", "coulomb_joint_c", "--law-path", "."],
+        );
+        let says = match variant.flags {
+            "0" => "tangent unsymmetric",
+            "PILUM_T_NO_TANGENT" => "no tangent but the elastic operator",
+            _ => "tangent unsymmetric, approximate",
+        };
+        assert!(page.stdout.contains(says), "{}{}", page.stdout, page.stderr);
+    }
+}
