@@ -481,7 +481,7 @@ fn what_is_no_pile_is_told_where_it_is_written() {
         ),
         (
             ("head = \"head\"\n", "head = \"far\"\n"),
-            "`far` has no node of the pile's groups",
+            "`far` has no side of the pile's elements",
         ),
         (
             ("head = \"head\"\n", "head = \"head\"\ndiameter = -1.0\n"),
