@@ -70,12 +70,14 @@ const EXPORTS: File = ("exports.map", contract!("include/exports.map"));
 const CONTRACT: File = ("CONTRACT.md", contract!("README.md"));
 
 /// The contract's crate without its optional features, and the one that exports laws to other programs.
-const CRATES: [File; 21] = [
+const CRATES: [File; 23] = [
     (ABI_MANIFEST, template!("rust/abi.toml.txt")),
     ("abi/README.md", contract!("README.md")),
     ("abi/src/lib.rs", contract!("src/lib.rs")),
     ("abi/src/access.rs", contract!("src/access.rs")),
     ("abi/src/descriptor.rs", contract!("src/descriptor.rs")),
+    ("abi/src/differences.rs", contract!("src/differences.rs")),
+    ("abi/src/dual.rs", contract!("src/dual.rs")),
     ("abi/src/export.rs", contract!("src/export.rs")),
     (
         "abi/src/export/adapter.rs",
