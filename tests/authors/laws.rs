@@ -82,6 +82,7 @@ fn json_says_the_same() {
     for id in [
         "coulomb_joint",
         "elastic",
+        "hyperbolic_joint",
         "mepi",
         "mepi_softening",
         "mohr_coulomb",

@@ -32,6 +32,11 @@ fn elastic_passes() {
 }
 
 #[test]
+fn hyperbolic_joint_passes() {
+    passes(&library_of("hyperbolic_joint"));
+}
+
+#[test]
 fn mepi_passes() {
     passes(&library_of("mepi"));
 }

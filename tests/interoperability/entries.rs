@@ -53,6 +53,14 @@ fn laws_for_solids() {
 fn laws_for_interfaces() {
     let joint = [1e6, 4e5, 1.0, 30.0, 5.0];
     compare("coulomb_joint", "CoulombJoint", -100.0, 1e-4, &joint);
+    let hyperbolic = [1e6, 2e4, 0.6, 0.85, 4.0, 30.0];
+    compare(
+        "hyperbolic_joint",
+        "HyperbolicJoint",
+        -100.0,
+        1e-4,
+        &hyperbolic,
+    );
     let mepi = [1e3, 0.4e3, 0.9, 0.2, 0.62, 0.5, 8e-3, 1.5, 2e-3];
     compare("mepi", "Mepi", -100.0, 1e-5, &mepi);
     // P0 and SigmaNi stand between those that must be given.

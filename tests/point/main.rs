@@ -11,6 +11,7 @@
 mod coulomb_joint;
 mod driver;
 mod elastic;
+mod hyperbolic_joint;
 mod input_errors;
 mod mepi;
 mod mepi_softening;
