@@ -27,6 +27,11 @@ fn coulomb_joint_passes() {
 }
 
 #[test]
+fn cyclic_joint_passes() {
+    passes(&library_of("cyclic_joint"));
+}
+
+#[test]
 fn elastic_passes() {
     passes(&library_of("elastic"));
 }

@@ -53,6 +53,8 @@ fn laws_for_solids() {
 fn laws_for_interfaces() {
     let joint = [1e6, 4e5, 1.0, 30.0, 5.0];
     compare("coulomb_joint", "CoulombJoint", -100.0, 1e-4, &joint);
+    let cyclic = [1e6, 4e5, 35.0, 25.0, 5e-3, 2.0, 1e-3];
+    compare("cyclic_joint", "CyclicJoint", -100.0, 1e-4, &cyclic);
     let hyperbolic = [1e6, 2e4, 0.6, 0.85, 4.0, 30.0];
     compare(
         "hyperbolic_joint",
