@@ -87,6 +87,8 @@ fn json_says_the_same() {
         "mepi",
         "mepi_softening",
         "mohr_coulomb",
+        "qz_curve",
+        "tz_curve",
     ] {
         assert!(ids.contains(&id), "{ids:?}");
     }

@@ -56,6 +56,11 @@ fn oriented_mohr_coulomb_passes() {
     passes(&library_of("oriented_mohr_coulomb"));
 }
 
+#[test]
+fn tz_curve_passes() {
+    passes(&library_of("tz_curve"));
+}
+
 /// Structs of a later minor version are longer, and tables have another stride.
 #[test]
 fn a_library_of_a_later_minor_version_passes() {

@@ -23,3 +23,4 @@ mod oriented_mohr_coulomb;
 mod rules;
 mod runaway;
 mod singular;
+mod tz_curve;
