@@ -81,10 +81,14 @@ fn json_says_the_same() {
         .collect();
     for id in [
         "coulomb_joint",
+        "cyclic_joint",
         "elastic",
+        "hyperbolic_joint",
         "mepi",
         "mepi_softening",
         "mohr_coulomb",
+        "qz_curve",
+        "tz_curve",
     ] {
         assert!(ids.contains(&id), "{ids:?}");
     }

@@ -12,5 +12,6 @@ mod chamber_loading;
 mod chamber_mesh;
 mod chamber_soil_law;
 mod ground;
+mod joint_laws;
 mod shear_box;
 mod variant;

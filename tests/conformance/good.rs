@@ -27,8 +27,18 @@ fn coulomb_joint_passes() {
 }
 
 #[test]
+fn cyclic_joint_passes() {
+    passes(&library_of("cyclic_joint"));
+}
+
+#[test]
 fn elastic_passes() {
     passes(&library_of("elastic"));
+}
+
+#[test]
+fn hyperbolic_joint_passes() {
+    passes(&library_of("hyperbolic_joint"));
 }
 
 #[test]
@@ -44,6 +54,11 @@ fn mohr_coulomb_passes() {
 #[test]
 fn oriented_mohr_coulomb_passes() {
     passes(&library_of("oriented_mohr_coulomb"));
+}
+
+#[test]
+fn tz_curve_passes() {
+    passes(&library_of("tz_curve"));
 }
 
 /// Structs of a later minor version are longer, and tables have another stride.

@@ -131,6 +131,19 @@ const COMMITTED: &[Committed] = &[
         "*",
         &["friction", "normal_stress", "toe_load"],
     ),
+    ("joint_laws/hyperbolic.toml", "", "*", &["hyperbolic_tau"]),
+    (
+        "joint_laws/cyclic.toml",
+        "",
+        "*",
+        &["cyclic_tau", "cyclic_sigma_n"],
+    ),
+    (
+        "joint_laws/load_transfer.toml",
+        "",
+        "*",
+        &["load_transfer_tau"],
+    ),
     (
         "shear_box/fontainebleau.toml",
         "",
@@ -174,7 +187,10 @@ fn pictures() -> BTreeSet<PathBuf> {
 fn draw(input: &str) -> TempDir {
     let place = TempDir::new().unwrap();
     let path = cases().join(input);
-    if input.starts_with("shear_box/") {
+    if ["shear_box/", "joint_laws/"]
+        .iter()
+        .any(|point| input.starts_with(point))
+    {
         run_file_variants(&path, None, Some(&place.path().join("rows.csv")), |_| ()).unwrap();
         return place;
     }

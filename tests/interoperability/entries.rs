@@ -19,7 +19,11 @@ static ENTRIES: LazyLock<(TempDir, PathBuf)> = LazyLock::new(|| {
 
 /// Panics if an entry differs from the native one.
 fn compare(law: &str, behaviour: &str, flux: f64, step: f64, parameters: &[f64]) {
-    let file = law.strip_suffix("_softening").unwrap_or(law);
+    let file = match law {
+        "mepi_softening" => "mepi",
+        "qz_curve" => "tz_curve",
+        law => law,
+    };
     let mut command = Command::new(&ENTRIES.1);
     command.arg(library(file)).args([law, behaviour]);
     let numbers = [flux, step].into_iter().chain(parameters.iter().copied());
@@ -53,10 +57,24 @@ fn laws_for_solids() {
 fn laws_for_interfaces() {
     let joint = [1e6, 4e5, 1.0, 30.0, 5.0];
     compare("coulomb_joint", "CoulombJoint", -100.0, 1e-4, &joint);
+    let cyclic = [1e6, 4e5, 35.0, 25.0, 5e-3, 2.0, 1e-3];
+    compare("cyclic_joint", "CyclicJoint", -100.0, 1e-4, &cyclic);
+    let hyperbolic = [1e6, 2e4, 0.6, 0.85, 4.0, 30.0];
+    compare(
+        "hyperbolic_joint",
+        "HyperbolicJoint",
+        -100.0,
+        1e-4,
+        &hyperbolic,
+    );
     let mepi = [1e3, 0.4e3, 0.9, 0.2, 0.62, 0.5, 8e-3, 1.5, 2e-3];
     compare("mepi", "Mepi", -100.0, 1e-5, &mepi);
     // P0 and SigmaNi stand between those that must be given.
     let (other, softening) = (f64::NAN, [0.45, 5.0, 2e-4]);
     let mepi = [&mepi[..], &[other, other], &softening[..]].concat();
     compare("mepi_softening", "MepiSoftening", -100.0, 1e-5, &mepi);
+    let shaft = [12e3, 0.6, 1.0, 80.0, 1e6];
+    compare("tz_curve", "TzCurve", -100.0, 1e-3, &shaft);
+    let base = [12e3, 0.6, 0.0, 2e3, 1e5];
+    compare("qz_curve", "QzCurve", -100.0, 1e-3, &base);
 }

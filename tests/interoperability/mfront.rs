@@ -188,7 +188,10 @@ fn bounds_and_defaults_of_our_laws_are_exported() {
         ("mohr_coulomb", "3d"),
         ("oriented_mohr_coulomb", "axisymmetric"),
         ("coulomb_joint", "interface_2d"),
+        ("cyclic_joint", "interface_2d"),
+        ("hyperbolic_joint", "interface_2d"),
         ("mepi", "interface_2d"),
+        ("tz_curve", "interface_2d"),
     ] {
         let native = Opener::default().open(&library(file)).unwrap();
         let foreign = Foreign {

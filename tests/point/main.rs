@@ -9,8 +9,10 @@
 #![allow(clippy::doc_markdown, reason = "the headers hold formulas")]
 
 mod coulomb_joint;
+mod cyclic_joint;
 mod driver;
 mod elastic;
+mod hyperbolic_joint;
 mod input_errors;
 mod mepi;
 mod mepi_softening;
@@ -21,3 +23,4 @@ mod oriented_mohr_coulomb;
 mod rules;
 mod runaway;
 mod singular;
+mod tz_curve;

@@ -443,7 +443,65 @@ fn law() -> impl Strategy<Value = Law> {
                 modulus: 86e3 * 100_f64.powf(n),
             }
         });
-    prop_oneof![1 => elastic, 5 => mohr_coulomb, 2 => oriented, 3 => joint, 4 => mepi]
+    let hyperbolic = (
+        3.0..5.0_f64,
+        prop_oneof![Just(0.0), Just(1.0), 0.0..1.2_f64],
+        prop_oneof![Just(0.0), Just(1.0), 0.5..1.0_f64],
+        5.0..45.0_f64,
+        1.0..4.0_f64,
+    )
+        .prop_map(|(number, n, r_f, delta, unloading)| {
+            let number = 10_f64.powf(number);
+            Law {
+                id: "hyperbolic_joint",
+                hypothesis: "interface_2d",
+                parameters: vec![
+                    ("normal_stiffness", 20.0 * number, 1.0),
+                    ("stiffness_number", number, 0.0),
+                    ("stiffness_exponent", n, 0.0),
+                    ("failure_ratio", r_f, 0.0),
+                    // It goes where contact is lost: led to no normal traction, rounding decides.
+                    ("adhesion", 0.0, 1.0),
+                    ("friction_angle", delta, 0.0),
+                    ("unloading_number", number * unloading, 0.0),
+                    ("unit_weight_of_water", 9.81, 1.0),
+                    ("atmospheric_pressure", 101.325, 1.0),
+                ],
+                modulus: 40.0 * number,
+            }
+        });
+    let cyclic = (
+        prop::sample::select(vec![1e4, 1e6, 1e9]),
+        0.1..10.0_f64,
+        (10.0..45.0_f64, 0.3..1.0_f64),
+        prop_oneof![Just(0.0), 2.0..10.0_f64],
+        (-4.0..0.0_f64, -4.0..0.0_f64),
+    )
+        .prop_map(
+            |(k, ratio, (peak, share), angle, (friction, contraction))| Law {
+                id: "cyclic_joint",
+                hypothesis: "interface_2d",
+                parameters: vec![
+                    ("normal_stiffness", k * ratio, 1.0),
+                    ("shear_stiffness", k, 1.0),
+                    ("peak_friction_angle", peak, 0.0),
+                    ("residual_friction_angle", peak * share, 0.0),
+                    ("friction_slip", 10_f64.powf(friction), 0.0),
+                    ("contraction_angle", angle, 0.0),
+                    ("contraction_slip", 10_f64.powf(contraction), 0.0),
+                ],
+                modulus: k.max(k * ratio),
+            },
+        );
+    prop_oneof![
+        1 => elastic,
+        5 => mohr_coulomb,
+        2 => oriented,
+        3 => joint,
+        4 => mepi,
+        2 => hyperbolic,
+        2 => cyclic,
+    ]
 }
 
 fn lead() -> impl Strategy<Value = Lead> {
