@@ -22,6 +22,7 @@ mod results;
 mod resume;
 mod run_table;
 mod settings;
+mod shear_zone;
 mod stopping;
 mod streams;
 mod swapped;

@@ -4,7 +4,7 @@
 use crate::Error;
 use crate::adapter::{Adapter, Externals};
 use crate::description::words;
-use crate::{BatchFailure, Law, Moment, Operator, PointCall, Request, Site};
+use crate::{BatchFailure, Law, Moment, Operator, PointCall, Request, ShearZone, Site};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -63,6 +63,8 @@ pub struct LawPart {
     pub sidecar: Option<PathBuf>,
     /// What becomes of routines that nobody supplies.
     pub externals: Option<Externals>,
+    /// The zone that it fills, if the call is one of an interface that it is made to.
+    pub shear_zone: Option<ShearZone>,
 }
 
 /// What became of a call.
@@ -158,6 +160,7 @@ impl Capsule {
                 adapter: foreign.map(|foreign| foreign.adapter),
                 sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
                 externals: foreign.and_then(|foreign| foreign.externals),
+                shear_zone: law.loaded().shear_zone(),
             },
             origin: origin
                 .into_iter()
@@ -343,6 +346,9 @@ impl std::fmt::Display for Capsule {
         }
         if let Some(externals) = law.externals {
             writeln!(f, "externals = {}", text(externals.name()))?;
+        }
+        if let Some(zone) = law.shear_zone {
+            writeln!(f, "shear_zone = {zone}")?;
         }
         writeln!(f)?;
         writeln!(f, "[where]")?;

@@ -729,7 +729,9 @@ impl Bench {
             Origin::Foreign(law) => law
                 .create(hypothesis, &parameters)
                 .map(LawInstance::Foreign),
-            Origin::Apart { .. } => return Err(unusable("its worker has a worker")),
+            Origin::Apart { .. } | Origin::Zone(..) => {
+                return Err(unusable("its worker has a worker"));
+            }
         }
         .map_err(|(status, message)| Started::Refused(status, message))?;
         if has_copied(process) {
