@@ -13,4 +13,5 @@ mod chamber_mesh;
 mod chamber_soil_law;
 mod ground;
 mod shear_box;
+mod shear_zone;
 mod variant;

@@ -127,6 +127,12 @@ const COMMITTED: &[Committed] = &[
         "*",
         &["silica_tau", "silica_mu", "silica_sigma_n", "silica_u_n"],
     ),
+    (
+        "shear_zone/mohr_coulomb.toml",
+        "",
+        "mohr_coulomb_*",
+        &["tau", "u_n"],
+    ),
 ];
 
 fn cases() -> PathBuf {
@@ -152,7 +158,7 @@ fn pictures() -> BTreeSet<PathBuf> {
 fn draw(input: &str) -> TempDir {
     let place = TempDir::new().unwrap();
     let path = cases().join(input);
-    if input.starts_with("shear_box/") {
+    if input.starts_with("shear_box/") || input.starts_with("shear_zone/") {
         run_file_variants(&path, None, Some(&place.path().join("rows.csv")), |_| ()).unwrap();
         return place;
     }
