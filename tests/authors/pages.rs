@@ -336,6 +336,7 @@ how_to! {
     how_to_compare_variants: "compare-variants",
     how_to_set_from_the_command_line: "set-from-the-command-line",
     how_to_use_a_umat: "use-a-umat",
+    how_to_use_a_udsm: "use-a-udsm",
     how_to_use_an_mfront_behaviour: "use-an-mfront-behaviour",
     how_to_make_an_interface_law: "shear-zone",
     how_to_choose_an_integration: "which-integration",

@@ -30,4 +30,5 @@ mod syntax;
 mod trade_off;
 mod troubled;
 mod trust;
+mod udsm;
 mod umat;

@@ -6,7 +6,7 @@ use crate::material::{ForeignKeys, ParameterTable, ParameterValue, Route, shear_
 use crate::{Error, schema};
 use law::Opener;
 use law::ShearZone;
-use law::adapter::{Externals, Foreign, Scratch};
+use law::adapter::{Externals, Foreign, Order, Scratch};
 use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integration};
 use results::wanted::{Output, Reduce};
@@ -364,6 +364,9 @@ pub struct LawInput {
     /// What becomes of its scratch files.
     #[schemars(with = "Option<Scratch>")]
     pub scratch: Option<Spanned<Scratch>>,
+    /// UDSM: how its stiffness stands in memory; `columns`, as Fortran has it, if left out.
+    #[schemars(with = "Option<Order>")]
+    pub tangent_order: Option<Spanned<Order>>,
     /// Shear zone: its thickness, m. `law` is then a law of solids, or another table of laws.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     pub thickness: Option<Spanned<f64>>,
@@ -412,6 +415,7 @@ impl LawInput {
             record: self.record.as_ref(),
             externals: self.externals.as_ref(),
             scratch: self.scratch.as_ref(),
+            tangent_order: self.tangent_order.as_ref(),
         }
     }
 }

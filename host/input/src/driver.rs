@@ -10,7 +10,7 @@ use crate::figures::table_figures;
 use crate::material::{self, LawTables, ParameterTable, ParameterValue, Route, build_law};
 use crate::schema;
 use indexmap::IndexMap;
-use law::adapter::{Externals, Scratch};
+use law::adapter::{Externals, Order, Scratch};
 use law::{BuiltLaw, Opener, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
@@ -64,6 +64,9 @@ pub(crate) struct DriverFile {
     /// What becomes of its scratch files.
     #[schemars(with = "Option<Scratch>")]
     scratch: Option<Spanned<Scratch>>,
+    /// UDSM: how its stiffness stands in memory; `columns`, as Fortran has it, if left out.
+    #[schemars(with = "Option<Order>")]
+    tangent_order: Option<Spanned<Order>>,
     /// Shear zone: its thickness, m. `law` is then a law of solids, or one of `laws`.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     thickness: Option<Spanned<f64>>,
@@ -112,6 +115,7 @@ impl DriverFile {
             record: self.record.clone(),
             externals: self.externals.clone(),
             scratch: self.scratch.clone(),
+            tangent_order: self.tangent_order.clone(),
             thickness: self.thickness.clone(),
             lateral_ratio: self.lateral_ratio.clone(),
             parameters: self.parameters.clone(),

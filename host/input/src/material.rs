@@ -4,7 +4,7 @@ use crate::Error;
 use crate::case::LawInput;
 use crate::ground::Over;
 use abi::Hypothesis;
-use law::adapter::{Adapter, Externals, Foreign, Scratch};
+use law::adapter::{Adapter, Externals, Foreign, Order, Scratch};
 use law::{BuildCause, BuildFailure, BuiltLaw, LoadedLaw, SearchPath, ShearZone, Value};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -149,6 +149,8 @@ pub enum Route {
     Umat,
     /// MFront's generic interface.
     Mfront,
+    /// PLAXIS, `User_Mod`.
+    Udsm,
     /// An interface law made from a law of solids, which fills a zone of some `thickness`.
     ShearZone,
 }
@@ -159,6 +161,7 @@ impl Route {
         match self {
             Self::Umat => Some(Adapter::Umat),
             Self::Mfront => Some(Adapter::Mfront),
+            Self::Udsm => Some(Adapter::Udsm),
             Self::ShearZone => None,
         }
     }
@@ -306,6 +309,8 @@ pub(crate) struct ForeignKeys<'a> {
     pub(crate) externals: Option<&'a Spanned<Externals>>,
     /// The key `scratch`.
     pub(crate) scratch: Option<&'a Spanned<Scratch>>,
+    /// The key `tangent_order`.
+    pub(crate) tangent_order: Option<&'a Spanned<Order>>,
 }
 
 impl ForeignKeys<'_> {
@@ -338,7 +343,8 @@ impl ForeignKeys<'_> {
                     .hint(
                         "libraries of the contract are found by the law's id, more folders are \
                          named in `law_path`; `adapter = \"umat\"` is for Abaqus user subroutines, \
-                         `adapter = \"mfront\"` for MFront behaviours",
+                         `adapter = \"mfront\"` for MFront behaviours, `adapter = \"udsm\"` for soil \
+                         models of PLAXIS",
                     )
                     .into()),
             };
@@ -350,6 +356,7 @@ impl ForeignKeys<'_> {
             let message = "`adapter` needs the `library` that it is for";
             return Err(source.error(adapter.span(), message).into());
         };
+        self.refuse_of_others(source, made_for)?;
         self.refuse_without_worker(source, made_for)?;
         Ok(Some(Foreign {
             adapter: made_for,
@@ -363,6 +370,7 @@ impl ForeignKeys<'_> {
             records_once: false,
             externals: self.externals.map(|written| *written.get_ref()),
             scratch: self.scratch.map(|written| *written.get_ref()),
+            tangent_order: self.tangent_order.map(|written| *written.get_ref()),
         }))
     }
 
@@ -375,11 +383,39 @@ impl ForeignKeys<'_> {
             ("record", self.record.map(Spanned::span)),
             ("externals", self.externals.map(Spanned::span)),
             ("scratch", self.scratch.map(Spanned::span)),
+            ("tangent_order", self.tangent_order.map(Spanned::span)),
         ];
         given.into_iter().filter_map(|(key, at)| Some((key, at?)))
     }
 
-    /// Traps and scratch folders are a matter of the workers of UMATs.
+    /// Keys that one adapter has and others have not.
+    fn refuse_of_others(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
+        let keys = [
+            ("sidecar", self.sidecar.map(Spanned::span), Adapter::Umat),
+            ("record", self.record.map(Spanned::span), Adapter::Umat),
+            (
+                "tangent_order",
+                self.tangent_order.map(Spanned::span),
+                Adapter::Udsm,
+            ),
+        ];
+        for (key, at, of) in keys {
+            let Some(at) = at.filter(|_| adapter != of) else {
+                continue;
+            };
+            let message = format!("`{key}` is for `adapter = \"{}\"`", of.name());
+            let error = source.error(at, message);
+            return Err(if key == "tangent_order" && adapter == Adapter::Umat {
+                error.hint("of a UMAT the sidecar says it")
+            } else {
+                error
+            }
+            .into());
+        }
+        Ok(())
+    }
+
+    /// Traps and scratch folders are a matter of the workers of UMATs and UDSMs.
     fn refuse_without_worker(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
         let is_trap = |written: &Spanned<Externals>| *written.get_ref() == Externals::Trap;
         let is_kept = |written: &Spanned<Scratch>| *written.get_ref() == Scratch::Keep;
@@ -398,8 +434,9 @@ impl ForeignKeys<'_> {
         let in_process = self.in_process.is_some_and(|written| *written.get_ref());
         for (key, at, needs_worker) in keys {
             let Some(at) = at else { continue };
-            if adapter != Adapter::Umat {
-                let message = format!("`{key}` is for `adapter = \"umat\"`");
+            if adapter == Adapter::Mfront {
+                let message =
+                    format!("`{key}` is for `adapter = \"umat\"` and `adapter = \"udsm\"`");
                 return Err(source.error(at, message).into());
             }
             if needs_worker && in_process {

@@ -131,6 +131,7 @@ fn find_own(capsule: &Capsule, opener: &Opener) -> Result<LoadedLaw, Error> {
             records_once: false,
             externals: part.externals,
             scratch: None,
+            tangent_order: part.tangent_order,
         };
         return Ok(search.foreign_law(&part.id, &foreign)?);
     }
