@@ -14,4 +14,5 @@ mod chamber_soil_law;
 mod ground;
 mod joint_laws;
 mod shear_box;
+mod shear_zone;
 mod variant;

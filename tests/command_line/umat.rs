@@ -19,7 +19,7 @@ use tempfile::TempDir;
 use tests::case::table;
 
 /// A folder with a routine and its sidecar. `None`, with a remark, where there is no compiler.
-fn place(name: &str) -> Option<Place> {
+pub(crate) fn place(name: &str) -> Option<Place> {
     static COMPILED: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
     if !compiled.contains_key(name) {

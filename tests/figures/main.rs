@@ -162,6 +162,12 @@ const COMMITTED: &[Committed] = &[
         "*",
         &["silica_tau", "silica_mu", "silica_sigma_n", "silica_u_n"],
     ),
+    (
+        "shear_zone/mohr_coulomb.toml",
+        "",
+        "mohr_coulomb_*",
+        &["tau", "u_n"],
+    ),
 ];
 
 fn cases() -> PathBuf {
@@ -187,7 +193,7 @@ fn pictures() -> BTreeSet<PathBuf> {
 fn draw(input: &str) -> TempDir {
     let place = TempDir::new().unwrap();
     let path = cases().join(input);
-    if ["shear_box/", "joint_laws/"]
+    if ["shear_box/", "shear_zone/", "joint_laws/"]
         .iter()
         .any(|point| input.starts_with(point))
     {

@@ -203,6 +203,7 @@ fn bounds_and_defaults_of_our_laws_are_exported() {
             records_once: false,
             externals: None,
             scratch: None,
+            tangent_order: None,
         };
         let foreign = Opener::default()
             .open_foreign(&foreign, |_| Ok(()))

@@ -3,7 +3,7 @@
 
 use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
 use crate::ground::{ProfileInput, level};
-use crate::material::{ParameterValue, find_law, place_failure, try_law};
+use crate::material::{LawTables, ParameterValue, place_failure, try_law};
 use crate::mesh::{self, Built, MeshFile};
 use crate::{Error, figures, pile, probes};
 use abi::Hypothesis;
@@ -473,8 +473,14 @@ impl<'a> LawShelf<'a> {
 
     /// The law without its parameters.
     fn loaded(&self, entry: &LawInput) -> Result<LoadedLaw, Error> {
-        let foreign = entry.foreign(self.source)?;
-        find_law(self.source, &self.search, &entry.law, foreign.as_ref())
+        self.tables().loaded(&self.search, entry)
+    }
+
+    fn tables(&self) -> LawTables<'a> {
+        LawTables {
+            source: self.source,
+            tables: &self.file.laws,
+        }
     }
 
     /// The law of this name, for a group.
@@ -495,7 +501,7 @@ impl<'a> LawShelf<'a> {
         let built = if let Some(built) = self.laws.get(&key) {
             Arc::clone(built)
         } else {
-            let parameters = &entry.parameters;
+            let parameters = &self.tables().parameters(entry);
             let loaded = self.loaded(entry)?;
             let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
                 let error = place_failure(self.source, &entry.law, parameters, &failure);
@@ -511,7 +517,7 @@ impl<'a> LawShelf<'a> {
         };
         let mut material = Material::new(name.get_ref(), built);
         material.varying = self.varying(entry, hypothesis)?;
-        for (variable, value) in &entry.initial {
+        for (variable, value) in &self.tables().initial(entry) {
             if !value.get_ref().is_finite() {
                 let message = "expected a finite number";
                 return Err(self.source.error(value.span(), message).into());
@@ -540,8 +546,9 @@ impl<'a> LawShelf<'a> {
         entry: &LawInput,
         hypothesis: Hypothesis,
     ) -> Result<Vec<(String, Profile)>, Error> {
+        let given = self.tables().parameters(entry);
         let mut varying = Vec::new();
-        for (id, value) in &entry.parameters {
+        for (id, value) in &given {
             if let ParameterValue::Varying(over) = value.get_ref() {
                 let profile = ProfileInput::Over(over.clone()).read(self.source, value.span())?;
                 varying.push((id.get_ref().clone(), profile));
@@ -552,7 +559,7 @@ impl<'a> LawShelf<'a> {
             .map(|(_, profile)| profile.points().len())
             .max();
         for point in 1..most.unwrap_or(0) {
-            let mut parameters = entry.parameters.clone();
+            let mut parameters = given.clone();
             for value in parameters.values_mut() {
                 if let ParameterValue::Varying(over) = value.get_mut() {
                     let last = over.z.len() - 1;
@@ -560,9 +567,8 @@ impl<'a> LawShelf<'a> {
                 }
             }
             let loaded = self.loaded(entry)?;
-            try_law(&loaded, hypothesis, &parameters).map_err(|failure| {
-                place_failure(self.source, &entry.law, &entry.parameters, &failure)
-            })?;
+            try_law(&loaded, hypothesis, &parameters)
+                .map_err(|failure| place_failure(self.source, &entry.law, &given, &failure))?;
         }
         Ok(varying)
     }

@@ -2,10 +2,11 @@
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
 use crate::ground::{ProfileInput, StressInput, WaterChange, WaterInput};
-use crate::material::{ForeignKeys, ParameterTable, ParameterValue};
+use crate::material::{ForeignKeys, ParameterTable, ParameterValue, Route, shear_zone};
 use crate::{Error, schema};
 use law::Opener;
-use law::adapter::{Adapter, Externals, Foreign, Scratch};
+use law::ShearZone;
+use law::adapter::{Externals, Foreign, Order, Scratch};
 use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integration};
 use results::wanted::{Output, Reduce};
@@ -342,9 +343,9 @@ pub struct LawInput {
     /// SHA-256 that its library must have, in hexadecimal digits.
     #[schemars(with = "Option<String>")]
     pub sha256: Option<Spanned<String>>,
-    /// What its library is made for, if not for the contract.
-    #[schemars(with = "Option<Adapter>")]
-    pub adapter: Option<Spanned<Adapter>>,
+    /// What its library is made for, if not for the contract; or that it is made from another law.
+    #[schemars(with = "Option<Route>")]
+    pub adapter: Option<Spanned<Route>>,
     /// That library.
     #[schemars(with = "Option<PathBuf>")]
     pub library: Option<Spanned<PathBuf>>,
@@ -363,6 +364,15 @@ pub struct LawInput {
     /// What becomes of its scratch files.
     #[schemars(with = "Option<Scratch>")]
     pub scratch: Option<Spanned<Scratch>>,
+    /// UDSM: how its stiffness stands in memory; `columns`, as Fortran has it, if left out.
+    #[schemars(with = "Option<Order>")]
+    pub tangent_order: Option<Spanned<Order>>,
+    /// Shear zone: its thickness, m. `law` is then a law of solids, or another table of laws.
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    pub thickness: Option<Spanned<f64>>,
+    /// Shear zone: stress along it and out of plane over the normal traction at the start; 1 if left out.
+    #[schemars(with = "Option<f64>", range(min = 0))]
+    pub lateral_ratio: Option<Spanned<f64>>,
     /// Its parameters.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
@@ -379,7 +389,25 @@ impl LawInput {
     /// # Errors
     /// [`text::Error::Input`] at the key that does not fit.
     pub fn foreign(&self, source: &Source) -> Result<Option<Foreign>, Error> {
-        let keys = ForeignKeys {
+        self.keys().read(source)
+    }
+
+    /// The zone that its law of solids fills, if it is made so.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] at the key that does not fit.
+    pub fn shear_zone(&self, source: &Source) -> Result<Option<ShearZone>, Error> {
+        let (thickness, ratio) = (self.thickness.as_ref(), self.lateral_ratio.as_ref());
+        shear_zone(source, self.keys(), thickness, ratio)
+    }
+
+    pub(crate) fn is_shear_zone(&self) -> bool {
+        let adapter = self.adapter.as_ref();
+        adapter.is_some_and(|adapter| *adapter.get_ref() == Route::ShearZone)
+    }
+
+    fn keys(&self) -> ForeignKeys<'_> {
+        ForeignKeys {
             adapter: self.adapter.as_ref(),
             library: self.library.as_ref(),
             sidecar: self.sidecar.as_ref(),
@@ -387,8 +415,8 @@ impl LawInput {
             record: self.record.as_ref(),
             externals: self.externals.as_ref(),
             scratch: self.scratch.as_ref(),
-        };
-        keys.read(source)
+            tangent_order: self.tangent_order.as_ref(),
+        }
     }
 }
 

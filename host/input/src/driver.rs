@@ -5,12 +5,12 @@
 mod path;
 
 use crate::Error;
-use crate::case::FigureInput;
+use crate::case::{FigureInput, LawInput};
 use crate::figures::table_figures;
-use crate::material::{self, ForeignKeys, ParameterTable, ParameterValue, build_law, find_law};
+use crate::material::{self, LawTables, ParameterTable, ParameterValue, Route, build_law};
 use crate::schema;
 use indexmap::IndexMap;
-use law::adapter::{Adapter, Externals, Scratch};
+use law::adapter::{Externals, Order, Scratch};
 use law::{BuiltLaw, Opener, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
@@ -43,9 +43,9 @@ pub(crate) struct DriverFile {
     /// SHA-256 of the law's library; another one is refused.
     #[schemars(with = "Option<String>")]
     sha256: Option<Spanned<String>>,
-    /// What the law's library is made for, if not for the contract.
-    #[schemars(with = "Option<Adapter>")]
-    adapter: Option<Spanned<Adapter>>,
+    /// What the law's library is made for, if not for the contract; or that it is made from another law.
+    #[schemars(with = "Option<Route>")]
+    adapter: Option<Spanned<Route>>,
     /// That library.
     #[schemars(with = "Option<PathBuf>")]
     library: Option<Spanned<PathBuf>>,
@@ -64,6 +64,19 @@ pub(crate) struct DriverFile {
     /// What becomes of its scratch files.
     #[schemars(with = "Option<Scratch>")]
     scratch: Option<Spanned<Scratch>>,
+    /// UDSM: how its stiffness stands in memory; `columns`, as Fortran has it, if left out.
+    #[schemars(with = "Option<Order>")]
+    tangent_order: Option<Spanned<Order>>,
+    /// Shear zone: its thickness, m. `law` is then a law of solids, or one of `laws`.
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    thickness: Option<Spanned<f64>>,
+    /// Shear zone: stress along it and out of plane over the normal traction at the start; 1 if left out.
+    #[schemars(with = "Option<f64>", range(min = 0))]
+    lateral_ratio: Option<Spanned<f64>>,
+    /// Shear zone: the law that fills it, where its library is made for another program.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, LawInput>")]
+    laws: Named<LawInput>,
     /// What the driver is.
     #[serde(default)]
     title: String,
@@ -87,6 +100,41 @@ pub(crate) struct DriverFile {
     /// Curves of columns of the table.
     #[serde(default, rename = "figure")]
     figures: Vec<FigureInput>,
+}
+
+impl DriverFile {
+    /// Its law as a table of laws has it.
+    fn entry(&self, initial: &Initial) -> LawInput {
+        LawInput {
+            law: self.law.clone(),
+            sha256: self.sha256.clone(),
+            adapter: self.adapter.clone(),
+            library: self.library.clone(),
+            sidecar: self.sidecar.clone(),
+            in_process: self.in_process.clone(),
+            record: self.record.clone(),
+            externals: self.externals.clone(),
+            scratch: self.scratch.clone(),
+            tangent_order: self.tangent_order.clone(),
+            thickness: self.thickness.clone(),
+            lateral_ratio: self.lateral_ratio.clone(),
+            parameters: self.parameters.clone(),
+            initial: initial.internal.clone(),
+        }
+    }
+}
+
+/// A driver has one law: its tables of laws are for what that is made from.
+fn refuse_unused(tables: LawTables<'_>, entry: &LawInput) -> Result<(), Error> {
+    let used = tables.filler(entry);
+    let is_used = |table: &LawInput| used.is_some_and(|used| std::ptr::eq(used, table));
+    let mut all = tables.tables.iter();
+    let Some((name, _)) = all.find(|(_, table)| !is_used(table.get_ref())) else {
+        return Ok(());
+    };
+    let message = format!("law `{}` is not used", name.get_ref());
+    let hint = "a driver has one law; with `adapter = \"shear_zone\"` its `law` may name a table";
+    Err(tables.source.error(name.span(), message).hint(hint).into())
 }
 
 /// The initial state.
@@ -234,28 +282,27 @@ impl Driver {
                 .join(written.get_ref())
         };
         let folders: Vec<PathBuf> = file.law_path.iter().map(folder).collect();
-        let law = std::iter::once((&file.law, file.sha256.as_ref()));
+        let entry = file.entry(initial);
+        let tables = LawTables {
+            source,
+            tables: &file.laws,
+        };
+        refuse_unused(tables, &entry)?;
+        let others = file.laws.values().map(Spanned::get_ref);
+        let all = std::iter::once(&entry).chain(others);
+        let laws = all.map(|law| (&law.law, law.sha256.as_ref()));
         let pins = if locked {
-            Pins::of(source, law)?
+            Pins::of(source, laws)?
         } else {
-            Pins::given(source, law)?
+            Pins::given(source, laws)?
         };
         let search = SearchPath::of(opener, &folders).pinned(pins);
-        let keys = ForeignKeys {
-            adapter: file.adapter.as_ref(),
-            library: file.library.as_ref(),
-            sidecar: file.sidecar.as_ref(),
-            in_process: file.in_process.as_ref(),
-            record: file.record.as_ref(),
-            externals: file.externals.as_ref(),
-            scratch: file.scratch.as_ref(),
-        };
-        let foreign = keys.read(source)?;
-        let loaded = find_law(source, &search, &file.law, foreign.as_ref())?;
-        let built = build_law(source, &loaded, &file.law, hypothesis, &file.parameters)?;
+        let loaded = tables.loaded(&search, &entry)?;
+        let parameters = tables.parameters(&entry);
+        let built = build_law(source, &loaded, &file.law, hypothesis, &parameters)?;
         let place = (source, &place_of_initial);
         let mut point = started(built, &flux, segments).map_err(|error| located(place, error))?;
-        let internal = internal(source, &point, &initial.internal)?;
+        let internal = internal(source, &point, &tables.initial(&entry))?;
         point.set_internal(internal)?;
         point.set_variant(variant);
         let names = drawable(&point);

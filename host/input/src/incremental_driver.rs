@@ -62,6 +62,7 @@ impl Driver {
             records_once: false,
             externals: None,
             scratch: None,
+            tangent_order: None,
         };
         let library = opener.open_foreign(&foreign, |_| Ok(()))?;
         let id = library.laws().next().map(|law| law.id.clone());

@@ -6,7 +6,7 @@
 
 use crate::case::Case;
 use crate::driver::Driver;
-use crate::material::find_law;
+use crate::material::LawTables;
 use crate::{Error, is_driver};
 use law::{LoadedLaw, Opener, Pins, SearchPath, lock_path};
 use serde::Serialize;
@@ -84,10 +84,11 @@ fn laws_of_case(opener: &Opener, path: &Path) -> Result<Vec<LoadedLaw>, Error> {
         for name in groups.chain(swaps.map(Spanned::get_ref)) {
             let entry = file.laws.iter().find(|(key, _)| key.get_ref() == name);
             if let Some((_, law)) = entry {
-                let law = law.get_ref();
-                let foreign = law.foreign(&case.source)?;
-                let (source, id) = (&case.source, &law.law);
-                laws.push(find_law(source, &search, id, foreign.as_ref())?);
+                let tables = LawTables {
+                    source: &case.source,
+                    tables: &file.laws,
+                };
+                laws.push(tables.loaded(&search, law.get_ref())?);
             }
         }
     }

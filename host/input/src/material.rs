@@ -1,12 +1,14 @@
 //! Laws as files name them: where their libraries are, and what their parameters are.
 
 use crate::Error;
+use crate::case::LawInput;
 use crate::ground::Over;
 use abi::Hypothesis;
-use law::adapter::{Adapter, Externals, Foreign, Scratch};
-use law::{BuildCause, BuildFailure, BuiltLaw, LoadedLaw, SearchPath, Value};
+use law::adapter::{Adapter, Externals, Foreign, Order, Scratch};
+use law::{BuildCause, BuildFailure, BuiltLaw, LoadedLaw, SearchPath, ShearZone, Value};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use text::{Named, Source};
 use toml::Spanned;
@@ -138,11 +140,163 @@ pub(crate) fn find_law(
     })
 }
 
+/// How a law comes here that is none of the contract.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Adapter")]
+pub enum Route {
+    /// Abaqus, `SUBROUTINE UMAT`.
+    Umat,
+    /// MFront's generic interface.
+    Mfront,
+    /// PLAXIS, `User_Mod`.
+    Udsm,
+    /// An interface law made from a law of solids, which fills a zone of some `thickness`.
+    ShearZone,
+}
+
+impl Route {
+    /// What the library is made for; `None` if there is none.
+    fn adapter(self) -> Option<Adapter> {
+        match self {
+            Self::Umat => Some(Adapter::Umat),
+            Self::Mfront => Some(Adapter::Mfront),
+            Self::Udsm => Some(Adapter::Udsm),
+            Self::ShearZone => None,
+        }
+    }
+}
+
+/// The tables of laws in a file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LawTables<'a> {
+    /// The file.
+    pub(crate) source: &'a Source,
+    /// The tables, by name.
+    pub(crate) tables: &'a Named<LawInput>,
+}
+
+impl<'a> LawTables<'a> {
+    /// The law of a table, without its parameters.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] at the place that does not fit; [`law::Error::Library`].
+    pub(crate) fn loaded(self, search: &SearchPath, entry: &LawInput) -> Result<LoadedLaw, Error> {
+        let Self { source, .. } = self;
+        let Some(zone) = entry.shear_zone(source)? else {
+            let foreign = entry.foreign(source)?;
+            return find_law(source, search, &entry.law, foreign.as_ref());
+        };
+        let law = match self.filler(entry) {
+            None => find_law(source, search, &entry.law, None)?,
+            Some(table) if table.is_shear_zone() => {
+                let message = format!("law `{}` is a shear zone itself", entry.law.get_ref());
+                return Err(source.error(entry.law.span(), message).into());
+            }
+            Some(table) => {
+                if let Some(sha256) = &entry.sha256 {
+                    let message = "`sha256` belongs to the law that fills the zone";
+                    let hint = format!("write it under [laws.{}]", entry.law.get_ref());
+                    return Err(source.error(sha256.span(), message).hint(hint).into());
+                }
+                self.loaded(search, table)?
+            }
+        };
+        law.in_shear_zone(zone)
+            .map_err(|why| source.error(entry.law.span(), why).into())
+    }
+
+    /// The table of the law that fills a zone, if it has one.
+    pub(crate) fn filler(self, entry: &LawInput) -> Option<&'a LawInput> {
+        if !entry.is_shear_zone() {
+            return None;
+        }
+        let mut tables = self.tables.iter();
+        let named = tables.find(|(name, _)| name.get_ref() == entry.law.get_ref());
+        let table = named.map(|(_, table)| table.get_ref());
+        // A zone may be called like the law of the contract that fills it.
+        table.filter(|table| !std::ptr::eq(*table, entry))
+    }
+
+    /// Parameters of a table: of a zone those of the law that fills it, and its own over them.
+    pub(crate) fn parameters(self, entry: &LawInput) -> ParameterTable {
+        let filler = self.filler(entry).map(|table| &table.parameters);
+        over(filler, &entry.parameters)
+    }
+
+    /// Initial internal variables of a table, likewise.
+    pub(crate) fn initial(self, entry: &LawInput) -> Named<f64> {
+        let filler = self.filler(entry).map(|table| &table.initial);
+        over(filler, &entry.initial)
+    }
+}
+
+/// The entries of one table, and those of another over them.
+pub(crate) fn over<T: Clone>(below: Option<&Named<T>>, above: &Named<T>) -> Named<T> {
+    let mut all = above.clone();
+    for (key, value) in below.into_iter().flatten() {
+        if !above.keys().any(|other| other.get_ref() == key.get_ref()) {
+            all.insert(key.clone(), value.clone());
+        }
+    }
+    all
+}
+
+/// The zone of `adapter = "shear_zone"`; `None` if it is another one or none.
+///
+/// # Errors
+/// [`text::Error::Input`] at the key that misses another or does not fit.
+pub(crate) fn shear_zone(
+    source: &Source,
+    keys: ForeignKeys<'_>,
+    thickness: Option<&Spanned<f64>>,
+    lateral_ratio: Option<&Spanned<f64>>,
+) -> Result<Option<ShearZone>, Error> {
+    let own = [("thickness", thickness), ("lateral_ratio", lateral_ratio)];
+    let Some(adapter) = keys
+        .adapter
+        .filter(|adapter| *adapter.get_ref() == Route::ShearZone)
+    else {
+        let mut given = own
+            .into_iter()
+            .filter_map(|(key, v)| Some((key, v?.span())));
+        return match given.next() {
+            None => Ok(None),
+            Some((key, at)) => {
+                let message = format!("`{key}` is for `adapter = \"shear_zone\"`");
+                Err(source.error(at, message).into())
+            }
+        };
+    };
+    if let Some((key, at)) = keys.beside_adapter().next() {
+        let message = format!("`{key}` belongs to the law that fills the zone");
+        return Err(source
+            .error(at, message)
+            .hint("write that law as a table `[laws.NAME]` of its own, and here `law = \"NAME\"`")
+            .into());
+    }
+    let Some(written) = thickness else {
+        let message = "`adapter = \"shear_zone\"` needs the `thickness` of the zone, m";
+        return Err(source.error(adapter.span(), message).into());
+    };
+    let zone = ShearZone {
+        thickness: *written.get_ref(),
+        lateral_ratio: lateral_ratio.map_or(1.0, |written| *written.get_ref()),
+    };
+    let Some((key, why)) = zone.fault() else {
+        return Ok(Some(zone));
+    };
+    let mut own = own.into_iter();
+    let at = own.find_map(|(other, value)| value.filter(|_| key == other));
+    let at = at.map_or(adapter.span(), Spanned::span);
+    Err(source.error(at, why).into())
+}
+
 /// What a file says beside `law` if the library is made for another program.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ForeignKeys<'a> {
     /// The key `adapter`.
-    pub(crate) adapter: Option<&'a Spanned<Adapter>>,
+    pub(crate) adapter: Option<&'a Spanned<Route>>,
     /// The key `library`.
     pub(crate) library: Option<&'a Spanned<PathBuf>>,
     /// The key `sidecar`.
@@ -155,6 +309,8 @@ pub(crate) struct ForeignKeys<'a> {
     pub(crate) externals: Option<&'a Spanned<Externals>>,
     /// The key `scratch`.
     pub(crate) scratch: Option<&'a Spanned<Scratch>>,
+    /// The key `tangent_order`.
+    pub(crate) tangent_order: Option<&'a Spanned<Order>>,
 }
 
 impl ForeignKeys<'_> {
@@ -180,36 +336,30 @@ impl ForeignKeys<'_> {
             Err(Error::from(source.error(written.span(), message)))
         };
         let Some(adapter) = self.adapter else {
-            let alone = [
-                ("library", self.library.map(Spanned::span)),
-                ("sidecar", self.sidecar.map(Spanned::span)),
-                ("in_process", self.in_process.map(Spanned::span)),
-                ("record", self.record.map(Spanned::span)),
-                ("externals", self.externals.map(Spanned::span)),
-                ("scratch", self.scratch.map(Spanned::span)),
-            ];
-            return match alone
-                .into_iter()
-                .find_map(|(key, at)| at.map(|at| (key, at)))
-            {
+            return match self.beside_adapter().next() {
                 None => Ok(None),
                 Some((key, at)) => Err(source
                     .error(at, format!("`{key}` needs an `adapter`"))
                     .hint(
                         "libraries of the contract are found by the law's id, more folders are \
                          named in `law_path`; `adapter = \"umat\"` is for Abaqus user subroutines, \
-                         `adapter = \"mfront\"` for MFront behaviours",
+                         `adapter = \"mfront\"` for MFront behaviours, `adapter = \"udsm\"` for soil \
+                         models of PLAXIS",
                     )
                     .into()),
             };
+        };
+        let Some(made_for) = adapter.get_ref().adapter() else {
+            return Ok(None);
         };
         let Some(library) = self.library else {
             let message = "`adapter` needs the `library` that it is for";
             return Err(source.error(adapter.span(), message).into());
         };
-        self.refuse_without_worker(source, *adapter.get_ref())?;
+        self.refuse_of_others(source, made_for)?;
+        self.refuse_without_worker(source, made_for)?;
         Ok(Some(Foreign {
-            adapter: *adapter.get_ref(),
+            adapter: made_for,
             library: existing("library", library)?,
             sidecar: self
                 .sidecar
@@ -220,10 +370,52 @@ impl ForeignKeys<'_> {
             records_once: false,
             externals: self.externals.map(|written| *written.get_ref()),
             scratch: self.scratch.map(|written| *written.get_ref()),
+            tangent_order: self.tangent_order.map(|written| *written.get_ref()),
         }))
     }
 
-    /// Traps and scratch folders are a matter of the workers of UMATs.
+    /// Keys that an adapter for a library explains, as they are given.
+    fn beside_adapter(self) -> impl Iterator<Item = (&'static str, Range<usize>)> {
+        let given = [
+            ("library", self.library.map(Spanned::span)),
+            ("sidecar", self.sidecar.map(Spanned::span)),
+            ("in_process", self.in_process.map(Spanned::span)),
+            ("record", self.record.map(Spanned::span)),
+            ("externals", self.externals.map(Spanned::span)),
+            ("scratch", self.scratch.map(Spanned::span)),
+            ("tangent_order", self.tangent_order.map(Spanned::span)),
+        ];
+        given.into_iter().filter_map(|(key, at)| Some((key, at?)))
+    }
+
+    /// Keys that one adapter has and others have not.
+    fn refuse_of_others(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
+        let keys = [
+            ("sidecar", self.sidecar.map(Spanned::span), Adapter::Umat),
+            ("record", self.record.map(Spanned::span), Adapter::Umat),
+            (
+                "tangent_order",
+                self.tangent_order.map(Spanned::span),
+                Adapter::Udsm,
+            ),
+        ];
+        for (key, at, of) in keys {
+            let Some(at) = at.filter(|_| adapter != of) else {
+                continue;
+            };
+            let message = format!("`{key}` is for `adapter = \"{}\"`", of.name());
+            let error = source.error(at, message);
+            return Err(if key == "tangent_order" && adapter == Adapter::Umat {
+                error.hint("of a UMAT the sidecar says it")
+            } else {
+                error
+            }
+            .into());
+        }
+        Ok(())
+    }
+
+    /// Traps and scratch folders are a matter of the workers of UMATs and UDSMs.
     fn refuse_without_worker(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
         let is_trap = |written: &Spanned<Externals>| *written.get_ref() == Externals::Trap;
         let is_kept = |written: &Spanned<Scratch>| *written.get_ref() == Scratch::Keep;
@@ -242,8 +434,9 @@ impl ForeignKeys<'_> {
         let in_process = self.in_process.is_some_and(|written| *written.get_ref());
         for (key, at, needs_worker) in keys {
             let Some(at) = at else { continue };
-            if adapter != Adapter::Umat {
-                let message = format!("`{key}` is for `adapter = \"umat\"`");
+            if adapter == Adapter::Mfront {
+                let message =
+                    format!("`{key}` is for `adapter = \"umat\"` and `adapter = \"udsm\"`");
                 return Err(source.error(at, message).into());
             }
             if needs_worker && in_process {

@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | [`Adapter::Umat`] | an Abaqus user subroutine `UMAT` | no: a sidecar file does |
 //! | [`Adapter::Mfront`] | behaviours of MFront's generic interface | yes, by its symbols |
+//! | [`Adapter::Udsm`] | a user-defined soil model of PLAXIS | yes, by functions, which run in a worker |
 //!
 //! A further adapter is a variant of [`Adapter`], an arm of `open`, a `ForeignLaw` and a
 //! `ForeignInstance`.
@@ -13,6 +14,7 @@ pub mod conventions;
 mod mfront;
 mod sidecar;
 mod symbols;
+mod udsm;
 mod umat;
 
 use super::description::LawDescription;
@@ -37,6 +39,8 @@ pub enum Adapter {
     Umat,
     /// MFront's generic interface.
     Mfront,
+    /// PLAXIS, `User_Mod`.
+    Udsm,
 }
 
 impl Adapter {
@@ -45,6 +49,7 @@ impl Adapter {
         match self {
             Self::Umat => "umat",
             Self::Mfront => "mfront",
+            Self::Udsm => "udsm",
         }
     }
 }
@@ -66,6 +71,27 @@ impl Externals {
         match self {
             Self::Refuse => "refuse",
             Self::Trap => "trap",
+        }
+    }
+}
+
+/// How the stiffness that a routine leaves stands in memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Order {
+    /// Column by column, as Fortran keeps matrices.
+    #[default]
+    Columns,
+    /// Row by row, as C does.
+    Rows,
+}
+
+impl Order {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Columns => "columns",
+            Self::Rows => "rows",
         }
     }
 }
@@ -100,6 +126,8 @@ pub struct Foreign {
     pub externals: Option<Externals>,
     /// What becomes of its scratch files; else the sidecar says it.
     pub scratch: Option<Scratch>,
+    /// How a UDSM leaves its stiffness; by columns if nothing is said.
+    pub tangent_order: Option<Order>,
 }
 
 /// A law of a foreign library, without parameters yet.
@@ -147,7 +175,7 @@ pub(crate) struct ForeignLaws {
     pub(crate) wishes: (Option<Externals>, Option<Scratch>),
 }
 
-/// Describes the laws of a foreign library. Nothing of it runs.
+/// Describes the laws of a foreign library. Nothing of it runs, but for a UDSM's functions.
 ///
 /// # Errors
 /// [`Error::Library`] for the library; [`text::Error::Input`] at the place of its description.
@@ -155,6 +183,7 @@ pub(crate) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
     match foreign.adapter {
         Adapter::Umat => umat::open(foreign, image),
         Adapter::Mfront => mfront::open(foreign, image),
+        Adapter::Udsm => udsm::open(foreign, image),
     }
 }
 

@@ -49,6 +49,8 @@ pub struct Moment {
     pub increment: u32,
     /// Time at which it started.
     pub step_start: f64,
+    /// Pore water does not leave.
+    pub is_undrained: bool,
 }
 
 impl Default for Moment {
@@ -58,6 +60,7 @@ impl Default for Moment {
             step: 1,
             increment: 1,
             step_start: 0.0,
+            is_undrained: false,
         }
     }
 }

@@ -2,9 +2,9 @@
 //! repeated bit for bit, without the case it comes from.
 
 use crate::Error;
-use crate::adapter::{Adapter, Externals};
+use crate::adapter::{Adapter, Externals, Order};
 use crate::description::words;
-use crate::{BatchFailure, Law, Moment, Operator, PointCall, Request, Site};
+use crate::{BatchFailure, Law, Moment, Operator, PointCall, Request, ShearZone, Site};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -63,6 +63,10 @@ pub struct LawPart {
     pub sidecar: Option<PathBuf>,
     /// What becomes of routines that nobody supplies.
     pub externals: Option<Externals>,
+    /// How the routine leaves its stiffness.
+    pub tangent_order: Option<Order>,
+    /// The zone that it fills, if the call is one of an interface that it is made to.
+    pub shear_zone: Option<ShearZone>,
 }
 
 /// What became of a call.
@@ -94,6 +98,8 @@ struct MomentPart {
     step: u32,
     increment: u32,
     start: f64,
+    #[serde(default)]
+    undrained: bool,
 }
 
 /// Where the point lies; laws of the contract do not ask.
@@ -158,6 +164,8 @@ impl Capsule {
                 adapter: foreign.map(|foreign| foreign.adapter),
                 sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
                 externals: foreign.and_then(|foreign| foreign.externals),
+                tangent_order: foreign.and_then(|foreign| foreign.tangent_order),
+                shear_zone: law.loaded().shear_zone(),
             },
             origin: origin
                 .into_iter()
@@ -173,6 +181,7 @@ impl Capsule {
                     step: call.moment.step,
                     increment: call.moment.increment,
                     start: call.moment.step_start,
+                    undrained: call.moment.is_undrained,
                 }),
                 site: foreign.map(|_| SitePart {
                     position: call.site.position,
@@ -344,6 +353,12 @@ impl std::fmt::Display for Capsule {
         if let Some(externals) = law.externals {
             writeln!(f, "externals = {}", text(externals.name()))?;
         }
+        if let Some(order) = law.tangent_order {
+            writeln!(f, "tangent_order = {}", text(order.name()))?;
+        }
+        if let Some(zone) = law.shear_zone {
+            writeln!(f, "shear_zone = {zone}")?;
+        }
         writeln!(f)?;
         writeln!(f, "[where]")?;
         for (key, value) in &self.origin {
@@ -372,9 +387,14 @@ impl std::fmt::Display for Capsule {
         )?;
         if let Some(moment) = &self.call.moment {
             let (step, increment, start) = (moment.step, moment.increment, real(moment.start));
+            let undrained = if moment.undrained {
+                ", undrained = true"
+            } else {
+                ""
+            };
             writeln!(
                 f,
-                "moment = {{ step = {step}, increment = {increment}, start = {start} }}"
+                "moment = {{ step = {step}, increment = {increment}, start = {start}{undrained} }}"
             )?;
         }
         if let Some(site) = &self.call.site {
@@ -499,6 +519,7 @@ impl Capsule {
                     step: moment.step,
                     increment: moment.increment,
                     step_start: moment.start,
+                    is_undrained: moment.undrained,
                 }),
             site: self.call.site.map_or_else(Site::default, |site| Site {
                 position: site.position,

@@ -53,7 +53,7 @@ const LONGEST: u32 = 1 << 24;
 /// Words that are shared at first.
 const FIRST_WORDS: usize = 1 << 13;
 /// Words of a request on the socket.
-const REQUEST: usize = 10;
+const REQUEST: usize = 11;
 /// Words of a point's place in the memory.
 const SITE: usize = 5;
 
@@ -253,6 +253,7 @@ impl Worker {
             u64::from(call.moment.increment),
             call.moment.step_start.to_bits(),
             u64::from(sizes.has_sites),
+            u64::from(call.moment.is_undrained),
         ];
         self.socket.set_read_timeout(Some(limit))?;
         self.socket.write_all(&bytes(&request))?;
@@ -427,15 +428,19 @@ pub fn memory_file() -> io::Result<File> {
     Ok(file)
 }
 
-/// What a library says about its laws, asked in a worker.
+/// What a library says about its laws, asked in a worker. `foreign`: what it is made for, if not for the contract.
 ///
 /// # Errors
 /// What is wrong with the library, in words.
-pub(crate) fn describe(path: &Path, sha256: &str) -> Result<Vec<(LawDescription, Origin)>, String> {
+pub(crate) fn describe(
+    path: &Path,
+    sha256: &str,
+    foreign: Option<&Foreign>,
+) -> Result<Vec<(LawDescription, Origin)>, String> {
     let start = Start {
         path: path.as_os_str().to_owned(),
         sha256: sha256.to_owned(),
-        foreign: None,
+        foreign: foreign.cloned(),
         build: None,
         folder: None,
     };
@@ -453,7 +458,8 @@ pub(crate) fn describe(path: &Path, sha256: &str) -> Result<Vec<(LawDescription,
             formulation.index = number;
         }
     }
-    let apart = |law| (law, Origin::Apart { is_serial: false });
+    let is_serial = foreign.is_some();
+    let apart = |law| (law, Origin::Apart { is_serial });
     Ok(laws.into_iter().map(apart).collect())
 }
 
@@ -511,9 +517,9 @@ impl IsolatedInstance {
         Ok(instance)
     }
 
-    /// A routine of Abaqus writes files where it stands.
+    /// Routines of Abaqus and PLAXIS write files where they stand.
     fn scratch(id: &str, foreign: Option<&Foreign>) -> Result<Option<Scratch>, (Status, String)> {
-        let Some(foreign) = foreign.filter(|foreign| foreign.adapter == Adapter::Umat) else {
+        let Some(foreign) = foreign.filter(|foreign| foreign.adapter != Adapter::Mfront) else {
             return Ok(None);
         };
         let is_kept = foreign.scratch == Some(adapter::Scratch::Keep);
@@ -729,7 +735,9 @@ impl Bench {
             Origin::Foreign(law) => law
                 .create(hypothesis, &parameters)
                 .map(LawInstance::Foreign),
-            Origin::Apart { .. } => return Err(unusable("its worker has a worker")),
+            Origin::Apart { .. } | Origin::Zone(..) => {
+                return Err(unusable("its worker has a worker"));
+            }
         }
         .map_err(|(status, message)| Started::Refused(status, message))?;
         if has_copied(process) {
@@ -774,6 +782,7 @@ impl Bench {
             increment,
             start,
             sites,
+            undrained,
         ] = request;
         if self.memory.len() != length as usize {
             self.memory.follow()?;
@@ -830,6 +839,7 @@ impl Bench {
                 step: step as u32,
                 increment: increment as u32,
                 step_start: f64::from_bits(start),
+                is_undrained: undrained != 0,
             },
             sites: &sites,
             gradient0,

@@ -5,6 +5,7 @@ use crate::calls::{self, Doing};
 #[cfg(unix)]
 use crate::isolate;
 use crate::library::{Call, OwnedInstance, Strided};
+use crate::shear_zone::ZoneInstance;
 use crate::{
     BatchFailure, BatchSuccess, End, FormulationDescription, LawDescription, Library, LoadedLaw,
     Moment, Operator, PointCall, Request, Site, Start, Tangent,
@@ -35,6 +36,7 @@ pub(crate) enum LawInstance {
     Foreign(Box<dyn ForeignInstance>),
     #[cfg(unix)]
     Apart(Box<isolate::IsolatedInstance>),
+    Zone(ZoneInstance),
 }
 
 impl LawInstance {
@@ -45,6 +47,7 @@ impl LawInstance {
             Self::Foreign(instance) => instance.init_state(call),
             #[cfg(unix)]
             Self::Apart(instance) => instance.init_state(call),
+            Self::Zone(zone) => Some(zone.init_state(call)),
         }
     }
 
@@ -55,6 +58,7 @@ impl LawInstance {
             Self::Foreign(instance) => instance.integrate(call),
             #[cfg(unix)]
             Self::Apart(instance) => instance.integrate(call),
+            Self::Zone(zone) => zone.integrate(call),
         }
     }
 
@@ -64,6 +68,7 @@ impl LawInstance {
             Self::Foreign(instance) => instance.take_overwritten(),
             #[cfg(unix)]
             Self::Apart(instance) => instance.take_overwritten(),
+            Self::Zone(zone) => zone.take_overwritten(),
         }
     }
 }

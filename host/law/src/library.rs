@@ -17,6 +17,7 @@ pub(crate) mod mfront;
 pub mod probe;
 #[cfg(unix)]
 mod shared;
+pub(crate) mod udsm;
 pub(crate) mod umat;
 
 #[cfg(unix)]

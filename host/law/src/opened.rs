@@ -5,8 +5,9 @@ use crate::calls::{self, Doing};
 #[cfg(unix)]
 use crate::isolate;
 use crate::law::LawInstance;
-use crate::library::{LawHandle, probe};
+use crate::library::{CallFailure, LawHandle, probe};
 use crate::opener::Stamp;
+use crate::shear_zone::{ShearZone, ZoneInstance};
 use crate::{Law, LawDescription, Moment, custody, search};
 use abi::Hypothesis;
 use abi::raw;
@@ -42,6 +43,8 @@ pub(crate) enum Origin {
         /// Calls of one material must follow one another.
         is_serial: bool,
     },
+    /// Where the law of solids is that fills this zone.
+    Zone(ShearZone, Box<LoadedLaw>),
 }
 
 impl Library {
@@ -155,7 +158,7 @@ impl LoadedLaw {
     /// # Errors
     /// The law's refusal, or a defect of the library.
     pub fn build(&self, hypothesis: Hypothesis, parameters: &[f64]) -> Result<Law, CreateFailure> {
-        let (description, origin) = &self.library.laws[self.number];
+        let description = self.description();
         let defect = |reason: &str| CreateFailure {
             parameter: None,
             reason: reason.to_owned(),
@@ -165,24 +168,13 @@ impl LoadedLaw {
             .formulation(hypothesis)
             .ok_or_else(|| defect("the hypothesis is not offered"))?
             .clone();
-        let index = formulation.index;
         let name = calls::name(&format!(
             "law `{}` of library {}",
             description.id,
             self.library.path.display()
         ));
         calls::remember_process();
-        let create = || match origin {
-            Origin::Here(handle) => handle.create(index, parameters).map(LawInstance::Here),
-            Origin::Foreign(law) => law.create(hypothesis, parameters).map(LawInstance::Foreign),
-            #[cfg(unix)]
-            Origin::Apart { is_serial } => {
-                let library = &self.library;
-                let law = (self.number, index);
-                isolate::IsolatedInstance::create(library, law, parameters, *is_serial)
-                    .map(|apart| LawInstance::Apart(Box::new(apart)))
-            }
-        };
+        let create = || self.instance(hypothesis, parameters);
         let created = calls::calling(name, Doing::Create, 0, Moment::default(), create);
         let changes = custody::restore().map_err(|why| defect(&why))?;
         let instance = created.map_err(|(status, message)| {
@@ -206,5 +198,35 @@ impl LoadedLaw {
             name,
             changes,
         })
+    }
+
+    /// What the library makes of the parameters, in this process or in workers.
+    ///
+    /// # Errors
+    /// The law's status and message.
+    pub(crate) fn instance(
+        &self,
+        hypothesis: Hypothesis,
+        parameters: &[f64],
+    ) -> Result<LawInstance, CallFailure> {
+        let (description, origin) = &self.library.laws[self.number];
+        let Some(formulation) = description.formulation(hypothesis) else {
+            let message = "the hypothesis is not offered".to_owned();
+            return Err((raw::PILUM_E_INTERNAL, message));
+        };
+        let index = formulation.index;
+        match origin {
+            Origin::Here(handle) => handle.create(index, parameters).map(LawInstance::Here),
+            Origin::Foreign(law) => law.create(hypothesis, parameters).map(LawInstance::Foreign),
+            #[cfg(unix)]
+            Origin::Apart { is_serial } => {
+                let law = (self.number, index);
+                isolate::IsolatedInstance::create(&self.library, law, parameters, *is_serial)
+                    .map(|apart| LawInstance::Apart(Box::new(apart)))
+            }
+            Origin::Zone(zone, law) => {
+                ZoneInstance::create(*zone, law, parameters).map(LawInstance::Zone)
+            }
+        }
     }
 }

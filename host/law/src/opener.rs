@@ -118,7 +118,7 @@ impl Opener {
         let trust = self.trust();
         #[cfg(unix)]
         if trust.isolate.is_some() {
-            return isolate::describe(path, &image.sha256).map_err(unusable);
+            return isolate::describe(path, &image.sha256, None).map_err(unusable);
         }
         if trust.probe {
             vetting::vet(path, &image.sha256)?;
@@ -148,6 +148,25 @@ impl Opener {
             ));
         }
         let foreign = &self.completed(foreign);
+        let call_limit = self.trust().isolate;
+        #[cfg(unix)]
+        let apart = !foreign.in_process || call_limit.is_some();
+        #[cfg(unix)]
+        if apart && foreign.adapter == Adapter::Udsm {
+            // What describes it is code of its own.
+            let laws = isolate::describe(path, &image.sha256, Some(foreign))
+                .map_err(|why| Error::library(format!("library {}: {why}", path.display())))?;
+            return Ok(Arc::new(Library {
+                path: path.clone(),
+                warnings: std::mem::take(&mut image.warnings),
+                sha256: image.sha256.clone(),
+                stamp: None,
+                laws,
+                sidecar: None,
+                foreign: Some(foreign.clone()),
+                call_limit,
+            }));
+        }
         let opened = adapter::open(foreign, &image)?;
         let (externals, scratch) = opened.wishes;
         let foreign = Foreign {
@@ -155,9 +174,6 @@ impl Opener {
             scratch: foreign.scratch.or(scratch),
             ..foreign.clone()
         };
-        let call_limit = self.trust().isolate;
-        #[cfg(unix)]
-        let apart = !foreign.in_process || call_limit.is_some();
         let origin = |law: Arc<dyn ForeignLaw>| {
             #[cfg(unix)]
             if apart {
@@ -208,6 +224,7 @@ mod tests {
             records_once: false,
             externals: None,
             scratch: None,
+            tangent_order: None,
         }
     }
 

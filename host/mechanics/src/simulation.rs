@@ -381,6 +381,7 @@ impl Simulation {
                 step: self.time as u32 + 1,
                 increment: increment as u32,
                 step_start: self.time,
+                is_undrained: group.is_undrained(),
             };
         }
         let done = match self.reach(&place, n, phase, watch) {

@@ -94,6 +94,7 @@ impl Driver {
                     step: segment.step,
                     increment: (segment.first + k) as u32,
                     step_start,
+                    is_undrained: false,
                 };
                 let place = Place::Increment {
                     segment: number + 1,

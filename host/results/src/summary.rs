@@ -454,7 +454,7 @@ fn law(built: &BuiltLaw) -> Value {
         .iter()
         .map(|v| json!({ "id": v.id, "symbol": v.symbol, "unit": v.unit, "doc": v.doc }))
         .collect();
-    json!({
+    let mut entry = json!({
         "law": description.id,
         "name": description.name,
         "doc": description.doc,
@@ -466,7 +466,12 @@ fn law(built: &BuiltLaw) -> Value {
         "described_parameters": described,
         "internal_variables": variables,
         "warnings": built.warnings,
-    })
+    });
+    if let Some(zone) = built.law.loaded().shear_zone() {
+        let (thickness, ratio) = (zone.thickness, zone.lateral_ratio);
+        entry["shear_zone"] = json!({ "thickness": thickness, "lateral_ratio": ratio });
+    }
+    entry
 }
 
 #[cfg(test)]

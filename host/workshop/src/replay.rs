@@ -103,8 +103,18 @@ fn compare(capsule: &Capsule, law: &Law, say: &mut dyn FnMut(&str)) -> Result<()
     outcome
 }
 
-/// The law, from the capsule's library if that is still there.
+/// The law, in its zone if it fills one.
 fn find(capsule: &Capsule, opener: &Opener) -> Result<LoadedLaw, Error> {
+    let law = find_own(capsule, opener)?;
+    let Some(zone) = capsule.law.shear_zone else {
+        return Ok(law);
+    };
+    law.in_shear_zone(zone)
+        .map_err(|why| capsule.error(&["law", "shear_zone"], why).into())
+}
+
+/// The law, from the capsule's library if that is still there.
+fn find_own(capsule: &Capsule, opener: &Opener) -> Result<LoadedLaw, Error> {
     let search = SearchPath::of(opener, &[]);
     let part = &capsule.law;
     if !part.library.is_file() {
@@ -121,6 +131,7 @@ fn find(capsule: &Capsule, opener: &Opener) -> Result<LoadedLaw, Error> {
             records_once: false,
             externals: part.externals,
             scratch: None,
+            tangent_order: part.tangent_order,
         };
         return Ok(search.foreign_law(&part.id, &foreign)?);
     }

@@ -77,6 +77,28 @@ pub const ROUTES: &[Route] = &[
             ("smaller step", "return value −1, factor in rdt"),
         ],
     },
+    Route {
+        name: "udsm",
+        key: "adapter = \"udsm\", library = \"PATH\", law = \"MODEL\"",
+        conventions: &[
+            ("order", "xx yy zz xy yz zx; axisymmetric r z θ rz"),
+            ("sign", "tension positive"),
+            ("shear strain", "γ = 2 ε in dEps and D"),
+            (
+                "tangent",
+                "D of task 3 after task 2, column-major unless `tangent_order` says otherwise",
+            ),
+            (
+                "strains",
+                "dEps(1:6) the increment, dEps(7:12) the total at the start",
+            ),
+            (
+                "stress, state",
+                "Sig0, StVar0 are read, Sig, StVar written; task 1 writes StVar0",
+            ),
+            ("smaller step", "iAbort other than 0 in task 2"),
+        ],
+    },
 ];
 
 /// The routes as `pilum laws` prints them.

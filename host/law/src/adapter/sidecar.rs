@@ -1,6 +1,6 @@
 //! The sidecar of a library that cannot describe itself: `NAME.law.toml` beside `libNAME.so`.
 
-use super::{Externals, Scratch};
+use super::{Externals, Order, Scratch};
 use crate::Error;
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
@@ -85,17 +85,6 @@ struct Internal {
     #[serde(default)]
     initial: f64,
     components: Option<Spanned<usize>>,
-}
-
-/// How DDSDDE stands in memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Order {
-    /// As Fortran keeps matrices.
-    #[default]
-    Columns,
-    /// As C keeps them.
-    Rows,
 }
 
 /// What DDSDDE is: a routine always writes one.
@@ -263,23 +252,39 @@ fn unique<'a>(
     Ok(())
 }
 
+/// Whether tables of results have a column of this name, whatever the law.
+pub(super) fn is_column(id: &str) -> bool {
+    let mut places = [
+        "x",
+        "y",
+        "s",
+        "iterations",
+        "phase",
+        "increment",
+        "group",
+        "element",
+        "point",
+    ]
+    .into_iter();
+    let is_component = |word: &str| {
+        let rest = id
+            .strip_prefix(word)
+            .and_then(|rest| rest.strip_prefix('_'));
+        let mut all = Hypothesis::ALL.into_iter();
+        rest.is_some_and(|rest| all.any(|h| h.components().contains(&rest)))
+    };
+    let mut words = ["strain", "stress", "jump", "traction"].into_iter();
+    places.any(|place| place == id) || words.any(is_component)
+}
+
 /// Internal variables are columns of tables: each has a name of its own, which none of the others
 /// that stand there has.
 fn columns(source: &Source, internal: &[Internal]) -> Result<(), Error> {
-    let places = ["phase", "increment", "group", "element", "point"];
-    let columns = ["x", "y", "s", "iterations"].into_iter().chain(places);
-    let mut seen: HashSet<String> = columns.map(str::to_owned).collect();
-    for word in ["strain", "stress", "jump", "traction"] {
-        for hypothesis in Hypothesis::ALL {
-            let components = hypothesis.components().iter();
-            seen.extend(components.map(|c| format!("{word}_{c}")));
-        }
-    }
-    let taken = seen.clone();
+    let mut seen = HashSet::new();
     for written in internal {
         for variable in components(source, written)? {
             let id = variable.id;
-            if taken.contains(&id) {
+            if is_column(&id) {
                 let message = format!(
                     "internal variable `{id}` has the name of another column in tables of results"
                 );

@@ -3,10 +3,10 @@
 //! All arguments of a call stand in one block of words, apart from each other by guard words. A
 //! point gets a fresh block; after the call every word that is no output must be what it was.
 
-use super::sidecar::{Order, Sidecar};
+use super::sidecar::Sidecar;
 use super::{
-    Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, PointEnd, PointStart, Refusal,
-    each_point,
+    Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
+    Refusal, each_point,
 };
 use crate::Error;
 use crate::image::Image;

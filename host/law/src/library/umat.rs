@@ -37,14 +37,7 @@ impl Routine {
         names: &[&str],
         traps: bool,
     ) -> Result<Self, String> {
-        let _guard = super::ONE_AT_A_TIME
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let sha256 = image.sha256.clone();
-        // SAFETY: running the library's initialisers is what loading means; the user named it.
-        let loaded = unsafe { load_private(path, image) };
-        let library = loaded.or_else(|why| supply(path, &sha256, traps, why))?;
-        let library: &'static libloading::Library = Box::leak(Box::new(library));
+        let library = open_private(path, image, traps)?;
         names
             .iter()
             .find_map(|name| {
@@ -78,6 +71,26 @@ impl Routine {
         };
         call();
     }
+}
+
+/// Opens another image of a library, with variables (`SAVE`, `COMMON`) of its own. Where `traps` are
+/// wanted, they stand for what it calls and nobody supplies.
+///
+/// # Errors
+/// What is wrong with the library, in words.
+pub(super) fn open_private(
+    path: &Path,
+    image: Image,
+    traps: bool,
+) -> Result<&'static libloading::Library, String> {
+    let _guard = super::ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
+    let sha256 = image.sha256.clone();
+    // SAFETY: running the library's initialisers is what loading means; the user named it.
+    let loaded = unsafe { load_private(path, image) };
+    let library = loaded.or_else(|why| supply(path, &sha256, traps, why))?;
+    Ok(Box::leak(Box::new(library)))
 }
 
 /// Tries once more to load a library that could not be, `why`; with traps if those are what it lacks.

@@ -30,6 +30,7 @@ impl Simulation {
             step: self.time as u32 + 1,
             increment: 1,
             step_start: self.time,
+            is_undrained: false,
         };
         let cannot_start = |failure| Error::CannotStart(Box::new(failure));
         let start = self.loading[1].clone();

@@ -1,0 +1,715 @@
+//! User-defined soil models of PLAXIS, `User_Mod`, as laws.
+//!
+//! A library has one model or several. It names them, their parameters and state variables by
+//! functions, which run where the models do: in a worker, unless the file says otherwise. All calls
+//! have six components; plane problems leave yz and zx at zero.
+//!
+//! Arguments stand in one block of words, apart from each other by guard words. A point gets a
+//! fresh block; after the call every word that is no output must be what it was.
+
+use super::sidecar::is_column;
+use super::{
+    Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
+    Refusal, each_point,
+};
+use crate::Error;
+use crate::description::{
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
+};
+use crate::image::Image;
+use crate::library::udsm::{N_ARGUMENTS, Routine};
+use crate::library::{Call, CallFailure};
+use abi::Hypothesis;
+use abi::raw::{self, Status};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Entries of Props, Sig0 and dEps, whatever the model.
+const N_PROPS: usize = 50;
+const N_SIG0: usize = 20;
+const N_DEPS: usize = 12;
+/// Characters of iPrjDir.
+const N_DIR: usize = 255;
+/// Components, and the place of each of ours, 11 22 33 12 13 23, among xx yy zz xy yz zx.
+const N: usize = 6;
+const PLACE: [usize; N] = [0, 1, 2, 3, 5, 4];
+/// Most models and state variables that are plausible.
+const MOST_MODELS: i32 = 200;
+const MOST_STATES: i32 = 1000;
+/// Guard words on each side of an argument.
+const N_GUARD: usize = 24;
+/// What guard words hold: a signalling NaN.
+const GUARD: u64 = 0x7ff4_dead_beef_dead;
+/// dTime of calls that are no increment.
+const TIME_AT_REST: f64 = 1.0;
+/// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
+const OUT_OF_PLANE: f64 = 1e-9;
+
+/// What `User_Mod` is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Task {
+    Initialise = 1,
+    Stresses = 2,
+    Stiffness = 3,
+    CountStates = 4,
+    Attributes = 5,
+    ElasticStiffness = 6,
+}
+
+/// The arguments in their order.
+#[rustfmt::skip]
+#[expect(dead_code, reason = "some are never looked at")]
+#[derive(Clone, Copy, Debug)]
+enum A {
+    IdTask, IMod, IsUndr, IStep, ITer, IEl, Int, X, Y, Z, Time0, DTime, Props, Sig0, Swp0, StVar0,
+    DEps, D, BulkW, Sig, Swp, StVar, Ipl, NStat, NonSym, IStrsDep, ITimeDep, ITang, IPrjDir,
+    IPrjLen, IAbort,
+}
+
+/// What an argument consists of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Real,
+    Integer,
+}
+
+/// What a routine may do with an argument: write it; read its copy, so that nobody sees what it
+/// leaves there; read it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Role {
+    Output,
+    Copy,
+    Fixed,
+}
+
+use Kind::{Integer as I, Real as R};
+use Role::{Copy as C, Fixed as F, Output as O};
+
+/// Name, kind, entries and role. StVar0 and StVar have as many entries as the model has variables.
+#[rustfmt::skip]
+const ARGUMENTS: [(&str, Kind, usize, Role); N_ARGUMENTS] = [
+    ("IDTask", I, 1, F), ("iMod", I, 1, F), ("IsUndr", I, 1, F), ("iStep", I, 1, F),
+    ("iTer", I, 1, F), ("iEl", I, 1, F), ("Int", I, 1, F), ("X", R, 1, C), ("Y", R, 1, C),
+    ("Z", R, 1, C), ("Time0", R, 1, C), ("dTime", R, 1, C), ("Props", R, N_PROPS, F),
+    ("Sig0", R, N_SIG0, C), ("Swp0", R, 1, C), ("StVar0", R, 0, O), ("dEps", R, N_DEPS, C),
+    ("D", R, N * N, O), ("BulkW", R, 1, O), ("Sig", R, N, O), ("Swp", R, 1, O),
+    ("StVar", R, 0, O), ("ipl", I, 1, O), ("nStat", I, 1, O), ("NonSym", I, 1, O),
+    ("iStrsDep", I, 1, O), ("iTimeDep", I, 1, O), ("iTang", I, 1, O), ("iPrjDir", I, N_DIR, F),
+    ("iPrjLen", I, 1, F), ("iAbort", I, 1, O),
+];
+
+/// Asks a library for its models. Its functions run.
+///
+/// # Errors
+/// [`Error::Library`] with what it lacks.
+pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
+    let path = &foreign.library;
+    let fault = |why: String| Error::library(format!("library {}: {why}", path.display()));
+    let traps = foreign.externals == Some(Externals::Trap);
+    let sha256 = &image.sha256;
+    let routine = open_again(path, sha256, traps).map_err(fault)?;
+    let n_models = routine.n_models().unwrap_or(1);
+    if !(1..=MOST_MODELS).contains(&n_models) {
+        return Err(fault(format!("it says that it has {n_models} models")));
+    }
+    let mut laws: Vec<(LawDescription, Arc<dyn ForeignLaw>)> = Vec::new();
+    for model in 1..=n_models {
+        let (law, n_states) = describe(routine, model).map_err(fault)?;
+        if laws.iter().any(|(other, _)| other.id == law.id) {
+            return Err(fault(format!("two of its models are called `{}`", law.id)));
+        }
+        let udsm = Udsm {
+            library: path.clone(),
+            sha256: sha256.clone(),
+            traps,
+            order: foreign.tangent_order.unwrap_or_default(),
+            model,
+            n_states,
+        };
+        laws.push((law, Arc::new(udsm)));
+    }
+    Ok(ForeignLaws {
+        laws,
+        sidecar: None,
+        wishes: (None, None),
+    })
+}
+
+/// The routine in an image of its own, of a file that has not changed.
+fn open_again(path: &Path, sha256: &str, traps: bool) -> Result<Routine, String> {
+    let image = Image::read(path)?;
+    if image.sha256 != sha256 {
+        return Err("it was changed".to_owned());
+    }
+    Routine::open(path, image, traps)
+}
+
+/// What a model says of itself, and its number of state variables.
+fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), String> {
+    let name = routine.model_name(model);
+    let name = name.map_or(String::new(), |name| readable(&name));
+    let id = identifier(&name, &format!("model_{model}"));
+    let n_parameters = routine.count("GetParamCount", model);
+    let n_parameters = n_parameters.unwrap_or(N_PROPS as i32);
+    if !(0..=N_PROPS as i32).contains(&n_parameters) {
+        return Err(format!(
+            "model `{id}` says that it has {n_parameters} parameters, Props holds {N_PROPS}"
+        ));
+    }
+    let text = |function: &str, number: i32| {
+        let text = routine.name(function, model, number);
+        text.map_or(String::new(), |text| readable(&text))
+    };
+    let mut parameters: Vec<ParameterDescription> = Vec::new();
+    for number in 1..=n_parameters {
+        let symbol = text("GetParamName", number);
+        let id = identifier(&symbol, &format!("prop_{number}"));
+        let is_taken = parameters.iter().any(|other| other.id == id);
+        parameters.push(ParameterDescription {
+            id: numbered(id, is_taken, number),
+            doc: format!("Parameter {number}, {symbol}"),
+            symbol,
+            unit: unit(&text("GetParamUnit", number)),
+            default: None,
+            optional: false,
+            bounds: ANY,
+            usual: ANY,
+            choices: Vec::new(),
+        });
+    }
+    let block = asked(routine, model, Task::CountStates)?;
+    let n_states = block.integer(A::NStat);
+    if let Some(said) = routine.count("GetStateVarCount", model)
+        && said != n_states
+    {
+        return Err(format!(
+            "model `{id}`: GetStateVarCount says {said} state variables, task 4 says {n_states}"
+        ));
+    }
+    if !(0..=MOST_STATES).contains(&n_states) {
+        return Err(format!(
+            "model `{id}` says that it has {n_states} state variables"
+        ));
+    }
+    let mut internal_variables: Vec<InternalVariable> = Vec::new();
+    for number in 1..=n_states {
+        let symbol = text("GetStateVarName", number);
+        let id = identifier(&symbol, &format!("state_{number}"));
+        let id = if is_column(&id) {
+            format!("state_{id}")
+        } else {
+            id
+        };
+        let is_taken = internal_variables.iter().any(|other| other.id == id);
+        internal_variables.push(InternalVariable {
+            id: numbered(id, is_taken, number),
+            doc: format!("State variable {number}, {symbol}"),
+            symbol,
+            unit: unit(&text("GetStateVarUnit", number)),
+            initial_value: 0.0,
+            output_only: false,
+        });
+    }
+    let attributes = asked(routine, model, Task::Attributes)?;
+    let solids = [
+        Hypothesis::PlaneStrain,
+        Hypothesis::Axisymmetric,
+        Hypothesis::ThreeD,
+    ];
+    let formulations = solids.into_iter().zip(0..);
+    let formulation = |(hypothesis, index): (Hypothesis, u32)| FormulationDescription {
+        hypothesis: hypothesis.name(),
+        index,
+        symmetric: attributes.integer(A::NonSym) == 0,
+        linear: false,
+        tangent: if attributes.integer(A::ITang) == 1 {
+            Tangent::Consistent
+        } else {
+            Tangent::Approximate
+        },
+        local_axes: false,
+        internal_variables: internal_variables.clone(),
+    };
+    let law = LawDescription {
+        name: if name.is_empty() { id.clone() } else { name },
+        id,
+        version: "unversioned".to_owned(),
+        author: "unknown".to_owned(),
+        licence: "unknown licence".to_owned(),
+        doc: format!("User-defined soil model {model} of its library."),
+        references: "none given".to_owned(),
+        parameters,
+        formulations: formulations.map(formulation).collect(),
+    };
+    Ok((law, n_states as usize))
+}
+
+/// Any value.
+const ANY: Bounds = Bounds {
+    lower: f64::NEG_INFINITY,
+    open_lower: false,
+    upper: f64::INFINITY,
+    open_upper: false,
+};
+
+/// The answer to a task that is not about a point.
+fn asked(routine: Routine, model: i32, task: Task) -> Result<Block, String> {
+    let mut block = Block::new(model, 0, &[]);
+    block.set_integers(A::IdTask, &[task as i32]);
+    let before = block.clone();
+    routine.call(&mut block.words, &block.at);
+    block.overwritten(&before)?;
+    match block.integer(A::IAbort) {
+        0 => Ok(block),
+        abort => Err(format!("task {} ends with iAbort = {abort}", task as i32)),
+    }
+}
+
+/// A text as PLAXIS takes it: its length may stand in its first character.
+fn readable(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|b| *b == 0).filter(|end| *end > 0);
+    let bytes = &bytes[..end.unwrap_or(bytes.len())];
+    let bytes = bytes.trim_ascii_end();
+    let bytes = match bytes.split_first() {
+        Some((&length, rest)) if length < b' ' || rest.len() == usize::from(length) => {
+            &rest[..rest.len().min(usize::from(length))]
+        }
+        _ => bytes,
+    };
+    String::from_utf8_lossy(bytes).trim().to_owned()
+}
+
+/// Letters of the font Symbol that PLAXIS writes between `@` and `#`.
+#[rustfmt::skip]
+const GREEK: [(char, &str); 24] = [
+    ('a', "alpha"), ('b', "beta"), ('c', "chi"), ('d', "delta"), ('e', "epsilon"), ('f', "phi"),
+    ('g', "gamma"), ('h', "eta"), ('i', "iota"), ('j', "phi"), ('k', "kappa"), ('l', "lambda"),
+    ('m', "mu"), ('n', "nu"), ('o', "omicron"), ('p', "pi"), ('q', "theta"), ('r', "rho"),
+    ('s', "sigma"), ('t', "tau"), ('u', "upsilon"), ('w', "omega"), ('x', "xi"), ('y', "psi"),
+];
+
+/// The id of a name: Greek letters in words, subscripts and what is no letter or digit behind `_`.
+fn identifier(name: &str, otherwise: &str) -> String {
+    let mut id = String::new();
+    let mut is_greek = false;
+    for c in name.chars() {
+        match c {
+            '@' => is_greek = true,
+            '#' => is_greek = false,
+            _ if is_greek && c.is_ascii_alphabetic() => {
+                let lower = c.to_ascii_lowercase();
+                let word = GREEK.iter().find(|(letter, _)| *letter == lower);
+                let word = word.map_or("zeta", |(_, word)| word);
+                if c.is_ascii_uppercase() {
+                    id.push(word.as_bytes()[0].to_ascii_uppercase() as char);
+                    id.push_str(&word[1..]);
+                } else {
+                    id.push_str(word);
+                }
+            }
+            _ if c.is_ascii_alphanumeric() => id.push(c),
+            _ if !id.is_empty() && !id.ends_with('_') => id.push('_'),
+            _ => {}
+        }
+    }
+    let id = id.trim_end_matches('_');
+    match id.chars().next() {
+        None => otherwise.to_owned(),
+        Some(first) if first.is_ascii_digit() => format!("{otherwise}_{id}"),
+        Some(_) => id.to_owned(),
+    }
+}
+
+/// An id that is there already gets its number.
+fn numbered(id: String, is_taken: bool, number: i32) -> String {
+    if is_taken {
+        format!("{id}_{number}")
+    } else {
+        id
+    }
+}
+
+/// A unit: F, L stand for those of force and length.
+fn unit(text: &str) -> String {
+    let text = text.replace(['#', '_'], "");
+    text.replace('F', "kN").replace('L', "m")
+}
+
+/// A model of a library.
+#[derive(Debug)]
+struct Udsm {
+    library: PathBuf,
+    sha256: String,
+    /// Traps stand for what it calls and nobody supplies.
+    traps: bool,
+    order: Order,
+    model: i32,
+    n_states: usize,
+}
+
+impl ForeignLaw for Udsm {
+    fn is_serial(&self) -> bool {
+        true
+    }
+
+    fn create(
+        &self,
+        hypothesis: Hypothesis,
+        parameters: &[f64],
+    ) -> Result<Box<dyn ForeignInstance>, CallFailure> {
+        let unusable = |why: String| (raw::PILUM_E_INTERNAL, why);
+        let routine = open_again(&self.library, &self.sha256, self.traps).map_err(unusable)?;
+        Ok(Box::new(Instance {
+            routine,
+            template: Block::new(self.model, self.n_states, parameters),
+            n: hypothesis.n_components(),
+            order: self.order,
+            turn: Mutex::default(),
+            overwritten: AtomicU64::new(0),
+            told: AtomicU64::new(0),
+        }))
+    }
+}
+
+/// Arguments of a call in one block of words.
+#[derive(Clone, Debug)]
+struct Block {
+    words: Vec<u64>,
+    /// First word and number of entries of every argument.
+    at: [usize; N_ARGUMENTS],
+    entries: [usize; N_ARGUMENTS],
+}
+
+impl Block {
+    /// What all calls of a material have in common.
+    fn new(model: i32, n_states: usize, parameters: &[f64]) -> Self {
+        let mut entries = ARGUMENTS.map(|(_, _, entries, _)| entries);
+        entries[A::StVar0 as usize] = n_states;
+        entries[A::StVar as usize] = n_states;
+        let mut at = [0; N_ARGUMENTS];
+        let mut end = N_GUARD;
+        for (i, (_, kind, ..)) in ARGUMENTS.iter().enumerate() {
+            at[i] = end;
+            end += n_words(*kind, entries[i]) + N_GUARD;
+        }
+        let mut block = Self {
+            words: vec![GUARD; end],
+            at,
+            entries,
+        };
+        for (i, (_, kind, ..)) in ARGUMENTS.iter().enumerate() {
+            let n = n_words(*kind, entries[i]);
+            block.words[at[i]..][..n].fill(0);
+        }
+        block.set(A::Props, parameters);
+        block.set_integers(A::IMod, &[model]);
+        block.set_integers(A::IStep, &[1]);
+        block.set_integers(A::ITer, &[1]);
+        block.set_integers(A::NStat, &[n_states as i32]);
+        let folder = std::env::current_dir().unwrap_or_default();
+        let folder = folder.to_string_lossy();
+        let characters: Vec<i32> = folder.bytes().take(N_DIR).map(i32::from).collect();
+        block.set_integers(A::IPrjDir, &characters);
+        block.set_integers(A::IPrjLen, &[characters.len() as i32]);
+        block
+    }
+
+    /// Writes the first entries of an argument.
+    fn set(&mut self, argument: A, values: &[f64]) {
+        let words = &mut self.words[self.at[argument as usize]..];
+        for (word, value) in words.iter_mut().zip(values) {
+            *word = value.to_bits();
+        }
+    }
+
+    fn set_integers(&mut self, argument: A, values: &[i32]) {
+        let words = &mut self.words[self.at[argument as usize]..];
+        for (word, pair) in words.iter_mut().zip(values.chunks(2)) {
+            let half = |i: usize| pair.get(i).copied().unwrap_or_default().to_ne_bytes();
+            let ([a, b, c, d], [e, f, g, h]) = (half(0), half(1));
+            *word = u64::from_ne_bytes([a, b, c, d, e, f, g, h]);
+        }
+    }
+
+    fn reals(&self, argument: A) -> impl Iterator<Item = f64> {
+        let i = argument as usize;
+        let words = &self.words[self.at[i]..][..self.entries[i]];
+        words.iter().map(|word| f64::from_bits(*word))
+    }
+
+    fn integer(&self, argument: A) -> i32 {
+        let [a, b, c, d, ..] = self.words[self.at[argument as usize]].to_ne_bytes();
+        i32::from_ne_bytes([a, b, c, d])
+    }
+
+    /// Which copies a call has written to, by bits.
+    ///
+    /// # Errors
+    /// The first argument that it has written to without right, in words.
+    fn overwritten(&self, before: &Self) -> Result<u64, String> {
+        let mut copies = 0;
+        let differs = |from: usize, to: usize| self.words[from..to] != before.words[from..to];
+        if differs(0, self.at[0]) {
+            return Err(format!("the routine writes in front of {}", ARGUMENTS[0].0));
+        }
+        for (i, (name, kind, _, role)) in ARGUMENTS.iter().enumerate() {
+            let (first, n) = (self.at[i], n_words(*kind, self.entries[i]));
+            if *role != Role::Output && differs(first, first + n) {
+                if *role == Role::Fixed {
+                    return Err(format!("the routine overwrites {name}, which is an input"));
+                }
+                copies |= 1 << i;
+            }
+            let end = first + n;
+            let next = ARGUMENTS.get(i + 1).map_or("", |(name, ..)| *name);
+            if differs(end, end + N_GUARD / 2) {
+                let size = self.entries[i];
+                return Err(format!(
+                    "the routine writes beyond the end of {name}, which has {size} entries"
+                ));
+            }
+            if differs(end + N_GUARD / 2, end + N_GUARD) {
+                return Err(format!(
+                    "the routine writes between {name} and {next}, in front of one or beyond the \
+                     end of the other"
+                ));
+            }
+        }
+        Ok(copies)
+    }
+}
+
+fn n_words(kind: Kind, entries: usize) -> usize {
+    match kind {
+        Kind::Real => entries,
+        Kind::Integer => entries.div_ceil(2),
+    }
+}
+
+/// A model with its parameters fixed.
+#[derive(Debug)]
+struct Instance {
+    routine: Routine,
+    template: Block,
+    /// Components of the hypothesis.
+    n: usize,
+    /// How D stands in memory.
+    order: Order,
+    /// Whose turn it is: routines keep variables.
+    turn: Mutex<()>,
+    /// Which of its copies the routine has overwritten, by bits, and which of them have been told.
+    overwritten: AtomicU64,
+    told: AtomicU64,
+}
+
+impl ForeignInstance for Instance {
+    fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
+        let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut block = self.template.clone();
+        // No gradients, no state at the start: an increment of nothing.
+        let zeros = vec![0.0; call.state1.len()];
+        let call = Call {
+            state0: &zeros,
+            ..call
+        };
+        Some(each_point(call, |start, end| {
+            self.fill(&mut block, start, Task::Initialise);
+            self.call(&mut block)?;
+            finite(&block, A::StVar0, true)?;
+            for (to, value) in end.state.iter_mut().zip(block.reals(A::StVar0)) {
+                *to = value;
+            }
+            Ok(())
+        }))
+    }
+
+    fn integrate(&self, call: Call<'_>) -> (Status, String) {
+        let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut block = self.template.clone();
+        each_point(call, |start, end| self.update(&mut block, start, end))
+    }
+
+    fn take_overwritten(&self) -> Vec<String> {
+        let overwritten = self.overwritten.load(Ordering::Relaxed);
+        let told = self.told.swap(overwritten, Ordering::Relaxed);
+        let new = (0..N_ARGUMENTS).filter(|i| (overwritten & !told) >> i & 1 == 1);
+        new.map(|i| ARGUMENTS[i].0.to_owned()).collect()
+    }
+}
+
+impl Instance {
+    fn update(
+        &self,
+        block: &mut Block,
+        start: &PointStart<'_>,
+        end: &mut PointEnd<'_>,
+    ) -> Result<(), Refusal> {
+        let is_at_rest = start.gradient == start.gradient_end;
+        self.fill(block, start, Task::Stresses);
+        self.call(block)?;
+        finite(block, A::Sig, is_at_rest)?;
+        finite(block, A::StVar, is_at_rest)?;
+        let stress: Vec<f64> = block.reals(A::Sig).collect();
+        let state: Vec<f64> = block.reals(A::StVar).collect();
+        let largest = stress.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
+        let mut rest = PLACE[self.n..].iter().map(|place| stress[*place]);
+        if let Some(stress) = rest.find(|v| v.abs() > OUT_OF_PLANE * largest) {
+            return Err(Refusal::error(
+                raw::PILUM_E_UNSUPPORTED,
+                format!("a stress yz or zx of {stress:e} arises, which a plane problem lacks"),
+            ));
+        }
+        for (to, place) in end.flux.iter_mut().zip(PLACE) {
+            *to = stress[place];
+        }
+        end.state.copy_from_slice(&state);
+        if end.operator.is_empty() {
+            return Ok(());
+        }
+        let is_elastic = start.request & raw::PILUM_REQ_ELASTIC != 0;
+        let task = if is_elastic {
+            Task::ElasticStiffness
+        } else {
+            Task::Stiffness
+        };
+        self.fill(block, start, task);
+        if !is_elastic {
+            // The end that has just been found.
+            block.set(A::Sig, &stress);
+            block.set(A::StVar, &state);
+        }
+        self.call(block)?;
+        finite(block, A::D, is_at_rest)?;
+        let stiffness: Vec<f64> = block.reals(A::D).collect();
+        for i in 0..self.n {
+            for j in 0..self.n {
+                let entry = match self.order {
+                    Order::Columns => PLACE[i] + PLACE[j] * N,
+                    Order::Rows => PLACE[i] * N + PLACE[j],
+                };
+                end.operator[i * self.n + j] = stiffness[entry];
+            }
+        }
+        Ok(())
+    }
+
+    /// Fresh arguments.
+    fn fill(&self, block: &mut Block, start: &PointStart<'_>, task: Task) {
+        block.words.copy_from_slice(&self.template.words);
+        let six = |values: &[f64]| {
+            let mut six = [0.0; N];
+            for (value, place) in values.iter().zip(PLACE) {
+                six[place] = *value;
+            }
+            six
+        };
+        let (stress, strain) = (six(start.flux), six(start.gradient));
+        let strain_end = six(start.gradient_end);
+        let mut increments = [0.0; N_DEPS];
+        for c in 0..N {
+            increments[c] = strain_end[c] - strain[c];
+            increments[N + c] = strain[c];
+        }
+        block.set_integers(A::IdTask, &[task as i32]);
+        block.set_integers(A::IsUndr, &[i32::from(start.moment.is_undrained)]);
+        block.set_integers(A::IStep, &[start.moment.increment as i32]);
+        block.set_integers(A::IEl, &[start.site.element as i32]);
+        block.set_integers(A::Int, &[start.site.point as i32]);
+        let [x, y] = start.site.position;
+        block.set(A::X, &[x]);
+        block.set(A::Y, &[y]);
+        block.set(A::Time0, &[start.time]);
+        let time_increment = Some(start.time_increment).filter(|dt| *dt > 0.0);
+        block.set(A::DTime, &[time_increment.unwrap_or(TIME_AT_REST)]);
+        block.set(A::Sig0, &stress);
+        block.set(A::StVar0, start.state);
+        block.set(A::StVar, start.state);
+        block.set(A::DEps, &increments);
+        // What is not written shows.
+        let sig = if task == Task::Stresses {
+            [f64::NAN; N]
+        } else {
+            stress
+        };
+        block.set(A::Sig, &sig);
+    }
+
+    /// One call.
+    fn call(&self, block: &mut Block) -> Result<(), Refusal> {
+        let before = block.clone();
+        self.routine.call(&mut block.words, &block.at);
+        let overwritten = block
+            .overwritten(&before)
+            .map_err(|damage| Refusal::error(raw::PILUM_E_INTERNAL, damage))?;
+        if overwritten != 0 {
+            self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
+        }
+        let abort = block.integer(A::IAbort);
+        if abort == 0 {
+            return Ok(());
+        }
+        // A routine has no other words for an increment that it cannot follow.
+        let task = before.integer(A::IdTask);
+        let is_update = task == Task::Stresses as i32;
+        Err(Refusal {
+            status: if is_update {
+                raw::PILUM_CUT_STEP
+            } else {
+                raw::PILUM_E_INTERNAL
+            },
+            factor: f64::NAN,
+            message: format!("the routine ends task {task} with iAbort = {abort}"),
+        })
+    }
+}
+
+/// Numbers that are none are a smaller increment's matter, unless there is no increment.
+fn finite(block: &Block, result: A, is_at_rest: bool) -> Result<(), Refusal> {
+    if block.reals(result).all(f64::is_finite) {
+        return Ok(());
+    }
+    let name = ARGUMENTS[result as usize].0;
+    let (status, when) = if is_at_rest {
+        (raw::PILUM_E_INTERNAL, ", without any strain")
+    } else {
+        (raw::PILUM_E_NUMERIC, "")
+    };
+    let message = format!("the routine leaves {name} with values that are not finite{when}");
+    Err(Refusal::error(status, message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_with_and_without_their_length() {
+        assert_eq!(readable(b"\x04c'_x            \0"), "c'_x");
+        assert_eq!(readable(b"cohesion        \0"), "cohesion");
+        assert_eq!(readable(b"E\0garbage"), "E");
+        assert_eq!(readable(b"   \0"), "");
+        // 37 is the character %.
+        let long = format!("%{}   \0", "x".repeat(37));
+        assert_eq!(readable(long.as_bytes()), "x".repeat(37));
+    }
+
+    #[test]
+    fn ids_are_made_of_markup() {
+        for (name, id) in [
+            ("E", "E"),
+            ("@n#", "nu"),
+            ("@f#_cv#", "phi_cv"),
+            ("@G#", "Gamma"),
+            ("p_0#'", "p_0"),
+            ("@z#", "zeta"),
+            ("", "prop_3"),
+            ("2x", "prop_3_2x"),
+            ("e (void ratio)", "e_void_ratio"),
+        ] {
+            assert_eq!(identifier(name, "prop_3"), id, "{name}");
+        }
+        assert_eq!(unit("F/L^2#"), "kN/m^2");
+        assert_eq!(unit("-"), "-");
+    }
+}

@@ -1,0 +1,152 @@
+//! Opening a library with a user-defined soil model of PLAXIS, and calling it.
+
+use super::super::image::Image;
+use super::umat::open_private;
+use std::ffi::{c_char, c_int, c_void};
+use std::path::Path;
+
+/// Number of arguments of `User_Mod`.
+pub(crate) const N_ARGUMENTS: usize = 31;
+/// Length of a name, `CHARACTER*255`.
+const N_NAME: usize = 255;
+
+type P = *mut c_void;
+
+#[rustfmt::skip]
+type Function = unsafe extern "C" fn(
+    P, P, P, P, P, P, P, P, P, P, P, P, P, P, P, P,
+    P, P, P, P, P, P, P, P, P, P, P, P, P, P, P,
+);
+/// What counts models, or parameters and state variables of one.
+type CountAll = unsafe extern "C" fn(*mut c_int);
+type CountOf = unsafe extern "C" fn(*const c_int, *mut c_int);
+/// What names a model, or one of its parameters and variables. The hidden length of the text comes
+/// last; C leaves it alone.
+type NameOf = unsafe extern "C" fn(*const c_int, *mut c_char, usize);
+type NameIn = unsafe extern "C" fn(*const c_int, *const c_int, *mut c_char, usize);
+
+/// The routine in an image of its library that nobody else uses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Routine {
+    function: Function,
+    library: &'static libloading::Library,
+}
+
+/// A Fortran routine by the names that compilers give it.
+fn spellings(name: &str) -> [String; 6] {
+    let (lower, upper) = (name.to_lowercase(), name.to_uppercase());
+    let with = |name: &str| format!("{name}_");
+    [
+        with(&lower),
+        name.to_owned(),
+        lower.clone(),
+        upper.clone(),
+        with(name),
+        with(&upper),
+    ]
+}
+
+impl Routine {
+    /// Opens another image of the library, with variables of its own. Where `traps` are wanted,
+    /// they stand for what it calls and nobody supplies.
+    ///
+    /// # Errors
+    /// What is wrong with the library, in words.
+    pub(crate) fn open(path: &Path, image: Image, traps: bool) -> Result<Self, String> {
+        let library = open_private(path, image, traps)?;
+        // SAFETY: the user says by the adapter that a symbol of this name is a `User_Mod`.
+        let function = unsafe { find::<Function>(library, "User_Mod") }
+            .ok_or_else(|| "it has no routine User_Mod".to_owned())?;
+        Ok(Self { function, library })
+    }
+
+    /// Calls the routine. Argument `i` starts at word `at[i]`.
+    ///
+    /// # Panics
+    /// An argument starts outside the words.
+    pub(crate) fn call(self, words: &mut [u64], at: &[usize; N_ARGUMENTS]) {
+        assert!(at.iter().all(|first| *first < words.len()));
+        let start = words.as_mut_ptr();
+        // SAFETY: every place lies inside `words`, see above.
+        let p = at.map(|first| unsafe { start.add(first) }.cast::<c_void>());
+        #[rustfmt::skip]
+        let call = || {
+            // SAFETY: 31 addresses of numbers, of the sizes that PLAXIS gives them; the words are
+            // borrowed until it has returned. That it stays within them is checked afterwards by
+            // the words in between.
+            unsafe { (self.function)(
+                p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10],
+                p[11], p[12], p[13], p[14], p[15], p[16], p[17], p[18], p[19], p[20],
+                p[21], p[22], p[23], p[24], p[25], p[26], p[27], p[28], p[29], p[30],
+            ); }
+        };
+        call();
+    }
+
+    /// How many models there are, if the library says so.
+    pub(crate) fn n_models(self) -> Option<i32> {
+        // SAFETY: the user says by the adapter what a symbol of this name is.
+        let count = unsafe { find::<CountAll>(self.library, "GetModelCount") }?;
+        let mut n = 0;
+        // SAFETY: one integer.
+        unsafe { count(&raw mut n) };
+        Some(n)
+    }
+
+    /// What `function`, `GetParamCount` or `GetStateVarCount`, says of a model.
+    pub(crate) fn count(self, function: &str, model: i32) -> Option<i32> {
+        // SAFETY: the user says by the adapter what a symbol of this name is.
+        let count = unsafe { find::<CountOf>(self.library, function) }?;
+        let mut n = 0;
+        // SAFETY: two integers.
+        unsafe { count(&raw const model, &raw mut n) };
+        Some(n)
+    }
+
+    /// The name of a model, as it is written.
+    pub(crate) fn model_name(self, model: i32) -> Option<Vec<u8>> {
+        // SAFETY: the user says by the adapter what a symbol of this name is.
+        let name = unsafe { find::<NameOf>(self.library, "GetModelName") }?;
+        let mut text = blank();
+        // SAFETY: an integer, and a text of this length with room behind it.
+        unsafe { name(&raw const model, text.as_mut_ptr().cast(), N_NAME) };
+        Some(text)
+    }
+
+    /// What `function`, such as `GetParamName` or `GetStateVarUnit`, says of the parameter or
+    /// variable with this number, from 1.
+    pub(crate) fn name(self, function: &str, model: i32, number: i32) -> Option<Vec<u8>> {
+        // SAFETY: the user says by the adapter what a symbol of this name is.
+        let name = unsafe { find::<NameIn>(self.library, function) }?;
+        let mut text = blank();
+        // SAFETY: two integers, and a text of this length with room behind it.
+        unsafe {
+            name(
+                &raw const model,
+                &raw const number,
+                text.as_mut_ptr().cast(),
+                N_NAME,
+            );
+        }
+        Some(text)
+    }
+}
+
+/// Room for a name, and for the end that C writes.
+fn blank() -> Vec<u8> {
+    let mut text = vec![b' '; N_NAME];
+    text.push(0);
+    text
+}
+
+/// A function by the first of the spellings of its name that is there.
+///
+/// # Safety
+/// A symbol of this name has this type.
+unsafe fn find<T: Copy>(library: &'static libloading::Library, name: &str) -> Option<T> {
+    spellings(name).iter().find_map(|name| {
+        // SAFETY: passed on to the caller.
+        let symbol = unsafe { library.get::<T>(name.as_bytes()) }.ok()?;
+        Some(*symbol)
+    })
+}

@@ -1,0 +1,244 @@
+//! Interface laws made from laws of solids, `adapter = "shear_zone"`.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, DONE, Edit, JOINT, NO_EQUILIBRIUM, Place, edited};
+use crate::umat;
+use tests::case::column;
+
+/// The joint of the case, 1 cm of the soil.
+const ZONE: &str = "adapter = \"shear_zone\"\nlaw = \"elastic\"\nthickness = 0.01\n\
+                    parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n";
+const OWN: &str = "law = \"coulomb_joint\"\n[laws.joint.parameters]\nnormal_stiffness = 1e6\n\
+                   shear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
+                   dilatancy_angle = 5.0\n";
+
+/// The case with its joint along the middle, of this law.
+fn joint(law: &str) -> String {
+    let text = edited(JOINT);
+    assert!(text.contains(OWN));
+    text.replacen(OWN, law, 1)
+}
+
+/// Ends of all probes.
+fn ends(place: &Place, text: &str, arguments: &[&str]) -> Vec<f64> {
+    place.write("case.toml", text);
+    let run = ["run", "case.toml", "--out", "out"];
+    let outcome = place.run(&[&run, arguments].concat());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let end = |name| *column(&place.path("out/history.csv"), name).last().unwrap();
+    ["settlement", "tau"].map(end).to_vec()
+}
+
+fn assert_same(found: &[f64], expected: &[f64]) {
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(
+            (found - expected).abs() <= 1e-9 * expected.abs(),
+            "{found} instead of {expected}"
+        );
+    }
+}
+
+/// A joint with the stiffness of the zone, (λ + 2G)/d and G/d, and strength without end.
+fn equal_joint() -> String {
+    let (g, lambda) = (1e4 / 2.6, 1e4 * 0.3 / (1.3 * 0.4));
+    joint(&format!(
+        "law = \"coulomb_joint\"\n[laws.joint.parameters]\nnormal_stiffness = {:?}\n\
+         shear_stiffness = {:?}\ncohesion = 1e9\nfriction_angle = 30.0\ndilatancy_angle = 0.0\n",
+        (lambda + 2.0 * g) / 0.01,
+        g / 0.01
+    ))
+}
+
+#[test]
+fn an_elastic_zone_is_a_joint_with_its_stiffness() {
+    let place = Place::new();
+    let expected = ends(&place, &equal_joint(), &[]);
+    assert!(expected[1].abs() > 1e-3, "it is sheared: {expected:?}");
+    for arguments in [&[][..], &["--isolate"]] {
+        assert_same(&ends(&place, &joint(ZONE), arguments), &expected);
+    }
+    // A law of its own name may fill it; and one of another table, whose values it overrides.
+    let named = joint(&ZONE.replace("\"elastic\"", "\"soil\""));
+    assert_same(&ends(&place, &named, &[]), &expected);
+    let inherited = joint("adapter = \"shear_zone\"\nlaw = \"soil\"\nthickness = 0.01\n");
+    assert_same(&ends(&place, &inherited, &[]), &expected);
+    let named = joint(ZONE)
+        .replace("[laws.joint]", "[laws.elastic]")
+        .replacen("law = \"joint\"", "law = \"elastic\"", 1);
+    assert_same(&ends(&place, &named, &[]), &expected);
+}
+
+#[test]
+fn a_umat_fills_a_zone() {
+    let Some(place) = umat::place("elastic") else {
+        return;
+    };
+    let expected = ends(&place, &equal_joint(), &[]);
+    let table = "adapter = \"shear_zone\"\nlaw = \"clay\"\nthickness = 0.01\n\n[laws.clay]\n\
+                 law = \"umat_elastic\"\nadapter = \"umat\"\nlibrary = \"libelastic.so\"\n\
+                 parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n";
+    let text = joint(table);
+    assert_same(&ends(&place, &text, &[]), &expected);
+    // The lock of the case holds the routine; the summary says what was filled.
+    let outcome = place.run(&["lock", "case.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_same(&ends(&place, &text, &[]), &expected);
+    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let zone = &summary["laws"]["joint (interface_2d)"]["shear_zone"];
+    assert_eq!(zone["thickness"].as_f64(), Some(0.01));
+    assert_eq!(zone["lateral_ratio"].as_f64(), Some(1.0));
+}
+
+/// A driver of a zone that a routine fills which follows no increment above 10⁻⁵ of strain.
+const SMALLER: &str = "law = \"soil\"\nadapter = \"shear_zone\"\nthickness = 0.02\n\
+                       lateral_ratio = 0.5\nhypothesis = \"interface_2d\"\n\
+                       [laws.soil]\nlaw = \"umat_smaller\"\nadapter = \"umat\"\n\
+                       library = \"libsmaller.so\"\n\
+                       [laws.soil.parameters]\nyoung_modulus = 2e4\npoisson_ratio = 0.3\n\
+                       largest = 1e-30\n\
+                       [initial]\ntraction = { n = -100.0, t = 0.0 }\n\
+                       [[segment]]\nincrements = 1\ncontrol = { t = { jump = 1e-3 } }\n";
+
+#[test]
+fn a_failed_call_is_repeated_in_its_zone() {
+    let Some(place) = umat::place("smaller") else {
+        return;
+    };
+    place.write("driver.toml", SMALLER);
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    let text = std::fs::read_to_string(place.path("out.failure.toml")).unwrap();
+    let capsule: toml::Table = toml::from_str(&text).unwrap();
+    let zone = &capsule["law"]["shear_zone"];
+    assert_eq!(zone["thickness"].as_float(), Some(0.02));
+    assert_eq!(zone["lateral_ratio"].as_float(), Some(0.5));
+    let start = &capsule["start"];
+    assert_eq!(start["traction"]["n"].as_float(), Some(-100.0));
+    assert_eq!(start["internal"]["zone_stress_11"].as_float(), Some(-50.0));
+    assert_eq!(start["internal"]["zone_stress_33"].as_float(), Some(-50.0));
+    let outcome = place.run(&["replay", "out.failure.toml"]);
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert!(
+        outcome.stdout.contains("as recorded: `cut step`"),
+        "{}",
+        outcome.stdout
+    );
+
+    // What no zone can be is refused where it stands.
+    place.write(
+        "flat.toml",
+        text.replacen("thickness = 0.02", "thickness = 0.0", 1),
+    );
+    let outcome = place.run(&["replay", "flat.toml"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("`thickness`: 0 m is outside (0, ∞)"),
+        "{}",
+        outcome.stderr
+    );
+    assert!(outcome.says("flat.toml"), "{}", outcome.stderr);
+}
+
+#[test]
+fn mistakes_are_said_where_they_are_made() {
+    let place = Place::new();
+    let mistakes: &[(Edit, &[&str])] = &[
+        (
+            ("thickness = 0.01\n", ""),
+            &["`adapter = \"shear_zone\"` needs the `thickness` of the zone, m"],
+        ),
+        (
+            ("thickness = 0.01", "thickness = 0.0"),
+            &["`thickness`: 0 m is outside (0, ∞)"],
+        ),
+        (
+            ("thickness = 0.01", "thickness = 0.01\nlateral_ratio = -1.0"),
+            &["`lateral_ratio`: -1 is outside [0, ∞)"],
+        ),
+        (
+            ("adapter = \"shear_zone\"\n", ""),
+            &["`thickness` is for `adapter = \"shear_zone\"`"],
+        ),
+        (
+            (
+                "thickness = 0.01",
+                "thickness = 0.01\nlibrary = \"libx.so\"",
+            ),
+            &[
+                "`library` belongs to the law that fills the zone",
+                "law = \"NAME\"",
+            ],
+        ),
+        (
+            (
+                "law = \"elastic\"\nthickness",
+                "law = \"coulomb_joint\"\nthickness",
+            ),
+            &["a shear zone is made from a law of solids", "interface_2d"],
+        ),
+        (
+            (
+                "law = \"elastic\"\nthickness",
+                "law = \"elastik\"\nthickness",
+            ),
+            &["no library with law `elastik`"],
+        ),
+        (
+            (
+                "law = \"elastic\"\nthickness",
+                "law = \"soil\"\nsha256 = \"0000000000000000000000000000000000000000000000000000000000000000\"\nthickness",
+            ),
+            &[
+                "`sha256` belongs to the law that fills the zone",
+                "[laws.soil]",
+            ],
+        ),
+        (
+            (
+                "poisson_ratio = 0.3 }\n\n[groups.soil]",
+                "poisson_ratio = 0.7 }\n\n[groups.soil]",
+            ),
+            &["`poisson_ratio`: 0.7"],
+        ),
+    ];
+    for ((from, to), messages) in mistakes {
+        let text = joint(ZONE);
+        assert!(text.contains(from), "{from}");
+        let outcome = place.run_case(text.replacen(from, to, 1));
+        assert_ne!(outcome.code, Some(DONE), "{to}");
+        for message in *messages {
+            assert!(outcome.says(message), "{to}: {}", outcome.stderr);
+        }
+        assert!(outcome.says("case.toml"), "{to}: {}", outcome.stderr);
+    }
+    // A zone of a zone; a solid of a zone.
+    let nested = joint(&format!(
+        "adapter = \"shear_zone\"\nlaw = \"other\"\nthickness = 0.01\n[laws.other]\n{ZONE}"
+    ));
+    let outcome = place.run_case(nested);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("law `other` is a shear zone itself"),
+        "{}",
+        outcome.stderr
+    );
+    let solid = joint(ZONE).replacen("law = \"soil\"", "law = \"joint\"", 1);
+    let outcome = place.run_case(solid);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("is made for interface_2d"),
+        "{}",
+        outcome.stderr
+    );
+    // A driver's table that nothing is made from.
+    let unused = SMALLER.replacen(
+        "adapter = \"shear_zone\"\nthickness = 0.02\nlateral_ratio = 0.5\n",
+        "",
+        1,
+    );
+    place.write("driver.toml", unused);
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("law `soil` is not used"), "{}", outcome.stderr);
+}
