@@ -228,6 +228,7 @@ fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), Str
         } else {
             Tangent::Approximate
         },
+        rates: false,
         local_axes: false,
         internal_variables: internal_variables.clone(),
     };
