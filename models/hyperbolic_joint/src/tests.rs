@@ -73,6 +73,7 @@ impl Walker {
             state: self.state,
             time: 0.0,
             time_increment: 1.0,
+            step_time: 0.0,
         };
         self.law.update(&point, tangent).unwrap()
     }

@@ -85,6 +85,7 @@ impl<'a, L: InterfaceLaw> Walker<'a, L> {
             state: self.state,
             time: 0.0,
             time_increment: 1.0,
+            step_time: 0.0,
         };
         self.law.update(&point, tangent).unwrap()
     }
