@@ -4,7 +4,7 @@
 set -eu
 at=$(mktemp -d)
 trap 'rm -r "$at"' EXIT
-cargo build --release --quiet -p coulomb_joint -p dual_joint
+cargo build --release --quiet -p coulomb_joint -p sensitive_joint
 built=${CARGO_TARGET_DIR:-target}/release
 own="-shared -fPIC -fvisibility=hidden -I abi/include"
 foreign=models/foreign
@@ -28,6 +28,6 @@ printf '%-24s %8s %12s %8s\n' "ns per point" update with_tangent rates
 "$at/languages" "$at/coulomb_joint.cpp.so" coulomb_joint_cpp $joint
 "$at/languages" "$at/coulomb_joint.f90.so" coulomb_joint_fortran $joint
 "$at/languages" "$at/differences.so" joint_by_differences $joint
-"$at/languages" $built/libdual_joint.so dual_joint 10 1e6 4e5 0.5 5 30 10 -- -50 0 -1e-5 2e-4
+"$at/languages" $built/libsensitive_joint.so sensitive_joint 10 1e6 4e5 0.5 5 30 10 -- -50 0 -1e-5 2e-4
 "$at/languages" "$at/cam_clay.cpp.so" cam_clay_cpp $clay
 "$at/languages" "$at/cam_clay.f90.so" cam_clay_fortran $clay

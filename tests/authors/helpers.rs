@@ -114,7 +114,8 @@ fn too_many_of_anything_in_fortran_is_said() {
             "not within 1 and MAX_STATES",
         ),
         (
-            "do k = 1, 300; call add_parameter('x', 'x', '-', 'X.'); end do",
+            "do k = 1, 300; call add_parameter('x'//achar(97 + mod(k, 26))//achar(97 + k/26), \
+             'x', '-', 'X.'); end do",
             "more parameters than MAX_PARAMETERS",
         ),
         (

@@ -2,7 +2,7 @@
 //!
 //! Goal        rates that a law gives through dual numbers, carried from increment to increment,
 //!             are the derivatives of what it ends with, by every parameter and the initial stress
-//! Set-up      `fixtures/dual_joint`, compressed, sheared to and fro into slip, with dilatancy
+//! Set-up      `fixtures/sensitive_joint`, compressed, sheared to and fro into slip, with dilatancy
 //! Asserts     within 1e-7 of central differences of whole paths; the flag; `pilum check`
 
 use crate::program::pilum;
@@ -102,7 +102,7 @@ fn end_rates(law: &LoadedLaw, parameter: &[f64], initial: [f64; 2]) -> Vec<f64> 
 
 #[test]
 fn sensitivities_follow_a_path() {
-    let law = SearchPath::new(&[]).law("dual_joint").unwrap();
+    let law = SearchPath::new(&[]).law("sensitive_joint").unwrap();
     let formulation = law.description().formulation(Hypothesis::Interface2d);
     assert!(formulation.unwrap().rates);
     let slipped = end(&law, &VALUES, TRACTION)[2];
@@ -145,7 +145,7 @@ fn sensitivities_follow_a_path() {
 
 #[test]
 fn a_law_by_duals_passes_the_checks() {
-    let law = SearchPath::new(&[]).law("dual_joint").unwrap();
+    let law = SearchPath::new(&[]).law("sensitive_joint").unwrap();
     let file = law.library().path().to_str().unwrap();
     let folder = tempfile::TempDir::new().unwrap();
     let outcome = pilum(folder.path(), &["check", file]);
@@ -161,6 +161,6 @@ fn a_law_by_duals_passes_the_checks() {
         .lines()
         .find(|line| line.contains("rates-match-differences"));
     assert!(line.unwrap().contains("passed"), "{}", outcome.stdout);
-    let page = pilum(folder.path(), &["laws", "dual_joint"]);
+    let page = pilum(folder.path(), &["laws", "sensitive_joint"]);
     assert!(page.stdout.contains("; rates"), "{}", page.stdout);
 }

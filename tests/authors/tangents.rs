@@ -5,7 +5,8 @@
 //! Set-up      the joint of `models/foreign` in C, with what it writes as its tangent changed
 //!             (derivative, differences, elastic operator, none), between two blocks, pressed and pushed
 //!             into slip with dilatancy
-//! Asserts     the same shear traction to the tolerance of the solver; iterations of differences as of the
+//! Asserts     the same shear traction to the tolerance of the solver; differences take at most half as
+//!             many iterations again as the
 //!             derivative; the method that the declaration chooses; `pilum check` passes
 
 use crate::compilers::{library, repository};
@@ -160,7 +161,8 @@ fn every_kind_of_tangent_is_solved() {
         assert_eq!(said.contains("stands for"), !is_exact, "{name}: {said}");
         assert!(!said.contains("differs"), "{name}: {said}");
         if is_exact {
-            assert!(iterations <= few + 1, "{name}: {iterations}, {few}");
+            // At the kink where slip begins differences lie between both sides.
+            assert!(2 * iterations <= 3 * few, "{name}: {iterations}, {few}");
         }
         let path = file.to_str().unwrap();
         let outcome = pilum(folder.path(), &["check", path]);
