@@ -151,48 +151,41 @@ impl Opener {
         let call_limit = self.trust().isolate;
         #[cfg(unix)]
         let apart = !foreign.in_process || call_limit.is_some();
+        // What describes a UDSM is code of its own.
         #[cfg(unix)]
-        if apart && foreign.adapter == Adapter::Udsm {
-            // What describes it is code of its own.
-            let laws = isolate::describe(path, &image.sha256, Some(foreign))
-                .map_err(|why| Error::library(format!("library {}: {why}", path.display())))?;
-            return Ok(Arc::new(Library {
-                path: path.clone(),
-                warnings: std::mem::take(&mut image.warnings),
-                sha256: image.sha256.clone(),
-                stamp: None,
-                laws,
-                sidecar: None,
-                foreign: Some(foreign.clone()),
-                call_limit,
-            }));
-        }
-        let opened = adapter::open(foreign, &image)?;
-        let (externals, scratch) = opened.wishes;
-        let foreign = Foreign {
-            externals: foreign.externals.or(externals),
-            scratch: foreign.scratch.or(scratch),
-            ..foreign.clone()
-        };
-        let origin = |law: Arc<dyn ForeignLaw>| {
-            #[cfg(unix)]
-            if apart {
-                let is_serial = law.is_serial();
-                return Origin::Apart { is_serial };
-            }
-            Origin::Foreign(law)
+        let described = (apart && foreign.adapter == Adapter::Udsm)
+            .then(|| isolate::describe(path, &image.sha256, Some(foreign)))
+            .transpose()
+            .map_err(|why| Error::library(format!("library {}: {why}", path.display())))?;
+        #[cfg(not(unix))]
+        let described = None;
+        let mut foreign = foreign.clone();
+        let (laws, sidecar) = if let Some(laws) = described {
+            (laws, None)
+        } else {
+            let opened = adapter::open(&foreign, &image)?;
+            let (externals, scratch) = opened.wishes;
+            foreign.externals = foreign.externals.or(externals);
+            foreign.scratch = foreign.scratch.or(scratch);
+            let origin = |law: Arc<dyn ForeignLaw>| {
+                #[cfg(unix)]
+                if apart {
+                    let is_serial = law.is_serial();
+                    return Origin::Apart { is_serial };
+                }
+                Origin::Foreign(law)
+            };
+            let laws = opened.laws.into_iter();
+            let laws = laws.map(|(description, law)| (description, origin(law)));
+            (laws.collect(), opened.sidecar)
         };
         Ok(Arc::new(Library {
             path: path.clone(),
             warnings: std::mem::take(&mut image.warnings),
             sha256: image.sha256.clone(),
             stamp: None,
-            laws: opened
-                .laws
-                .into_iter()
-                .map(|(description, law)| (description, origin(law)))
-                .collect(),
-            sidecar: opened.sidecar,
+            laws,
+            sidecar,
             foreign: Some(foreign),
             call_limit,
         }))
