@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::build::line;
-use crate::case::Case;
+use crate::case::{Case, PileInput};
 use mechanics::Simulation;
 use results::pile::{Base, Misfit, Parts, Pile};
 use text::suggestion;
@@ -87,33 +87,38 @@ pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Err
         head: input.head.get_ref().clone(),
         diameter: diameter.map(|diameter| *diameter.get_ref()),
     };
-    let misfit = |misfit| {
-        let (at, what) = match misfit {
-            Misfit::NotSolid(number) => (
-                &input.group.0[number],
-                "is an interface; a pile is made of `solid` groups",
-            ),
-            Misfit::Head => (&input.head, "has no side of the pile's elements"),
-            Misfit::NotAnInterface(number) => (
-                &input.shaft.0[number],
-                "is no interface; a shaft has `zero_thickness` or `thin_layer` groups",
-            ),
-            Misfit::ApartFromShaft(number) => {
-                (&input.shaft.0[number], "does not touch the pile's groups")
-            }
-            Misfit::BaseNotAnInterface => (
-                &input.base,
-                "is no interface; a base is a `zero_thickness` or `thin_layer` group, or a line",
-            ),
-            Misfit::Base => (&input.base, "does not touch the pile's groups"),
-            Misfit::BaseInside => (
-                &input.base,
-                "lies inside the pile's groups; the base is where they end below",
-            ),
-            Misfit::UpsideDown => (&input.base, "is not below the pile's head"),
-        };
+    let placed = |misfit| {
+        let (at, what) = told(&misfit, input);
         let message = format!("[pile]: `{}` {what}", at.get_ref());
         source.error(at.span(), message).into()
     };
-    Pile::new(parts, simulation).map(Some).map_err(misfit)
+    Pile::new(parts, simulation).map(Some).map_err(placed)
+}
+
+/// Where a misfit is written, and what does not fit.
+fn told<'i>(misfit: &Misfit, input: &'i PileInput) -> (&'i Spanned<String>, &'static str) {
+    match *misfit {
+        Misfit::NotSolid(number) => (
+            &input.group.0[number],
+            "is an interface; a pile is made of `solid` groups",
+        ),
+        Misfit::Head => (&input.head, "has no side of the pile's elements"),
+        Misfit::NotAnInterface(number) => (
+            &input.shaft.0[number],
+            "is no interface; a shaft has `zero_thickness` or `thin_layer` groups",
+        ),
+        Misfit::ApartFromShaft(number) => {
+            (&input.shaft.0[number], "does not touch the pile's groups")
+        }
+        Misfit::BaseNotAnInterface => (
+            &input.base,
+            "is no interface; a base is a `zero_thickness` or `thin_layer` group, or a line",
+        ),
+        Misfit::Base => (&input.base, "does not touch the pile's groups"),
+        Misfit::BaseInside => (
+            &input.base,
+            "lies inside the pile's groups; the base is where they end below",
+        ),
+        Misfit::UpsideDown => (&input.base, "is not below the pile's head"),
+    }
 }

@@ -61,8 +61,8 @@ impl Problem {
     /// Whether pore water leaves a group in a phase, by their numbers: what was last said of it.
     pub fn drainage(&self, group: usize, phase: usize) -> Drainage {
         let said = self.phases.iter().take(phase + 1);
-        let said = said.flat_map(|phase| &phase.drainage);
-        let last = said.filter(|(of, _)| *of == group).last();
+        let mut said = said.flat_map(|phase| &phase.drainage).rev();
+        let last = said.find(|(of, _)| *of == group);
         last.map_or(self.groups[group].drainage, |(_, drainage)| *drainage)
     }
 

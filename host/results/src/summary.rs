@@ -362,13 +362,11 @@ fn points_per_element(group: &Group) -> Value {
         .collect();
     counts.sort_unstable();
     counts.dedup();
-    match counts[..] {
-        [n] => json!(n),
-        _ => {
-            let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
-            json!(counts.join(" or "))
-        }
+    if let [n] = counts[..] {
+        return json!(n);
     }
+    let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
+    json!(counts.join(" or "))
 }
 
 fn solver(solver: &Settings) -> Value {
