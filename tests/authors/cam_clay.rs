@@ -145,7 +145,7 @@ fn both_languages_answer_alike() {
             for (point, law) in points.iter_mut().zip(&laws) {
                 point.step(law, &direction);
             }
-            plastic += usize::from(points[0].state[0] != before);
+            plastic += usize::from(points[0].state[0].to_bits() != before.to_bits());
             let [a, b] = &points;
             let differs = |a: &[f64], b: &[f64]| {
                 let largest = a.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
