@@ -41,8 +41,8 @@ fn joint(control: &str) -> String {
 #[test]
 fn unknown_keys() {
     refuses(
-        &format!("laws = 'x'\n{SOLID}{SEGMENT}"),
-        &["laws", "law_path"],
+        &format!("laws_path = 'x'\n{SOLID}{SEGMENT}"),
+        &["laws_path", "law_path"],
     );
     refuses(&format!("{SOLID}[initials]\n{SEGMENT}"), &["initials"]);
     refuses(

@@ -63,7 +63,7 @@ impl Axes {
         across: [0.0, 1.0],
     };
 
-    /// Axes of a facet in this direction. Both point towards increasing coordinates ([`increase`]), so that
+    /// Axes of a facet in this direction. Both point towards increasing coordinates, so that
     /// the shear stress of a horizontal or vertical facet is the global σ₁₂.
     pub fn of_facet(direction: [f64; 2]) -> Self {
         let towards_increase = |v: [f64; 2]| {
