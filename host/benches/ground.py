@@ -31,6 +31,12 @@ def replaced(text, old, new):
     return text.replace(old, new)
 
 
+def case():
+    """The case without its figures, which stand last."""
+    text = CASE.read_text()
+    return text[:text.index("[[figure]]")]
+
+
 def grid(text, columns, rows):
     """The case on these columns and rows: number, coordinate of the end, ratio."""
     start, end = text.index("columns = ["), text.index("lines.axis")
@@ -46,7 +52,7 @@ def without(text, phase):
 
 def pushed():
     """The pile's head pushed down by a tenth of the diameter."""
-    text = grid(without(CASE.read_text(), "unloading"),
+    text = grid(without(case(), "unloading"),
                 [(3, 0.5, 0.8), (8, 1.5, 1.29), (16, 25.0, 1.2)],
                 [(13, -17.0, 0.84), (13, -15.0, 0.87), (32, -5.0, 1.03), (13, 0.0, 1.0)])
     text = replaced(text, "increments = 30", "increments = 40")
@@ -56,7 +62,7 @@ def pushed():
 
 def at_rest():
     """The ground alone."""
-    text = grid(CASE.read_text(), [(10, 0.5, 0.93), (30, 1.5, 1.07), (60, 25.0, 1.05)],
+    text = grid(case(), [(10, 0.5, 0.93), (30, 1.5, 1.07), (60, 25.0, 1.05)],
                 [(40, -17.0, 0.94), (40, -15.0, 0.96), (80, -5.0, 1.01), (40, 0.0, 1.0)])
     for phase in ("pile in place", "load test", "unloading"):
         text = without(text, phase)
