@@ -247,7 +247,7 @@ impl GroupBuilder<'_> {
         }
         self.refuse_turned_signs(&material)?;
         let stress = self.initial_stress(&*kinematics);
-        self.refuse_tension_at_rest(&*kinematics)?;
+        self.refuse_tension_at_rest(&*kinematics, &stress)?;
         Group::new(name, formulation, kinematics, stress, thickness, material)
             .map_err(|failure| BuildError::CannotStart(Box::new(failure)))
     }
@@ -500,24 +500,30 @@ impl GroupBuilder<'_> {
         }
     }
 
-    /// Refuses an earth pressure at rest that pulls.
-    fn refuse_tension_at_rest(&self, kinematics: &dyn Kinematics) -> Result<(), Refusal> {
+    /// Refuses an earth pressure at rest (of solids, so in global axes) that pulls.
+    fn refuse_tension_at_rest(
+        &self,
+        kinematics: &dyn Kinematics,
+        stress: &[f64],
+    ) -> Result<(), Refusal> {
         let Some(InitialStress::AtRest(at_rest)) = &self.group.initial_stress else {
             return Ok(());
         };
-        for point in 0..kinematics.n_points() {
+        let refuse = |cause| Err(self.refuse_key(Key::InitialStress, cause));
+        for (point, stress) in stress.chunks_exact(kinematics.n_components()).enumerate() {
+            let [horizontal, vertical] = [-stress[0], -stress[1]];
             let at = kinematics.position(point);
-            let [above, pore] = self.initial.on_a_plane(self.number, at);
-            let left = above + at_rest.surcharge - pore;
-            if left < -ROUND_OFF_AT_REST * (above.abs() + pore) {
-                let cause = Cause::LiftedAtRest { at, above, pore };
-                return Err(self.refuse_key(Key::InitialStress, cause));
+            // Where nothing is left of the vertical one, there may be less than nothing.
+            if vertical <= 0.0 {
+                let [above, pore] = self.initial.on_a_plane(self.number, at);
+                let left = above + at_rest.surcharge - pore;
+                if left < -ROUND_OFF_AT_REST * (above.abs() + pore) {
+                    return refuse(Cause::LiftedAtRest { at, above, pore });
+                }
             }
-            let [horizontal, vertical, ..] = self.initial.at(self.number, at).unwrap_or_default();
-            if horizontal > 0.0 {
-                let stress = [-horizontal, -vertical];
-                let cause = Cause::TensionAtRest { at, stress };
-                return Err(self.refuse_key(Key::InitialStress, cause));
+            if horizontal < 0.0 {
+                let stress = [horizontal, vertical];
+                return refuse(Cause::TensionAtRest { at, stress });
             }
         }
         Ok(())

@@ -116,6 +116,11 @@ impl<'m> Columns<'m> {
         let mut found = Crossings::default();
         for edge in solid.edges() {
             let [a, b, m] = edge.map(|node| self.mesh.nodes[node]);
+            // An edge lies between its ends and where its tangents there meet.
+            let reach = [a[0], b[0], 2.0 * m[0] - 0.5 * (a[0] + b[0])];
+            if reach.iter().all(|at| *at > x) || reach.iter().all(|at| *at < x) {
+                continue;
+            }
             // x(t) = x_m + t (x_b − x_a)/2 + t² (x_a + x_b − 2 x_m)/2, t from −1 to 1, and y likewise.
             let half = [0, 1].map(|c| 0.5 * (b[c] - a[c]));
             let bend = [0, 1].map(|c| 0.5 * (a[c] + b[c]) - m[c]);
