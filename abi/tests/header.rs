@@ -41,7 +41,7 @@ fn the_committed_header_is_the_generated_one() -> Outcome {
     assert!(
         committed == generated,
         "abi/include/pilum_law.h differs from the Rust types (first at {differing:?}); \
-         rewrite it with: PILUM_BLESS=1 cargo test -p abi --test header"
+         rewrite it with: PILUM_BLESS=1 cargo test -p pilum-abi --test header"
     );
     Ok(())
 }

@@ -12,7 +12,7 @@ for tool in valgrind cargo; do
   command -v "$tool" >/dev/null || { echo "instructions.sh: \`$tool\` is not on the path"; exit 2; }
 done
 cargo build --release --quiet
-points=$(cargo bench --package host --bench points --no-run 2>&1 | sed -n 's/.*Executable.*(\(.*\))$/\1/p')
+points=$(cargo bench --package pilum --bench points --no-run 2>&1 | sed -n 's/.*Executable.*(\(.*\))$/\1/p')
 [ -x "$points" ] || { echo "instructions.sh: the bench \`points\` does not build"; exit 2; }
 
 # Instructions of a run with so many calls.

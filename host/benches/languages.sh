@@ -4,7 +4,7 @@
 set -eu
 at=$(mktemp -d)
 trap 'rm -r "$at"' EXIT
-cargo build --release --quiet -p coulomb_joint -p sensitive_joint
+cargo build --release --quiet -p pilum-coulomb-joint -p sensitive_joint
 built=${CARGO_TARGET_DIR:-target}/release
 own="-shared -fPIC -fvisibility=hidden -I abi/include"
 foreign=models/foreign

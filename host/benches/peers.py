@@ -35,7 +35,7 @@ def bench(name):
     cargo = program("cargo")
     run(cargo, "build", "--release", "--quiet", "--manifest-path", ROOT / "Cargo.toml")
     listing = subprocess.run(
-        [cargo, "bench", "--package", "host", "--bench", name, "--no-run"],
+        [cargo, "bench", "--package", "pilum", "--bench", name, "--no-run"],
         cwd=ROOT, capture_output=True, text=True)
     for line in listing.stderr.splitlines():
         if "Executable" in line:

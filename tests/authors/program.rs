@@ -35,7 +35,7 @@ fn folder() -> PathBuf {
     let folder = deps().parent().unwrap().to_owned();
     assert!(
         folder.join(format!("pilum{EXE_SUFFIX}")).is_file(),
-        "the program is missing: `cargo test --workspace` builds it, or `cargo build -p host` (with \
+        "the program is missing: `cargo test --workspace` builds it, or `cargo build -p pilum` (with \
          the same profile)"
     );
     folder

@@ -239,7 +239,7 @@ fn program(deps: &Path) -> PathBuf {
     let path = deps.parent().unwrap().join(name);
     assert!(
         path.is_file(),
-        "{} is missing: `cargo test --workspace` builds it, or `cargo build -p host` (with the \
+        "{} is missing: `cargo test --workspace` builds it, or `cargo build -p pilum` (with the \
          same profile)",
         path.display()
     );

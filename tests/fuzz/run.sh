@@ -22,7 +22,7 @@ RUSTC_WORKSPACE_WRAPPER="$PWD/tests/fuzz/$wrapper" \
   cargo build --quiet --release -p fuzz --features libfuzzer
 # Laws are looked for beside the program: these, and nothing else that lies in a folder of cargo's.
 laws=target/release/deps
-[ -e $laws/libmepi.so ] || cargo build --quiet --release -p elastic -p coulomb_joint -p mepi
+[ -e $laws/libmepi.so ] || cargo build --quiet --release -p pilum-elastic -p pilum-coulomb-joint -p pilum-mepi
 cp target/release/fuzz $folder/bin/
 for law in elastic coulomb_joint mepi; do cp $laws/lib$law.so $folder/bin/; done
 

@@ -39,7 +39,7 @@ pub(crate) fn pilum(arguments: &[&str]) {
     let path = program.display();
     assert!(
         program.is_file(),
-        "{path} is missing: `cargo build -p host`"
+        "{path} is missing: `cargo build -p pilum`"
     );
     let output = Command::new(&program)
         .args(arguments)
