@@ -11,6 +11,8 @@ pub mod law;
 pub mod layout;
 pub mod raw;
 pub mod reclosure;
+#[cfg(feature = "sources")]
+pub mod sources;
 pub mod status;
 pub mod substepping;
 pub mod version;

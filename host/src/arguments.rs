@@ -134,6 +134,9 @@ pub(crate) enum Command {
         /// A folder with law libraries, looked in first; may be repeated.
         #[arg(long, value_name = "DIR")]
         law_path: Vec<PathBuf>,
+        /// Instead: the folders that laws are looked for in, in order, and what each has.
+        #[arg(long = "where", conflicts_with = "id")]
+        places: bool,
         /// As JSON.
         #[arg(long)]
         json: bool,

@@ -108,7 +108,12 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         Command::Check(arguments) => {
             printing(|out| workshop::check::run(&arguments, &opener, &mut |text| out.text(text)))
         }
-        Command::Laws { id, law_path, json } => show_laws(&opener, id.as_deref(), &law_path, json),
+        Command::Laws {
+            id,
+            law_path,
+            places,
+            json,
+        } => show_laws(&opener, id.as_deref(), &law_path, places, json),
         Command::NewLaw(project) => print(&project.write()?),
         Command::Schema { file } => print_schema(file),
         Command::Completions { shell } => {
@@ -268,6 +273,7 @@ fn show_laws(
     opener: &Opener,
     id: Option<&str>,
     folders: &[PathBuf],
+    places: bool,
     json: bool,
 ) -> Result<(), Error> {
     if let Some(missing) = folders.iter().find(|folder| !folder.is_dir()) {
@@ -276,6 +282,8 @@ fn show_laws(
     }
     let search = SearchPath::of(opener, folders);
     let text = match (id, json) {
+        (None, false) if places => workshop::laws::places(&search),
+        (None, true) if places => workshop::laws::places_json(&search)?,
         (None, false) => workshop::laws::list(&search),
         (None, true) => workshop::laws::list_json(&search)?,
         (Some(id), false) => workshop::laws::page(&search.law(id)?),

@@ -363,6 +363,7 @@ macro_rules! how_to {
 }
 
 how_to! {
+    how_to_install: "install",
     how_to_lead_a_law_alone: "law-at-a-point",
     how_to_compute_a_slice: "slice",
     how_to_swap_a_law: "swap-a-law",

@@ -162,6 +162,62 @@ fn licences_and_sources_are_those_of_deny_toml() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// What `cargo package` takes: the crates have names of ours, all that a registry asks for, and no part outside
+/// their folder.
+#[test]
+fn crates_can_be_packaged() {
+    let output = Command::new(env!("CARGO"))
+        .args(["package", "--no-verify", "--allow-dirty", "--offline"])
+        .arg("--target-dir")
+        .arg(concat!(env!("CARGO_TARGET_TMPDIR"), "/packages"))
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{said}");
+    assert!(!said.contains("warning"), "{said}");
+    let packed = said
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("Packaging "));
+    let packed: Vec<&str> = packed.collect();
+    assert!(packed.len() > 15, "{said}");
+    for package in packed {
+        let (name, rest) = package.split_once(' ').unwrap();
+        assert!(name == "pilum" || name.starts_with("pilum-"), "{name}");
+        let (_, folder) = rest.split_once('(').unwrap();
+        let folder = Path::new(folder.trim_end_matches(')'))
+            .canonicalize()
+            .unwrap();
+        let mut files = Vec::new();
+        sources(&folder, &mut files);
+        for file in files {
+            for inner in included(&std::fs::read_to_string(&file).unwrap()) {
+                let path = file.parent().unwrap().join(&inner);
+                let is_within = path
+                    .canonicalize()
+                    .is_ok_and(|path| path.starts_with(&folder));
+                assert!(is_within, "{}: {inner} is not in the crate", file.display());
+            }
+        }
+    }
+}
+
+/// Paths in `include_str!("…")` and `#[path = "…"]`.
+fn included(text: &str) -> Vec<String> {
+    let after = ["include_str!(\"", "include_bytes!(\"", "#[path = \""];
+    let found = after.iter().flat_map(|start| text.split(start).skip(1));
+    found
+        .map(|rest| rest.split('"').next().unwrap().to_owned())
+        .collect()
+}
+
+#[test]
+fn what_lies_outside_a_crate_is_found() {
+    let text =
+        "const A: &str = include_str!(\"../../abi/README.md\");\n#[path = \"a/b.rs\"]\nmod b;";
+    assert_eq!(included(text), ["../../abi/README.md", "a/b.rs"]);
+}
+
 #[test]
 fn expressions_of_licences_are_understood() {
     let mit = |one: &str| one == "MIT";

@@ -11,6 +11,8 @@ pub mod calculix;
 pub mod laws;
 pub mod mfront;
 pub mod point;
+#[cfg(feature = "sources")]
+pub mod sources;
 pub mod umat;
 
 /// What the macros name of the contract.

@@ -51,7 +51,7 @@ pub use library::{Strided, probe};
 pub use opened::{CreateFailure, Library, LoadedLaw};
 pub use opener::Opener;
 pub use pins::{Pins, lock_path};
-pub use search::SearchPath;
+pub use search::{Libraries, Origin, Place, SearchPath};
 pub use shear_zone::ShearZone;
 pub use stop::{GRACE, Stop, Stopped};
 pub use trust::Trust;

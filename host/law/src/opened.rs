@@ -69,8 +69,8 @@ impl Library {
         let Some(Ok(folder)) = folder else {
             return false;
         };
-        let mut own = search::beside_program().into_iter();
-        own.any(|own| own.canonicalize().is_ok_and(|own| own == folder))
+        let mut own = search::of_program().into_iter();
+        own.any(|own| own.folder.canonicalize().is_ok_and(|own| own == folder))
     }
 
     /// SHA-256 of the file, in hexadecimal digits.

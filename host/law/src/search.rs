@@ -12,41 +12,99 @@ use std::sync::{Arc, Mutex, PoisonError};
 use text::file;
 use text::suggestion;
 
+/// A folder to look in, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The folder; it need not exist.
+    pub folder: PathBuf,
+    /// Why it is looked in.
+    pub origin: Origin,
+}
+
+/// Why a folder is looked in, in the order in which they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// The input file or the command line names it.
+    Given,
+    /// `PILUM_LAW_PATH` names it.
+    Variable,
+    /// The program lies in it.
+    Program,
+    /// `../lib/pilum` of the program: laws that were installed with it.
+    Installed,
+    /// `deps` of the program: cargo's folder of parts.
+    Parts,
+}
+
+impl Origin {
+    /// Why the folder is looked in, in a few words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Given => "as asked",
+            Self::Variable => "PILUM_LAW_PATH",
+            Self::Program => "beside the program",
+            Self::Installed => "installed with the program",
+            Self::Parts => "built with the program",
+        }
+    }
+}
+
+/// Libraries of a folder, each with the ids of its laws.
+pub type Libraries = Vec<(PathBuf, Vec<String>)>;
+
 /// Folders to look in, in order, and the libraries opened so far. A library that changes on the way
 /// stays what it was.
 #[derive(Debug)]
 pub struct SearchPath {
-    folders: Vec<PathBuf>,
+    places: Vec<Place>,
     pins: Pins,
     opener: Opener,
     opened: Mutex<BTreeMap<PathBuf, Arc<Library>>>,
 }
 
-/// The folder of the program and its `deps`; both exist in a build folder.
-pub(crate) fn beside_program() -> Vec<PathBuf> {
+/// The program's own folders, by where it is: a link to the program is followed.
+pub(crate) fn of_program() -> Vec<Place> {
     let program = std::env::current_exe().ok();
-    let folder = program.as_deref().and_then(Path::parent);
-    folder.map_or(Vec::new(), |folder| {
-        vec![folder.to_owned(), folder.join("deps")]
+    let program = program.map(|program| program.canonicalize().unwrap_or(program));
+    let Some(folder) = program.as_deref().and_then(Path::parent) else {
+        return Vec::new();
+    };
+    // Without `..`, as users would write it.
+    let installed = folder.parent().map(|above| above.join("lib/pilum"));
+    [
+        (Some(folder.to_owned()), Origin::Program),
+        (installed, Origin::Installed),
+        (Some(folder.join("deps")), Origin::Parts),
+    ]
+    .into_iter()
+    .filter_map(|(folder, origin)| {
+        Some(Place {
+            folder: folder?,
+            origin,
+        })
     })
+    .collect()
 }
 
 impl SearchPath {
     /// First the given folders (from a case file), then those of `PILUM_LAW_PATH`, then the
-    /// folder of the program and its `deps`.
+    /// folder of the program, its `../lib/pilum` and its `deps`.
     pub fn new(from_case: &[PathBuf]) -> Self {
         Self::of(&Opener::default(), from_case)
     }
 
     /// As [`SearchPath::new`]; libraries are opened with this.
     pub fn of(opener: &Opener, from_case: &[PathBuf]) -> Self {
-        let mut folders = from_case.to_vec();
+        let place = |origin| move |folder| Place { folder, origin };
+        let given = from_case.iter().cloned();
+        let mut places: Vec<Place> = given.map(place(Origin::Given)).collect();
         if let Some(list) = std::env::var_os("PILUM_LAW_PATH") {
-            folders.extend(std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty()));
+            let named = std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty());
+            places.extend(named.map(place(Origin::Variable)));
         }
-        folders.extend(beside_program());
+        places.extend(of_program());
         Self {
-            folders,
+            places,
             pins: Pins::default(),
             opener: opener.clone(),
             opened: Mutex::default(),
@@ -60,8 +118,8 @@ impl SearchPath {
     }
 
     /// The folders, in order.
-    pub fn folders(&self) -> &[PathBuf] {
-        &self.folders
+    pub fn places(&self) -> &[Place] {
+        &self.places
     }
 
     /// Opens the library that holds a law: in the first folder that has one, the library named
@@ -71,7 +129,7 @@ impl SearchPath {
     /// [`Error::Library`] if there is none, if two libraries of a folder claim the law, or if the
     /// library cannot be used.
     pub fn law(&self, id: &str) -> Result<LoadedLaw, Error> {
-        for folder in &self.folders {
+        for Place { folder, .. } in &self.places {
             let named = folder.join(format!("{DLL_PREFIX}{id}{DLL_SUFFIX}"));
             let path = if named.is_file() {
                 named
@@ -98,20 +156,19 @@ impl SearchPath {
         }
         let installed = self.installed();
         let ids: Vec<&str> = installed.keys().map(String::as_str).collect();
-        let folders: Vec<String> = self
-            .folders
-            .iter()
-            .map(|f| f.display().to_string())
-            .collect();
+        let places = self.places.iter();
+        let folders: Vec<String> = places.map(|p| p.folder.display().to_string()).collect();
         Err(Error::Library {
             message: format!("no library with law `{id}` in {}", folders.join(", ")),
             hint: Some(if ids.is_empty() {
-                "no law library is there at all; in the repository, `cargo build --release` builds \
-                 the laws"
+                "no law library is there at all; an archive of Pilum has them in lib/pilum, in the \
+                 repository `cargo build --release` builds them; `pilum laws --where` says where \
+                 they are looked for"
                     .to_owned()
             } else {
                 format!(
-                    "{}; more folders: `law_path` in the file, or PILUM_LAW_PATH",
+                    "{}; more folders: `law_path` in the file, or PILUM_LAW_PATH \
+                     (`pilum laws --where`)",
                     suggestion(id, ids)
                 )
             }),
@@ -153,16 +210,7 @@ impl SearchPath {
     /// Ids of all laws found, with their libraries, read from manifests without running anything.
     pub fn installed(&self) -> BTreeMap<String, PathBuf> {
         let mut found = BTreeMap::new();
-        let mut is_installed = false;
-        for (number, folder) in self.folders.iter().enumerate() {
-            // Cargo's folder of parts holds the libraries of tests too. Who has built the program
-            // has the others beside it.
-            let is_last = number + 1 == self.folders.len();
-            if is_last && is_installed && folder.ends_with("deps") {
-                continue;
-            }
-            let libraries = manifests(folder);
-            is_installed = !libraries.is_empty();
+        for (_, libraries) in self.libraries() {
             for (path, laws) in libraries {
                 for law in laws {
                     found.entry(law).or_insert_with(|| path.clone());
@@ -170,6 +218,26 @@ impl SearchPath {
             }
         }
         found
+    }
+
+    /// The folders with the libraries that each has, sorted by name, and the ids of their laws, read
+    /// from manifests without running anything.
+    pub fn libraries(&self) -> Vec<(&Place, Libraries)> {
+        let mut has_built = false;
+        let of = |place| {
+            // Cargo's folder of parts holds the libraries of tests too. Who has built the program
+            // has the others beside it.
+            let &Place { ref folder, origin } = place;
+            let is_left_out = origin == Origin::Parts && has_built;
+            let libraries = if is_left_out {
+                Vec::new()
+            } else {
+                manifests(folder)
+            };
+            has_built |= origin == Origin::Program && !libraries.is_empty();
+            (place, libraries)
+        };
+        self.places.iter().map(of).collect()
     }
 }
 
@@ -182,7 +250,7 @@ fn no_such_law(library: &Library, path: &Path, id: &str) -> Error {
 }
 
 /// Libraries of a folder that carry a manifest, sorted by name, with the ids of their laws.
-fn manifests(folder: &Path) -> Vec<(PathBuf, Vec<String>)> {
+fn manifests(folder: &Path) -> Libraries {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Vec::new();
     };

@@ -360,7 +360,7 @@ fn library_path(name: &str) -> Result<PathBuf, Error> {
     let search = SearchPath::new(&[]);
     let installed = search.installed();
     let file = format!("{DLL_PREFIX}{name}{DLL_SUFFIX}");
-    let mut named = search.folders().iter().map(|folder| folder.join(&file));
+    let mut named = search.places().iter().map(|place| place.folder.join(&file));
     named
         .find(|path| path.is_file())
         .or_else(|| installed.get(name).cloned())

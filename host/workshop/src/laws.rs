@@ -4,7 +4,7 @@ use crate::Error;
 use abi::Hypothesis;
 use law::adapter::conventions;
 use law::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw, Origin,
     ParameterDescription, SearchPath, Tangent,
 };
 use serde::Serialize;
@@ -54,15 +54,68 @@ pub fn list(search: &SearchPath) -> String {
         let _ = writeln!(text, "{id:24}  {line}");
     }
     if text.is_empty() {
-        let folders: Vec<_> = search.folders().iter().map(|f| f.display()).collect();
         text.push_str("no law library in:\n");
-        for folder in folders {
-            let _ = writeln!(text, "  {folder}");
+        for place in search.places() {
+            let _ = writeln!(text, "  {}", place.folder.display());
         }
     }
     text.push('\n');
     text.push_str(&conventions::text());
     text
+}
+
+/// A folder that laws are looked for in, as `--json` gives it.
+#[derive(Debug, Serialize)]
+struct Folder<'a> {
+    folder: &'a Path,
+    why: &'static str,
+    exists: bool,
+    laws: Vec<String>,
+}
+
+fn folders(search: &SearchPath) -> impl Iterator<Item = (Origin, Folder<'_>)> {
+    let found = search.libraries().into_iter();
+    found.map(|(place, libraries)| {
+        let folder = Folder {
+            folder: &place.folder,
+            why: place.origin.words(),
+            exists: place.folder.is_dir(),
+            laws: libraries.into_iter().flat_map(|(_, laws)| laws).collect(),
+        };
+        (place.origin, folder)
+    })
+}
+
+/// The folders that laws are looked for in, in order: each with why, and the laws that it has.
+pub fn places(search: &SearchPath) -> String {
+    let mut text = "Laws are looked for in these folders, in this order:\n".to_owned();
+    for (origin, found) in folders(search) {
+        let laws = match origin {
+            _ if !found.exists => "there is no such folder".to_owned(),
+            _ if !found.laws.is_empty() => found.laws.join(" "),
+            Origin::Parts => "nothing that is not above".to_owned(),
+            _ => "no law".to_owned(),
+        };
+        let (folder, why) = (found.folder.display(), found.why);
+        let _ = writeln!(text, "\n{folder}\n  {why}: {laws}");
+    }
+    text.push_str(
+        "\nMore folders: `law_path` in a case or driver file and --law-path here, which come first, and \
+         PILUM_LAW_PATH.\nThe folder that one works in is not looked in.\n",
+    );
+    text
+}
+
+/// The same, as a JSON array.
+///
+/// # Errors
+/// [`text::Error::Internal`] only.
+pub fn places_json(search: &SearchPath) -> Result<String, Error> {
+    json(
+        &folders(search)
+            .map(|(_, folder)| folder)
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// Everything about every law found, as a JSON array.

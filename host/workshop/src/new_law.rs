@@ -1,9 +1,11 @@
 //! `pilum new-law`: a small project for a law, in the author's language, that builds and runs.
 //!
 //! The templates are files in `new_law/`, complete laws called `my_law`; what they need of the
-//! contract (`abi/`) is carried by the program, so that a project depends on nothing else.
+//! contract is carried by the program ([`abi::sources`]), so that a project depends on nothing else,
+//! no registry and no installation, and stays with the version that it was written for.
 
 use crate::Error;
+use abi::sources::{self, CPP_HEADER, HEADER, MODULE, POINT_HEADER};
 use law::SearchPath;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
@@ -56,57 +58,8 @@ macro_rules! template {
     };
 }
 
-macro_rules! contract {
-    ($name:literal) => {
-        include_str!(concat!("../../../abi/", $name))
-    };
-}
-
-const HEADER: File = ("include/pilum_law.h", contract!("include/pilum_law.h"));
-const POINT_HEADER: File = ("include/pilum_point.h", contract!("include/pilum_point.h"));
-const CPP_HEADER: File = ("include/pilum_law.hpp", contract!("include/pilum_law.hpp"));
-const MODULE: File = ("include/pilum_law.f90", contract!("include/pilum_law.f90"));
-const EXPORTS: File = ("exports.map", contract!("include/exports.map"));
-const CONTRACT: File = ("CONTRACT.md", contract!("README.md"));
-
-/// The contract's crate without its optional features, and the one that exports laws to other programs.
-const CRATES: [File; 23] = [
-    (ABI_MANIFEST, template!("rust/abi.toml.txt")),
-    ("abi/README.md", contract!("README.md")),
-    ("abi/src/lib.rs", contract!("src/lib.rs")),
-    ("abi/src/access.rs", contract!("src/access.rs")),
-    ("abi/src/descriptor.rs", contract!("src/descriptor.rs")),
-    ("abi/src/differences.rs", contract!("src/differences.rs")),
-    ("abi/src/dual.rs", contract!("src/dual.rs")),
-    ("abi/src/export.rs", contract!("src/export.rs")),
-    (
-        "abi/src/export/adapter.rs",
-        contract!("src/export/adapter.rs"),
-    ),
-    ("abi/src/friction.rs", contract!("src/friction.rs")),
-    ("abi/src/law.rs", contract!("src/law.rs")),
-    ("abi/src/raw.rs", contract!("src/raw.rs")),
-    ("abi/src/reclosure.rs", contract!("src/reclosure.rs")),
-    ("abi/src/status.rs", contract!("src/status.rs")),
-    ("abi/src/substepping.rs", contract!("src/substepping.rs")),
-    ("abi/src/version.rs", contract!("src/version.rs")),
-    (BRIDGES_MANIFEST, template!("rust/bridges.toml.txt")),
-    (
-        "abi/bridges/src/calculix.rs",
-        contract!("bridges/src/calculix.rs"),
-    ),
-    ("abi/bridges/src/laws.rs", contract!("bridges/src/laws.rs")),
-    ("abi/bridges/src/lib.rs", contract!("bridges/src/lib.rs")),
-    (
-        "abi/bridges/src/mfront.rs",
-        contract!("bridges/src/mfront.rs"),
-    ),
-    (
-        "abi/bridges/src/point.rs",
-        contract!("bridges/src/point.rs"),
-    ),
-    ("abi/bridges/src/umat.rs", contract!("bridges/src/umat.rs")),
-];
+const CONTRACT: File = ("CONTRACT.md", sources::README);
+const EXPORTS: File = ("exports.map", sources::EXPORTS.1);
 const ABI_MANIFEST: &str = "abi/Cargo.toml";
 const BRIDGES_MANIFEST: &str = "abi/bridges/Cargo.toml";
 
@@ -138,34 +91,38 @@ impl Language {
     /// What stands beside it.
     fn rest(self) -> Vec<File> {
         match self {
-            Self::Rust => {
-                let mut files = vec![("Cargo.toml", template!("rust/Cargo.toml.txt"))];
-                files.extend(CRATES);
-                files
-            }
-            Self::C => vec![
-                ("build.sh", template!("c/build.sh")),
-                HEADER,
-                POINT_HEADER,
-                CONTRACT,
+            Self::Rust => vec![
+                ("Cargo.toml", template!("rust/Cargo.toml.txt")),
+                (ABI_MANIFEST, template!("rust/abi.toml.txt")),
+                (BRIDGES_MANIFEST, template!("rust/bridges.toml.txt")),
             ],
-            Self::Cpp => vec![
-                ("build.sh", template!("cpp/build.sh")),
-                EXPORTS,
-                HEADER,
-                POINT_HEADER,
-                CPP_HEADER,
-                CONTRACT,
-            ],
+            Self::C => vec![("build.sh", template!("c/build.sh"))],
+            Self::Cpp => vec![("build.sh", template!("cpp/build.sh"))],
             Self::Fortran => vec![
                 ("build.sh", template!("fortran/build.sh")),
                 ("manifest.c", template!("fortran/manifest.c")),
-                EXPORTS,
-                HEADER,
-                MODULE,
-                CONTRACT,
             ],
         }
+    }
+
+    /// What it needs of the contract. In Rust that is the contract's crate without its optional
+    /// features, and the one that exports laws to other programs.
+    fn contract(self) -> Vec<(String, &'static str)> {
+        let files = match self {
+            Self::Rust => {
+                let below = |folder: &'static str| {
+                    move |(path, text): File| (format!("{folder}/{path}"), text)
+                };
+                let abi = sources::CRATE.into_iter().map(below("abi"));
+                let bridges = bridges::sources::CRATE.into_iter();
+                return abi.chain(bridges.map(below("abi/bridges"))).collect();
+            }
+            Self::C => vec![HEADER, POINT_HEADER, CONTRACT],
+            Self::Cpp => vec![EXPORTS, HEADER, POINT_HEADER, CPP_HEADER, CONTRACT],
+            Self::Fortran => vec![EXPORTS, HEADER, MODULE, CONTRACT],
+        };
+        let files = files.into_iter();
+        files.map(|(path, text)| (path.to_owned(), text)).collect()
     }
 
     /// The command that builds the project, and the folder of the library.
@@ -232,7 +189,7 @@ impl NewLaw {
     }
 
     /// All files of the project, filled in.
-    fn files(&self) -> Vec<(&'static str, String)> {
+    fn files(&self) -> Vec<(String, String)> {
         let common = match self.kind {
             Kind::Interface => [
                 ("point.toml", template!("interface/point.toml")),
@@ -243,26 +200,20 @@ impl NewLaw {
                 ("case.toml", template!("continuum/case.toml")),
             ],
         };
-        let mut files = vec![
+        let mut templates = vec![
             ("README.md", template!("README.md")),
             (".gitignore", "build/\ntarget/\nresults/\n*.csv\n"),
             self.language.law(self.kind),
         ];
-        files.extend(common);
-        files.extend(self.language.rest());
+        templates.extend(common);
+        templates.extend(self.language.rest());
+        let filled = templates.into_iter();
+        let filled = filled.map(|(path, text)| (path.to_owned(), self.fill(text)));
         // The contract is carried as it is.
-        let fill = |(path, text): File| {
-            let is_contract = path.starts_with("include/")
-                || path == CONTRACT.0
-                || (path.starts_with("abi/") && ![ABI_MANIFEST, BRIDGES_MANIFEST].contains(&path));
-            let text = if is_contract {
-                text.to_owned()
-            } else {
-                self.fill(text)
-            };
-            (path, text)
-        };
-        files.into_iter().map(fill).collect()
+        let contract = self.language.contract().into_iter();
+        filled
+            .chain(contract.map(|(path, text)| (path, text.to_owned())))
+            .collect()
     }
 
     /// A template with the project's names in it.

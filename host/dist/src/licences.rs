@@ -1,0 +1,103 @@
+//! Licences of everything that is in the program and in the laws.
+
+use crate::metadata::Package;
+use crate::{Error, Metadata, copy, output};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// How names of files with licences begin.
+const NAMES: [&str; 6] = [
+    "LICENSE",
+    "LICENCE",
+    "COPYING",
+    "COPYRIGHT",
+    "NOTICE",
+    "UNLICENSE",
+];
+
+/// Writes `licences.txt` into a folder: every package with its licence, then the texts, each once. Beside it
+/// comes what Rust says of its own library, where the toolchain has it.
+pub(crate) fn write(repository: &Path, metadata: &Metadata, folder: &Path) -> Result<(), Error> {
+    let linked = metadata.linked();
+    let foreign = || linked.iter().filter(|package| package.is_foreign);
+    let mut list = format!(
+        "Pilum {} is free software under the MIT licence or the Apache licence 2.0, at your choice: \
+         LICENSE-MIT and\nLICENSE-APACHE beside this file. Program and laws contain the standard library of \
+         Rust (MIT OR Apache-2.0) and these\nlibraries of others, whose sources are at the addresses given; \
+         reports contain uPlot (MIT).\n\n",
+        metadata.version
+    );
+    // Texts, with those who have them.
+    let mut texts: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for package in foreign() {
+        let Package { name, version, .. } = package;
+        let address = package.repository.as_deref().unwrap_or("");
+        let _ = writeln!(list, "{name} {version}: {}  {address}", package.licence);
+        let files = files(&package.folder)?;
+        if files.is_empty() {
+            let authors = package.authors.join(", ");
+            let by = if authors.is_empty() {
+                "its authors"
+            } else {
+                &authors
+            };
+            let _ = writeln!(
+                list,
+                "  Copyright (c) {by}. It comes without a text of its own: see those of the same licence."
+            );
+        }
+        for path in files {
+            let text = fs::read_to_string(&path).map_err(Error::of(&path))?;
+            let text = text.replace('\r', "").trim_end().to_owned();
+            texts
+                .entry(text)
+                .or_default()
+                .push(format!("{name} {version}"));
+        }
+    }
+    let uplot = repository.join("host/results/src/report/vendor/LICENSE-uPlot");
+    let text = fs::read_to_string(&uplot).map_err(Error::of(&uplot))?;
+    texts
+        .entry(text.trim_end().to_owned())
+        .or_default()
+        .push("uPlot".to_owned());
+    for (text, of) in texts {
+        let line = "-".repeat(100);
+        let _ = write!(list, "\n{line}\n{}:\n\n{text}\n", of.join(", "));
+    }
+    let to = folder.join("licences.txt");
+    fs::write(&to, list).map_err(Error::of(&to))?;
+
+    let sysroot = output(
+        Command::new("rustc")
+            .args(["--print", "sysroot"])
+            .current_dir(repository),
+    )?;
+    let sysroot = PathBuf::from(String::from_utf8_lossy(&sysroot).trim_end());
+    let of_rust = sysroot.join("share/doc/rust/COPYRIGHT-library.html");
+    if of_rust.is_file() {
+        copy(&of_rust, &folder.join("licences-of-rust.html"))?;
+    }
+    Ok(())
+}
+
+/// Files with licences of a package.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).map_err(Error::of(folder))? {
+        let path = entry.map_err(Error::of(folder))?.path();
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_uppercase();
+        if path.is_file() && NAMES.iter().any(|start| name.starts_with(start)) {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
