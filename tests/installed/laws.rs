@@ -1,9 +1,9 @@
 //! Laws that are built with the installed headers, by pkg-config and by CMake.
 
-use crate::place::Place;
+use crate::place::{Compilers, Place, are_there};
 use std::fs;
 use std::process::Command;
-use tests::needs::{compiler, output};
+use tests::needs::{assert_named, output};
 
 /// A project without its own copy of the contract.
 fn bare(place: &Place, language: &str) {
@@ -20,8 +20,7 @@ fn used(place: &Place) {
 #[test]
 fn pkg_config_finds_the_headers() {
     if output(Command::new("pkg-config").arg("--version")).is_none()
-        || compiler("CC", "cc").is_none()
-        || compiler("FC", "gfortran").is_none()
+        || !are_there(&[("CC", "cc"), ("FC", "gfortran")])
     {
         return;
     }
@@ -69,7 +68,7 @@ fn cmake_finds_the_package() {
     if output(Command::new("cmake").arg("--version")).is_none() {
         return;
     }
-    let cases: [(&str, &str, &str, &[(&str, &str)]); 3] = [
+    let cases: [(&str, &str, &str, Compilers); 3] = [
         ("c", "C", "law.c", &[("CC", "cc")]),
         ("cpp", "CXX", "law.cpp", &[("CXX", "c++")]),
         (
@@ -80,12 +79,7 @@ fn cmake_finds_the_package() {
         ),
     ];
     for (language, languages, sources, compilers) in cases {
-        let needed = compilers.iter();
-        if needed
-            .filter(|(variable, name)| compiler(variable, name).is_none())
-            .count()
-            > 0
-        {
+        if !are_there(compilers) {
             continue;
         }
         let place = Place::new();
@@ -132,4 +126,10 @@ fn cmake_refuses_another_version() {
             outcome.stderr
         );
     }
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    assert_named("laws::pkg_config_finds_the_headers", "`pkg-config`");
+    assert_named("laws::cmake_finds_the_package", "`cmake`");
 }

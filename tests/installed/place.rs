@@ -9,6 +9,18 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 use tempfile::TempDir;
+use tests::needs::compiler;
+
+/// Compilers that a test needs: variables, and what stands for them.
+pub(crate) type Compilers = &'static [(&'static str, &'static str)];
+
+/// Whether all are there; with a remark where one is not.
+pub(crate) fn are_there(compilers: Compilers) -> bool {
+    let found = compilers
+        .iter()
+        .map(|(variable, name)| compiler(variable, name));
+    found.into_iter().all(|found| found.is_some())
+}
 
 /// What became of a command.
 #[derive(Debug)]

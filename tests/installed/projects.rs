@@ -1,18 +1,12 @@
 //! What `pilum new-law` writes, by the installed program: built, checked and run as its README says.
 
-use crate::place::Place;
+use crate::place::{Compilers, Place, are_there};
 use approx::assert_relative_eq;
 use std::fs;
 use tests::case::column;
-use tests::needs::compiler;
 
-fn follow(language: &str, compilers: &[(&str, &str)]) {
-    let needed = compilers.iter();
-    if needed
-        .filter(|(variable, name)| compiler(variable, name).is_none())
-        .count()
-        > 0
-    {
+fn follow(language: &str, compilers: Compilers) {
+    if !are_there(compilers) {
         return;
     }
     let place = Place::new();

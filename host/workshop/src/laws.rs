@@ -66,17 +66,17 @@ pub fn list(search: &SearchPath) -> String {
 
 /// A folder that laws are looked for in, as `--json` gives it.
 #[derive(Debug, Serialize)]
-struct Folder<'a> {
+struct PlaceRecord<'a> {
     folder: &'a Path,
     why: &'static str,
     exists: bool,
     laws: Vec<String>,
 }
 
-fn folders(search: &SearchPath) -> impl Iterator<Item = (Origin, Folder<'_>)> {
+fn folders(search: &SearchPath) -> impl Iterator<Item = (Origin, PlaceRecord<'_>)> {
     let found = search.libraries().into_iter();
     found.map(|(place, libraries)| {
-        let folder = Folder {
+        let folder = PlaceRecord {
             folder: &place.folder,
             why: place.origin.words(),
             exists: place.folder.is_dir(),
