@@ -22,7 +22,6 @@ const NAMES: [&str; 6] = [
 /// comes what Rust says of its own library, where the toolchain has it.
 pub(crate) fn write(repository: &Path, metadata: &Metadata, folder: &Path) -> Result<(), Error> {
     let linked = metadata.linked();
-    let foreign = || linked.iter().filter(|package| package.is_foreign);
     let mut list = format!(
         "Pilum {} is free software under the MIT licence or the Apache licence 2.0, at your choice: \
          LICENSE-MIT and\nLICENSE-APACHE beside this file. Program and laws contain the standard library of \
@@ -32,7 +31,7 @@ pub(crate) fn write(repository: &Path, metadata: &Metadata, folder: &Path) -> Re
     );
     // Texts, with those who have them.
     let mut texts: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for package in foreign() {
+    for package in linked.iter().filter(|package| package.is_foreign) {
         let Package { name, version, .. } = package;
         let address = package.repository.as_deref().unwrap_or("");
         let _ = writeln!(list, "{name} {version}: {}  {address}", package.licence);
