@@ -11,17 +11,22 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
+const USAGE: &str = "cargo run --release -p pilum-dist [-- PREFIX]\n\
+    makes target/dist/pilum-VERSION-PLATFORM.tar.gz, or installs into the folder PREFIX";
+
 fn main() -> ExitCode {
     let mut arguments = env::args_os().skip(1);
     let prefix = arguments.next();
+    let asks = |name: &str| prefix.as_ref().is_some_and(|prefix| prefix == name);
+    if asks("--help") || asks("-h") {
+        println!("{USAGE}");
+        return ExitCode::SUCCESS;
+    }
     let is_option = prefix
         .as_ref()
         .is_some_and(|prefix| prefix.to_string_lossy().starts_with('-'));
     if is_option || arguments.next().is_some() {
-        eprintln!("cargo run --release -p pilum-dist [-- PREFIX]");
-        eprintln!(
-            "makes target/dist/pilum-VERSION-PLATFORM.tar.gz, or installs into the folder PREFIX"
-        );
+        eprintln!("{USAGE}");
         return ExitCode::from(1);
     }
     match run(prefix.map(PathBuf::from).as_deref()) {
