@@ -36,6 +36,10 @@ use text::write::replace;
 
 /// Arguments of `pilum check`.
 #[derive(Clone, Debug, clap::Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches of the command line"
+)]
 pub struct Arguments {
     /// A library, or the id of a law that is found as `pilum laws` finds it.
     #[arg(required_unless_present = "list")]

@@ -161,6 +161,9 @@ fn results_are_finite(subject: &Subject) -> Found {
 const CALLS: usize = 400;
 const LOOKS: usize = 3;
 
+/// Something that is to leave nothing behind.
+type Work<'a> = Box<dyn Fn() -> Result<(), Verdict> + 'a>;
+
 fn memory_is_freed(subject: &Subject) -> Found {
     if process::heap_in_use().is_none() {
         return Err(skipped("the system does not tell what is in use"));
@@ -171,7 +174,6 @@ fn memory_is_freed(subject: &Subject) -> Found {
         let mut broken = point.clone();
         broken[0].gradient1[0] = f64::NAN;
         let fluxes = vec![point[0].flux0.clone()];
-        type Work<'a> = Box<dyn Fn() -> Result<(), Verdict> + 'a>;
         let kinds: [(&str, Work<'_>); 4] = [
             (
                 "a call of `integrate`",
@@ -183,14 +185,18 @@ fn memory_is_freed(subject: &Subject) -> Found {
             ),
             (
                 "a call of `init_state`",
-                Box::new(|| Ok(drop(specimen.probe.init_state(&fluxes, &Form::of(0))?))),
+                Box::new(|| {
+                    specimen.probe.init_state(&fluxes, &Form::of(0))?;
+                    Ok(())
+                }),
             ),
             (
                 "an instance",
                 Box::new(|| {
                     let form =
                         create_form(&specimen.formulation, specimen.hypothesis, &specimen.values);
-                    Ok(drop(specimen.law.probe(&form)?))
+                    specimen.law.probe(&form)?;
+                    Ok(())
                 }),
             ),
         ];

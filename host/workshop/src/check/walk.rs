@@ -514,7 +514,7 @@ impl Led {
             return true;
         };
         let most = 10.0 * (self.increment.abs() + self.size);
-        if !(by.amax() <= most) {
+        if by.amax().is_nan() || by.amax() > most {
             return true;
         }
         for (i, &c) in self.held.iter().enumerate() {
