@@ -13,7 +13,7 @@ pub enum Fence {
     Before,
 }
 
-/// Bytes in pages of their own, or, where nothing is forbidden, of the heap, which costs a tenth.
+/// Bytes in pages of their own, or, where nothing is forbidden, of the heap, which takes fewer calls of the system.
 /// Without `mmap` there are no fences and no locks.
 #[derive(Debug)]
 pub(super) struct Pages {
