@@ -51,7 +51,7 @@ fn follow(kind: &str, look: impl Fn(&Path)) {
         assert_eq!(written.code, Some(0), "{language}: {}", written.stderr);
         let project = place.path().join("clay_or_joint");
         let commands = commands(&project.join("README.md"));
-        assert_eq!(commands.len(), 5, "{commands:?}");
+        assert_eq!(commands.len(), 6, "{commands:?}");
         for command in commands {
             // `pilum check` is judged by its own tests where the program has it.
             if command.starts_with("pilum check") && !has_check(place.path()) {

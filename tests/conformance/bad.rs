@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 51] = [
+const GALLERY: [(&str, &str, &str, Point); 69] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -196,11 +196,108 @@ const GALLERY: [(&str, &str, &str, Point); 51] = [
     ),
     ("bad_linear", "linearity-as-declared", "failed", CannotTell),
     (
+        "bad_init_last",
+        "initial-states-are-written",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_init_random", "repeatable", "failed", CannotTell),
+    (
+        "bad_init_split",
+        "independent-of-split",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_neighbour",
+        "independent-of-split",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_cache",
+        "independent-of-earlier-calls",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_cache_address",
+        "independent-of-earlier-calls",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_cache_parameter",
+        "independent-of-earlier-calls",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_fork",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_fork_continues",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_open_file",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_signal",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_thread_left",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_variable",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_leak", "memory-is-freed", "failed", CannotTell),
+    ("bad_leak_instance", "memory-is-freed", "failed", CannotTell),
+    ("bad_radians", "angles-are-degrees", "failed", CannotTell),
+    (
+        "bad_tangent_far",
+        "tangent-matches-differences",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_tangent_unloading",
+        "tangent-matches-differences",
+        "failed",
+        CannotTell,
+    ),
+    (
         "bad_zero_increment",
         "zero-increment-changes-nothing",
         "failed",
         CannotTell,
     ),
+];
+
+/// Mistakes that may be meant: the fixture, and the one check that warns.
+const WARNED: [(&str, &str); 5] = [
+    ("bad_compression", "compression-is-negative"),
+    ("bad_engineering_shear", "response-is-isotropic"),
+    ("bad_tangential_axis", "tangential-axis-is-arbitrary"),
+    ("bad_unit", "units-are-known"),
+    ("bad_usual_range", "ranges-are-plausible"),
 ];
 
 /// The one check that fails is this one, and says how to repeat it.
@@ -267,6 +364,21 @@ fn every_bad_library_fails_the_check_that_names_its_fault() {
     }
 }
 
+#[test]
+fn what_may_be_meant_is_a_warning_of_the_check_that_names_it() {
+    for (fixture, id) in WARNED {
+        let folder = folder();
+        let Some(library) = compiled(fixture, folder.path()) else {
+            return;
+        };
+        let report = check(&library, &[]);
+        let bad = report.with(&["failed", "crashed", "warning"]);
+        assert_eq!(bad, [id], "{fixture}: {:#}", report.json);
+        assert_eq!(report.check(id)["outcome"], "warning", "{fixture}");
+        assert_eq!(report.code, Some(0), "{fixture}: {}", report.stderr);
+    }
+}
+
 /// The gallery and the folder of fixtures are the same.
 #[test]
 fn every_fixture_is_in_the_gallery() {
@@ -277,7 +389,8 @@ fn every_fixture_is_in_the_gallery() {
         .filter_map(|name| name.strip_suffix(".c").map(str::to_owned))
         .filter(|name| name.starts_with("bad_"))
         .collect();
-    let mut listed: Vec<&str> = GALLERY.iter().map(|(fixture, ..)| *fixture).collect();
+    let failing = GALLERY.iter().map(|(fixture, ..)| *fixture);
+    let mut listed: Vec<&str> = failing.chain(WARNED.map(|(fixture, _)| fixture)).collect();
     there.sort();
     listed.sort_unstable();
     assert_eq!(there, listed);
@@ -353,6 +466,85 @@ fn a_failure_says_why() {
         fails(&report, &library, id, "failed");
         let details = report.check(id)["details"].as_str().unwrap();
         assert!(details.contains(&says), "{name}: {details}");
+    }
+}
+
+/// Details of the one check of a law with these definitions.
+fn details(definitions: &str, name: &str, id: &str) -> Option<String> {
+    let folder = folder();
+    let library = compiled_with(definitions, name, folder.path())?;
+    let report = check(&library, &["--only", id]);
+    Some(report.check(id)["details"].as_str().unwrap().to_owned())
+}
+
+#[test]
+fn a_warning_says_what_was_probably_meant() {
+    let fixture = |name: &str| {
+        let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(tests.join(format!("fixtures/bad_{name}.c")));
+        text.unwrap().replace("#include \"law.h\"\n", "")
+    };
+    // A law that refuses to start there.
+    let starts = |refused: &str| {
+        format!(
+            "#define AT_INIT if (PILUM_AT(batch->flux0, i, 0) {refused}) {{ \
+             TELL(PILUM_E_DOMAIN, i); return PILUM_E_DOMAIN; }}"
+        )
+    };
+    for (definitions, name, id, says) in [
+        (
+            fixture("unit"),
+            "unit",
+            "units-are-known",
+            "`kN/m3` of `normal_stiffness`: `kN/m^3`?",
+        ),
+        (
+            "#define UNIT \"rad\"".to_owned(),
+            "rad",
+            "ranges-are-plausible",
+            "`normal_stiffness`: angles are in degrees, `deg`",
+        ),
+        (
+            "#define UNIT \"deg\"\n#define USUAL_LOWER 0.1\n#define USUAL_UPPER 1.5".to_owned(),
+            "little",
+            "ranges-are-plausible",
+            "the usual range [0.1, 1.5] deg looks like radians",
+        ),
+        (
+            fixture("usual_range"),
+            "usual",
+            "ranges-are-plausible",
+            "the usual range [-1000, 1000000000] kPa/m reaches outside the bounds (0, ∞)",
+        ),
+        (
+            fixture("engineering_shear"),
+            "shear",
+            "response-is-isotropic",
+            "the shear modulus is 2.000 times (D11 − D12)/2, where shear strains are γ = 2ε",
+        ),
+        (
+            fixture("cache"),
+            "cache",
+            "independent-of-earlier-calls",
+            "`integrate` gives another result after a call that differs in `gradient0` alone",
+        ),
+        (
+            starts("< 0.0"),
+            "signs",
+            "compression-is-negative",
+            "it starts from a tension of 10 kPa, but not from as much compression",
+        ),
+        (
+            starts("<= 0.0"),
+            "pulled",
+            "integrate-works",
+            "a tension of 100 kPa is: compression is negative here",
+        ),
+    ] {
+        let Some(details) = details(&definitions, name, id) else {
+            return;
+        };
+        assert!(details.contains(says), "{name}: {details}");
     }
 }
 

@@ -5,7 +5,7 @@ use crate::program::{check, compiled, folder, library_of, pilum, refused};
 use std::path::Path;
 
 /// No check fails; those that say nothing of this law are skipped for its own reason.
-fn passes(library: &Path) {
+pub(crate) fn passes(library: &Path) {
     let report = check(library, &[]);
     let bad: Vec<_> = report
         .checks()
@@ -18,7 +18,7 @@ fn passes(library: &Path) {
         let why = report.check(&skipped)["details"].as_str().unwrap();
         assert!(!why.contains("needs"), "{skipped}: {why}");
     }
-    assert!(report.with(&["passed"]).len() >= 38, "{:#?}", report.json);
+    assert!(report.with(&["passed"]).len() >= 44, "{:#?}", report.json);
 }
 
 #[test]
@@ -108,9 +108,11 @@ fn ids_are_stable() {
             "description-is-readable",
             "description-is-complete",
             "units-are-known",
+            "ranges-are-plausible",
             "create-works",
             "wrong-arguments-are-refused",
             "bounds-are-kept",
+            "initial-states-are-written",
             "integrate-works",
             "unknown-requests-are-refused",
             "missing-tangent-is-refused",
@@ -124,12 +126,14 @@ fn ids_are_stable() {
             "reads-stay-inside",
             "inputs-stay-untouched",
             "results-are-finite",
+            "memory-is-freed",
             "repeatable",
             "independent-of-split",
             "independent-of-order",
             "independent-of-layout",
             "independent-of-thread",
             "instances-are-independent",
+            "independent-of-earlier-calls",
             "environment-is-left-alone",
             "prints-nothing",
             "writes-no-files",
@@ -143,6 +147,9 @@ fn ids_are_stable() {
             "zero-increment-changes-nothing",
             "hypotheses-agree",
             "tangential-axis-is-arbitrary",
+            "response-is-isotropic",
+            "compression-is-negative",
+            "angles-are-degrees",
             "plastic-work-is-not-negative",
         ]
     );

@@ -2,7 +2,9 @@
 //! and no other, and neither `pilum check` nor, where a fault can be seen in time, `pilum point`
 //! goes down with it.
 
+mod aids;
 mod bad;
 mod good;
+mod languages;
 mod minors;
 mod program;

@@ -18,6 +18,11 @@ fn deps() -> PathBuf {
 
 /// Runs the program.
 pub(crate) fn pilum(arguments: &[&str]) -> Output {
+    pilum_in(Path::new(env!("CARGO_TARGET_TMPDIR")), arguments)
+}
+
+/// Runs the program in a folder.
+pub(crate) fn pilum_in(folder: &Path, arguments: &[&str]) -> Output {
     let program = deps().parent().unwrap().join(format!("pilum{EXE_SUFFIX}"));
     assert!(
         program.is_file(),
@@ -26,6 +31,7 @@ pub(crate) fn pilum(arguments: &[&str]) -> Output {
     );
     Command::new(program)
         .args(arguments)
+        .current_dir(folder)
         .env_remove("PILUM_LAW_PATH")
         .output()
         .unwrap()
@@ -95,7 +101,10 @@ pub(crate) struct Report {
 
 /// Checks a library.
 pub(crate) fn check(library: &Path, more: &[&str]) -> Report {
-    let mut arguments = vec!["check", library.to_str().unwrap(), "--json"];
+    // Calls that are found wrong would be written to the folder of the tests.
+    let name = library.file_stem().unwrap().to_str().unwrap();
+    let out = format!("{}/check/{name}", env!("CARGO_TARGET_TMPDIR"));
+    let mut arguments = vec!["check", library.to_str().unwrap(), "--json", "--out", &out];
     arguments.extend(more);
     let output = pilum(&arguments);
     let stdout = String::from_utf8(output.stdout).unwrap();

@@ -5,6 +5,7 @@
 //! that it builds on has not passed, so that a fault is reported by the check that names it.
 
 mod contract;
+mod course;
 mod description;
 mod load;
 mod mathematics;
@@ -13,12 +14,14 @@ mod purity;
 mod random;
 mod robustness;
 mod specimen;
+mod walk;
 
 use crate::Error;
 use abi::raw;
+use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
 use law::probe::NO_OUTCOME;
-use law::{LoadedLaw, Opener, SearchPath, hexadecimal_sha256};
+use law::{LoadedLaw, Opener, SearchPath, Trust, hexadecimal_sha256};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -29,9 +32,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use text::file;
 use text::suggestion;
+use text::write::replace;
 
 /// Arguments of `pilum check`.
 #[derive(Clone, Debug, clap::Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches of the command line"
+)]
 pub struct Arguments {
     /// A library, or the id of a law that is found as `pilum laws` finds it.
     #[arg(required_unless_present = "list")]
@@ -48,15 +56,30 @@ pub struct Arguments {
     /// Fix a parameter of the laws, where random ones are refused; may be repeated.
     #[arg(long, value_name = "ID=VALUE", value_parser = setting)]
     set: Vec<(String, f64)>,
+    /// Lead the law along the path of this driver file, with its parameters, in place of random
+    /// ones.
+    #[arg(long, value_name = "FILE", conflicts_with = "set")]
+    driver: Option<PathBuf>,
+    /// Where the calls behind failures and warnings are written, for `pilum replay`; default:
+    /// `results/check/<library>`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print only the checks that failed or crashed.
+    #[arg(long)]
+    only_failed: bool,
     /// Seconds after which a check is ended.
     #[arg(long, default_value_t = 60.0, value_parser = positive)]
     time_limit: f64,
     /// List the checks.
     #[arg(long)]
     list: bool,
-    /// Run the one check in this process; its answer is the last line.
-    #[arg(long, hide = true, requires = "only")]
+    /// Run the checks in this process, one after the other, for a debugger: a law that crashes or
+    /// hangs takes the program with it, and there are no limits of time and memory.
+    #[arg(long)]
     in_process: bool,
+    /// Run the one check as a child; its answer is the last line.
+    #[arg(long, hide = true, requires = "only", conflicts_with = "in_process")]
+    child: bool,
 }
 
 fn setting(text: &str) -> Result<(String, f64), String> {
@@ -121,6 +144,18 @@ enum Verdict {
     Skipped(String),
     Warning(String),
     Failed(String),
+    /// One of the above, with the call that it is about.
+    At(Box<Self>, Box<Capsule>),
+}
+
+impl Verdict {
+    /// What it says.
+    fn words(&self) -> &str {
+        match self {
+            Self::Skipped(why) | Self::Warning(why) | Self::Failed(why) => why,
+            Self::At(inner, _) => inner.words(),
+        }
+    }
 }
 
 /// Details of what was tried, or what is wrong.
@@ -180,9 +215,21 @@ struct Subject {
     seed: u64,
     settings: Vec<(String, f64)>,
     opener: Opener,
+    /// The author's own path.
+    driver: Option<PathBuf>,
 }
 
 impl Subject {
+    fn new(arguments: &Arguments, opener: &Opener, path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            seed: arguments.seed,
+            settings: arguments.set.clone(),
+            opener: opener.clone(),
+            driver: arguments.driver.clone(),
+        }
+    }
+
     fn bytes(&self) -> Result<Vec<u8>, Verdict> {
         file::read_library(&self.path).map_err(|why| failed(format!("it cannot be read: {why}")))
     }
@@ -234,6 +281,9 @@ struct Finding {
     /// The command that runs this check alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     replay: Option<String>,
+    /// The file with the call that it is about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    capsule: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -257,7 +307,7 @@ pub fn run(
 ) -> Result<(), Error> {
     let ids: Vec<&str> = checks().map(|check| check.id).collect();
     for id in &arguments.only {
-        let is_inner = arguments.in_process && id == SETTINGS.id;
+        let is_inner = arguments.child && INNER.iter().any(|check| id == check.id);
         if !is_inner && !ids.contains(&id.as_str()) {
             let known = suggestion(id, ids.iter().copied());
             return Err(Error::usage(format!("there is no check `{id}`: {known}")));
@@ -268,9 +318,16 @@ pub fn run(
         return Ok(());
     }
     let path = library_path(arguments.library.as_deref().unwrap_or_default())?;
-    if arguments.in_process {
-        let answer = in_process(arguments, opener, path)?;
-        print(&format!("\n{ANSWER}{answer}\n"));
+    if arguments.child {
+        let started = std::process::id();
+        child::enter().map_err(|error| Error::internal(error.to_string()))?;
+        let answer = answer(arguments, opener, &path)?;
+        // A law that forks would have two processes answer.
+        if std::process::id() == started {
+            let answer = serde_json::to_string(&answer);
+            let answer = answer.map_err(|error| Error::internal(error.to_string()))?;
+            print(&format!("\n{ANSWER}{answer}\n"));
+        }
         return Ok(());
     }
     // What cannot be read needs no checks, and what it was is what is reported.
@@ -280,13 +337,24 @@ pub fn run(
     })?;
     let sha256 = hexadecimal_sha256(&bytes);
     drop(bytes);
+    let arguments = &with_absolute_driver(arguments)?;
     if !arguments.set.is_empty() {
         refuse_settings(arguments, &path)?;
     }
-    let findings = run_all(arguments, &path)?;
+    if let Some(driver) = &arguments.driver {
+        refuse_driver(arguments, opener, driver, &path)?;
+    }
+    let mut findings = if arguments.in_process {
+        run_here(arguments, &path)?
+    } else {
+        run_all(arguments, &path)?
+    };
     let mut counts = BTreeMap::new();
     for finding in &findings {
         *counts.entry(finding.outcome.name()).or_insert(0) += 1;
+    }
+    if arguments.only_failed {
+        findings.retain(|finding| finding.outcome.is_bad());
     }
     let report = Report {
         library: path.display().to_string(),
@@ -313,6 +381,21 @@ pub fn run(
         path.display(),
         bad.join(", ")
     )))
+}
+
+/// Children work in folders of their own.
+fn with_absolute_driver(arguments: &Arguments) -> Result<Arguments, Error> {
+    let mut own = arguments.clone();
+    if let Some(driver) = &arguments.driver {
+        let unreadable = |source| text::Error::Unreadable {
+            path: driver.clone(),
+            source,
+        };
+        let whole = std::path::absolute(driver).map_err(unreadable)?;
+        file::read_text(&whole).map_err(unreadable)?;
+        own.driver = Some(whole);
+    }
+    Ok(own)
 }
 
 fn json(value: &impl Serialize) -> Result<String, Error> {
@@ -383,6 +466,35 @@ static SETTINGS: Check = Check {
     run: specimen::settings_fit,
 };
 
+/// What is asked of `--driver` before the checks.
+static DRIVER: Check = Check {
+    id: "driver-fits",
+    family: Family::Description,
+    description: "The driver can be read, and leads a law of the library.",
+    needs: &[],
+    run: course::driver_fits,
+};
+
+/// Checks of what is asked for, none of the library.
+static INNER: [&Check; 2] = [&SETTINGS, &DRIVER];
+
+/// Refuses a driver that cannot be read or leads another law. Whether its library can be opened is
+/// tried in a child first; it is left to the checks if not.
+fn refuse_driver(
+    arguments: &Arguments,
+    opener: &Opener,
+    driver: &Path,
+    path: &Path,
+) -> Result<(), Error> {
+    let finding = in_child(&DRIVER, arguments, path, &ScratchFolder::new()?)?;
+    match finding.outcome {
+        // Once more here, with the place in the file.
+        Outcome::Warning => course::read(opener, driver).map(drop),
+        Outcome::Failed => Err(Error::usage(finding.details)),
+        _ => Ok(()),
+    }
+}
+
 /// Refuses settings that do not fit the laws. A library that cannot answer is left to the checks.
 fn refuse_settings(arguments: &Arguments, path: &Path) -> Result<(), Error> {
     let finding = in_child(&SETTINGS, arguments, path, &ScratchFolder::new()?)?;
@@ -392,11 +504,28 @@ fn refuse_settings(arguments: &Arguments, path: &Path) -> Result<(), Error> {
     }
 }
 
+/// The checks that are asked for.
+fn chosen(arguments: &Arguments) -> Vec<&'static Check> {
+    checks()
+        .filter(|check| arguments.only.is_empty() || arguments.only.iter().any(|id| id == check.id))
+        .collect()
+}
+
+/// The check that this one builds on and that has not passed, if there is one.
+fn missing(check: &Check, findings: &BTreeMap<&str, Finding>) -> Option<&'static str> {
+    let mut needs = check.needs.iter();
+    needs
+        .find(|id| {
+            findings.get(**id).is_some_and(|finding| {
+                !matches!(finding.outcome, Outcome::Passed | Outcome::Warning)
+            })
+        })
+        .copied()
+}
+
 /// Runs the checks, all that can at the same time.
 fn run_all(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
-    let chosen: Vec<&Check> = checks()
-        .filter(|check| arguments.only.is_empty() || arguments.only.iter().any(|id| id == check.id))
-        .collect();
+    let chosen = chosen(arguments);
     let folder = ScratchFolder::new()?;
     let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
     loop {
@@ -413,19 +542,36 @@ fn run_all(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
         }
         let done: Vec<Finding> = ready
             .par_iter()
-            .map(|check| {
-                let missing = check.needs.iter().find(|id| {
-                    findings.get(**id).is_some_and(|finding| {
-                        !matches!(finding.outcome, Outcome::Passed | Outcome::Warning)
-                    })
-                });
-                match missing {
-                    Some(id) => Ok(finding(check, Outcome::Skipped, format!("needs `{id}`"))),
-                    None => in_child(check, arguments, path, &folder),
-                }
+            .map(|check| match missing(check, &findings) {
+                Some(id) => Ok(finding(check, Outcome::Skipped, format!("needs `{id}`"))),
+                None => in_child(check, arguments, path, &folder),
             })
             .collect::<Result<_, Error>>()?;
         findings.extend(done.into_iter().map(|finding| (finding.id, finding)));
+    }
+    Ok(chosen
+        .iter()
+        .filter_map(|check| findings.remove(check.id))
+        .collect())
+}
+
+/// Runs the checks in this process, one after the other.
+fn run_here(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
+    // Nothing is tried in a child first: what happens is to happen here.
+    let opener = Opener::new(Trust {
+        probe: false,
+        isolate: None,
+    });
+    let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
+    let chosen = chosen(arguments);
+    for check in &chosen {
+        let done = if let Some(id) = missing(check, &findings) {
+            finding(check, Outcome::Skipped, format!("needs `{id}`"))
+        } else {
+            let answer = run_check(check, &Subject::new(arguments, &opener, path));
+            answer.reported(check, arguments, path)?
+        };
+        findings.insert(check.id, done);
     }
     Ok(chosen
         .iter()
@@ -441,6 +587,7 @@ fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
         outcome,
         details,
         replay: None,
+        capsule: None,
     }
 }
 
@@ -449,34 +596,94 @@ const ANSWER: &str = "pilum-check-answer ";
 /// Most memory of a check, in bytes.
 const MEMORY: u64 = 8 << 30;
 
-/// A child's answer.
+/// What came of a check.
 #[derive(Serialize, Deserialize)]
 struct Answer {
     outcome: Outcome,
     details: String,
+    /// The call that it is about.
+    capsule: Option<String>,
 }
 
-/// Runs one check here. The answer as JSON.
-fn in_process(arguments: &Arguments, opener: &Opener, path: PathBuf) -> Result<String, Error> {
-    child::enter().map_err(|error| Error::internal(error.to_string()))?;
-    let subject = Subject {
-        path,
-        seed: arguments.seed,
-        settings: arguments.set.clone(),
-        opener: opener.clone(),
+/// Runs one check here.
+fn run_check(check: &Check, subject: &Subject) -> Answer {
+    let (verdict, capsule) = match (check.run)(subject) {
+        Err(Verdict::At(verdict, mut capsule)) => {
+            let keys = [
+                ("check", check.id.to_owned()),
+                ("seed", subject.seed.to_string()),
+            ];
+            for (key, value) in keys {
+                capsule.origin.insert(key.to_owned(), value.into());
+            }
+            (Err(*verdict), Some(capsule.to_string()))
+        }
+        verdict => (verdict, None),
     };
+    let (outcome, details) = match verdict {
+        Ok(details) => (Outcome::Passed, details),
+        Err(verdict) => {
+            let outcome = match verdict {
+                Verdict::Skipped(_) => Outcome::Skipped,
+                Verdict::Warning(_) => Outcome::Warning,
+                Verdict::Failed(_) | Verdict::At(..) => Outcome::Failed,
+            };
+            (outcome, verdict.words().to_owned())
+        }
+    };
+    Answer {
+        outcome,
+        details,
+        capsule,
+    }
+}
+
+impl Answer {
+    /// The line of the report, with the file for `pilum replay`.
+    fn reported(self, check: &Check, arguments: &Arguments, path: &Path) -> Result<Finding, Error> {
+        let mut finding = finding(check, self.outcome, self.details);
+        if finding.outcome.is_bad() {
+            let own: Vec<String> = own_arguments(check, arguments)
+                .iter()
+                .map(|a| a.to_string_lossy().into_owned())
+                .collect();
+            finding.replay = Some(format!("pilum check {} {}", path.display(), own.join(" ")));
+        }
+        if let Some(capsule) = self.capsule {
+            let name = path.file_stem().unwrap_or_default();
+            let folder = arguments.out.clone();
+            let folder = folder.unwrap_or_else(|| Path::new("results/check").join(name));
+            std::fs::create_dir_all(&folder)
+                .map_err(|source| text::Error::unwritable(&folder, source))?;
+            let file = folder.join(format!("{}.toml", check.id));
+            replace(&file, capsule)?;
+            finding.capsule = Some(file);
+        }
+        Ok(finding)
+    }
+}
+
+/// Runs one check in this process, a child.
+fn answer(arguments: &Arguments, opener: &Opener, path: &Path) -> Result<Answer, Error> {
     let check = checks()
-        .chain([&SETTINGS])
+        .chain(INNER)
         .find(|check| arguments.only.iter().any(|id| id == check.id))
         .ok_or_else(|| Error::internal("there is no check to run".to_owned()))?;
-    let (outcome, details) = match (check.run)(&subject) {
-        Ok(details) => (Outcome::Passed, details),
-        Err(Verdict::Skipped(why)) => (Outcome::Skipped, why),
-        Err(Verdict::Warning(why)) => (Outcome::Warning, why),
-        Err(Verdict::Failed(why)) => (Outcome::Failed, why),
-    };
-    serde_json::to_string(&Answer { outcome, details })
-        .map_err(|error| Error::internal(error.to_string()))
+    Ok(run_check(check, &Subject::new(arguments, opener, path)))
+}
+
+/// The arguments that make a check the same again.
+fn own_arguments(check: &Check, arguments: &Arguments) -> Vec<OsString> {
+    let mut own: Vec<OsString> = ["--only", check.id, "--seed", &arguments.seed.to_string()]
+        .map(OsString::from)
+        .to_vec();
+    for (id, value) in &arguments.set {
+        own.extend(["--set".into(), format!("{id}={value}").into()]);
+    }
+    if let Some(driver) = &arguments.driver {
+        own.extend(["--driver".into(), driver.into()]);
+    }
+    own
 }
 
 /// Runs one check in a child.
@@ -488,15 +695,9 @@ fn in_child(
 ) -> Result<Finding, Error> {
     let internal = |error: std::io::Error| Error::internal(error.to_string());
     let folder = scratch.inner(check.id).map_err(internal)?;
-    let mut own: Vec<OsString> = ["--only", check.id, "--seed", &arguments.seed.to_string()]
-        .map(OsString::from)
-        .to_vec();
-    for (id, value) in &arguments.set {
-        own.extend(["--set".into(), format!("{id}={value}").into()]);
-    }
     let mut all: Vec<OsString> = vec!["check".into(), path.into()];
-    all.extend(own.clone());
-    all.push("--in-process".into());
+    all.extend(own_arguments(check, arguments));
+    all.push("--child".into());
     let outcome = child::run(&Work {
         arguments: all,
         folder: Some(folder.clone()),
@@ -510,40 +711,39 @@ fn in_child(
         .lines()
         .find_map(|line| line.strip_prefix(ANSWER))
         .and_then(|line| serde_json::from_str::<Answer>(line).ok());
-    let (outcome, details) = match (answer, outcome.ending) {
-        (_, Ending::TimedOut) => (
-            Outcome::Crashed,
-            format!("it did not return within {} s", arguments.time_limit),
-        ),
+    let crashed = |details| Answer {
+        outcome: Outcome::Crashed,
+        details,
+        capsule: None,
+    };
+    let answer = match (answer, outcome.ending) {
+        (_, Ending::TimedOut) => crashed(format!(
+            "it did not return within {} s",
+            arguments.time_limit
+        )),
         (Some(answer), Ending::Exited(0)) => {
-            let Answer { outcome, details } = answer;
-            match (outcome, afterwards(check.id, &stdout, &stderr, &folder)) {
-                (Outcome::Passed, Some(why)) => (Outcome::Failed, why),
-                _ => (outcome, details),
+            match (
+                answer.outcome,
+                afterwards(check.id, &stdout, &stderr, &folder),
+            ) {
+                (Outcome::Passed, Some(details)) => Answer {
+                    outcome: Outcome::Failed,
+                    details,
+                    capsule: None,
+                },
+                _ => answer,
             }
         }
-        (Some(_), ending) => (
-            Outcome::Crashed,
-            format!("the process ended with {ending} after the check"),
-        ),
+        (Some(_), ending) => crashed(format!("the process ended with {ending} after the check")),
         (None, ending) => {
             let last = stderr.lines().rfind(|line| !line.trim().is_empty());
             let last = last.map_or(String::new(), |line| format!(": {}", line.trim()));
-            (
-                Outcome::Crashed,
-                format!("the process ended with {ending} before it could answer{last}"),
-            )
+            crashed(format!(
+                "the process ended with {ending} before it could answer{last}"
+            ))
         }
     };
-    let mut finding = finding(check, outcome, details);
-    if outcome.is_bad() {
-        let own: Vec<String> = own
-            .iter()
-            .map(|a| a.to_string_lossy().into_owned())
-            .collect();
-        finding.replay = Some(format!("pilum check {} {}", path.display(), own.join(" ")));
-    }
-    Ok(finding)
+    answer.reported(check, arguments, path)
 }
 
 /// What only the parent can see of two of the checks.
@@ -616,6 +816,9 @@ fn text(report: &Report<'_>) -> String {
                 finding.description
             );
         }
+        if let Some(capsule) = &finding.capsule {
+            let _ = writeln!(text, "           pilum replay {}", capsule.display());
+        }
     }
     let counts: Vec<String> = report
         .counts
@@ -625,7 +828,7 @@ fn text(report: &Report<'_>) -> String {
     let _ = writeln!(
         text,
         "\n{} checks: {}",
-        report.checks.len(),
+        report.counts.values().sum::<usize>(),
         counts.join(", ")
     );
     text

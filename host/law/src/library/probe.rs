@@ -3,6 +3,7 @@
 //! hands over and gets back is safe.
 
 mod pages;
+pub mod process;
 
 use super::{HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, load};
 use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};

@@ -7,7 +7,7 @@ use abi::raw;
 use abi::status::{Outcome, most_severe};
 use abi::version::BATCH_SIZE_1_0;
 use law::LoadedLaw;
-use law::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME};
+use law::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME, Order};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -36,11 +36,19 @@ pub(super) const CHECKS: &[Check] = &[
         run: bounds_are_kept,
     },
     Check {
+        id: "initial-states-are-written",
+        family: Family::Contract,
+        description: "Where `init_state` succeeds, it has written an outcome and all internal \
+                      variables, finite, of every point, the last one too.",
+        needs: &["create-works"],
+        run: initial_states_are_written,
+    },
+    Check {
         id: "integrate-works",
         family: Family::Contract,
         description: "`integrate` and `init_state` return, in time, write an outcome for every \
                       point, and report no defect of their own; some increments succeed.",
-        needs: &["create-works"],
+        needs: &["initial-states-are-written"],
         run: integrate_works,
     },
     Check {
@@ -281,6 +289,47 @@ fn bounds_are_kept(subject: &Subject) -> Found {
     Ok(format!("{n} values"))
 }
 
+fn initial_states_are_written(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "initial states");
+    let mut n_points = 0;
+    for specimen in subject.specimens(2, &mut random)? {
+        for n in [1, 2, 5, 16, 33] {
+            let pressures = (0..n).map(|_| random.logarithmic(1.0, 1000.0));
+            let fluxes: Vec<Vec<f64>> = pressures.map(|p| specimen.under_pressure(p)).collect();
+            for order in [Order::Points, Order::Components, Order::Spread] {
+                let form = Form {
+                    order,
+                    ..Form::of(0)
+                };
+                let Some(answer) = specimen.probe.init_state(&fluxes, &form)? else {
+                    continue;
+                };
+                for (i, end) in answer.points.iter().enumerate() {
+                    let point = format!("`init_state`, point {i} of {n}");
+                    if end.status == NO_OUTCOME && answer.status != raw::PILUM_E_ARGUMENT {
+                        return Err(specimen.fails(format!("{point}: there is no outcome")));
+                    }
+                    let unwritten = end.state.iter().position(|value| !value.is_finite());
+                    if let Some(k) = unwritten
+                        && end.status == raw::PILUM_OK
+                    {
+                        return Err(specimen.fails(format!(
+                            "{point}: `{}` is not written, or not finite",
+                            specimen.formulation.internal_variables[k].id
+                        )));
+                    }
+                    n_points += 1;
+                }
+            }
+        }
+    }
+    if n_points == 0 {
+        // No reason to skip what builds on this.
+        return Ok("no law has `init_state`".to_owned());
+    }
+    Ok(format!("{n_points} points"))
+}
+
 fn integrate_works(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "integrate");
     let (mut n_successes, mut n) = (0, 0);
@@ -288,6 +337,7 @@ fn integrate_works(subject: &Subject) -> Found {
         let walk = specimen
             .walk(12, &mut random)
             .map_err(|verdict| match verdict {
+                // A law that starts nowhere does not work.
                 Verdict::Skipped(why) => Verdict::Failed(why),
                 other => other,
             })?;

@@ -22,9 +22,18 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "units-are-known",
         family: Family::Description,
-        description: "Units are made of kPa, kN, kJ, m, mm, s, h, d, deg, rad, 1 and - (warning).",
+        description: "Units are made of kPa, kN, kJ, m, mm, s, h, d, deg, rad, 1 and - (warning, \
+                      with the unit that was probably meant).",
         needs: &["description-is-readable"],
         run: units_are_known,
+    },
+    Check {
+        id: "ranges-are-plausible",
+        family: Family::Description,
+        description: "Usual ranges and defaults are within the bounds; angles are in degrees, and \
+                      their usual ranges look it (warning).",
+        needs: &["description-is-readable"],
+        run: ranges_are_plausible,
     },
 ];
 
@@ -99,7 +108,8 @@ fn units_are_known(subject: &Subject) -> Found {
             .flat_map(|f| f.internal_variables.iter().map(|v| (&v.id, &v.unit)));
         for (id, unit) in parameters.chain(variables) {
             if !is_unit(unit) {
-                strange.push(format!("`{unit}` of `{id}`"));
+                let meant = meant(unit).map(|meant| format!(": `{meant}`?"));
+                strange.push(format!("`{unit}` of `{id}`{}", meant.unwrap_or_default()));
             }
         }
     }
@@ -107,13 +117,127 @@ fn units_are_known(subject: &Subject) -> Found {
     all_well(&strange)
 }
 
+const KNOWN: [&str; 12] = [
+    "kPa", "kN", "kJ", "m", "mm", "s", "h", "d", "deg", "rad", "1", "-",
+];
+
 /// Products and quotients of powers of known units.
 fn is_unit(text: &str) -> bool {
-    const KNOWN: [&str; 12] = [
-        "kPa", "kN", "kJ", "m", "mm", "s", "h", "d", "deg", "rad", "1", "-",
-    ];
     text.split(['/', '·', '*', ' '])
         .all(|factor| KNOWN.contains(&factor.split('^').next().unwrap_or_default()))
+}
+
+/// The unit that was probably meant, in the spelling of the contract.
+fn meant(text: &str) -> Option<String> {
+    const NAMES: [(&str, &str); 13] = [
+        ("°", "deg"),
+        ("degree", "deg"),
+        ("degrees", "deg"),
+        ("radian", "rad"),
+        ("radians", "rad"),
+        ("%", "-"),
+        ("sec", "s"),
+        ("hr", "h"),
+        ("day", "d"),
+        ("days", "d"),
+        ("meter", "m"),
+        ("metre", "m"),
+        ("none", "-"),
+    ];
+    const OTHER_SCALE: [(&str, &str); 6] = [
+        ("Pa", "kPa"),
+        ("MPa", "kPa"),
+        ("GPa", "kPa"),
+        ("N", "kN"),
+        ("MN", "kN"),
+        ("cm", "m"),
+    ];
+    let spelled = |factor: &str| -> Option<String> {
+        let plain: String = factor
+            .chars()
+            .map(|c| match c {
+                '²' => '2',
+                '³' => '3',
+                other => other,
+            })
+            .collect();
+        let digits = plain.find(|c: char| c.is_ascii_digit() || c == '^' || c == '-');
+        let (name, power) = plain.split_at(digits.filter(|&at| at > 0).unwrap_or(plain.len()));
+        let power = power.trim_start_matches('^');
+        let listed = |table: &[(&str, &'static str)]| {
+            let mut rows = table.iter();
+            rows.find(|(known, _)| known.eq_ignore_ascii_case(name))
+                .map(|(_, right)| *right)
+        };
+        let exactly = |table: &[(&str, &'static str)]| {
+            let mut rows = table.iter();
+            rows.find(|(known, _)| *known == name)
+                .map(|(_, right)| *right)
+        };
+        let known = KNOWN.iter().find(|known| **known == name).copied();
+        let known = known
+            .or_else(|| listed(&NAMES))
+            .or_else(|| exactly(&OTHER_SCALE))
+            .or_else(|| {
+                let mut all = KNOWN.iter();
+                all.find(|known| known.eq_ignore_ascii_case(name)).copied()
+            })?;
+        Some(if power.is_empty() {
+            known.to_owned()
+        } else {
+            format!("{known}^{power}")
+        })
+    };
+    let mut right = String::new();
+    let mut factor = String::new();
+    for c in text.trim().chars().chain(['\0']) {
+        if ['/', '·', '*', ' ', '\0'].contains(&c) {
+            right.push_str(&spelled(&factor)?);
+            factor.clear();
+            if c != '\0' {
+                right.push(c);
+            }
+        } else {
+            factor.push(c);
+        }
+    }
+    is_unit(&right).then_some(right)
+}
+
+/// The largest of a usual range of angles that looks like radians: a little more than π/2.
+const RADIANS: f64 = 1.6;
+
+fn ranges_are_plausible(subject: &Subject) -> Found {
+    let mut odd = Vec::new();
+    for law in subject.laws()? {
+        for p in &law.description().parameters {
+            let mut say = |why: String| odd.push(format!("`{}`: {why}", p.id));
+            let (usual, bounds) = (&p.usual, &p.bounds);
+            let range = format!("the usual range {usual} {}", p.unit);
+            let below = usual.lower.is_finite() && usual.lower < bounds.lower;
+            let above = usual.upper.is_finite() && usual.upper > bounds.upper;
+            if usual.upper < bounds.lower || usual.lower > bounds.upper {
+                say(format!("{range} lies outside the bounds {bounds}"));
+            } else if below || above {
+                say(format!("{range} reaches outside the bounds {bounds}"));
+            }
+            if let Some(default) = p.default
+                && p.choices.is_empty()
+                && !bounds.contain(default)
+            {
+                say(format!(
+                    "the default {default} is outside the bounds {bounds}"
+                ));
+            }
+            if p.unit == "rad" {
+                say("angles are in degrees, `deg`".to_owned());
+            } else if p.unit == "deg" && usual.upper > 0.0 && usual.upper <= RADIANS {
+                say(format!("{range} looks like radians"));
+            }
+        }
+    }
+    odd.dedup();
+    all_well(&odd)
 }
 
 fn all_well(gaps: &[String]) -> Found {
@@ -121,5 +245,26 @@ fn all_well(gaps: &[String]) -> Found {
         Ok(String::new())
     } else {
         Err(Verdict::Warning(gaps.join("; ")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::meant;
+
+    #[test]
+    fn units_are_spelled_as_in_the_contract() {
+        for (written, right) in [
+            ("kN/m3", Some("kN/m^3")),
+            ("kN/m³", Some("kN/m^3")),
+            ("kPa/M", Some("kPa/m")),
+            ("°", Some("deg")),
+            ("degrees", Some("deg")),
+            ("MPa", Some("kPa")),
+            ("m2", Some("m^2")),
+            ("furlong", None),
+        ] {
+            assert_eq!(meant(written).as_deref(), right, "{written}");
+        }
     }
 }

@@ -1,10 +1,10 @@
 //! Does a law keep to the memory it is given?
 
 use super::random::Random;
-use super::specimen::{is_finite, is_success};
-use super::{Check, Family, Found, Subject};
+use super::specimen::{create_form, is_finite, is_success};
+use super::{Check, Family, Found, Subject, Verdict, skipped};
 use abi::raw;
-use law::probe::{Fence, Form, Order};
+use law::probe::{Fence, Form, Order, process};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -38,6 +38,14 @@ pub(super) const CHECKS: &[Check] = &[
                       Outputs are NaN before the call.",
         needs: &["integrate-works"],
         run: results_are_finite,
+    },
+    Check {
+        id: "memory-is-freed",
+        family: Family::Memory,
+        description: "What is in use of the heap does not grow with calls of `integrate`, good and \
+                      failing, of `init_state`, nor with instances that are created and destroyed.",
+        needs: &["writes-stay-inside"],
+        run: memory_is_freed,
     },
 ];
 
@@ -120,7 +128,7 @@ fn results_are_finite(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "finite");
     let mut n_successes = 0;
     for specimen in subject.specimens(3, &mut random)? {
-        let walk = specimen.walk(20, &mut random)?;
+        let walk = specimen.paths(20, &mut random)?;
         if walk.steps.len() < walk.successes.len() {
             return Err(specimen.fails(format!(
                 "{} of {} points that are said to have succeeded have results that are not \
@@ -138,12 +146,80 @@ fn results_are_finite(subject: &Subject) -> Found {
                 .iter()
                 .position(|end| is_success(end.status) && !is_finite(end));
             if let Some(i) = bad {
-                return Err(specimen.fails(format!(
+                let why = format!(
                     "with request {request}, the results at {:?} are not finite, or not written",
                     starts[i]
-                )));
+                );
+                return Err(specimen.fails_at(&starts[i], why));
             }
         }
     }
     Ok(format!("{n_successes} points"))
+}
+
+/// Calls between two looks at the heap, and looks.
+const CALLS: usize = 400;
+const LOOKS: usize = 3;
+
+/// Something that is to leave nothing behind.
+type Work<'a> = Box<dyn Fn() -> Result<(), Verdict> + 'a>;
+
+fn memory_is_freed(subject: &Subject) -> Found {
+    if process::heap_in_use().is_none() {
+        return Err(skipped("the system does not tell what is in use"));
+    }
+    let mut random = Random::new(subject.seed, "heap");
+    for specimen in subject.specimens(1, &mut random)? {
+        let point = specimen.points(1, &mut random)?;
+        let mut broken = point.clone();
+        broken[0].gradient1[0] = f64::NAN;
+        let fluxes = vec![point[0].flux0.clone()];
+        let kinds: [(&str, Work<'_>); 4] = [
+            (
+                "a call of `integrate`",
+                Box::new(|| specimen.call(&point, UPDATE).map(drop)),
+            ),
+            (
+                "a call of `integrate` that fails",
+                Box::new(|| specimen.call(&broken, UPDATE).map(drop)),
+            ),
+            (
+                "a call of `init_state`",
+                Box::new(|| {
+                    specimen.probe.init_state(&fluxes, &Form::of(0))?;
+                    Ok(())
+                }),
+            ),
+            (
+                "an instance",
+                Box::new(|| {
+                    let form =
+                        create_form(&specimen.formulation, specimen.hypothesis, &specimen.values);
+                    specimen.law.probe(&form)?;
+                    Ok(())
+                }),
+            ),
+        ];
+        for (what, work) in kinds {
+            let mut least = usize::MAX;
+            // The first calls may fill what later ones use again.
+            for look in 0..=LOOKS {
+                let before = process::heap_in_use().unwrap_or_default();
+                for _ in 0..CALLS {
+                    work()?;
+                }
+                let after = process::heap_in_use().unwrap_or_default();
+                if look > 0 {
+                    least = least.min(after.saturating_sub(before));
+                }
+            }
+            if least >= 8 * CALLS {
+                return Err(specimen.fails(format!(
+                    "{what} leaves {} bytes of the heap in use",
+                    least / CALLS
+                )));
+            }
+        }
+    }
+    Ok(format!("{} calls of each kind", (LOOKS + 1) * CALLS))
 }

@@ -1,17 +1,21 @@
 //! Is an update a function of its arguments, and of nothing else?
 
 use super::random::Random;
-use super::specimen::{Specimen, create_form, first_difference};
+use super::specimen::{Function, Specimen, create_form, first_difference, is_same};
 use super::{Check, Family, Found, Subject, Verdict, skipped};
 use abi::raw;
-use law::probe::{Form, Order, PointEnd, PointStart};
+use law::probe::{Form, Order, PointEnd, PointStart, Probe, process};
+use std::ffi::OsString;
 use std::hint::black_box;
+use std::path::PathBuf;
+use std::time::Instant;
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "repeatable",
         family: Family::Purity,
-        description: "The same call gives the same bits, also after other calls.",
+        description: "The same call gives the same bits, also after other calls, as do those below \
+                      for `init_state` too.",
         needs: &[
             "results-are-finite",
             "writes-stay-inside",
@@ -59,9 +63,20 @@ pub(super) const CHECKS: &[Check] = &[
         run: instances_are_independent,
     },
     Check {
+        id: "independent-of-earlier-calls",
+        family: Family::Purity,
+        description: "A call gives the same bits after one that differs from it in a single input, \
+                      parameter, request or the time increment, by a half or by 10⁻⁹, and in an \
+                      instance that stands where another one stood.",
+        needs: &["instances-are-independent"],
+        run: independent_of_earlier_calls,
+    },
+    Check {
         id: "environment-is-left-alone",
         family: Family::Purity,
-        description: "Rounding, subnormal numbers and working directory are as before.",
+        description: "Rounding, subnormal numbers, working directory, signal handlers and variables \
+                      of the environment are as before; no process was started, no thread and no \
+                      open file is left behind.",
         needs: &["integrate-works"],
         run: environment_is_left_alone,
     },
@@ -83,63 +98,109 @@ pub(super) const CHECKS: &[Check] = &[
 
 const UPDATE: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT;
 
-/// Compares the results of another way to call with those of one batch.
+/// One of the functions of a law.
+struct Called<'a> {
+    specimen: &'a Specimen,
+    function: Function,
+}
+
+impl Called<'_> {
+    fn update(&self, points: &[PointStart]) -> Result<Vec<PointEnd>, Verdict> {
+        self.requested(points, UPDATE)
+    }
+
+    fn requested(&self, points: &[PointStart], request: u32) -> Result<Vec<PointEnd>, Verdict> {
+        let form = self.specimen.form(request);
+        self.specimen.ask(self.function, points, &form)
+    }
+}
+
+/// Compares the results of another way to call with those of one batch, for both functions.
 fn compare(
     subject: &Subject,
     name: &str,
-    mut other: impl FnMut(&Specimen, &[PointStart], &mut Random) -> Result<Vec<PointEnd>, Verdict>,
+    mut other: impl FnMut(&Called<'_>, &[PointStart], &mut Random) -> Result<Vec<PointEnd>, Verdict>,
 ) -> Found {
     let mut random = Random::new(subject.seed, name);
     let mut n = 0;
-    for specimen in subject.specimens(3, &mut random)? {
+    for specimen in &subject.specimens(3, &mut random)? {
         let points = specimen.points(96, &mut random)?;
-        let expected = specimen.call(&points, UPDATE)?.points;
-        let found = other(&specimen, &points, &mut random)?;
-        if let Some(i) = first_difference(&expected, &found) {
-            return Err(specimen.fails(format!(
-                "point {i} of {}: {:?} gave flux {:?}, then {:?}",
-                points.len(),
-                points[i],
-                expected[i].flux,
-                found.get(i).map(|end| end.flux.clone()).unwrap_or_default()
-            )));
+        for function in Function::BOTH {
+            let called = Called { specimen, function };
+            let expected = called.update(&points)?;
+            let found = other(&called, &points, &mut random)?;
+            if let Some(i) = first_difference(&expected, &found) {
+                return Err(differs(&called, &points, i, &expected[i], found.get(i)));
+            }
         }
         n += points.len();
     }
     Ok(format!("{n} points"))
 }
 
+/// Another result than before.
+fn differs(
+    called: &Called<'_>,
+    points: &[PointStart],
+    i: usize,
+    expected: &PointEnd,
+    found: Option<&PointEnd>,
+) -> Verdict {
+    let specimen = called.specimen;
+    if called.function == Function::InitState {
+        return specimen.fails(format!(
+            "`init_state`, point {i} of {}: flux {:?} gave internal variables {:?}, then {:?}",
+            points.len(),
+            points[i].flux0,
+            expected.state,
+            found.map(|end| end.state.clone()).unwrap_or_default()
+        ));
+    }
+    let why = format!(
+        "point {i} of {}: {:?} gave flux {:?}, then {:?}",
+        points.len(),
+        points[i],
+        expected.flux,
+        found.map(|end| end.flux.clone()).unwrap_or_default()
+    );
+    specimen.fails_at(&points[i], why)
+}
+
 fn repeatable(subject: &Subject) -> Found {
-    compare(subject, "repeatable", |specimen, points, _| {
+    compare(subject, "repeatable", |called, points, _| {
         let mut others = points.to_vec();
         for point in &mut others {
             for (c, value) in point.gradient1.iter_mut().enumerate() {
-                if specimen.is_free(c) {
+                if called.specimen.is_free(c) {
                     *value = point.gradient0[c] - 3.0 * (*value - point.gradient0[c]);
                 }
             }
+            for value in &mut point.flux0 {
+                *value *= 0.5;
+            }
         }
-        specimen.call(&others, UPDATE)?;
-        specimen.call(points, raw::PILUM_REQ_FLUX)?;
-        Ok(specimen.call(points, UPDATE)?.points)
+        called.update(&others)?;
+        called.requested(points, raw::PILUM_REQ_FLUX)?;
+        called.update(points)
     })
 }
 
 fn independent_of_split(subject: &Subject) -> Found {
-    compare(subject, "split", |specimen, points, random| {
+    compare(subject, "split", |called, points, random| {
         let mut singles = Vec::new();
         for point in points {
-            singles.extend(specimen.call(std::slice::from_ref(point), UPDATE)?.points);
+            singles.extend(called.update(std::slice::from_ref(point))?);
         }
         let mut parts = Vec::new();
-        while parts.len() < points.len() {
-            let rest = &points[parts.len()..];
+        let mut rest = points;
+        while !rest.is_empty() {
             let n = (1 + random.below(9)).min(rest.len());
-            parts.extend(specimen.call(&rest[..n], UPDATE)?.points);
+            parts.extend(called.update(&rest[..n])?);
+            rest = &rest[n..];
         }
         // Where they differ from each other, one of them differs from the whole.
         let differing = first_difference(&singles, &parts).is_some();
-        let whole = specimen.call(points, UPDATE)?.points;
+        let whole = called.update(points)?;
         let singles_differ = first_difference(&singles, &whole).is_some();
         Ok(if differing && !singles_differ {
             parts
@@ -150,13 +211,13 @@ fn independent_of_split(subject: &Subject) -> Found {
 }
 
 fn independent_of_order(subject: &Subject) -> Found {
-    compare(subject, "order", |specimen, points, random| {
+    compare(subject, "order", |called, points, random| {
         let mut order: Vec<usize> = (0..points.len()).collect();
         for i in (1..order.len()).rev() {
             order.swap(i, random.below(i + 1));
         }
         let shuffled: Vec<PointStart> = order.iter().map(|&i| points[i].clone()).collect();
-        let ends = specimen.call(&shuffled, UPDATE)?.points;
+        let ends = called.update(&shuffled)?;
         let mut back: Vec<(usize, PointEnd)> = order.into_iter().zip(ends).collect();
         back.sort_by_key(|(i, _)| *i);
         Ok(back.into_iter().map(|(_, end)| end).collect())
@@ -164,37 +225,42 @@ fn independent_of_order(subject: &Subject) -> Found {
 }
 
 fn independent_of_layout(subject: &Subject) -> Found {
-    let in_order = |specimen: &Specimen, points: &[PointStart], order| -> Result<_, Verdict> {
+    let in_order = |called: &Called<'_>, points: &[PointStart], order| -> Result<_, Verdict> {
         let form = Form {
             order,
-            ..Form::of(UPDATE)
+            ..called.specimen.form(UPDATE)
         };
-        Ok(specimen.probe.integrate(points, &form)?.points)
+        called.specimen.ask(called.function, points, &form)
     };
     for order in [Order::Components, Order::Spread] {
-        compare(subject, "layout", |specimen, points, _| {
-            in_order(specimen, points, order)
+        compare(subject, "layout", |called, points, _| {
+            in_order(called, points, order)
         })?;
     }
-    compare(subject, "layout", |specimen, points, _| {
+    compare(subject, "layout", |called, points, _| {
         let mut ends = Vec::new();
         for point in points {
             let same = vec![point.clone(); 3];
-            let three = in_order(specimen, &same, Order::Uniform)?;
+            let three = in_order(called, &same, Order::Uniform)?;
+            let Some(first) = three.first() else { break };
             // The one of the three that differs, if any does.
-            let odd = (1..3).find(|&i| first_difference(&three[..1], &three[i..=i]).is_some());
-            ends.push(three[odd.unwrap_or(0)].clone());
+            let odd = three.iter().find(|end| !is_same(first, end));
+            ends.push(odd.unwrap_or(first).clone());
         }
         Ok(ends)
     })
 }
 
 fn independent_of_thread(subject: &Subject) -> Found {
-    compare(subject, "thread", |specimen, points, _| {
+    compare(subject, "thread", |called, points, _| {
+        // Slow laws meet each other in fewer calls.
+        let start = Instant::now();
+        called.update(points)?;
+        let n_calls = (0.02 / start.elapsed().as_secs_f64()).clamp(3.0, 20.0) as usize;
         let work = || -> Result<Vec<PointEnd>, Verdict> {
             let mut last = Vec::new();
-            for _ in 0..20 {
-                last = specimen.call(points, UPDATE)?.points;
+            for _ in 0..n_calls {
+                last = called.update(points)?;
             }
             Ok(last)
         };
@@ -208,7 +274,7 @@ fn independent_of_thread(subject: &Subject) -> Found {
             results.collect::<Result<Vec<_>, Verdict>>()
         })?;
         let odd = (1..all.len()).find(|&i| first_difference(&all[0], &all[i]).is_some());
-        let alone = specimen.call(points, UPDATE)?.points;
+        let alone = called.update(points)?;
         let first_differs = first_difference(&all[0], &alone).is_some();
         let chosen = if first_differs { 0 } else { odd.unwrap_or(0) };
         Ok(all.into_iter().nth(chosen).unwrap_or_default())
@@ -217,7 +283,8 @@ fn independent_of_thread(subject: &Subject) -> Found {
 
 fn instances_are_independent(subject: &Subject) -> Found {
     let others = subject.specimens(3, &mut Random::new(subject.seed, "others"))?;
-    compare(subject, "instances", |specimen, points, _| {
+    compare(subject, "instances", |called, points, _| {
+        let specimen = called.specimen;
         for other in &others {
             let form = create_form(&other.formulation, other.hypothesis, &other.values);
             let created = other.law.probe(&form)?;
@@ -225,11 +292,203 @@ fn instances_are_independent(subject: &Subject) -> Found {
                 && other.law.description().id == specimen.law.description().id
                 && let Some(probe) = &created.probe
             {
-                probe.integrate(points, &Form::of(UPDATE))?;
+                on(probe, called.function, points, UPDATE)?;
             }
         }
-        Ok(specimen.call(points, UPDATE)?.points)
+        called.update(points)
     })
+}
+
+/// What another instance makes of the points.
+fn on(
+    probe: &Probe,
+    function: Function,
+    points: &[PointStart],
+    request: u32,
+) -> Result<Vec<PointEnd>, Verdict> {
+    let answer = match function {
+        Function::Integrate => Some(probe.integrate(points, &Form::of(request))?),
+        Function::InitState => {
+            let fluxes: Vec<Vec<f64>> = points.iter().map(|point| point.flux0.clone()).collect();
+            probe.init_state(&fluxes, &Form::of(0))?
+        }
+    };
+    Ok(answer.map_or(Vec::new(), |answer| answer.points))
+}
+
+/// A change of one input of a call; other inputs stay.
+type Change = fn(&mut PointStart, f64);
+
+const CHANGES: [(&str, Change); 4] = [
+    ("gradient0", |point, part| {
+        let ends = point.gradient1.iter();
+        for (start, end) in point.gradient0.iter_mut().zip(ends) {
+            *start += part * (end - *start);
+        }
+    }),
+    ("gradient1", |point, part| {
+        let starts = point.gradient0.iter();
+        for (end, start) in point.gradient1.iter_mut().zip(starts) {
+            *end -= part * (*end - start);
+        }
+    }),
+    ("flux0", |point, part| {
+        point.flux0.iter_mut().for_each(|flux| *flux *= 1.0 - part);
+    }),
+    ("state0", |point, part| {
+        let states = point.state0.iter_mut();
+        states.for_each(|state| *state *= 1.0 - part);
+    }),
+];
+
+/// Parts by which inputs are changed: far more than any tolerance, and less than most.
+const PARTS: [f64; 2] = [0.5, 1e-9];
+
+fn independent_of_earlier_calls(subject: &Subject) -> Found {
+    const N: usize = 8;
+    let mut random = Random::new(subject.seed, "earlier calls");
+    let mut n = 0;
+    for specimen in &subject.specimens(2, &mut random)? {
+        let points = specimen.points(2 * N, &mut random)?;
+        for (i, point) in points.iter().enumerate().take(N) {
+            let unlike = &points[(i + points.len() / 2) % points.len()];
+            for function in Function::BOTH {
+                n += after_alike(&Called { specimen, function }, point, unlike)?;
+                after_other_instances(subject, &Called { specimen, function }, point, unlike)?;
+            }
+        }
+    }
+    Ok(format!("{n} calls"))
+}
+
+/// Compares calls after an unlike one with the same after one that differs in a single thing.
+fn after_alike(
+    called: &Called<'_>,
+    point: &PointStart,
+    unlike: &PointStart,
+) -> Result<usize, Verdict> {
+    let Called { specimen, function } = called;
+    let one = |start: &PointStart, form: &Form| {
+        specimen.ask(*function, std::slice::from_ref(start), form)
+    };
+    let form = specimen.form(UPDATE);
+    let mut calls = Vec::new();
+    for part in PARTS {
+        for (what, change) in CHANGES {
+            let mut changed = point.clone();
+            change(&mut changed, part);
+            calls.push((format!("`{what}`"), changed, form));
+        }
+        let slower = Form {
+            time_increment: form.time_increment * (1.0 - part),
+            ..form
+        };
+        calls.push(("the time increment".to_owned(), point.clone(), slower));
+    }
+    for request in [
+        raw::PILUM_REQ_FLUX,
+        raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
+    ] {
+        let other = Form { request, ..form };
+        calls.push(("the request".to_owned(), point.clone(), other));
+    }
+    for (what, start, form_of_it) in &calls {
+        one(unlike, &form)?;
+        let expected = one(start, form_of_it)?;
+        one(unlike, &form)?;
+        one(point, &form)?;
+        let found = one(start, form_of_it)?;
+        if first_difference(&expected, &found).is_some() {
+            return Err(specimen.fails_at(
+                start,
+                format!(
+                    "`{}` gives another result after a call that differs in {what} alone: \
+                     flux {:?} and internal variables {:?}, else {:?} and {:?}, at {start:?}",
+                    function.name(),
+                    found[0].flux,
+                    found[0].state,
+                    expected[0].flux,
+                    expected[0].state
+                ),
+            ));
+        }
+    }
+    Ok(calls.len())
+}
+
+/// The same with instances that differ in one parameter, and with one that stands where another
+/// one stood.
+fn after_other_instances(
+    subject: &Subject,
+    called: &Called<'_>,
+    point: &PointStart,
+    unlike: &PointStart,
+) -> Result<(), Verdict> {
+    let Called { specimen, function } = called;
+    let one = |probe: &Probe, start: &PointStart| {
+        on(probe, *function, std::slice::from_ref(start), UPDATE)
+    };
+    let create = |values: &[f64]| {
+        let form = create_form(&specimen.formulation, specimen.hypothesis, values);
+        Ok::<_, Verdict>(specimen.law.probe(&form)?.probe)
+    };
+    // One whose parameters all differ makes a law forget what it kept of the others.
+    let parameters = specimen.law.description().parameters.iter().enumerate();
+    let varied: Vec<usize> = parameters
+        .filter(|(i, p)| {
+            let is_fixed = subject.settings.iter().any(|(id, _)| *id == p.id);
+            !is_fixed && p.choices.is_empty() && specimen.values[*i].is_finite()
+        })
+        .map(|(i, _)| i)
+        .collect();
+    let with = |some: &[usize]| -> Vec<f64> {
+        let mut values = specimen.values.clone();
+        for &i in some {
+            values[i] *= 1.0 - 1e-3;
+        }
+        values
+    };
+    let unlike_all = create(&with(&varied))?;
+    let forget = || one(unlike_all.as_ref().unwrap_or(&specimen.probe), unlike);
+    for &i in &varied {
+        let parameter = &specimen.law.description().parameters[i];
+        let Some(other) = create(&with(&[i]))? else {
+            continue;
+        };
+        forget()?;
+        let expected = one(&other, point)?;
+        forget()?;
+        one(&specimen.probe, point)?;
+        let found = one(&other, point)?;
+        // Where the first one stood.
+        forget()?;
+        one(&other, point)?;
+        drop(other);
+        let Some(again) = create(&specimen.values)? else {
+            continue;
+        };
+        let there = one(&again, point)?;
+        forget()?;
+        let own = one(&specimen.probe, point)?;
+        let what = if first_difference(&expected, &found).is_some() {
+            format!(
+                "after the same call of an instance that differs in `{}` alone",
+                parameter.id
+            )
+        } else if first_difference(&own, &there).is_some() {
+            "in an instance that stands where another one stood".to_owned()
+        } else {
+            continue;
+        };
+        return Err(specimen.fails_at(
+            point,
+            format!(
+                "`{}` gives another result {what}, at {point:?}",
+                function.name()
+            ),
+        ));
+    }
+    Ok(())
 }
 
 /// What a law could change about numbers and the process.
@@ -237,7 +496,14 @@ fn instances_are_independent(subject: &Subject) -> Found {
 struct Environment {
     rounded: [u64; 4],
     subnormal: u64,
-    folder: Option<std::path::PathBuf>,
+    folder: Option<PathBuf>,
+    signals: Vec<usize>,
+    variables: Vec<(OsString, OsString)>,
+    process: u32,
+    had_children: bool,
+    /// Where the system tells.
+    threads: Option<usize>,
+    files: Option<usize>,
 }
 
 impl Environment {
@@ -245,30 +511,63 @@ impl Environment {
         let one = black_box(1.0_f64);
         let little = black_box(0.75 * f64::EPSILON);
         let less = black_box(0.25 * f64::EPSILON);
+        let entries = |folder: &str| Some(std::fs::read_dir(folder).ok()?.count());
         Self {
             // Each direction of rounding gives another four numbers.
             rounded: [one + little, one + less, -one - little, -one - less].map(f64::to_bits),
             subnormal: (black_box(f64::MIN_POSITIVE) * black_box(0.5)).to_bits(),
             folder: std::env::current_dir().ok(),
+            signals: process::signal_handlers(),
+            variables: std::env::vars_os().collect(),
+            process: std::process::id(),
+            had_children: process::has_had_children(),
+            threads: entries("/proc/self/task"),
+            files: entries("/proc/self/fd"),
         }
+    }
+
+    /// What is not as it was.
+    fn changed(&self, after: &Self) -> Option<String> {
+        let more = |before: Option<usize>, after: Option<usize>| {
+            let more = after?.checked_sub(before?)?;
+            (more > 0).then_some(more)
+        };
+        let what = if self.folder != after.folder {
+            "the working directory has changed"
+        } else if self.subnormal != after.subnormal {
+            "the treatment of subnormal numbers has changed"
+        } else if self.rounded != after.rounded {
+            "the rounding mode has changed"
+        } else if self.process != after.process || self.had_children != after.had_children {
+            "a process was started"
+        } else if let Some(number) = (1..)
+            .zip(self.signals.iter().zip(&after.signals))
+            .find_map(|(number, (before, after))| (before != after).then_some(number))
+        {
+            return Some(format!("the handler of signal {number} has changed"));
+        } else if self.variables != after.variables {
+            "the variables of the environment have changed"
+        } else if let Some(n) = more(self.threads, after.threads) {
+            return Some(format!("threads are left behind: {n}"));
+        } else if let Some(n) = more(self.files, after.files) {
+            return Some(format!("open files are left behind: {n}"));
+        } else {
+            return None;
+        };
+        Some(what.to_owned())
     }
 }
 
 fn environment_is_left_alone(subject: &Subject) -> Found {
-    let before = Environment::now();
+    let mut before = Environment::now();
+    // The program itself may keep the file of a library that it has opened.
+    subject.laws()?;
+    before.files = Environment::now().files;
     drive(subject)?;
-    let after = Environment::now();
-    if before == after {
-        return Ok(String::new());
+    match before.changed(&Environment::now()) {
+        None => Ok(String::new()),
+        Some(what) => Err(super::failed(what)),
     }
-    let what = if before.folder != after.folder {
-        "the working directory"
-    } else if before.subnormal != after.subnormal {
-        "the treatment of subnormal numbers"
-    } else {
-        "the rounding mode"
-    };
-    Err(super::failed(format!("{what} has changed")))
 }
 
 /// Uses all functions, with failures too.

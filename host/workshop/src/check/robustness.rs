@@ -19,7 +19,7 @@ pub(super) const CHECKS: &[Check] = &[
         id: "failing-points-stay-alone",
         family: Family::Robustness,
         description: "A failing point changes no bit of the others, wherever it stands.",
-        needs: &["repeatable", "bad-numbers-are-refused"],
+        needs: &["independent-of-split", "bad-numbers-are-refused"],
         run: failing_points_stay_alone,
     },
     Check {
@@ -124,7 +124,7 @@ fn huge_steps_end_well(subject: &Subject) -> Found {
                 _ => Some(format!("the outcome is {}", status_name(end.status))),
             };
             if let Some(why) = why {
-                return Err(specimen.fails(format!("{why}, for {huge:?}")));
+                return Err(specimen.fails_at(&huge, format!("{why}, for {huge:?}")));
             }
         }
     }

@@ -1,19 +1,20 @@
-//! Laws with sample parameters, led along random paths.
+//! Laws with sample parameters, or with those of the author's own driver.
 
 use super::random::Random;
-use super::{Found, Subject, Verdict, failed, refusal, skipped};
+use super::{Found, Subject, Verdict, failed, refusal};
 use abi::Hypothesis;
 use abi::raw;
-use law::probe::{Answer, CreateForm, Form, NO_OUTCOME, PointEnd, PointStart, Probe};
-use law::{FormulationDescription, LoadedLaw, ParameterDescription};
+use abi::status::Outcome;
+use law::capsule::Capsule;
+use law::probe::{Answer, CreateForm, Form, PointEnd, PointStart, Probe};
+use law::{
+    BatchFailure, FormulationDescription, LoadedLaw, Moment, Operator, ParameterDescription,
+    PointCall, Request, Site,
+};
 use text::suggestion;
 
 /// Draws of parameters until a law must have accepted one.
 const MOST_DRAWS: usize = 500;
-/// Points that walk side by side.
-const WALKERS: usize = 16;
-/// Increments in one direction.
-const STRAIGHT: usize = 6;
 
 /// A law under one hypothesis with one set of parameters.
 #[derive(Debug)]
@@ -23,31 +24,28 @@ pub(super) struct Specimen {
     pub(super) hypothesis: Hypothesis,
     pub(super) values: Vec<f64>,
     pub(super) probe: Probe,
+    /// The increments of the author's own path, if it is led along one.
+    pub(super) course: Option<Vec<PointStart>>,
+    /// Length of its increments in time.
+    pub(super) time_increment: f64,
 }
 
-/// One increment of a point that ended well.
-#[derive(Clone, Debug)]
-pub(super) struct Step {
-    pub(super) start: PointStart,
-    pub(super) end: PointEnd,
-    /// Largest entry of the elastic operator at the start of the path.
-    pub(super) stiffness: f64,
+/// Which function of a law is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Function {
+    Integrate,
+    InitState,
 }
 
-/// Steps of a path, and the outcomes that ended parts of it.
-#[derive(Debug, Default)]
-pub(super) struct Walk {
-    pub(super) steps: Vec<Step>,
-    pub(super) refusals: Vec<(raw::Status, String)>,
-    /// Starts of the points that are said to have succeeded, finite or not.
-    pub(super) successes: Vec<PointStart>,
-}
+impl Function {
+    pub(super) const BOTH: [Self; 2] = [Self::Integrate, Self::InitState];
 
-impl Walk {
-    /// Why a part of the path ended first; empty if none did.
-    pub(super) fn why(&self) -> String {
-        let first = self.refusals.first();
-        first.map_or(String::new(), |(status, text)| refusal(*status, Some(text)))
+    /// As the header calls it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Integrate => "integrate",
+            Self::InitState => "init_state",
+        }
     }
 }
 
@@ -179,6 +177,9 @@ impl Subject {
         random: &mut Random,
         how: Draw,
     ) -> Result<Vec<Specimen>, Verdict> {
+        if self.driver.is_some() {
+            return self.led_specimens();
+        }
         let mut specimens = Vec::new();
         for law in self.laws()? {
             for (formulation, hypothesis) in hypotheses(&law) {
@@ -236,6 +237,8 @@ impl Subject {
                     hypothesis,
                     values,
                     probe,
+                    course: None,
+                    time_increment: 1.0,
                 }));
             }
             let why = if created.status == raw::PILUM_OK {
@@ -295,6 +298,7 @@ pub(super) fn settings_fit(subject: &Subject) -> Found {
         seed: subject.seed,
         settings: Vec::new(),
         opener: subject.opener.clone(),
+        driver: None,
     };
     for law in laws {
         for (formulation, hypothesis) in hypotheses(&law) {
@@ -338,173 +342,81 @@ impl Specimen {
         failed(format!("{}: {why}", self.name()))
     }
 
+    /// A failure of this specimen in a call that can be repeated.
+    pub(super) fn fails_at(&self, start: &PointStart, why: impl std::fmt::Display) -> Verdict {
+        self.recorded(start, self.fails(why))
+    }
+
+    /// A verdict with the call that it is about.
+    pub(super) fn recorded(&self, start: &PointStart, verdict: Verdict) -> Verdict {
+        // Without a capsule the words remain.
+        match self.capsule(start, verdict.words()) {
+            Some(capsule) => Verdict::At(Box::new(verdict), Box::new(capsule)),
+            None => verdict,
+        }
+    }
+
+    fn capsule(&self, start: &PointStart, why: &str) -> Option<Capsule> {
+        let law = self.law.build(self.hypothesis, &self.values).ok()?;
+        let call = PointCall {
+            request: Request::Update(Operator::Consistent),
+            time: 0.0,
+            time_increment: self.time_increment,
+            gradient: start.gradient0.clone(),
+            gradient_end: start.gradient1.clone(),
+            flux: start.flux0.clone(),
+            state: start.state0.clone(),
+            moment: Moment::default(),
+            site: Site::default(),
+        };
+        let failure = BatchFailure {
+            point: 0,
+            outcome: Outcome::Ok,
+            message: why.to_owned(),
+            factor: None,
+            claims_success: false,
+            call: Some(Box::new(call)),
+        };
+        Capsule::of(&law, &failure, Vec::new())
+    }
+
+    /// The form of an ordinary call.
+    pub(super) fn form(&self, request: u32) -> Form {
+        Form {
+            time_increment: self.time_increment,
+            ..Form::of(request)
+        }
+    }
+
     /// An ordinary call.
     pub(super) fn call(&self, starts: &[PointStart], request: u32) -> Result<Answer, Verdict> {
-        Ok(self.probe.integrate(starts, &Form::of(request))?)
+        Ok(self.probe.integrate(starts, &self.form(request))?)
+    }
+
+    /// What one of the functions makes of the points; nothing if the law lacks it.
+    pub(super) fn ask(
+        &self,
+        function: Function,
+        starts: &[PointStart],
+        form: &Form,
+    ) -> Result<Vec<PointEnd>, Verdict> {
+        let answer = match function {
+            Function::Integrate => Some(self.probe.integrate(starts, form)?),
+            Function::InitState => {
+                let fluxes: Vec<Vec<f64>> = starts.iter().map(|s| s.flux0.clone()).collect();
+                let form = Form {
+                    request: 0,
+                    ..*form
+                };
+                self.probe.init_state(&fluxes, &form)?
+            }
+        };
+        Ok(answer.map_or(Vec::new(), |answer| answer.points))
     }
 
     /// Components of the gradient that a path may move: under plane strain, 33 stays zero.
     pub(super) fn is_free(&self, component: usize) -> bool {
         self.hypothesis != Hypothesis::PlaneStrain || component != 2
-    }
-
-    /// Internal variables of a point with this flux; in words why the law cannot start there.
-    fn initial_state(&self, flux: &[f64]) -> Result<Result<Vec<f64>, String>, Verdict> {
-        let answer = self.probe.init_state(&[flux.to_vec()], &Form::of(0))?;
-        Ok(match answer {
-            None => {
-                let variables = self.formulation.internal_variables.iter();
-                Ok(variables.map(|v| v.initial_value).collect())
-            }
-            Some(answer) => {
-                let why = refusal(answer.status, answer.text().as_deref());
-                let state = answer.points.into_iter().next().map(|point| point.state);
-                state
-                    .filter(|_| answer.status == raw::PILUM_OK)
-                    .ok_or_else(|| format!("`init_state` gave {why}"))
-            }
-        })
-    }
-
-    /// A compressed or unstressed point before anything has happened, and the largest entry of its
-    /// elastic operator.
-    fn origin(&self, random: &mut Random) -> Result<(PointStart, f64, f64), Verdict> {
-        let n = self.probe.n_components();
-        let mut why = None;
-        for attempt in 0..20 {
-            let pressure = if attempt % 4 == 3 {
-                0.0
-            } else {
-                random.logarithmic(1.0, 1000.0)
-            };
-            let n_normal = if n == 2 { 1 } else { 3 };
-            let flux: Vec<f64> = (0..n)
-                .map(|c| if c < n_normal { -pressure } else { 0.0 })
-                .collect();
-            let state0 = match self.initial_state(&flux)? {
-                Ok(state0) => state0,
-                Err(refused) => {
-                    why = why.or(Some(refused));
-                    continue;
-                }
-            };
-            let start = PointStart {
-                gradient0: vec![0.0; n],
-                gradient1: vec![0.0; n],
-                flux0: flux,
-                state0,
-            };
-            let answer = self.call(
-                std::slice::from_ref(&start),
-                raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-            )?;
-            let stiffness = answer.points[0]
-                .tangent
-                .iter()
-                .fold(0.0, |most: f64, k| most.max(k.abs()));
-            let status = answer.points[0].status;
-            if is_success(status) && stiffness > 0.0 && stiffness.is_finite() {
-                return Ok((start, stiffness, pressure.max(10.0) / stiffness));
-            }
-            // The first reason, since a law that has panicked says no more why.
-            why = why.or_else(|| {
-                Some(if is_success(status) {
-                    format!("the largest entry of the elastic operator is {stiffness}")
-                } else {
-                    // Where a call is refused as a whole, no outcomes are written.
-                    let status = if status == NO_OUTCOME {
-                        answer.status
-                    } else {
-                        status
-                    };
-                    refusal(status, answer.text().as_deref())
-                })
-            });
-        }
-        Err(skipped(format!(
-            "{}: no initial stress was accepted: {}",
-            self.name(),
-            why.unwrap_or_default()
-        )))
-    }
-
-    /// Leads points along paths of random straight pieces, with tangents.
-    pub(super) fn walk(&self, n_increments: usize, random: &mut Random) -> Result<Walk, Verdict> {
-        let n = self.probe.n_components();
-        let mut walk = Walk::default();
-        let mut walkers = (0..WALKERS)
-            .map(|_| self.origin(random))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut moves = vec![vec![0.0; n]; WALKERS];
-        for increment in 0..n_increments {
-            if increment % STRAIGHT == 0 {
-                for (one, (_, _, size)) in moves.iter_mut().zip(&walkers) {
-                    let length = size * random.logarithmic(0.03, 10.0);
-                    for (c, value) in one.iter_mut().enumerate() {
-                        let free = self.is_free(c);
-                        *value = if free {
-                            length * random.between(-1.0, 1.0)
-                        } else {
-                            0.0
-                        };
-                    }
-                }
-            }
-            for ((start, ..), step) in walkers.iter_mut().zip(&moves) {
-                start.gradient1 = start
-                    .gradient0
-                    .iter()
-                    .zip(step)
-                    .map(|(g, d)| g + d)
-                    .collect();
-            }
-            let starts: Vec<PointStart> = walkers.iter().map(|(start, ..)| start.clone()).collect();
-            let answer = self.call(&starts, raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT)?;
-            let text = answer.text().unwrap_or_default();
-            for ((start, stiffness, size), end) in walkers.iter_mut().zip(answer.points) {
-                let success = is_success(end.status);
-                if success {
-                    walk.successes.push(start.clone());
-                } else {
-                    walk.refusals.push((end.status, text.clone()));
-                }
-                if success && is_finite(&end) {
-                    let next = PointStart {
-                        gradient0: start.gradient1.clone(),
-                        gradient1: start.gradient1.clone(),
-                        flux0: end.flux.clone(),
-                        state0: end.state.clone(),
-                    };
-                    let start = std::mem::replace(start, next);
-                    let stiffness = *stiffness;
-                    walk.steps.push(Step {
-                        start,
-                        end,
-                        stiffness,
-                    });
-                } else {
-                    (*start, *stiffness, *size) = self.origin(random)?;
-                }
-            }
-        }
-        Ok(walk)
-    }
-
-    /// Starts of steps that succeed together, at most so many.
-    pub(super) fn points(&self, n: usize, random: &mut Random) -> Result<Vec<PointStart>, Verdict> {
-        let walk = self.walk(n.div_ceil(WALKERS) + STRAIGHT, random)?;
-        let why = walk.why();
-        let mut starts = walk.successes;
-        // The last ones are the farthest from the elastic beginning.
-        starts.reverse();
-        starts.truncate(n);
-        if starts.is_empty() {
-            return Err(skipped(format!(
-                "{}: no increment succeeded: {why}",
-                self.name()
-            )));
-        }
-        Ok(starts)
     }
 }
 

@@ -13,10 +13,11 @@ pub enum Fence {
     Before,
 }
 
-/// Bytes in pages of their own. Without `mmap` there are no fences and no locks.
+/// Bytes in pages of their own, or, where nothing is forbidden, of the heap, which takes fewer calls of the system.
+/// Without `mmap` there are no fences and no locks.
 #[derive(Debug)]
 pub(super) struct Pages {
-    map: Map,
+    place: Place,
     offset: usize,
     length: usize,
 }
@@ -25,32 +26,53 @@ impl Pages {
     pub(super) fn new(length: usize, fence: Fence) -> io::Result<Self> {
         let page = page_size();
         let inner = length.next_multiple_of(page).max(page);
-        let map = Map::new(inner + 2 * page)?;
-        match fence {
-            Fence::Far => {}
-            Fence::After => map.forbid(page + inner, page)?,
-            Fence::Before => map.forbid(0, page)?,
+        let place = match fence {
+            Fence::Far => Place::Heap(Heap::new(length + 2 * page)),
+            Fence::After | Fence::Before => Place::Map(Map::new(inner + 2 * page)?),
+        };
+        if let Place::Map(map) = &place {
+            let forbidden = if fence == Fence::After {
+                page + inner
+            } else {
+                0
+            };
+            map.forbid(forbidden, page)?;
         }
         let offset = match fence {
             Fence::After => page + inner - length,
             Fence::Far | Fence::Before => page,
         };
         Ok(Self {
-            map,
+            place,
             offset,
             length,
         })
     }
 
-    /// From now on writing ends the process.
+    /// From now on writing ends the process. Bytes of the heap move to pages of their own.
     pub(super) fn lock(&mut self) -> io::Result<()> {
         let page = page_size();
         let inner = self.length.next_multiple_of(page).max(page);
-        self.map.lock(page, inner)
+        if let Place::Heap(_) = self.place {
+            let mut paged = Self {
+                place: Place::Map(Map::new(inner + 2 * page)?),
+                ..*self
+            };
+            paged.bytes_mut().copy_from_slice(self.bytes());
+            *self = paged;
+        }
+        match &mut self.place {
+            Place::Map(map) => map.lock(page, inner),
+            Place::Heap(_) => Ok(()),
+        }
     }
 
     pub(super) fn pointer(&self) -> *mut u8 {
-        self.map.start().wrapping_add(self.offset)
+        let start = match &self.place {
+            Place::Map(map) => map.start(),
+            Place::Heap(heap) => heap.start(),
+        };
+        start.wrapping_add(self.offset)
     }
 
     pub(super) fn bytes(&self) -> &[u8] {
@@ -59,9 +81,30 @@ impl Pages {
     }
 
     pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
-        assert!(!self.map.is_locked());
+        assert!(!matches!(&self.place, Place::Map(map) if map.is_locked()));
         // SAFETY: as above, and writable.
         unsafe { std::slice::from_raw_parts_mut(self.pointer(), self.length) }
+    }
+}
+
+#[derive(Debug)]
+enum Place {
+    Map(Map),
+    Heap(Heap),
+}
+
+/// Words of the heap, which others than their owner may write.
+#[derive(Debug)]
+struct Heap(Box<[std::cell::UnsafeCell<u64>]>);
+
+impl Heap {
+    fn new(length: usize) -> Self {
+        let words = length.div_ceil(size_of::<u64>());
+        Self((0..words).map(|_| std::cell::UnsafeCell::new(0)).collect())
+    }
+
+    fn start(&self) -> *mut u8 {
+        self.0.as_ptr().cast::<u8>().cast_mut()
     }
 }
 
@@ -142,20 +185,16 @@ mod elsewhere {
     }
 
     #[derive(Debug)]
-    pub(super) struct Map {
-        memory: Box<[std::cell::UnsafeCell<u64>]>,
-    }
+    pub(super) struct Map(super::Heap);
 
     impl Map {
+        #[expect(clippy::unnecessary_wraps, reason = "as on Unix")]
         pub(super) fn new(length: usize) -> io::Result<Self> {
-            let words = length.div_ceil(8);
-            Ok(Self {
-                memory: (0..words).map(|_| std::cell::UnsafeCell::new(0)).collect(),
-            })
+            Ok(Self(super::Heap::new(length)))
         }
 
         pub(super) fn start(&self) -> *mut u8 {
-            self.memory.as_ptr().cast::<u8>().cast_mut()
+            self.0.start()
         }
 
         pub(super) fn is_locked(&self) -> bool {

@@ -1,0 +1,121 @@
+//! The author's own path: the increments of a driver file are what the checks are made with.
+
+use super::specimen::{Specimen, create_form};
+use super::{Found, Subject, Verdict, failed, skipped};
+use crate::Error;
+use input::driver::Driver;
+use law::Opener;
+use law::probe::PointStart;
+use std::path::Path;
+
+/// The drivers of a file, one for each variant.
+///
+/// # Errors
+/// As those of [`Driver::read_unlocked`].
+pub(super) fn read(opener: &Opener, path: &Path) -> Result<Vec<Driver>, Error> {
+    Driver::read_unlocked(opener, path)
+}
+
+/// Whether the driver can be read (a warning, if not) and leads a law of the library.
+pub(super) fn driver_fits(subject: &Subject) -> Found {
+    let Some(path) = &subject.driver else {
+        return Ok(String::new());
+    };
+    let drivers = read(&subject.opener, path).map_err(|why| Verdict::Warning(why.to_string()))?;
+    let canonical = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    for driver in &drivers {
+        let law = driver.point().law();
+        let library = law.library();
+        if library.foreign().is_some() || law.loaded().shear_zone().is_some() {
+            return Err(failed(format!(
+                "{} leads a law behind an adapter; checks are of libraries that keep the contract",
+                path.display()
+            )));
+        }
+        if canonical(library.path()) != canonical(&subject.path) {
+            return Err(failed(format!(
+                "{} leads `{}` of library {}, not a law of {}",
+                path.display(),
+                law.description().id,
+                library.path().display(),
+                subject.path.display()
+            )));
+        }
+    }
+    Ok(String::new())
+}
+
+impl Subject {
+    /// The laws of the driver, with its parameters and the increments of its path; one for each
+    /// variant, and for each length of increments in time.
+    pub(super) fn led_specimens(&self) -> Result<Vec<Specimen>, Verdict> {
+        let Some(path) = &self.driver else {
+            return Ok(Vec::new());
+        };
+        let drivers = read(&self.opener, path).map_err(|why| failed(why.to_string()))?;
+        let mut specimens = Vec::new();
+        for driver in &drivers {
+            specimens.extend(of_driver(driver)?);
+        }
+        if specimens.is_empty() {
+            return Err(skipped(format!(
+                "{}: no increment was done",
+                path.display()
+            )));
+        }
+        Ok(specimens)
+    }
+}
+
+fn of_driver(driver: &Driver) -> Result<Vec<Specimen>, Verdict> {
+    let point = driver.point();
+    let segments = point.segments().iter();
+    let times: Vec<f64> = segments
+        .flat_map(|segment| std::iter::repeat_n(segment.time_increment, segment.increments))
+        .collect();
+    let mut courses: Vec<(f64, Vec<PointStart>)> = Vec::new();
+    let mut last: Option<PointStart> = None;
+    // How far it comes is for `pilum point` to say.
+    let _ = driver.run(|row| {
+        if let Some(mut start) = last.take() {
+            start.gradient1 = row.gradient.to_vec();
+            let time = times.get(row.increment - 1).copied().unwrap_or(1.0);
+            match courses
+                .iter_mut()
+                .find(|(other, _)| other.to_bits() == time.to_bits())
+            {
+                Some((_, course)) => course.push(start),
+                None => courses.push((time, vec![start])),
+            }
+        }
+        last = Some(PointStart {
+            gradient0: row.gradient.to_vec(),
+            gradient1: row.gradient.to_vec(),
+            flux0: row.flux.to_vec(),
+            state0: row.internal.to_vec(),
+        });
+    });
+    let law = point.law();
+    let mut specimens = Vec::new();
+    for (time_increment, course) in courses {
+        let formulation = law.formulation().clone();
+        let values = law.parameters().to_vec();
+        let form = create_form(&formulation, law.hypothesis(), &values);
+        let Some(probe) = law.loaded().probe(&form)?.probe else {
+            return Err(failed(format!(
+                "`create` refuses the parameters of {}",
+                driver.path().display()
+            )));
+        };
+        specimens.push(Specimen {
+            law: law.loaded().clone(),
+            formulation,
+            hypothesis: law.hypothesis(),
+            values,
+            probe,
+            course: Some(course),
+            time_increment,
+        });
+    }
+    Ok(specimens)
+}

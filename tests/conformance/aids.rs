@@ -1,0 +1,140 @@
+//! What helps an author: a path of his own, calls that can be repeated, less to read, a debugger.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{
+    check, compiled, compiled_with, folder, library_of, pilum, pilum_in, refused,
+};
+use std::path::Path;
+
+/// A tangent that is wrong where nobody usually is.
+const SOFT: &str = "#define TANGENT(row, column) ((batch->request & PILUM_REQ_TANGENT && \
+                    instance->stiffness[0] < 500.0 ? 1.05 : 1.0) * STIFFNESS(row, column))";
+
+/// A driver of the fixture in a folder.
+fn driver(folder: &Path, more: &str) -> String {
+    let file = folder.join("driver.toml");
+    let text = format!(
+        "law = \"fixture\"\nlaw_path = [{:?}]\nhypothesis = \"interface_2d\"\n\
+         [parameters]\nnormal_stiffness = 100.0\nshear_stiffness = 1e6\n\
+         [initial]\ntraction = {{ n = -20.0 }}\n\
+         [[segment]]\nincrements = 4\ncontrol = {{ t = {{ jump = 1e-3 }} }}\n{more}",
+        folder.display().to_string()
+    );
+    std::fs::write(&file, text).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+/// Random paths stay where the law is usually used; the author's own path is elsewhere.
+#[test]
+fn a_driver_is_what_the_checks_are_made_with() {
+    let folder = folder();
+    let Some(library) = compiled_with(SOFT, "fixture", folder.path()) else {
+        return;
+    };
+    assert_eq!(check(&library, &[]).code, Some(0));
+    let more = "[[segment]]\nincrements = 3\n\
+                control = { n = { traction = -40.0 } }\n\
+                [[variant]]\nname = \"soft\"\n[[variant]]\nname = \"hard\"\n\
+                [variant.parameters]\nnormal_stiffness = 1e6\n";
+    let driver = driver(folder.path(), more);
+    let report = check(&library, &["--driver", &driver]);
+    let id = "tangent-matches-differences";
+    assert_eq!(
+        report.with(&["failed", "crashed"]),
+        [id],
+        "{:#}",
+        report.json
+    );
+    let finding = report.check(id);
+    let details = finding["details"].as_str().unwrap();
+    assert!(details.contains("normal_stiffness = 100"), "{details}");
+    let replay = finding["replay"].as_str().unwrap();
+    assert!(replay.ends_with(&format!("--driver {driver}")), "{replay}");
+    // Two variants of seven increments each, in one batch.
+    let repeatable = &report.check("repeatable")["details"];
+    assert_eq!(repeatable, "14 points", "{:#}", report.json);
+}
+
+#[test]
+fn a_driver_that_does_not_fit_is_bad_input() {
+    let folder = folder();
+    let Some(library) = compiled_with("", "fixture", folder.path()) else {
+        return;
+    };
+    let library = library.to_str().unwrap();
+    let refused = |library: &str, driver: &str| refused(&["check", library, "--driver", driver], 1);
+    assert!(refused(library, "no/such.toml").contains("cannot read no/such.toml"));
+    let wrong = driver(folder.path(), "figur = []\n");
+    let words = refused(library, &wrong);
+    assert!(
+        words.contains("figur") && words.contains("driver.toml:12:"),
+        "{words}"
+    );
+    let right = driver(folder.path(), "");
+    let words = refused(library_of("elastic").to_str().unwrap(), &right);
+    assert!(words.contains("leads `fixture` of library"), "{words}");
+}
+
+/// A call that a check finds wrong is a file, which `replay` reads.
+#[test]
+fn a_wrong_call_can_be_repeated() {
+    let folder = folder();
+    let Some(library) = compiled("bad_tangent", folder.path()) else {
+        return;
+    };
+    let id = "tangent-matches-differences";
+    let report = check(&library, &["--only", id]);
+    let capsule = report.check(id)["capsule"].as_str().unwrap();
+    let text = std::fs::read_to_string(capsule).unwrap();
+    assert!(text.contains(&format!("check = \"{id}\"")), "{text}");
+    let output = pilum(&["replay", capsule]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(
+        said.contains("the call succeeds; it is recorded as `ok`"),
+        "{said}"
+    );
+    // Of the tangent that the law gives, 1 % is too much.
+    assert!(
+        said.contains("at most 9.9e-3 of its largest component off"),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_has_passed_need_not_be_read() {
+    let folder = folder();
+    let Some(library) = compiled("bad_print", folder.path()) else {
+        return;
+    };
+    let library = library.to_str().unwrap();
+    let all = pilum_in(folder.path(), &["check", library]);
+    let failed = pilum_in(folder.path(), &["check", library, "--only-failed"]);
+    assert_eq!(all.status.code(), failed.status.code());
+    let failed = String::from_utf8(failed.stdout).unwrap();
+    assert!(failed.contains("FAILED   prints-nothing"), "{failed}");
+    assert!(
+        !failed.contains("  passed ") && !failed.contains("  skipped "),
+        "{failed}"
+    );
+    let last = |text: &str| text.lines().last().unwrap().to_owned();
+    assert_eq!(last(&failed), last(&String::from_utf8(all.stdout).unwrap()));
+}
+
+/// In the process of the program a check is as in one of its own, and a law that crashes takes it along.
+#[test]
+fn a_check_can_be_run_under_a_debugger() {
+    let folder = folder();
+    let Some(library) = compiled("bad_abort", folder.path()) else {
+        return;
+    };
+    let only = |id: &str| {
+        let library = library.to_str().unwrap();
+        pilum(&["check", library, "--in-process", "--only", id])
+    };
+    let passing = only("create-works");
+    let said = String::from_utf8(passing.stdout).unwrap();
+    assert_eq!(passing.status.code(), Some(0), "{said}");
+    assert!(said.contains("passed   create-works"), "{said}");
+    assert_eq!(only("integrate-works").status.code(), None);
+}
