@@ -227,6 +227,10 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
     let solver = LinearSolver::with_block(&system.pattern, None, block);
     let mut solver = solver.expect("a sound pattern");
     let places = Places::new(&system, &chamber.prescribed);
+    let clock = Clock {
+        start: 0.0,
+        length: 1.0,
+    };
     let mut iterations = 0;
     bencher.bench_local(|| {
         let mut matrix = Matrix::default();
@@ -239,7 +243,7 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
             &chamber.settings,
             &mut costs,
         );
-        let step = newton.step(&chamber.loads, 0.0, 1.0, 0.0, None);
+        let step = newton.step(&chamber.loads, [0.0, 1.0], clock, None);
         iterations = step.expect("equilibrium").iterations.len();
     });
     assert!(iterations > 2, "the interface slides: {iterations}");

@@ -259,6 +259,22 @@ impl Refusal {
     }
 }
 
+/// DTIME of calls that are no increment: at the start of a law, and for its elastic operator.
+const TIME_AT_REST: f64 = 1.0;
+/// The same as a share of the phase or segment, of laws that would creep in it.
+const MOMENT_AT_REST: f64 = 1e-9;
+
+/// The time increment that a routine is given, which may divide by it: never 0.
+pub(crate) fn time_of_call(start: &PointStart<'_>, time_dependent: bool) -> f64 {
+    if start.time_increment > 0.0 {
+        start.time_increment
+    } else if time_dependent {
+        MOMENT_AT_REST * start.moment.step_length
+    } else {
+        TIME_AT_REST
+    }
+}
+
 /// Carries the points of a batch over the increment, each by itself. A point that fails does not
 /// stop the others; the message is that of the first of the worst.
 pub(crate) fn each_point(

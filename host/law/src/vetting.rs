@@ -153,11 +153,7 @@ fn call(law: &LoadedLaw, hypothesis: Hypothesis) {
     };
     let n = law.n_components();
     let rows = Strided::rows(n);
-    let normal = if hypothesis == Hypothesis::Interface2d {
-        1
-    } else {
-        3
-    };
+    let normal = if hypothesis.is_interface() { 1 } else { 3 };
     let compression = (0..n).map(|i| if i < normal { -100.0 } else { 0.0 });
     let flux: Vec<f64> = compression.cycle().take(n * N_POINTS).collect();
     let Ok(state) = law.initial_state(N_POINTS, (&flux, rows)) else {

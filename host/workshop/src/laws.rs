@@ -132,7 +132,7 @@ fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
         .into_iter()
         .find(|h| h.name() == formulation.hypothesis);
     let components = hypothesis.map_or(String::new(), |h| h.components().join(" "));
-    let pair = if hypothesis == Some(Hypothesis::Interface2d) {
+    let pair = if hypothesis.is_some_and(Hypothesis::is_interface) {
         "jump (m) to traction (kPa)"
     } else {
         "strain to stress (kPa)"

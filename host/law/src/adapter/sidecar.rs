@@ -43,6 +43,8 @@ struct File {
     #[serde(default)]
     thread_safe: bool,
     #[serde(default)]
+    time_dependent: bool,
+    #[serde(default)]
     symmetric: bool,
     #[serde(default)]
     tangent: Given,
@@ -165,6 +167,7 @@ impl Sidecar {
                     Given::Approximate => Tangent::Approximate,
                 },
                 rates: false,
+                time_dependent: file.time_dependent,
                 local_axes: false,
                 internal_variables: variables.clone(),
             });
