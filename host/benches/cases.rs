@@ -10,7 +10,7 @@ use input::Case;
 use input::case::Axis;
 use law::Operator;
 use mechanics::assembly::{Places, System};
-use mechanics::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton};
+use mechanics::equilibrium::{Clock, Costs, LinearDomain, Loads, Matrix, Newton};
 use mechanics::group::Group;
 use mechanics::{Mesh, Model, Place, Settings};
 use runs::run::{Observer, run};

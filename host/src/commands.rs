@@ -110,6 +110,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         }
         Command::Laws { id, law_path, json } => show_laws(&opener, id.as_deref(), &law_path, json),
         Command::NewLaw(project) => print(&project.write()?),
+        Command::NewSidecar(sidecar) => print(&sidecar.write()?),
         Command::Schema { file } => print_schema(file),
         Command::Completions { shell } => {
             let mut program = Arguments::command();
@@ -278,8 +279,8 @@ fn show_laws(
     let text = match (id, json) {
         (None, false) => workshop::laws::list(&search),
         (None, true) => workshop::laws::list_json(&search)?,
-        (Some(id), false) => workshop::laws::page(&search.law(id)?),
-        (Some(id), true) => workshop::laws::page_json(&search.law(id)?)?,
+        (Some(id), false) => workshop::laws::page(&workshop::laws::find(&search, opener, id)?),
+        (Some(id), true) => workshop::laws::page_json(&workshop::laws::find(&search, opener, id)?)?,
     };
     print(&text)
 }

@@ -193,8 +193,8 @@ fn step(law: &Law, operator: Operator, size: f64, flux: &[f64], state: &[f64]) {
     let _ = law.integrate(&start, operator, end);
 }
 
-/// A value that a parameter may have.
-fn plausible(parameter: &ParameterDescription) -> f64 {
+/// A value that a parameter may have; NaN: left out.
+pub fn plausible(parameter: &ParameterDescription) -> f64 {
     if let Some(default) = parameter.default {
         return default;
     }

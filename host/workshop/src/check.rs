@@ -12,6 +12,7 @@ mod memory;
 mod purity;
 mod random;
 mod robustness;
+mod routine;
 mod specimen;
 
 use crate::Error;
@@ -88,6 +89,7 @@ enum Family {
     Purity,
     Mathematics,
     Robustness,
+    Routine,
 }
 
 /// A check: its name and meaning are public and never change.
@@ -110,6 +112,7 @@ fn checks() -> impl Iterator<Item = &'static Check> {
         purity::CHECKS,
         robustness::CHECKS,
         mathematics::CHECKS,
+        routine::CHECKS,
     ]
     .into_iter()
     .flatten()
@@ -189,7 +192,12 @@ impl Subject {
 
     /// The laws of the library.
     fn laws(&self) -> Result<Vec<LoadedLaw>, Verdict> {
-        let library = self.opener.open(&self.path);
+        let library = if routine::is_one(&self.path) {
+            self.opener
+                .open_foreign(&routine::foreign(self), |_| Ok(()))
+        } else {
+            self.opener.open(&self.path)
+        };
         let library = library.map_err(|why| failed(why.to_string()))?;
         let ids = library.laws().map(|law| law.id.as_str());
         Ok(ids.filter_map(|id| library.law(id)).collect())
@@ -280,10 +288,23 @@ pub fn run(
     })?;
     let sha256 = hexadecimal_sha256(&bytes);
     drop(bytes);
-    if !arguments.set.is_empty() {
+    let is_routine = routine::is_one(&path);
+    if let Some(id) = arguments.only.iter().find(|id| !applies(id, is_routine)) {
+        let whose = if is_routine {
+            "libraries of the contract"
+        } else {
+            "UMATs"
+        };
+        return Err(Error::usage(format!(
+            "--only {id}: this check is for {whose}"
+        )));
+    }
+    if is_routine {
+        routine::refuse_settings(&arguments.set, &path)?;
+    } else if !arguments.set.is_empty() {
         refuse_settings(arguments, &path)?;
     }
-    let findings = run_all(arguments, &path)?;
+    let findings = run_all(arguments, &path, is_routine)?;
     let mut counts = BTreeMap::new();
     for finding in &findings {
         *counts.entry(finding.outcome.name()).or_insert(0) += 1;
@@ -308,8 +329,13 @@ pub fn run(
     if bad.is_empty() {
         return Ok(());
     }
+    let keeps = if is_routine {
+        "is not what its sidecar says"
+    } else {
+        "does not keep the contract"
+    };
     Err(Error::library(format!(
-        "library {} does not keep the contract: {}",
+        "library {} {keeps}: {}",
         path.display(),
         bad.join(", ")
     )))
@@ -392,9 +418,16 @@ fn refuse_settings(arguments: &Arguments, path: &Path) -> Result<(), Error> {
     }
 }
 
+/// Whether a check is for such a library: a UMAT with a sidecar, or one of the contract.
+fn applies(id: &str, is_routine: bool) -> bool {
+    let is_of_routines = routine::CHECKS.iter().any(|check| check.id == id);
+    is_of_routines == is_routine || is_routine && routine::SHARED.contains(&id)
+}
+
 /// Runs the checks, all that can at the same time.
-fn run_all(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
+fn run_all(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<Finding>, Error> {
     let chosen: Vec<&Check> = checks()
+        .filter(|check| applies(check.id, is_routine))
         .filter(|check| arguments.only.is_empty() || arguments.only.iter().any(|id| id == check.id))
         .collect();
     let folder = ScratchFolder::new()?;

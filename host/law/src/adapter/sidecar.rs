@@ -211,7 +211,7 @@ impl Sidecar {
 }
 
 /// `libNAME.so` has `NAME.law.toml` or `libNAME.law.toml` beside it.
-fn find(library: &Path) -> Result<PathBuf, Error> {
+pub(super) fn find(library: &Path) -> Result<PathBuf, Error> {
     let stem = library.file_stem().unwrap_or_default().to_string_lossy();
     let names = [stem.strip_prefix("lib").unwrap_or(&stem), &stem];
     let paths = names.map(|name| library.with_file_name(format!("{name}.law.toml")));
@@ -219,8 +219,10 @@ fn find(library: &Path) -> Result<PathBuf, Error> {
     found.cloned().ok_or_else(|| Error::Library {
         message: format!("library {} has no sidecar", library.display()),
         hint: Some(format!(
-            "a sidecar names parameters and internal variables: {}, or `sidecar = \"PATH\"`",
-            paths[0].display()
+            "a sidecar names parameters and internal variables: {}, or `sidecar = \"PATH\"`; `pilum \
+             new-sidecar {} --nprops N --nstatv M` writes one to fill in",
+            paths[0].display(),
+            library.display()
         )),
     })
 }

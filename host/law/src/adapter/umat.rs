@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Names by which compilers know the routine, in the order in which they are looked for.
-const SYMBOLS: [&str; 4] = ["umat_", "umat", "UMAT", "UMAT_"];
+pub const SYMBOLS: [&str; 4] = ["umat_", "umat", "UMAT", "UMAT_"];
 /// Characters of CMNAME.
 const N_CMNAME: usize = 80;
 /// Guard words on each side of an argument: a DDSDDE of six components where there is room for

@@ -59,7 +59,7 @@ pub(super) const CHECKS: &[Check] = &[
         id: "hypotheses-agree",
         family: Family::Mathematics,
         description: "Plane strain and axisymmetry give the stresses that 3D gives in a plane \
-                      (without 3D: plane strain those of axisymmetry).",
+                      (without 3D: plane strain those of axisymmetry); interfaces in two dimensions those of three.",
         needs: NEEDS,
         run: hypotheses_agree,
     },
@@ -523,6 +523,7 @@ fn hypotheses_agree(subject: &Subject) -> Found {
         let wanted = match specimen.hypothesis {
             Hypothesis::PlaneStrain => [Hypothesis::ThreeD, Hypothesis::Axisymmetric].as_slice(),
             Hypothesis::Axisymmetric => [Hypothesis::ThreeD].as_slice(),
+            Hypothesis::Interface2d => [Hypothesis::Interface3d].as_slice(),
             _ => continue,
         };
         let larger = wanted
@@ -572,7 +573,7 @@ fn hypotheses_agree(subject: &Subject) -> Found {
         }
     }
     if n == 0 {
-        return Err(skipped("no law offers two hypotheses of solids"));
+        return Err(skipped("no law offers two hypotheses of one kind"));
     }
     Ok(format!("{n} points"))
 }
@@ -597,7 +598,7 @@ fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "mirror");
     let mut n = 0;
     for specimen in subject.specimens_by_default(4, &mut random)? {
-        if specimen.hypothesis != Hypothesis::Interface2d {
+        if !specimen.hypothesis.is_interface() {
             continue;
         }
         // Signed internal variables would have to be reversed as well, so paths start fresh.
@@ -607,13 +608,13 @@ fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
             }
             let mut mirrored = step.start.clone();
             for values in [&mut mirrored.gradient1, &mut mirrored.flux0] {
-                values[1] = -values[1];
+                values[1..].iter_mut().for_each(|value| *value = -*value);
             }
             let end = &specimen.call(&[mirrored], UPDATE)?.points[0];
             let bound = ROUND_OFF * flux_scale(&step);
             let same = is_success(end.status)
                 && (end.flux[0] - step.end.flux[0]).abs() <= bound
-                && (end.flux[1] + step.end.flux[1]).abs() <= bound;
+                && (1..end.flux.len()).all(|c| (end.flux[c] + step.end.flux[c]).abs() <= bound);
             if !same {
                 return Err(Verdict::Warning(format!(
                     "{}: traction {:?} becomes {:?}, at {:?}",

@@ -377,7 +377,7 @@ impl Specimen {
             } else {
                 random.logarithmic(1.0, 1000.0)
             };
-            let n_normal = if n == 2 { 1 } else { 3 };
+            let n_normal = if self.hypothesis.is_interface() { 1 } else { 3 };
             let flux: Vec<f64> = (0..n)
                 .map(|c| if c < n_normal { -pressure } else { 0.0 })
                 .collect();
