@@ -144,6 +144,15 @@ fn ids_are_stable() {
             "hypotheses-agree",
             "tangential-axis-is-arbitrary",
             "plastic-work-is-not-negative",
+            "sidecar-is-read",
+            "routine-answers",
+            "routine-stays-inside",
+            "routine-is-repeatable",
+            "routine-stays-at-rest",
+            "time-as-declared",
+            "ddsdde-matches-differences",
+            "routine-agrees-in-the-plane",
+            "tangential-directions-are-alike",
         ]
     );
 }

@@ -34,7 +34,8 @@ use text::suggestion;
 /// Arguments of `pilum check`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Arguments {
-    /// A library, or the id of a law that is found as `pilum laws` finds it.
+    /// A library, of the contract or of a UMAT with a sidecar beside it; or the id of a law that is found
+    /// as `pilum laws` finds it.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
     /// Write JSON.

@@ -326,12 +326,15 @@ fn times_that_cannot_be_are_refused_at_their_place() {
     for (time, said) in [
         ("0.0", "`time` is 0, expected above 0"),
         ("-3.0", "`time` is -3, expected above 0"),
-        ("nan", "`time` is NaN, expected above 0"),
+        ("nan", "`time`: nan is no finite number"),
         (
             "1e21",
             "`time` is 1000000000000000000000, expected above 0 and at most 1e20",
         ),
-        ("\"1 h\"", "expected f64"),
+        (
+            "\"1 h\"",
+            "`time`: found the text \"1 h\", expected a number",
+        ),
     ] {
         place.write(
             "driver.toml",

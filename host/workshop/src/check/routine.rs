@@ -479,7 +479,8 @@ fn routine_stays_at_rest(subject: &Subject) -> Found {
                 .map_err(|why| routine.fails(why.message))?;
             if differ(&after.flux, &step.after.flux, ITERATED * step.scale()) {
                 return Err(routine.fails(format!(
-                    "DSTRAN = 0 changes STRESS {:?} to {:?}",
+                    "DSTRAN = 0 changes STRESS {:?} to {:?}; what the time does is declared by \
+                     `time_dependent = true` in the sidecar",
                     step.after.flux, after.flux
                 )));
             }
