@@ -79,8 +79,8 @@ fn all_directions_are_alike() {
     let path = |hypothesis: &str, slips: &[(&str, f64)]| {
         let control = |reach: f64| -> String {
             let led = slips.iter();
-            led.map(|(name, part)| format!(", {name} = {{ jump = {:?} }}", reach * part))
-                .collect()
+            let led = led.map(|(name, part)| format!("{name} = {{ jump = {:?} }}", reach * part));
+            format!(", {}", led.collect::<Vec<_>>().join(", "))
         };
         // Out, back over the start, opened and closed again.
         follow(&format!(

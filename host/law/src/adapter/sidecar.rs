@@ -18,6 +18,7 @@ const MOST_COMPONENTS: usize = 1000;
 /// Length of a material's name in Abaqus.
 const CMNAME: usize = 80;
 
+#[expect(clippy::struct_excessive_bools, reason = "keys of the file")]
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {

@@ -42,12 +42,12 @@ pub(super) fn of(
         .filter_map(|symbol| Some(symbol.name().ok()?.to_owned()))
         .filter(|name| !name.is_empty())
         .collect();
-    let mut suppliers = Suppliers::default();
-    suppliers.ours = abaqus::NAMES
-        .into_iter()
-        .filter(|name| wanted.remove(*name))
-        .map(str::to_owned)
-        .collect();
+    let ours = abaqus::NAMES.into_iter();
+    let ours = ours.filter(|name| wanted.remove(*name)).map(str::to_owned);
+    let mut suppliers = Suppliers {
+        ours: ours.collect(),
+        ..Suppliers::default()
+    };
     let folders = folders();
     let mut seen = HashSet::new();
     let mut queue: VecDeque<(String, Vec<PathBuf>)> = VecDeque::new();
