@@ -125,7 +125,7 @@ fn steps_of_an_increment_share_its_time() {
     let end = rows.last().unwrap();
     assert!(number(end, "dtime") <= 260.0 && number(end, "iterations") > 3.0);
     let passed = number(end, "passed");
-    assert!((passed - 3000.000_001).abs() < 1e-8, "{passed}");
+    assert!((passed - 3_000.000_001).abs() < 1e-8, "{passed}");
     // All steps are at least as short, so the result is nearer to the exact one.
     let exact = -20.0 * f64::exp(-3.0);
     let error = |stress: f64| (stress - exact).abs();
@@ -265,7 +265,7 @@ fn a_run_that_is_killed_goes_on_in_time() {
         let text = std::fs::read_to_string(place.path("out/history.csv")).unwrap_or_default();
         text.lines().count()
     };
-    while rows_now() < 60 && started.elapsed() < Duration::from_secs(60) {
+    while rows_now() < 60 && started.elapsed() < Duration::from_mins(1) {
         std::thread::sleep(Duration::from_millis(5));
     }
     child.kill().unwrap();
