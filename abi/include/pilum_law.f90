@@ -34,6 +34,7 @@ module pilum
   integer(c_int32_t), parameter :: PILUM_H_AXISYMMETRIC = 2
   integer(c_int32_t), parameter :: PILUM_H_3D = 3
   integer(c_int32_t), parameter :: PILUM_H_INTERFACE_2D = 10
+  integer(c_int32_t), parameter :: PILUM_H_INTERFACE_3D = 11
 
   integer(c_int32_t), parameter :: PILUM_SCALAR = 0
   integer(c_int32_t), parameter :: PILUM_VECTOR = 1
@@ -142,7 +143,8 @@ module pilum
 
   ! One integration point at the start of an increment, and the increment.
   type :: point_type
-    ! Number of components: 2 for interfaces, 4 for solids in the plane, 6 in space; and of internal
+    ! Number of components: 2 for interfaces in the plane, 3 in space; 4 for solids in the plane, 6 in
+    ! space; and of internal
     ! variables.
     integer :: n, n_states
     ! Strain or jump at the start, its increment, stress or traction at the start (kPa); components
@@ -380,7 +382,7 @@ contains
     integer, intent(in) :: n_states
     integer(c_int32_t), intent(in), optional :: flags
     character(len=2), parameter :: solid(6) = ['11', '22', '33', '12', '13', '23']
-    character(len=1), parameter :: interface(2) = ['n', 't']
+    character(len=1), parameter :: interface(3) = ['n', 't', 's']
     type(c_ptr) :: names
     integer :: f, c, n
     associate (law => described_laws(n_laws))
@@ -391,8 +393,8 @@ contains
       end if
       law%law%n_formulations = f
       names = c_loc(law%component_names(1, f))
-      if (hypothesis == PILUM_H_INTERFACE_2D) then
-        n = 2
+      if (hypothesis == PILUM_H_INTERFACE_2D .or. hypothesis == PILUM_H_INTERFACE_3D) then
+        n = merge(2, 3, hypothesis == PILUM_H_INTERFACE_2D)
         do c = 1, n
           law%component_names(c, f) = text(interface(c))
         end do

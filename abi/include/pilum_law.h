@@ -68,7 +68,8 @@ typedef int32_t pilum_hypothesis;
 #define PILUM_H_3D 3
 /* Interface in two dimensions, plane or axisymmetric: components normal, tangential. */
 #define PILUM_H_INTERFACE_2D 10
-/* Interface in three dimensions: components normal, tangential 1, tangential 2. */
+/* Interface in three dimensions: components normal, tangential 1, tangential 2. No host of version
+ * 1.0 uses it. */
 #define PILUM_H_INTERFACE_3D 11
 
 /* Shape of a variable, one of the `PILUM_SCALAR` ... values. */

@@ -150,6 +150,13 @@ constexpr pilum_formulation interface_2d(uint32_t flags = 0) {
     return formulation(PILUM_H_INTERFACE_2D, pilum_jump, pilum_traction, nullptr, 0, flags);
 }
 template <uint32_t n>
+constexpr pilum_formulation interface_3d(const pilum_variable (&states)[n], uint32_t flags = 0) {
+    return formulation(PILUM_H_INTERFACE_3D, pilum_jump_3, pilum_traction_3, states, n, flags);
+}
+constexpr pilum_formulation interface_3d(uint32_t flags = 0) {
+    return formulation(PILUM_H_INTERFACE_3D, pilum_jump_3, pilum_traction_3, nullptr, 0, flags);
+}
+template <uint32_t n>
 constexpr pilum_formulation plane_strain(const pilum_variable (&states)[n], uint32_t flags = 0) {
     return formulation(PILUM_H_PLANE_STRAIN, pilum_strain_4, pilum_stress_4, states, n, flags);
 }

@@ -38,7 +38,8 @@ typedef enum pilum_tangent {
 
 /* One integration point at the start of an increment, and the increment. */
 typedef struct pilum_point {
-    /* Number of components: 2 for interfaces, 4 for solids in the plane, 6 in space. */
+    /* Number of components: 2 for interfaces in the plane, 3 in space; 4 for solids in the plane, 6 in
+     * space. */
     uint32_t n;
     /* Number of values of internal variables. */
     uint32_t n_states;
@@ -371,7 +372,7 @@ static inline pilum_status pilum_differentiate(const pilum_instance *instance,
 #define PILUM_UNUSED
 #endif
 
-PILUM_UNUSED static const char *const pilum_names_interface[] = {"n", "t"};
+PILUM_UNUSED static const char *const pilum_names_interface[] = {"n", "t", "s"};
 PILUM_UNUSED static const char *const pilum_names_solid[] = {"11", "22", "33", "12", "13", "23"};
 
 /* Gradient and flux of an interface in two dimensions. */
@@ -381,6 +382,13 @@ PILUM_UNUSED static const pilum_variable pilum_jump =
 PILUM_UNUSED static const pilum_variable pilum_traction =
     PILUM_VARIABLE("traction", "t", "kPa", "Traction on the interface, tension positive.",
                    PILUM_VECTOR, 2, pilum_names_interface);
+/* The same in three dimensions. */
+PILUM_UNUSED static const pilum_variable pilum_jump_3 =
+    PILUM_VARIABLE("jump", "[u]", "m", "Relative displacement across the interface, opening positive.",
+                   PILUM_VECTOR, 3, pilum_names_interface);
+PILUM_UNUSED static const pilum_variable pilum_traction_3 =
+    PILUM_VARIABLE("traction", "t", "kPa", "Traction on the interface, tension positive.",
+                   PILUM_VECTOR, 3, pilum_names_interface);
 /* Gradient and flux of a solid: in plane strain and axisymmetry, and in three dimensions. */
 PILUM_UNUSED static const pilum_variable pilum_strain_4 =
     PILUM_VARIABLE("strain", "eps", "-", "Strain, engineering shear.", PILUM_SYMMETRIC_TENSOR, 4,

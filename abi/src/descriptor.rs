@@ -19,15 +19,18 @@ pub enum Hypothesis {
     ThreeD = raw::PILUM_H_3D,
     /// Components normal, tangential.
     Interface2d = raw::PILUM_H_INTERFACE_2D,
+    /// Components normal, first tangential, second tangential.
+    Interface3d = raw::PILUM_H_INTERFACE_3D,
 }
 
 impl Hypothesis {
     /// All hypotheses this version of the host can use.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::PlaneStrain,
         Self::Axisymmetric,
         Self::ThreeD,
         Self::Interface2d,
+        Self::Interface3d,
     ];
 
     /// The hypothesis with this code.
@@ -35,13 +38,15 @@ impl Hypothesis {
         Self::ALL.into_iter().find(|h| *h as i32 == code)
     }
 
-    /// Name in files: `plane_strain`, `axisymmetric`, `3d`, `interface_2d`.
+    /// Name in files: `plane_strain`, `axisymmetric`, `3d`, `interface_2d`,
+    /// `interface_3d`.
     pub fn name(self) -> &'static str {
         match self {
             Self::PlaneStrain => "plane_strain",
             Self::Axisymmetric => "axisymmetric",
             Self::ThreeD => "3d",
             Self::Interface2d => "interface_2d",
+            Self::Interface3d => "interface_3d",
         }
     }
 
@@ -51,6 +56,7 @@ impl Hypothesis {
             Self::PlaneStrain | Self::Axisymmetric => &["11", "22", "33", "12"],
             Self::ThreeD => &["11", "22", "33", "12", "13", "23"],
             Self::Interface2d => &["n", "t"],
+            Self::Interface3d => &["n", "t", "s"],
         }
     }
 
@@ -60,7 +66,13 @@ impl Hypothesis {
             Self::PlaneStrain | Self::Axisymmetric => 4,
             Self::ThreeD => 6,
             Self::Interface2d => 2,
+            Self::Interface3d => 3,
         }
+    }
+
+    /// Whether it is one of interfaces, with jumps and tractions.
+    pub const fn is_interface(self) -> bool {
+        matches!(self, Self::Interface2d | Self::Interface3d)
     }
 }
 
@@ -564,6 +576,23 @@ impl Variable {
             .with_components(raw::PILUM_SYMMETRIC_TENSOR, names)
             .0
     }
+
+    /// The jump of an interface.
+    const fn jump(names: &'static [*const c_char]) -> raw::Variable {
+        let doc = c"Relative displacement across the interface, opening positive.";
+        Self::new(c"[u]", c"m")
+            .called(c"jump", doc)
+            .with_components(raw::PILUM_VECTOR, names)
+            .0
+    }
+
+    /// The traction on an interface.
+    const fn traction(names: &'static [*const c_char]) -> raw::Variable {
+        Self::new(c"t", c"kPa")
+            .called(c"traction", c"Traction on the interface, tension positive.")
+            .with_components(raw::PILUM_VECTOR, names)
+            .0
+    }
 }
 
 const NAMES_4: &[*const c_char] = &[
@@ -581,21 +610,15 @@ const NAMES_6: &[*const c_char] = &[
     c"23".as_ptr(),
 ];
 const NAMES_NT: &[*const c_char] = &[c"n".as_ptr(), c"t".as_ptr()];
+const NAMES_NTS: &[*const c_char] = &[c"n".as_ptr(), c"t".as_ptr(), c"s".as_ptr()];
 const STRAIN_4: &raw::Variable = &Variable::strain(NAMES_4);
 const STRESS_4: &raw::Variable = &Variable::stress(NAMES_4);
 const STRAIN_6: &raw::Variable = &Variable::strain(NAMES_6);
 const STRESS_6: &raw::Variable = &Variable::stress(NAMES_6);
-const JUMP: &raw::Variable = &Variable::new(c"[u]", c"m")
-    .called(
-        c"jump",
-        c"Relative displacement across the interface, opening positive.",
-    )
-    .with_components(raw::PILUM_VECTOR, NAMES_NT)
-    .0;
-const TRACTION: &raw::Variable = &Variable::new(c"t", c"kPa")
-    .called(c"traction", c"Traction on the interface, tension positive.")
-    .with_components(raw::PILUM_VECTOR, NAMES_NT)
-    .0;
+const JUMP_2: &raw::Variable = &Variable::jump(NAMES_NT);
+const TRACTION_2: &raw::Variable = &Variable::traction(NAMES_NT);
+const JUMP_3: &raw::Variable = &Variable::jump(NAMES_NTS);
+const TRACTION_3: &raw::Variable = &Variable::traction(NAMES_NTS);
 
 impl raw::Formulation {
     /// The formulation of a law under one hypothesis.
@@ -607,7 +630,8 @@ impl raw::Formulation {
         let (gradient, flux): (&'static raw::Variable, &'static raw::Variable) = match hypothesis {
             Hypothesis::PlaneStrain | Hypothesis::Axisymmetric => (STRAIN_4, STRESS_4),
             Hypothesis::ThreeD => (STRAIN_6, STRESS_6),
-            Hypothesis::Interface2d => (JUMP, TRACTION),
+            Hypothesis::Interface2d => (JUMP_2, TRACTION_2),
+            Hypothesis::Interface3d => (JUMP_3, TRACTION_3),
         };
         Self {
             struct_size: size_of::<Self>() as u32,

@@ -115,15 +115,16 @@ pub struct SolidResponse<const N: usize, S> {
 }
 
 /// One integration point of an interface at the start of an increment, and the increment; in real
-/// numbers, or in [others](crate::dual).
+/// numbers, or in [others](crate::dual). `N` is 2 in the plane (normal, tangential), 3 in space (normal,
+/// two tangential).
 #[derive(Clone, Copy, Debug)]
-pub struct InterfacePoint<S, T = f64> {
+pub struct InterfacePoint<S, T = f64, const N: usize = 2> {
     /// Relative displacement u⁺ − u⁻ at the start, normal first, m.
-    pub jump: [T; 2],
+    pub jump: [T; N],
     /// Increment of the relative displacement, m.
-    pub jump_increment: [T; 2],
+    pub jump_increment: [T; N],
     /// Traction at the start, kPa.
-    pub traction: [T; 2],
+    pub traction: [T; N],
     /// Internal variables at the start.
     pub state: S,
     /// Time at the start.
@@ -137,24 +138,24 @@ pub struct InterfacePoint<S, T = f64> {
 
 /// The same point at the end of the increment.
 #[derive(Clone, Copy, Debug)]
-pub struct InterfaceResponse<S> {
+pub struct InterfaceResponse<S, const N: usize = 2> {
     /// Traction, kPa.
-    pub traction: [f64; 2],
+    pub traction: [f64; N],
     /// Internal variables.
     pub state: S,
     /// ∂traction/∂jump, row by row, kPa/m; ignored unless requested.
-    pub tangent: [[f64; 2]; 2],
+    pub tangent: [[f64; N]; N],
     /// The outputs are valid but inaccurate, for this reason.
     pub unreliable: Option<&'static str>,
 }
 
-impl<S> InterfaceResponse<S> {
+impl<S, const N: usize> InterfaceResponse<S, N> {
     /// Faces that do not touch: no traction, no stiffness.
     pub const fn open(state: S) -> Self {
         Self {
-            traction: [0.0; 2],
+            traction: [0.0; N],
             state,
-            tangent: [[0.0; 2]; 2],
+            tangent: [[0.0; N]; N],
             unreliable: None,
         }
     }
@@ -228,7 +229,7 @@ pub trait ContinuumLaw: Sized + Send + Sync + 'static {
     ) -> Result<SolidResponse<N, Self::State>, Failure>;
 }
 
-/// A law for interfaces in two dimensions. Immutable once built; `update` is a pure function of
+/// A law for interfaces, in two dimensions and perhaps in three. Immutable once built; `update` is a pure function of
 /// its arguments.
 pub trait InterfaceLaw: Sized + Send + Sync + 'static {
     /// What the law is called.
@@ -239,8 +240,10 @@ pub trait InterfaceLaw: Sized + Send + Sync + 'static {
     const LINEAR: bool = false;
     /// What it has for a consistent tangent.
     const TANGENT: HasTangent = HasTangent::Consistent;
-    /// Offers [`rates`](Self::rates).
+    /// Offers [`rates`](Self::rates), in two dimensions.
     const RATES: bool = false;
+    /// Offers three dimensions too: [`update_in_space`](Self::update_in_space).
+    const IN_SPACE: bool = false;
     /// Declared with [`parameters!`](crate::parameters).
     type Parameters: Parameters;
     /// Declared with [`internal_variables!`](crate::internal_variables), or `()`.
@@ -272,6 +275,30 @@ pub trait InterfaceLaw: Sized + Send + Sync + 'static {
         point: &InterfacePoint<Self::State>,
         tangent: Tangent,
     ) -> Result<InterfaceResponse<Self::State>, Failure>;
+
+    /// As [`initial_state`](Self::initial_state), in three dimensions: that of the tangential traction's
+    /// size, unless the law knows better.
+    ///
+    /// # Errors
+    /// As [`initial_state`](Self::initial_state).
+    fn initial_state_in_space(&self, traction: &[f64; 3]) -> Result<Self::State, Failure> {
+        let [normal, first, second] = *traction;
+        self.initial_state(&[normal, first.hypot(second)])
+    }
+
+    /// As [`update`](Self::update), in three dimensions. Called only where [`IN_SPACE`](Self::IN_SPACE)
+    /// is set.
+    ///
+    /// # Errors
+    /// As [`update`](Self::update).
+    fn update_in_space(
+        &self,
+        point: &InterfacePoint<Self::State, f64, 3>,
+        tangent: Tangent,
+    ) -> Result<InterfaceResponse<Self::State, 3>, Failure> {
+        let _ = (point, tangent);
+        Err(Failure::Numeric("the law is for two dimensions"))
+    }
 
     /// The derivative of [`update`](Self::update) in one direction: rates of traction and internal
     /// variables at the end. Called only where [`RATES`](Self::RATES) is set.

@@ -48,7 +48,8 @@ pub const PILUM_H_AXISYMMETRIC: HypothesisCode = 2;
 pub const PILUM_H_3D: HypothesisCode = 3;
 /// Interface in two dimensions, plane or axisymmetric: components normal, tangential.
 pub const PILUM_H_INTERFACE_2D: HypothesisCode = 10;
-/// Interface in three dimensions: components normal, tangential 1, tangential 2.
+/// Interface in three dimensions: components normal, tangential 1, tangential 2. No host of version
+/// 1.0 uses it.
 pub const PILUM_H_INTERFACE_3D: HypothesisCode = 11;
 
 /// Shape of a variable, one of the `PILUM_SCALAR` … values.

@@ -10,7 +10,7 @@ use input::Case;
 use input::case::Axis;
 use law::Operator;
 use mechanics::assembly::{Places, System};
-use mechanics::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton};
+use mechanics::equilibrium::{Clock, Costs, LinearDomain, Loads, Matrix, Newton};
 use mechanics::group::Group;
 use mechanics::{Mesh, Model, Place, Settings};
 use runs::run::{Observer, run};
@@ -228,6 +228,10 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
     let solver = LinearSolver::with_block(&system.pattern, None, block);
     let mut solver = solver.expect("a sound pattern");
     let places = Places::new(&system, &chamber.prescribed);
+    let clock = Clock {
+        start: 0.0,
+        length: 1.0,
+    };
     let mut iterations = 0;
     bencher.bench_local(|| {
         let mut matrix = Matrix::default();
@@ -240,7 +244,7 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
             &chamber.settings,
             &mut costs,
         );
-        let step = newton.step(&chamber.loads, 0.0, 1.0, 0.0, None);
+        let step = newton.step(&chamber.loads, [0.0, 1.0], clock, None);
         iterations = step.expect("equilibrium").iterations.len();
     });
     assert!(iterations > 2, "the interface slides: {iterations}");

@@ -129,7 +129,7 @@ pub(crate) enum Command {
     Check(workshop::check::Arguments),
     /// List the laws found, or show all about one of them.
     Laws {
-        /// Id of a law.
+        /// Id of a law, or the library of a UMAT with a sidecar.
         id: Option<String>,
         /// A folder with law libraries, looked in first; may be repeated.
         #[arg(long, value_name = "DIR")]
@@ -167,6 +167,9 @@ pub(crate) enum Command {
     },
     /// Write a small project for a law that builds and runs.
     NewLaw(NewLaw),
+    /// Write the sidecar of an Abaqus user subroutine: names for its parameters and internal variables,
+    /// to be filled in.
+    NewSidecar(workshop::new_sidecar::NewSidecar),
     /// Print the JSON Schema of an input file, for editors.
     Schema {
         /// Which file.

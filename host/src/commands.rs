@@ -115,6 +115,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             json,
         } => show_laws(&opener, id.as_deref(), &law_path, places, json),
         Command::NewLaw(project) => print(&project.write()?),
+        Command::NewSidecar(sidecar) => print(&sidecar.write()?),
         Command::Schema { file } => print_schema(file),
         Command::Completions { shell } => {
             let mut program = Arguments::command();
@@ -286,8 +287,8 @@ fn show_laws(
         (None, true) if places => workshop::laws::places_json(&search)?,
         (None, false) => workshop::laws::list(&search),
         (None, true) => workshop::laws::list_json(&search)?,
-        (Some(id), false) => workshop::laws::page(&search.law(id)?),
-        (Some(id), true) => workshop::laws::page_json(&search.law(id)?)?,
+        (Some(id), false) => workshop::laws::page(&workshop::laws::find(&search, opener, id)?),
+        (Some(id), true) => workshop::laws::page_json(&workshop::laws::find(&search, opener, id)?)?,
     };
     print(&text)
 }

@@ -114,7 +114,7 @@ fn mistakes_do_not_follow_it() {
         ),
         ("[initial]", "[intial]"),
         ("increments = 20", "increments = 0"),
-        ("t = { jump = 2e-3 }", "s = { jump = 2e-3 }"),
+        ("t = { jump = 2e-3 }", "u = { jump = 2e-3 }"),
         ("t = { jump = 2e-3 }", "t = { slip = 2e-3 }"),
         ("t = { jump = 2e-3 }", "t = { jump = 2e-3, traction = 0 }"),
         ("t = { jump = 2e-3 }", "t = 2e-3"),

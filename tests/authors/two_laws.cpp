@@ -1,4 +1,5 @@
-/* Two laws in one library: one with a choice and no internal variables, one without parameters. */
+/* Two laws in one library: one with a choice and no internal variables, in the plane and in space, one without
+ * parameters. */
 #include "pilum_law.hpp"
 
 class Spring {
@@ -14,15 +15,16 @@ public:
             .usual(0.1, 10.0)
             .optional(),
     };
-    static constexpr pilum_formulation formulations[] = {pilum::interface_2d(PILUM_T_LINEAR)};
+    static constexpr pilum_formulation formulations[] = {
+        pilum::interface_2d(PILUM_T_LINEAR), pilum::interface_3d(PILUM_T_LINEAR)};
 
     explicit Spring(const double *p)
         : k{(p[0] > 0.5 ? 1e6 : 1e3) * (std::isnan(p[1]) ? 1.0 : p[1])} {}
 
     pilum_status update(const pilum_point &point, pilum_tangent, pilum_response &end) const {
-        for (uint32_t i = 0; i < 2; i++) {
+        for (uint32_t i = 0; i < point.n; i++) {
             end.flux[i] = point.flux[i] + k * point.increment[i];
-            end.tangent[3 * i] = k;
+            end.tangent[(point.n + 1) * i] = k;
         }
         return PILUM_OK;
     }

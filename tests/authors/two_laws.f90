@@ -1,4 +1,5 @@
-! Two laws in one library: one with a choice and no internal variables, one without parameters.
+! Two laws in one library: one with a choice and no internal variables, in the plane and in space, one
+! without parameters.
 module two_laws
   use pilum
   implicit none
@@ -14,6 +15,7 @@ contains
     call add_parameter('factor', 'f', '-', 'Factor on the stiffness; 1 if left out.', &
       above=0.0_dp, usual=[0.1_dp, 10.0_dp], optional=.true.)
     call add_formulation(PILUM_H_INTERFACE_2D, 0, flags=PILUM_T_LINEAR)
+    call add_formulation(PILUM_H_INTERFACE_3D, 0, flags=PILUM_T_LINEAR)
 
     call describe_law(id='counter_fortran', name='stiff interface', version='2.0', &
       author='The Pilum authors', licence='MIT OR Apache-2.0', &
@@ -59,9 +61,11 @@ contains
     real(dp), intent(in) :: k
     type(point_type), intent(in) :: point
     type(response_type), intent(inout) :: end
+    integer :: i
     end%flux = point%flux + k*point%increment
-    end%tangent(1, 1) = k
-    end%tangent(2, 2) = k
+    do i = 1, size(point%flux)
+      end%tangent(i, i) = k
+    end do
   end subroutine
 end module
 

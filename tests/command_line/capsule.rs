@@ -185,7 +185,7 @@ fn what_is_wrong_with_a_capsule_is_marked_in_it() {
             "version = 2\n",
             &["1:11", "of version 2"][..],
         ),
-        ("interface_2d", "interface_3d", &["6:14", "`interface_2d`?"]),
+        ("interface_2d", "interface_2e", &["6:14", "`interface_2d`?"]),
         (
             "fluxes and",
             "fluxes und",

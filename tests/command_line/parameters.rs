@@ -119,7 +119,7 @@ fn refuses_laws_in_elements_they_are_not_made_for() {
                     ("law = \"soil\"", "law = \"joint\""),
                 ],
                 &[
-                    "made for interface_2d, expected plane_strain",
+                    "made for interface_2d, interface_3d, expected plane_strain",
                     "group `soil`",
                     "`solid`",
                 ],
@@ -134,7 +134,7 @@ fn refuses_laws_in_elements_they_are_not_made_for() {
                     ),
                 ],
                 &[
-                    "made for interface_2d, expected plane_strain",
+                    "made for interface_2d, interface_3d, expected plane_strain",
                     "group `soil`",
                 ],
             ),

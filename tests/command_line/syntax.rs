@@ -113,7 +113,7 @@ fn a_law_that_does_not_fit_is_marked_where_the_group_takes_it() {
             "an interface law for a solid",
             &[("law = \"soil\"", "law = \"joint\"")],
             &[
-                "is made for interface_2d, expected plane_strain",
+                "is made for interface_2d, interface_3d, expected plane_strain",
                 "taken by group `soil`",
             ],
         )],

@@ -7,7 +7,10 @@
 
 mod incremental_driver;
 mod mohr_coulomb;
+mod routines;
 mod silent;
+mod space;
+mod time;
 mod tolerance;
 
 use crate::program::{BAD_INPUT, CASE, DONE, Edit, PLUGIN_TROUBLE, Place, edited};
@@ -27,7 +30,10 @@ pub(crate) fn place(name: &str) -> Option<Place> {
         let out = folder.path().join("library");
         let endings = ["f", "c"];
         let sources = endings.map(|ending| source(&format!("{name}.{ending}")));
-        let sources: Vec<PathBuf> = sources.into_iter().filter(|path| path.is_file()).collect();
+        // It calls the cone.
+        let called = (name == "elastic_tangent").then(|| source("drucker_prager.f"));
+        let sources = sources.into_iter().chain(called);
+        let sources: Vec<PathBuf> = sources.filter(|path| path.is_file()).collect();
         gfortran(&["-shared", "-fPIC"], &sources, &out)?;
         compiled.insert(name.to_owned(), std::fs::read(out).unwrap());
     }

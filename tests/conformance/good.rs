@@ -151,6 +151,15 @@ fn ids_are_stable() {
             "compression-is-negative",
             "angles-are-degrees",
             "plastic-work-is-not-negative",
+            "sidecar-is-read",
+            "routine-answers",
+            "routine-stays-inside",
+            "routine-is-repeatable",
+            "routine-stays-at-rest",
+            "time-as-declared",
+            "ddsdde-matches-differences",
+            "routine-agrees-in-the-plane",
+            "tangential-directions-are-alike",
         ]
     );
 }

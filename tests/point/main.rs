@@ -14,6 +14,7 @@ mod driver;
 mod elastic;
 mod hyperbolic_joint;
 mod input_errors;
+mod interface_3d;
 mod mepi;
 mod mepi_softening;
 mod mepi_truth;

@@ -787,7 +787,7 @@ struct Scale([f64; 6]);
 impl Scale {
     fn of(hypothesis: Hypothesis) -> Self {
         Self(std::array::from_fn(|i| {
-            if i < 3 || hypothesis == Hypothesis::Interface2d {
+            if i < 3 || hypothesis.is_interface() {
                 1.0
             } else {
                 FRAC_1_SQRT_2

@@ -3,8 +3,8 @@
 use crate::access::{Access, Directions};
 use crate::descriptor::{Description, Hypothesis, InternalVariables, Parameters, Variable};
 use crate::law::{
-    ContinuumLaw, Failure, HasTangent, InterfaceLaw, InterfacePoint, InterfaceRates, SolidPoint,
-    SolidResponse, Tangent,
+    ContinuumLaw, Failure, HasTangent, InterfaceLaw, InterfacePoint, InterfaceRates,
+    InterfaceResponse, SolidPoint, SolidResponse, Tangent,
 };
 use crate::raw::{self, Formulation};
 use std::marker::PhantomData;
@@ -139,7 +139,7 @@ pub(super) const fn assert_solid(hypotheses: &[Hypothesis]) {
     let mut i = 0;
     while i < hypotheses.len() {
         assert!(
-            !matches!(hypotheses[i], Hypothesis::Interface2d),
+            !hypotheses[i].is_interface(),
             "`HYPOTHESES` of a `ContinuumLaw` holds an interface: implement `InterfaceLaw`"
         );
         i += 1;
@@ -242,19 +242,21 @@ impl<L> Interface<L> {
 impl<L: InterfaceLaw> Interface<L> {
     const FLAGS: u32 = flag(L::SYMMETRIC, raw::PILUM_T_SYMMETRIC)
         | flag(L::LINEAR, raw::PILUM_T_LINEAR)
-        | flag(L::RATES, raw::PILUM_T_RATES)
         | flags_of_tangent(L::TANGENT, L::LINEAR);
-    const TABLE: [Formulation; 1] = [Formulation::new(
-        Hypothesis::Interface2d,
-        Self::FLAGS,
-        <L::State as InternalVariables>::TABLE,
-    )];
+    const TABLE: [Formulation; 2] = {
+        let state = <L::State as InternalVariables>::TABLE;
+        let rates = flag(L::RATES, raw::PILUM_T_RATES);
+        [
+            Formulation::new(Hypothesis::Interface2d, Self::FLAGS | rates, state),
+            Formulation::new(Hypothesis::Interface3d, Self::FLAGS, state),
+        ]
+    };
 }
 
 impl<L: InterfaceLaw> Exported for Interface<L> {
     const DESCRIPTION: Description = L::DESCRIPTION;
     type Parameters = L::Parameters;
-    const FORMULATIONS: &'static [Formulation] = &Self::TABLE;
+    const FORMULATIONS: &'static [Formulation] = Self::TABLE.split_at(1 + L::IN_SPACE as usize).0;
     const STATE: &'static [Variable] = <L::State as InternalVariables>::TABLE;
 
     fn new(parameters: L::Parameters) -> Result<Self, String> {
@@ -268,7 +270,11 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
         access: &Access<'_, PACKED>,
         i: usize,
     ) -> Result<(), Failure> {
-        let state = self.0.initial_state(&access.flux0(i)?)?;
+        let state = if L::IN_SPACE && access.n_components == 3 {
+            self.0.initial_state_in_space(&access.flux0(i)?)?
+        } else {
+            self.0.initial_state(&access.flux0(i)?)?
+        };
         access.put_state(i, &state);
         Ok(())
     }
@@ -280,15 +286,14 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
         i: usize,
         tangent: Tangent,
     ) -> Result<Option<&'static str>, Failure> {
-        let point = interface_point::<L::State, PACKED>(access, i)?;
+        if L::IN_SPACE && access.n_components == 3 {
+            let point = interface_point::<L::State, 3, PACKED>(access, i)?;
+            let end = self.0.update_in_space(&point, tangent)?;
+            return put_interface(access, i, &end, tangent);
+        }
+        let point = interface_point::<L::State, 2, PACKED>(access, i)?;
         let end = self.0.update(&point, tangent)?;
-        access.put(
-            i,
-            &end.traction,
-            &end.state,
-            (tangent != Tangent::None).then_some(&end.tangent),
-        )?;
-        Ok(end.unreliable)
+        put_interface(access, i, &end, tangent)
     }
 
     fn rates<const PACKED: bool>(
@@ -297,7 +302,7 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
         rates: &Directions<'_>,
         i: usize,
     ) -> Result<(), Failure> {
-        let point = interface_point::<L::State, PACKED>(access, i)?;
+        let point = interface_point::<L::State, 2, PACKED>(access, i)?;
         let [jump, end]: [[f64; 2]; 2] = [rates.gradient0(i)?, rates.gradient1(i)?];
         let given = InterfaceRates {
             parameter: rates.parameter(),
@@ -330,10 +335,10 @@ impl<L: InterfaceLaw> Exported for Interface<L> {
 
 /// Point `i` as a law for interfaces receives it.
 #[inline]
-fn interface_point<S: InternalVariables, const PACKED: bool>(
+fn interface_point<S: InternalVariables, const N: usize, const PACKED: bool>(
     access: &Access<'_, PACKED>,
     i: usize,
-) -> Result<InterfacePoint<S>, Failure> {
+) -> Result<InterfacePoint<S, f64, N>, Failure> {
     let start = access.start(i)?;
     Ok(InterfacePoint {
         jump: start.gradient,
@@ -344,6 +349,23 @@ fn interface_point<S: InternalVariables, const PACKED: bool>(
         time_increment: access.batch.time_increment,
         step_time: access.batch.step_time,
     })
+}
+
+/// Writes what a law for interfaces makes of point `i`.
+#[inline]
+fn put_interface<S: InternalVariables, const N: usize, const PACKED: bool>(
+    access: &Access<'_, PACKED>,
+    i: usize,
+    end: &InterfaceResponse<S, N>,
+    tangent: Tangent,
+) -> Result<Option<&'static str>, Failure> {
+    access.put(
+        i,
+        &end.traction,
+        &end.state,
+        (tangent != Tangent::None).then_some(&end.tangent),
+    )?;
+    Ok(end.unreliable)
 }
 
 /// What a law for solids may not declare stops the compiler; the same law with a solid's

@@ -298,6 +298,10 @@ impl Case {
                 .phases
                 .get(*phase)
                 .and_then(|phase| Some(phase.rigid.get(*number)?.span())),
+            Item::Time(phase) => file
+                .phases
+                .get(*phase)
+                .and_then(|phase| Some(phase.time.as_ref()?.span())),
             Item::Course(phase) => file
                 .phases
                 .get(*phase)
@@ -414,6 +418,7 @@ fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, 
     Ok(Phase {
         name: input.name.get_ref().clone(),
         increments: *input.increments.get_ref(),
+        time: input.time.as_ref().map(|time| *time.get_ref()),
         materials: Vec::new(),
         activate: numbers(&input.activate),
         deactivate: numbers(&input.deactivate),

@@ -518,6 +518,9 @@ pub struct PhaseInput {
     /// Number of equal increments.
     #[schemars(with = "usize")]
     pub increments: Spanned<usize>,
+    /// How long it takes, in the unit of time of the laws' parameters; 1 if left out.
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    pub time: Option<Spanned<f64>>,
     /// Laws of groups from this phase on.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, String>")]
@@ -549,7 +552,7 @@ pub struct PhaseInput {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub rigid: Vec<Spanned<String>>,
-    /// Pairs of time (0 to 1) and factor on what this phase changes of loads and displacements; straight
+    /// Pairs of the share of its time (0 to 1) and factor on what this phase changes of loads and displacements; straight
     /// from 0 to 1 if left out.
     #[schemars(with = "Option<Vec<[f64; 2]>>")]
     pub course: Option<Spanned<Vec<[f64; 2]>>>,

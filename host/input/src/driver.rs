@@ -160,6 +160,9 @@ struct SegmentTable {
     /// Number of equal increments.
     #[schemars(with = "i64", range(min = 1))]
     increments: Spanned<i64>,
+    /// How long it takes, in the unit of time of the law's parameters; an increment takes 1 if left out.
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    time: Option<Spanned<f64>>,
     /// How each component is led; one without control keeps its traction or stress.
     #[schemars(with = "schema::Components<ControlTable>")]
     control: IndexMap<Spanned<String>, Spanned<ControlTable>>,

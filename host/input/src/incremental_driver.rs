@@ -379,7 +379,7 @@ impl Step {
             step: number,
             first,
             frame: self.frame,
-            time_increment: self.time / n as f64,
+            time: Some(self.time * (increments as f64 / n as f64)),
             restrictions: self.restrictions.clone(),
         };
         let Some(harmonic) = &self.harmonic else {

@@ -17,6 +17,8 @@ mod symbols;
 mod udsm;
 mod umat;
 
+pub use umat::SYMBOLS as UMAT_SYMBOLS;
+
 use super::description::LawDescription;
 use super::image::Image;
 use super::library::{Call, CallFailure, Strided};
@@ -27,7 +29,7 @@ use abi::raw::{self, Status};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use text::Source;
 
@@ -130,6 +132,23 @@ pub struct Foreign {
     pub tangent_order: Option<Order>,
 }
 
+impl Foreign {
+    /// A UMAT, with nothing said beside its library.
+    pub fn umat(library: &Path) -> Self {
+        Self {
+            adapter: Adapter::Umat,
+            library: library.to_owned(),
+            sidecar: None,
+            in_process: false,
+            record: None,
+            records_once: false,
+            externals: None,
+            scratch: None,
+            tangent_order: None,
+        }
+    }
+}
+
 /// A law of a foreign library, without parameters yet.
 pub(crate) trait ForeignLaw: Debug + Send + Sync {
     /// Whether calls of one material must follow one another.
@@ -185,6 +204,11 @@ pub(crate) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
         Adapter::Mfront => mfront::open(foreign, image),
         Adapter::Udsm => udsm::open(foreign, image),
     }
+}
+
+/// The sidecar beside a library, if there is one.
+pub fn sidecar_of(library: &Path) -> Option<PathBuf> {
+    sidecar::find(library).ok()
 }
 
 /// Reads a sidecar by itself.
@@ -256,6 +280,22 @@ impl Refusal {
             factor: f64::NAN,
             message: message.into(),
         }
+    }
+}
+
+/// DTIME of calls that are no increment: at the start of a law, and for its elastic operator.
+const TIME_AT_REST: f64 = 1.0;
+/// The same as a share of the phase or segment, of laws that would creep in it.
+const MOMENT_AT_REST: f64 = 1e-9;
+
+/// The time increment that a routine is given, which may divide by it: never 0.
+pub(crate) fn time_of_call(start: &PointStart<'_>, time_dependent: bool) -> f64 {
+    if start.time_increment > 0.0 {
+        start.time_increment
+    } else if time_dependent {
+        MOMENT_AT_REST * start.moment.step_length
+    } else {
+        TIME_AT_REST
     }
 }
 

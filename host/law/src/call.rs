@@ -49,6 +49,8 @@ pub struct Moment {
     pub increment: u32,
     /// Time at which it started.
     pub step_start: f64,
+    /// How long it takes.
+    pub step_length: f64,
     /// Pore water does not leave.
     pub is_undrained: bool,
 }
@@ -60,6 +62,7 @@ impl Default for Moment {
             step: 1,
             increment: 1,
             step_start: 0.0,
+            step_length: 1.0,
             is_undrained: false,
         }
     }

@@ -98,8 +98,15 @@ struct MomentPart {
     step: u32,
     increment: u32,
     start: f64,
+    #[serde(default = "one")]
+    length: f64,
     #[serde(default)]
     undrained: bool,
+}
+
+/// How long a phase or segment takes where nothing is said of it.
+fn one() -> f64 {
+    1.0
 }
 
 /// Where the point lies; laws of the contract do not ask.
@@ -181,6 +188,7 @@ impl Capsule {
                     step: call.moment.step,
                     increment: call.moment.increment,
                     start: call.moment.step_start,
+                    length: call.moment.step_length,
                     undrained: call.moment.is_undrained,
                 }),
                 site: foreign.map(|_| SitePart {
@@ -386,7 +394,8 @@ impl std::fmt::Display for Capsule {
             real(self.call.time_increment)
         )?;
         if let Some(moment) = &self.call.moment {
-            let (step, increment, start) = (moment.step, moment.increment, real(moment.start));
+            let (step, increment) = (moment.step, moment.increment);
+            let [start, length] = [moment.start, moment.length].map(real);
             let undrained = if moment.undrained {
                 ", undrained = true"
             } else {
@@ -394,7 +403,7 @@ impl std::fmt::Display for Capsule {
             };
             writeln!(
                 f,
-                "moment = {{ step = {step}, increment = {increment}, start = {start}{undrained} }}"
+                "moment = {{ step = {step}, increment = {increment}, start = {start}, length = {length}{undrained} }}"
             )?;
         }
         if let Some(site) = &self.call.site {
@@ -519,6 +528,7 @@ impl Capsule {
                     step: moment.step,
                     increment: moment.increment,
                     step_start: moment.start,
+                    step_length: moment.length,
                     is_undrained: moment.undrained,
                 }),
             site: self.call.site.map_or_else(Site::default, |site| Site {

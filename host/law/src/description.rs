@@ -159,6 +159,9 @@ pub struct FormulationDescription {
     /// It gives rates of its updates, by parameters too.
     #[serde(default, skip_serializing_if = "is_false")]
     pub rates: bool,
+    /// Its response is known to depend on how long an increment takes.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub time_dependent: bool,
     /// Components are in axes of the layer.
     pub local_axes: bool,
     /// Internal variables in the order of their values, one entry per component.
@@ -198,7 +201,7 @@ pub struct InternalVariable {
 /// Names of gradient and flux of a hypothesis.
 pub fn words(hypothesis: Hypothesis) -> (&'static str, &'static str) {
     match hypothesis {
-        Hypothesis::Interface2d => ("jump", "traction"),
+        Hypothesis::Interface2d | Hypothesis::Interface3d => ("jump", "traction"),
         Hypothesis::PlaneStrain | Hypothesis::Axisymmetric | Hypothesis::ThreeD => {
             ("strain", "stress")
         }

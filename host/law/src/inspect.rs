@@ -1,7 +1,10 @@
 //! What a library says about itself on disk. Nothing of it is executed, and it may be for another
 //! kind of computer.
 
+mod suppliers;
+
 use crate::Error;
+use crate::adapter;
 use crate::hexadecimal_sha256;
 use abi::raw::{self, MagicBlock};
 use abi::version;
@@ -60,6 +63,10 @@ pub struct Inspection {
     pub exported: Vec<String>,
     /// Symbols that others must provide.
     pub undefined: Vec<String>,
+    /// Those of them that this program provides: utility routines of Abaqus.
+    pub from_pilum: Vec<String>,
+    /// Those of them that nobody provides.
+    pub missing: Vec<String>,
     /// Why this program could not use it, and what it should not have.
     pub remarks: Vec<String>,
 }
@@ -131,13 +138,49 @@ pub fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<Inspection, Error> {
         search,
         exported,
         undefined,
+        from_pilum: Vec::new(),
+        missing: Vec::new(),
         remarks: Vec::new(),
     };
     inspection.remarks = inspection.remarks(&file);
+    inspection.look_for_suppliers(&file);
     Ok(inspection)
 }
 
 impl Inspection {
+    /// Whether it is a user subroutine of Abaqus, and no library of the contract.
+    pub fn is_umat(&self) -> bool {
+        let has = |name: &str| self.exported.iter().any(|other| other == name);
+        let exports = || adapter::UMAT_SYMBOLS.into_iter().any(has);
+        self.handshake.is_none() && (exports() || adapter::sidecar_of(&self.path).is_some())
+    }
+
+    /// Says who provides the symbols that it leaves to others, if it is for this system.
+    fn look_for_suppliers(&mut self, file: &File<'_>) {
+        let is_ours = self.format == "elf" && self.architecture == std::env::consts::ARCH;
+        if !is_ours || cfg!(not(target_os = "linux")) {
+            return;
+        }
+        let suppliers = suppliers::of(&self.path, file, (&self.needs, &self.search));
+        if !suppliers.not_found.is_empty() {
+            self.remarks.push(format!(
+                "not found, of the libraries that it needs: {}; what they provide is not known",
+                suppliers.not_found.join(", ")
+            ));
+        }
+        if !suppliers.missing.is_empty() {
+            let hint = if self.is_umat() {
+                ": it is refused, unless `externals = \"trap\"` says that they are never reached"
+            } else {
+                ": it cannot be opened"
+            };
+            let n = suppliers.missing.len();
+            self.remarks
+                .push(format!("nobody provides {n} of its symbols{hint}"));
+        }
+        (self.from_pilum, self.missing) = (suppliers.ours, suppliers.missing);
+    }
+
     fn remarks(&self, file: &File<'_>) -> Vec<String> {
         let mut remarks = Vec::new();
         let ours = std::env::consts::ARCH;
@@ -162,6 +205,18 @@ impl Inspection {
             remarks.push(format!("it is no shared library: {:?}", file.kind()));
         }
         match &self.handshake {
+            None if self.is_umat() => remarks.push(match adapter::sidecar_of(&self.path) {
+                Some(sidecar) => {
+                    format!(
+                        "a user subroutine of Abaqus, with the sidecar {}",
+                        sidecar.display()
+                    )
+                }
+                None => {
+                    "a user subroutine of Abaqus, without a sidecar: `pilum new-sidecar` writes one"
+                        .to_owned()
+                }
+            }),
             None => {
                 remarks.push("it has no handshake block `pilum_magic`: no law library".to_owned());
             }
@@ -183,6 +238,7 @@ impl Inspection {
             .map(String::as_str)
             .filter(|name| !CONTRACT.contains(name) && !LINKER.contains(name))
             .filter(|name| !self.is_for_other_programs(name))
+            .filter(|_| !self.is_umat())
             .collect();
         if let [first, ..] = others.as_slice() {
             remarks.push(format!(
@@ -242,6 +298,11 @@ impl fmt::Display for Inspection {
         }
         writeln!(f, "exports       {}", list(&self.exported))?;
         write!(f, "undefined     {}", list(&self.undefined))?;
+        for (what, names) in [("from Pilum", &self.from_pilum), ("missing", &self.missing)] {
+            if !names.is_empty() {
+                write!(f, "\n{what:14}{}", list(names))?;
+            }
+        }
         for remark in &self.remarks {
             write!(f, "\nremark        {remark}")?;
         }

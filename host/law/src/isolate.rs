@@ -53,7 +53,7 @@ const LONGEST: u32 = 1 << 24;
 /// Words that are shared at first.
 const FIRST_WORDS: usize = 1 << 13;
 /// Words of a request on the socket.
-const REQUEST: usize = 11;
+const REQUEST: usize = 12;
 /// Words of a point's place in the memory.
 const SITE: usize = 5;
 
@@ -252,6 +252,7 @@ impl Worker {
             u64::from(call.moment.step),
             u64::from(call.moment.increment),
             call.moment.step_start.to_bits(),
+            call.moment.step_length.to_bits(),
             u64::from(sizes.has_sites),
             u64::from(call.moment.is_undrained),
         ];
@@ -781,6 +782,7 @@ impl Bench {
             step,
             increment,
             start,
+            duration,
             sites,
             undrained,
         ] = request;
@@ -839,6 +841,7 @@ impl Bench {
                 step: step as u32,
                 increment: increment as u32,
                 step_start: f64::from_bits(start),
+                step_length: f64::from_bits(duration),
                 is_undrained: undrained != 0,
             },
             sites: &sites,

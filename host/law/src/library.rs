@@ -466,10 +466,7 @@ fn describe_formulation(
     allowance: &Allowance,
 ) -> Result<FormulationDescription, String> {
     let name = hypothesis.name();
-    let (gradient_id, flux_id) = match hypothesis {
-        Hypothesis::Interface2d => ("jump", "traction"),
-        _ => ("strain", "stress"),
-    };
+    let (gradient_id, flux_id) = super::words(hypothesis);
     let pair = [
         (gradient_id, formulation.gradient, formulation.n_gradients),
         (flux_id, formulation.flux, formulation.n_fluxes),
@@ -516,6 +513,7 @@ fn describe_formulation(
         },
         rates: formulation.flags & raw::PILUM_T_RATES != 0,
         linear: formulation.flags & raw::PILUM_T_LINEAR != 0 && internal_variables.is_empty(),
+        time_dependent: false,
         local_axes: formulation.flags & raw::PILUM_T_LOCAL_AXES != 0,
         internal_variables,
     })

@@ -153,11 +153,7 @@ fn call(law: &LoadedLaw, hypothesis: Hypothesis) {
     };
     let n = law.n_components();
     let rows = Strided::rows(n);
-    let normal = if hypothesis == Hypothesis::Interface2d {
-        1
-    } else {
-        3
-    };
+    let normal = if hypothesis.is_interface() { 1 } else { 3 };
     let compression = (0..n).map(|i| if i < normal { -100.0 } else { 0.0 });
     let flux: Vec<f64> = compression.cycle().take(n * N_POINTS).collect();
     let Ok(state) = law.initial_state(N_POINTS, (&flux, rows)) else {
@@ -197,8 +193,8 @@ fn step(law: &Law, operator: Operator, size: f64, flux: &[f64], state: &[f64]) {
     let _ = law.integrate(&start, operator, end);
 }
 
-/// A value that a parameter may have.
-fn plausible(parameter: &ParameterDescription) -> f64 {
+/// A value that a parameter may have; NaN: left out.
+pub fn plausible(parameter: &ParameterDescription) -> f64 {
     if let Some(default) = parameter.default {
         return default;
     }

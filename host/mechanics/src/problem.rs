@@ -188,6 +188,8 @@ pub struct Phase {
     pub name: String,
     /// Number of equal increments.
     pub increments: usize,
+    /// How long it takes, in the unit of time of the laws; 1 if nothing is said.
+    pub time: Option<f64>,
     /// Laws of groups, by number, from this phase on.
     pub materials: Vec<(usize, Material)>,
     /// Groups, by number, that are there from this phase on: solids free of stress, interfaces with
@@ -205,7 +207,7 @@ pub struct Phase {
     /// Lines whose nodes move alike from this phase on: in both directions, without rotation. Where a
     /// line reaches the axis of symmetry it does not move radially.
     pub rigid: Vec<String>,
-    /// What the phase changes, as a factor on the change, by the phase's time from 0 to 1: pairs of
+    /// What the phase changes, as a factor on the change, by the share of the phase's time, from 0 to 1: pairs of
     /// time and factor, linear between. Empty: a straight ramp from 0 to 1.
     pub course: Vec<[f64; 2]>,
     /// Forces, as totals at the end of the phase.
@@ -221,11 +223,17 @@ pub struct Phase {
 }
 
 impl Phase {
+    /// How long it takes.
+    pub fn length(&self) -> f64 {
+        self.time.unwrap_or(1.0)
+    }
+
     /// A phase in which nothing changes.
     pub fn new(name: impl Into<String>, increments: usize) -> Self {
         Self {
             name: name.into(),
             increments,
+            time: None,
             materials: Vec::new(),
             activate: Vec::new(),
             deactivate: Vec::new(),

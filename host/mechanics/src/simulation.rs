@@ -22,7 +22,7 @@ pub use warning::Warning;
 pub use watch::{Increment, Part, Watch, When};
 
 use crate::assembly::Tie;
-use crate::equilibrium::{Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
+use crate::equilibrium::{Clock, Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
 use crate::ground::{Acting, Loading};
 use crate::group::Group;
@@ -95,7 +95,7 @@ pub struct Simulation {
     force: Vec<f64>,
     /// Internal less external forces of the last state that was completed.
     reaction: Vec<f64>,
-    /// Pseudo-time at the start of the phase: one unit for every phase.
+    /// Time at the start of the phase.
     time: f64,
     /// Largest of the forces (2-norms) at the start of any phase so far.
     largest_force: f64,
@@ -230,10 +230,20 @@ impl Simulation {
         self.beyond.warnings()
     }
 
-    /// Pseudo-time: phases before the present one, and the share of it that is done.
+    /// The time: that of the phases before the present one, and what is done of it.
     pub fn time(&self) -> f64 {
-        let share = self.under_way.as_ref().map_or(0.0, |p| p.course.lambda);
-        self.time + share
+        let under_way = self.under_way.as_ref();
+        under_way.map_or(self.time, |phase| {
+            self.clock(phase.number).at(phase.course.lambda)
+        })
+    }
+
+    /// The time of a phase that is under way.
+    fn clock(&self, phase: usize) -> Clock {
+        Clock {
+            start: self.time,
+            length: self.problem.phases[phase].length(),
+        }
     }
 
     /// The present state, complete: all stresses, strains, displacements and reactions.
@@ -378,9 +388,10 @@ impl Simulation {
         };
         for group in &mut self.groups {
             group.moment = Moment {
-                step: self.time as u32 + 1,
+                step: phase.number as u32 + 1,
                 increment: increment as u32,
                 step_start: self.time,
+                step_length: input.length(),
                 is_undrained: group.is_undrained(),
             };
         }
@@ -412,7 +423,7 @@ impl Simulation {
         phase.record.increments += 1;
         phase.course.increment = increment;
         let done = Increment {
-            time: self.time + lambda,
+            time: self.clock(phase.number).at(lambda),
             of: n,
             iterations: done.iterations,
             unreliable: done.unreliable,
@@ -426,7 +437,7 @@ impl Simulation {
     fn hand_out_last(&mut self, place: &Place, phase: &mut UnderWay, watch: &mut dyn Watch) {
         let lambda = phase.course.lambda;
         if self.complete(phase, None).is_ok() {
-            let time = self.time + lambda;
+            let time = self.clock(phase.number).at(lambda);
             watch.last_equilibrium(place, lambda, time, &self.snapshot());
         }
     }
@@ -612,6 +623,7 @@ impl Simulation {
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
         let settings = self.settings();
+        let clock = self.clock(phase.number);
         let equations = &mut phase.equations;
         let mut newton = Newton::new(
             (&equations.system, &equations.places),
@@ -622,7 +634,7 @@ impl Simulation {
             &mut phase.record.costs,
         );
         newton = newton.stopped_by(&self.stop);
-        newton.step(&phase.course.loads, from, to, self.time + from, guess)
+        newton.step(&phase.course.loads, [from, to], clock, guess)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::driver::Driver;
 use crate::error::{Cause, Error, NoEquilibrium, Place, Warning};
 use crate::frame::Frame;
-use crate::path::Control;
+use crate::path::{Control, Segment};
 use crate::state::Point;
 use crate::walk::{Halt, Walk};
 use law::{Moment, words};
@@ -13,6 +13,8 @@ use law::{Moment, words};
 pub struct Row<'a> {
     /// Increment, counted through all segments; 0 is the initial state.
     pub increment: usize,
+    /// Time at its end.
+    pub time: f64,
     /// Jumps or strains.
     pub gradient: &'a [f64],
     /// Tractions or stresses.
@@ -67,25 +69,29 @@ impl Driver {
         let mut walk = Walk::new(point, search);
         let mut strayed = None;
         let n = self.law.n_components();
-        let mut row = |point: &Point, increment, iterations| {
+        let mut row = |point: &Point, (increment, time), iterations| {
             sink(&Row {
                 increment,
+                time,
                 gradient: &point.gradient[..n],
                 flux: &point.flux[..n],
                 internal: &point.internal,
                 iterations,
             })
         };
-        row(&walk.point, 0, 0)?;
+        row(&walk.point, (0, 0.0), 0)?;
         let mut increment = 0;
-        let (mut time, mut step_start) = (0.0, 0.0);
+        let mut time = 0.0;
+        let mut moment = Moment::default();
         let mut held = walk.point.flux;
         for (number, segment) in self.segments.iter().enumerate() {
             walk.change_frame(segment.frame, &mut held);
             let ramp = walk.enter(segment, n, &held);
             if segment.first == 0 {
-                step_start = time;
+                moment.step_start = time;
+                moment.step_length = self.length_of_step(number);
             }
+            let (start, share) = (time, segment.length() / segment.increments as f64);
             let mut goal = ramp.from;
             for k in 1..=segment.increments {
                 let next = ramp.goal(k, segment.increments);
@@ -93,8 +99,7 @@ impl Driver {
                 walk.search.moment = Moment {
                     step: segment.step,
                     increment: (segment.first + k) as u32,
-                    step_start,
-                    is_undrained: false,
+                    ..moment
                 };
                 let place = Place::Increment {
                     segment: number + 1,
@@ -102,7 +107,7 @@ impl Driver {
                     of: segment.increments,
                     row: increment + 1,
                 };
-                let reached = walk.advance(&goal, &next, (time, segment.time_increment));
+                let reached = walk.advance(&goal, &next, (time, share));
                 let point = walk.cartesian();
                 if walk.is_ignored {
                     walk.silence.ignored(place, &point.flux);
@@ -120,8 +125,8 @@ impl Driver {
                     strayed = self.strayed(&walk, place);
                 }
                 increment += 1;
-                time += segment.time_increment;
-                row(&point, increment, walk.search.calls - calls)?;
+                time = start + k as f64 * share;
+                row(&point, (increment, time), walk.search.calls - calls)?;
                 goal = next;
             }
             // A flux that was led keeps its goal; what is left of its residual does not pile up.
@@ -160,6 +165,14 @@ impl Driver {
             last: last.copied().collect(),
             warnings,
         })
+    }
+
+    /// How long the step takes that starts with a segment: one, or several that follow each other.
+    pub(crate) fn length_of_step(&self, number: usize) -> f64 {
+        let segments = self.segments.get(number..).unwrap_or_default();
+        let step = segments.first().map(|segment| segment.step);
+        let of_step = segments.iter().take_while(|s| Some(s.step) == step);
+        of_step.map(Segment::length).sum()
     }
 
     /// What to say of a point that went farther than what it was led to explains.

@@ -7,6 +7,8 @@ use crate::state::{N_MAX, Point, Vector};
 use abi::status::Outcome;
 use law::{Law, Stop, Strided};
 
+/// Column of the time.
+pub const TIME: &str = "time";
 /// Relative change of the initial flux that is worth a warning.
 const OUTSIDE: f64 = 1e-9;
 
@@ -122,6 +124,14 @@ impl Driver {
         self.segments.iter().map(|segment| segment.increments).sum()
     }
 
+    /// Whether its rows say the time: where a segment says how long it takes, and the law has no internal
+    /// variable of this name.
+    pub fn is_timed(&self) -> bool {
+        let variables = &self.law.formulation().internal_variables;
+        self.segments.iter().any(|segment| segment.time.is_some())
+            && variables.iter().all(|variable| variable.id != TIME)
+    }
+
     /// The value of a parameter of the law, of a choice its number; `None` if there is no such
     /// parameter, or it is left to the law.
     pub fn parameter(&self, id: &str) -> Option<f64> {
@@ -148,8 +158,17 @@ impl Driver {
         };
         let mut search = Search::new(&self.law, &point);
         search.stop = self.stop.clone();
+        search.moment.step_length = self.length_of_step(0);
         let notes = self.notes.iter().cloned();
         let mut warnings: Vec<Warning> = notes.map(Warning::Note).collect();
+        let depends = self.law.formulation().time_dependent;
+        let says_none = |segment: &Segment| segment.time.is_none();
+        if let Some(number) = self.segments.iter().position(says_none).filter(|_| depends) {
+            warnings.push(Warning::NoTime {
+                law: self.law.description().id.clone(),
+                segment: number + 1,
+            });
+        }
         let failure = |cause| self.failure(Place::Start, cause, Vec::new());
         let answer = search
             .at_rest(&point)
@@ -163,7 +182,9 @@ impl Driver {
         };
         let n = self.law.n_components();
         let scale = self.flux.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
-        if (0..n).any(|i| (returned[i] - self.flux[i]).abs() > OUTSIDE * scale) {
+        let moves = (0..n).any(|i| (returned[i] - self.flux[i]).abs() > OUTSIDE * scale);
+        // What a law does in the time of this call is what it is for.
+        if moves && !depends {
             let moved = Moved {
                 law: self.law.description().id.clone(),
                 hypothesis: self.law.hypothesis(),

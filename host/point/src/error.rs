@@ -32,7 +32,7 @@ pub enum Misuse {
     /// A number of increments outside 1 to [`MAX_INCREMENTS`](crate::MAX_INCREMENTS), all segments
     /// together.
     Increments(usize),
-    /// A time of an increment that is not above 0.
+    /// A time of a segment that is not above 0, or cannot be meant.
     Time(f64),
     /// A value that is not finite.
     NotFinite(f64),
@@ -165,6 +165,13 @@ pub enum Warning {
     Note(String),
     /// The law returns the initial flux to another one.
     OutsideSurface(Moved),
+    /// The law depends on the time, and a segment, counted from 1, says none.
+    NoTime {
+        /// Id of the law.
+        law: String,
+        /// The first such segment.
+        segment: usize,
+    },
     /// The law, called without any change, returns another flux: it may creep in the time of the call.
     DoesNotLast(Moved),
     /// A component went farther than what it was led to explains.

@@ -52,7 +52,7 @@ mod walk;
 mod words;
 
 pub use course::{Course, Row};
-pub use driver::Driver;
+pub use driver::{Driver, TIME};
 pub use error::{
     Cause, Criterion, Error, Failure, Misuse, Moved, NoEquilibrium, Place, Unmet, Warning,
 };

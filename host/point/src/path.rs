@@ -8,6 +8,8 @@ use abi::Hypothesis;
 
 /// Most increments of all segments together; a slip of the pen beyond.
 pub const MAX_INCREMENTS: usize = 100_000_000;
+/// Longest time of a segment.
+pub(crate) const LONGEST: f64 = 1e20;
 /// Number of the component 33.
 const OUT_OF_PLANE: usize = 2;
 
@@ -47,7 +49,7 @@ impl Control {
             return Err(Misuse::NotFinite(value));
         }
         if let Self::Stiffness(stiffness) = self {
-            if hypothesis != Hypothesis::Interface2d {
+            if !hypothesis.is_interface() {
                 return Err(Misuse::StiffnessOfSolid);
             }
             if stiffness < 0.0 {
@@ -82,8 +84,8 @@ pub struct Segment {
     pub first: usize,
     /// What the components are; other than Cartesian ones in three dimensions only.
     pub frame: Frame,
-    /// Time of an increment.
-    pub time_increment: f64,
+    /// How long it takes; an increment takes one unit of time if nothing is said.
+    pub time: Option<f64>,
     /// What holds in place of the controls, in three dimensions only.
     pub restrictions: Option<Restrictions>,
 }
@@ -102,9 +104,14 @@ impl Segment {
             step,
             first: 0,
             frame: Frame::Cartesian,
-            time_increment: 1.0,
+            time: None,
             restrictions: None,
         }
+    }
+
+    /// How long it takes.
+    pub fn length(&self) -> f64 {
+        self.time.unwrap_or(self.increments as f64)
     }
 
     /// Leads a component, counted from 0 in the order of the hypothesis.
@@ -125,8 +132,8 @@ impl Segment {
         if self.increments == 0 {
             return Err(Misuse::Increments(0));
         }
-        if !(self.time_increment > 0.0 && self.time_increment.is_finite()) {
-            return Err(Misuse::Time(self.time_increment));
+        if let Some(time) = self.time.filter(|time| !(*time > 0.0 && *time <= LONGEST)) {
+            return Err(Misuse::Time(time));
         }
         let is_plain = self.frame == Frame::Cartesian && self.restrictions.is_none();
         if !is_plain && hypothesis != Hypothesis::ThreeD {
@@ -241,7 +248,7 @@ mod tests {
             (
                 solid,
                 Segment {
-                    time_increment: 0.0,
+                    time: Some(0.0),
                     ..new(solid)
                 },
                 Misuse::Time(0.0),

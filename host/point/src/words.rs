@@ -3,7 +3,7 @@
 use crate::error::{
     Cause, Criterion, Error, Failure, Misuse, Moved, NoEquilibrium, Place, Unmet, Warning,
 };
-use crate::path::MAX_INCREMENTS;
+use crate::path::{LONGEST, MAX_INCREMENTS};
 use abi::status::Outcome;
 use law::words;
 use miette::Diagnostic;
@@ -34,7 +34,10 @@ impl Display for Misuse {
                 f,
                 "`increments`: {n} is outside [1, {MAX_INCREMENTS}], all segments together"
             ),
-            Self::Time(time) => write!(f, "an increment takes a time above 0, not {time}"),
+            Self::Time(time) => write!(
+                f,
+                "`time` is {time}, expected above 0 and at most {LONGEST:e}: how long the segment takes"
+            ),
             Self::NotFinite(value) => write!(f, "{value} is not finite"),
             Self::NegativeStiffness(stiffness) => {
                 write!(f, "`stiffness`: {stiffness} kPa/m is outside [0, ∞)")
@@ -223,6 +226,11 @@ impl Display for Warning {
                     moved.law
                 )
             }
+            Self::NoTime { law, segment } => write!(
+                f,
+                "law `{law}` depends on the time, and segment {segment} says none: each of its increments \
+                 takes 1"
+            ),
             Self::DoesNotLast(moved) => {
                 let (word, given, returned) = moved.in_words();
                 write!(

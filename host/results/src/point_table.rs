@@ -16,6 +16,8 @@ pub struct Table<W: Write> {
     flushed: Instant,
     /// The driver cannot be followed once more if a law ends the process: no row waits.
     is_only_once: bool,
+    /// Rows say the time.
+    is_timed: bool,
 }
 
 impl<W: Write> Table<W> {
@@ -23,6 +25,11 @@ impl<W: Write> Table<W> {
     /// that every row is handed over at once.
     pub fn new(out: W, driver: &Driver, is_only_once: bool) -> Self {
         let mut pending = String::from("increment");
+        let is_timed = driver.is_timed();
+        if is_timed {
+            pending.push(',');
+            pending.push_str(point::TIME);
+        }
         for column in driver.columns() {
             pending.push(',');
             pending.push_str(&column);
@@ -33,6 +40,7 @@ impl<W: Write> Table<W> {
             pending,
             flushed: Instant::now(),
             is_only_once,
+            is_timed,
         }
     }
 
@@ -44,7 +52,9 @@ impl<W: Write> Table<W> {
         let text = &mut self.pending;
         let full = "a string takes everything";
         write!(text, "{}", row.increment).map_err(|_| io::Error::other(full))?;
-        for value in row.gradient.iter().chain(row.flux).chain(row.internal) {
+        let time = self.is_timed.then_some(&row.time).into_iter();
+        let state = row.gradient.iter().chain(row.flux).chain(row.internal);
+        for value in time.chain(state) {
             // Adding 0 turns −0 into 0.
             text.push(',');
             write!(text, "{:.16e}", value + 0.0).map_err(|_| io::Error::other(full))?;

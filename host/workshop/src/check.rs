@@ -13,6 +13,7 @@ mod memory;
 mod purity;
 mod random;
 mod robustness;
+mod routine;
 mod specimen;
 mod walk;
 
@@ -41,7 +42,8 @@ use text::write::replace;
     reason = "switches of the command line"
 )]
 pub struct Arguments {
-    /// A library, or the id of a law that is found as `pilum laws` finds it.
+    /// A library, of the contract or of a UMAT with a sidecar beside it; or the id of a law that is found
+    /// as `pilum laws` finds it.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
     /// Write JSON.
@@ -111,6 +113,7 @@ enum Family {
     Purity,
     Mathematics,
     Robustness,
+    Routine,
 }
 
 /// A check: its name and meaning are public and never change.
@@ -133,6 +136,7 @@ fn checks() -> impl Iterator<Item = &'static Check> {
         purity::CHECKS,
         robustness::CHECKS,
         mathematics::CHECKS,
+        routine::CHECKS,
     ]
     .into_iter()
     .flatten()
@@ -236,7 +240,12 @@ impl Subject {
 
     /// The laws of the library.
     fn laws(&self) -> Result<Vec<LoadedLaw>, Verdict> {
-        let library = self.opener.open(&self.path);
+        let library = if routine::is_one(&self.path) {
+            self.opener
+                .open_foreign(&routine::foreign(self), |_| Ok(()))
+        } else {
+            self.opener.open(&self.path)
+        };
         let library = library.map_err(|why| failed(why.to_string()))?;
         let ids = library.laws().map(|law| law.id.as_str());
         Ok(ids.filter_map(|id| library.law(id)).collect())
@@ -337,17 +346,35 @@ pub fn run(
     })?;
     let sha256 = hexadecimal_sha256(&bytes);
     drop(bytes);
+    let is_routine = routine::is_one(&path);
+    if let Some(id) = arguments.only.iter().find(|id| !applies(id, is_routine)) {
+        let whose = if is_routine {
+            "libraries of the contract"
+        } else {
+            "UMATs"
+        };
+        return Err(Error::usage(format!(
+            "--only {id}: this check is for {whose}"
+        )));
+    }
     let arguments = &with_absolute_driver(arguments)?;
-    if !arguments.set.is_empty() {
+    if is_routine {
+        if arguments.driver.is_some() {
+            return Err(Error::usage(
+                "--driver leads the laws of a library of the contract; a UMAT is led by `pilum point`",
+            ));
+        }
+        routine::refuse_settings(&arguments.set, &path)?;
+    } else if !arguments.set.is_empty() {
         refuse_settings(arguments, &path)?;
     }
     if let Some(driver) = &arguments.driver {
         refuse_driver(arguments, opener, driver, &path)?;
     }
     let mut findings = if arguments.in_process {
-        run_here(arguments, &path)?
+        run_here(arguments, &path, is_routine)?
     } else {
-        run_all(arguments, &path)?
+        run_all(arguments, &path, is_routine)?
     };
     let mut counts = BTreeMap::new();
     for finding in &findings {
@@ -376,8 +403,13 @@ pub fn run(
     if bad.is_empty() {
         return Ok(());
     }
+    let keeps = if is_routine {
+        "is not what its sidecar says"
+    } else {
+        "does not keep the contract"
+    };
     Err(Error::library(format!(
-        "library {} does not keep the contract: {}",
+        "library {} {keeps}: {}",
         path.display(),
         bad.join(", ")
     )))
@@ -504,9 +536,16 @@ fn refuse_settings(arguments: &Arguments, path: &Path) -> Result<(), Error> {
     }
 }
 
+/// Whether a check is for such a library: a UMAT with a sidecar, or one of the contract.
+fn applies(id: &str, is_routine: bool) -> bool {
+    let is_of_routines = routine::CHECKS.iter().any(|check| check.id == id);
+    is_of_routines == is_routine || is_routine && routine::SHARED.contains(&id)
+}
+
 /// The checks that are asked for.
-fn chosen(arguments: &Arguments) -> Vec<&'static Check> {
+fn chosen(arguments: &Arguments, is_routine: bool) -> Vec<&'static Check> {
     checks()
+        .filter(|check| applies(check.id, is_routine))
         .filter(|check| arguments.only.is_empty() || arguments.only.iter().any(|id| id == check.id))
         .collect()
 }
@@ -524,8 +563,8 @@ fn missing(check: &Check, findings: &BTreeMap<&str, Finding>) -> Option<&'static
 }
 
 /// Runs the checks, all that can at the same time.
-fn run_all(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
-    let chosen = chosen(arguments);
+fn run_all(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<Finding>, Error> {
+    let chosen = chosen(arguments, is_routine);
     let folder = ScratchFolder::new()?;
     let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
     loop {
@@ -556,14 +595,14 @@ fn run_all(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
 }
 
 /// Runs the checks in this process, one after the other.
-fn run_here(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
+fn run_here(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<Finding>, Error> {
     // Nothing is tried in a child first: what happens is to happen here.
     let opener = Opener::new(Trust {
         probe: false,
         isolate: None,
     });
     let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
-    let chosen = chosen(arguments);
+    let chosen = chosen(arguments, is_routine);
     for check in &chosen {
         let done = if let Some(id) = missing(check, &findings) {
             finding(check, Outcome::Skipped, format!("needs `{id}`"))

@@ -2,14 +2,16 @@
 
 use crate::Error;
 use abi::Hypothesis;
-use law::adapter::conventions;
+use law::adapter::{self, Foreign, conventions};
 use law::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw, Origin,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw, Opener, Origin,
     ParameterDescription, SearchPath, Tangent,
 };
 use serde::Serialize;
+use std::env::consts::DLL_SUFFIX;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use text::Source;
 
 /// Longest line of a page.
 const WIDTH: usize = 100;
@@ -43,6 +45,21 @@ fn json(value: &impl Serialize) -> Result<String, Error> {
 /// library that claims a law and cannot be used is said to be so.
 pub fn list(search: &SearchPath) -> String {
     let mut text = String::new();
+    for (library, read) in sidecars(search) {
+        let _ = match read {
+            Ok(law) => {
+                let hypotheses = law.hypotheses();
+                writeln!(
+                    text,
+                    "{:24}  {:48}  {hypotheses}, UMAT {}",
+                    law.id,
+                    law.name,
+                    library.display()
+                )
+            }
+            Err(error) => writeln!(text, "{:24}  cannot be used: {error}", library.display()),
+        };
+    }
     for (id, library) in search.installed() {
         let line = match search.law(&id) {
             Ok(law) => {
@@ -118,6 +135,53 @@ pub fn places_json(search: &SearchPath) -> Result<String, Error> {
     )
 }
 
+/// User subroutines of Abaqus in the folders of a search that have a sidecar. Nothing of them runs.
+fn sidecars(search: &SearchPath) -> Vec<(PathBuf, Result<LawDescription, law::Error>)> {
+    let mut found = Vec::new();
+    for place in search.places() {
+        let entries = std::fs::read_dir(&place.folder).into_iter().flatten().flatten();
+        let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+        paths.sort();
+        for path in paths {
+            if path.to_string_lossy().ends_with(DLL_SUFFIX)
+                && let Some(sidecar) = adapter::sidecar_of(&path)
+            {
+                let read = Source::read(&sidecar).map_err(law::Error::from);
+                found.push((path, read.and_then(|source| adapter::sidecar(&source))));
+            }
+        }
+    }
+    found
+}
+
+/// The law of a name: an id, or the path of a user subroutine of Abaqus.
+///
+/// # Errors
+/// There is none, or it cannot be used.
+pub fn find(search: &SearchPath, opener: &Opener, name: &str) -> Result<LoadedLaw, Error> {
+    let path = Path::new(name);
+    let umat = if path.components().count() > 1 || name.ends_with(DLL_SUFFIX) {
+        if !law::inspect::inspect(path)?.is_umat() {
+            let message =
+                format!("{name} is no UMAT; of other libraries, `laws` takes the id of a law");
+            return Err(Error::usage(message));
+        }
+        Some(path.to_owned())
+    } else {
+        let is_it =
+            |law: &Result<LawDescription, law::Error>| law.as_ref().is_ok_and(|law| law.id == name);
+        let mut all = sidecars(search).into_iter();
+        all.find(|(_, law)| is_it(law)).map(|(library, _)| library)
+    };
+    let Some(library) = umat else {
+        return Ok(search.law(name)?);
+    };
+    let library = opener.open_foreign(&Foreign::umat(&library), |_| Ok(()))?;
+    let mut laws = library.laws().map(|law| law.id.clone());
+    let law = laws.next().and_then(|id| library.law(&id));
+    law.ok_or_else(|| Error::internal("a UMAT without a law".to_owned()))
+}
+
 /// Everything about every law found, as a JSON array.
 ///
 /// # Errors
@@ -143,7 +207,9 @@ pub fn page_json(law: &LoadedLaw) -> Result<String, Error> {
 pub fn page(law: &LoadedLaw) -> String {
     let description = law.description();
     let mut text = format!("{}: {}\n\n", description.id, description.name);
-    wrap(&mut text, "", &description.doc);
+    if !description.doc.is_empty() {
+        wrap(&mut text, "", &description.doc);
+    }
     let facts = [
         ("references", &description.references),
         ("version", &description.version),
@@ -172,7 +238,7 @@ pub fn page(law: &LoadedLaw) -> String {
 
     internal_variables(&mut text, &description.formulations);
     text.push_str("\nIn a case file\n");
-    example(&mut text, description);
+    example(&mut text, law);
     text.push_str(
         "\nUnits kN, m, kPa; angles in degrees. Tension and opening are positive, shear strains are \
          γ = 2ε,\nthe jump is that of the plus side less that of the minus side, normal first.\n",
@@ -185,7 +251,7 @@ fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
         .into_iter()
         .find(|h| h.name() == formulation.hypothesis);
     let components = hypothesis.map_or(String::new(), |h| h.components().join(" "));
-    let pair = if hypothesis == Some(Hypothesis::Interface2d) {
+    let pair = if hypothesis.is_some_and(Hypothesis::is_interface) {
         "jump (m) to traction (kPa)"
     } else {
         "strain to stress (kPa)"
@@ -201,6 +267,11 @@ fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
         Tangent::Approximate => format!("tangent {symmetric}, approximate"),
         Tangent::None => "no tangent but the elastic operator".to_owned(),
     };
+    let time = if formulation.time_dependent {
+        "; depends on the time"
+    } else {
+        ""
+    };
     let rates = if formulation.rates { "; rates" } else { "" };
     let axes = if formulation.local_axes {
         "; axes of the layer: 1 along it, 2 across it"
@@ -209,7 +280,7 @@ fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
     };
     let _ = writeln!(
         text,
-        "  {:14}{pair}, components {components}; {tangent}{rates}{axes}",
+        "  {:14}{pair}, components {components}; {tangent}{time}{rates}{axes}",
         formulation.hypothesis
     );
 }
@@ -319,9 +390,15 @@ fn variable_lines(text: &mut String, v: &InternalVariable) {
 }
 
 /// What to write for the law, defaults as comments.
-fn example(text: &mut String, description: &LawDescription) {
+fn example(text: &mut String, law: &LoadedLaw) {
+    let description = law.description();
     let id = &description.id;
     let _ = writeln!(text, "  [laws.NAME]\n  law = \"{id}\"");
+    if let Some(foreign) = law.library().foreign() {
+        let adapter = foreign.adapter.name();
+        let library = toml::Value::from(foreign.library.to_string_lossy().as_ref());
+        let _ = writeln!(text, "  adapter = \"{adapter}\"\n  library = {library}");
+    }
     if !description.parameters.is_empty() {
         text.push_str("  [laws.NAME.parameters]\n");
     }

@@ -4,6 +4,7 @@
 pub mod check;
 pub mod laws;
 pub mod new_law;
+pub mod new_sidecar;
 pub mod replay;
 
 pub use input::Error;

@@ -1,6 +1,7 @@
 #![doc = include_str!("../LAW.md")]
 #![forbid(unsafe_code)]
 
+mod in_space;
 mod return_mapping;
 #[cfg(test)]
 mod tests;
@@ -65,6 +66,7 @@ impl InterfaceLaw for CoulombJoint {
               strength and separation.",
         references: "De Gennaro & Frank, Table IV (2)",
     };
+    const IN_SPACE: bool = true;
     type Parameters = Parameters;
     type State = State;
 
@@ -126,6 +128,15 @@ impl InterfaceLaw for CoulombJoint {
             end.tangent = [[self.normal_stiffness, 0.0], [0.0, self.shear_stiffness]];
         }
         Ok(end)
+    }
+
+    #[inline]
+    fn update_in_space(
+        &self,
+        point: &InterfacePoint<State, f64, 3>,
+        tangent: Tangent,
+    ) -> Result<InterfaceResponse<State, 3>, Failure> {
+        Ok(self.slide_in_space(point, self.update(&self.along(point), tangent)?, tangent))
     }
 }
 

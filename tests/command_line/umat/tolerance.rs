@@ -14,7 +14,7 @@ fn point(place: &Place, text: &str) -> Outcome {
     place.run(&["point", "driver.toml", "--csv", "out.csv"])
 }
 
-fn summary(place: &Place) -> serde_json::Value {
+pub(super) fn summary(place: &Place) -> serde_json::Value {
     let text = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
     serde_json::from_str(&text).unwrap()
 }

@@ -69,7 +69,7 @@ pub(super) fn initial_flux(
     hypothesis: Hypothesis,
 ) -> Result<Vector, Error> {
     let (_, word) = words(hypothesis);
-    let (fits, misfit) = if hypothesis == Hypothesis::Interface2d {
+    let (fits, misfit) = if hypothesis.is_interface() {
         (&initial.traction, &initial.stress)
     } else {
         (&initial.stress, &initial.traction)
@@ -124,6 +124,12 @@ pub(super) fn segments(
                     .into());
             }
             let mut segment = Segment::new(hypothesis, number, increments);
+            if let Some(time) = &table.time {
+                segment.time = Some(*time.get_ref());
+                segment
+                    .check(hypothesis)
+                    .map_err(|misuse| source.error(time.span(), misuse.to_string()))?;
+            }
             for (name, written) in &table.control {
                 let i = component(source, name, hypothesis)?;
                 let (keyword, value, control) =
@@ -168,7 +174,7 @@ fn read_control(
 ) -> Result<(&'static str, Range<usize>, Control), Error> {
     type Kind = fn(f64) -> Control;
     let table = written.get_ref();
-    let interface = hypothesis == Hypothesis::Interface2d;
+    let interface = hypothesis.is_interface();
     // Keyword, value, whether it is made for interfaces, what it becomes.
     let kinds: [(&'static str, &Option<Spanned<f64>>, bool, Kind); 5] = [
         ("jump", &table.jump, true, Control::Gradient),

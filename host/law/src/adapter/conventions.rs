@@ -21,7 +21,7 @@ pub const ROUTES: &[Route] = &[
         conventions: &[
             (
                 "order",
-                "11 22 33 12 (13 23); axisymmetric r z θ rz; interfaces n t",
+                "11 22 33 12 (13 23); axisymmetric r z θ rz; interfaces n t (s)",
             ),
             ("sign", "tension and opening positive"),
             ("shear strain", "γ = 2 ε"),
@@ -37,7 +37,7 @@ pub const ROUTES: &[Route] = &[
         conventions: &[
             (
                 "order",
-                "11 22 33 12 (13 23); axisymmetric r z θ rz; interfaces n t",
+                "11 22 33 12 (13 23); axisymmetric r z θ rz; interfaces n t (s)",
             ),
             ("sign", "tension and opening positive"),
             ("shear strain", "γ = 2 ε in STRAN, DSTRAN and DDSDDE"),
@@ -63,7 +63,7 @@ pub const ROUTES: &[Route] = &[
         conventions: &[
             (
                 "order",
-                "11 22 33 12 (13 23); axisymmetric r z θ rz; cohesive zones n t",
+                "11 22 33 12 (13 23); axisymmetric r z θ rz; cohesive zones n t (s)",
             ),
             ("sign", "tension and opening positive"),
             ("shear", "strain γ / √2, stress √2 τ (Kelvin–Mandel)"),

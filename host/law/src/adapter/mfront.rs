@@ -115,7 +115,10 @@ const STRAINS: [(Hypothesis, &str); 3] = [
     (Hypothesis::Axisymmetric, "Axisymmetrical"),
     (Hypothesis::ThreeD, "Tridimensional"),
 ];
-const ZONES: [(Hypothesis, &str); 1] = [(Hypothesis::Interface2d, "PlaneStrain")];
+const ZONES: [(Hypothesis, &str); 2] = [
+    (Hypothesis::Interface2d, "PlaneStrain"),
+    (Hypothesis::Interface3d, "Tridimensional"),
+];
 
 /// The symbols of one behaviour.
 struct Reader<'a> {
@@ -348,6 +351,7 @@ impl Reader<'_> {
             index,
             symmetric: false,
             linear: false,
+            time_dependent: false,
             local_axes: false,
             internal_variables,
         };
@@ -382,7 +386,7 @@ impl Reader<'_> {
 
 /// Components of a variable of MFront's type, by name; one without a name for a scalar.
 fn components(kind: i32, hypothesis: Hypothesis) -> Option<&'static [&'static str]> {
-    let in_space = hypothesis == Hypothesis::ThreeD;
+    let in_space = matches!(hypothesis, Hypothesis::ThreeD | Hypothesis::Interface3d);
     match (kind, in_space) {
         (0, _) => Some(&[""]),
         (1, false) => Some(&["11", "22", "33", "12"]),
@@ -447,11 +451,7 @@ impl ForeignLaw for Mfront {
                 n_properties: properties.len(),
                 n_external: external.len(),
             },
-            shear: if hypothesis == Hypothesis::Interface2d {
-                n
-            } else {
-                3
-            },
+            shear: if hypothesis.is_interface() { n } else { 3 },
             properties,
             external,
         }))

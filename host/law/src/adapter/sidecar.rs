@@ -18,6 +18,7 @@ const MOST_COMPONENTS: usize = 1000;
 /// Length of a material's name in Abaqus.
 const CMNAME: usize = 80;
 
+#[expect(clippy::struct_excessive_bools, reason = "keys of the file")]
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -42,6 +43,8 @@ struct File {
     expand: bool,
     #[serde(default)]
     thread_safe: bool,
+    #[serde(default)]
+    time_dependent: bool,
     #[serde(default)]
     symmetric: bool,
     #[serde(default)]
@@ -165,6 +168,7 @@ impl Sidecar {
                     Given::Approximate => Tangent::Approximate,
                 },
                 rates: false,
+                time_dependent: file.time_dependent,
                 local_axes: false,
                 internal_variables: variables.clone(),
             });
@@ -208,7 +212,7 @@ impl Sidecar {
 }
 
 /// `libNAME.so` has `NAME.law.toml` or `libNAME.law.toml` beside it.
-fn find(library: &Path) -> Result<PathBuf, Error> {
+pub(super) fn find(library: &Path) -> Result<PathBuf, Error> {
     let stem = library.file_stem().unwrap_or_default().to_string_lossy();
     let names = [stem.strip_prefix("lib").unwrap_or(&stem), &stem];
     let paths = names.map(|name| library.with_file_name(format!("{name}.law.toml")));
@@ -216,8 +220,10 @@ fn find(library: &Path) -> Result<PathBuf, Error> {
     found.cloned().ok_or_else(|| Error::Library {
         message: format!("library {} has no sidecar", library.display()),
         hint: Some(format!(
-            "a sidecar names parameters and internal variables: {}, or `sidecar = \"PATH\"`",
-            paths[0].display()
+            "a sidecar names parameters and internal variables: {}, or `sidecar = \"PATH\"`; `pilum \
+             new-sidecar {} --nprops N --nstatv M` writes one to fill in",
+            paths[0].display(),
+            library.display()
         )),
     })
 }

@@ -10,7 +10,7 @@
 use super::sidecar::is_column;
 use super::{
     Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
-    Refusal, each_point,
+    Refusal, each_point, time_of_call,
 };
 use crate::Error;
 use crate::description::{
@@ -41,8 +41,6 @@ const MOST_STATES: i32 = 1000;
 const N_GUARD: usize = 24;
 /// What guard words hold: a signalling NaN.
 const GUARD: u64 = 0x7ff4_dead_beef_dead;
-/// dTime of calls that are no increment.
-const TIME_AT_REST: f64 = 1.0;
 /// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
 const OUT_OF_PLANE: f64 = 1e-9;
 
@@ -126,6 +124,7 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
             order: foreign.tangent_order.unwrap_or_default(),
             model,
             n_states,
+            time_dependent: law.formulations.iter().any(|f| f.time_dependent),
         };
         laws.push((law, Arc::new(udsm)));
     }
@@ -229,6 +228,7 @@ fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), Str
             Tangent::Approximate
         },
         rates: false,
+        time_dependent: attributes.integer(A::ITimeDep) != 0,
         local_axes: false,
         internal_variables: internal_variables.clone(),
     };
@@ -347,6 +347,8 @@ struct Udsm {
     order: Order,
     model: i32,
     n_states: usize,
+    /// Its response depends on the time.
+    time_dependent: bool,
 }
 
 impl ForeignLaw for Udsm {
@@ -366,6 +368,7 @@ impl ForeignLaw for Udsm {
             template: Block::new(self.model, self.n_states, parameters),
             n: hypothesis.n_components(),
             order: self.order,
+            time_dependent: self.time_dependent,
             turn: Mutex::default(),
             overwritten: AtomicU64::new(0),
             told: AtomicU64::new(0),
@@ -497,6 +500,7 @@ struct Instance {
     n: usize,
     /// How D stands in memory.
     order: Order,
+    time_dependent: bool,
     /// Whose turn it is: routines keep variables.
     turn: Mutex<()>,
     /// Which of its copies the routine has overwritten, by bits, and which of them have been told.
@@ -621,8 +625,7 @@ impl Instance {
         block.set(A::X, &[x]);
         block.set(A::Y, &[y]);
         block.set(A::Time0, &[start.time]);
-        let time_increment = Some(start.time_increment).filter(|dt| *dt > 0.0);
-        block.set(A::DTime, &[time_increment.unwrap_or(TIME_AT_REST)]);
+        block.set(A::DTime, &[time_of_call(start, self.time_dependent)]);
         block.set(A::Sig0, &stress);
         block.set(A::StVar0, start.state);
         block.set(A::StVar, start.state);

@@ -6,7 +6,7 @@
 use super::sidecar::Sidecar;
 use super::{
     Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
-    Refusal, each_point,
+    Refusal, each_point, time_of_call,
 };
 use crate::Error;
 use crate::image::Image;
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Names by which compilers know the routine, in the order in which they are looked for.
-const SYMBOLS: [&str; 4] = ["umat_", "umat", "UMAT", "UMAT_"];
+pub const SYMBOLS: [&str; 4] = ["umat_", "umat", "UMAT", "UMAT_"];
 /// Characters of CMNAME.
 const N_CMNAME: usize = 80;
 /// Guard words on each side of an argument: a DDSDDE of six components where there is room for
@@ -29,8 +29,6 @@ const N_GUARD: usize = 24;
 /// What guard words hold: a signalling NaN. What is read there shows in the results, and what is
 /// computed with it and written back shows in the word, since every operation makes it a quiet one.
 const GUARD: u64 = 0x7ff4_dead_beef_dead;
-/// DTIME of calls that are no increment: at the start of a law, and for its elastic operator.
-const TIME_AT_REST: f64 = 1.0;
 /// Words of PREDEF and DPRED: no predefined fields, but room to read.
 const N_FIELDS: usize = 8;
 /// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
@@ -151,11 +149,7 @@ impl ForeignLaw for Umat {
         let sizes = Sizes {
             n: hypothesis.n_components(),
             n_tens: self.sidecar.ntens[number],
-            n_normal: if hypothesis == Hypothesis::Interface2d {
-                1
-            } else {
-                3
-            },
+            n_normal: if hypothesis.is_interface() { 1 } else { 3 },
             n_states: formulations[number].internal_variables.len(),
             n_props: parameters.len(),
         };
@@ -165,6 +159,7 @@ impl ForeignLaw for Umat {
             template: Block::new(sizes, &self.sidecar.cmname, parameters),
             sizes,
             order: self.sidecar.order,
+            time_dependent: formulations[number].time_dependent,
             overwritten: AtomicU64::new(0),
             told: AtomicU64::new(0),
             turn: self.is_serial().then(Mutex::default),
@@ -385,6 +380,8 @@ struct Instance {
     sizes: Sizes,
     /// How DDSDDE stands in memory.
     order: Order,
+    /// Its response depends on the time.
+    time_dependent: bool,
     /// Which of its copies the routine has overwritten, by bits, and which of them have been told.
     overwritten: AtomicU64,
     told: AtomicU64,
@@ -491,9 +488,7 @@ impl Instance {
         block.set(A::Stran, start.gradient);
         block.set(A::Dstran, increment);
         block.set(A::Time, &[start.time - start.moment.step_start, start.time]);
-        let is_increment = start.time_increment > 0.0;
-        let time_increment = Some(start.time_increment).filter(|_| is_increment);
-        block.set(A::Dtime, &[time_increment.unwrap_or(TIME_AT_REST)]);
+        block.set(A::Dtime, &[time_of_call(start, self.time_dependent)]);
         block.set(A::Coords, &start.site.position);
         block.set(A::Celent, &[start.site.length]);
         block.set_integers(A::Noel, &[start.site.element as i32]);

@@ -12,6 +12,18 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+/// The routines, by the names that compilers give them.
+pub(crate) const NAMES: [&str; 8] = [
+    "getjobname_",
+    "getoutdir_",
+    "rotsig_",
+    "sinv_",
+    "sprinc_",
+    "sprind_",
+    "stdb_abqerr_",
+    "xit_",
+];
+
 /// Exit code of a process in which a routine called `XIT`.
 pub(super) const XIT: i32 = 70;
 /// Characters of JOBNAME and OUTDIR.

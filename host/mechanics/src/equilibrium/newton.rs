@@ -60,6 +60,28 @@ use path::ArcLength;
 use residual::Task;
 use std::time::Instant;
 
+/// The time of a phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    /// When it starts.
+    pub start: f64,
+    /// How long it takes.
+    pub length: f64,
+}
+
+impl Clock {
+    /// The time at a load factor of the phase.
+    pub fn at(&self, lambda: f64) -> f64 {
+        self.start + lambda * self.length
+    }
+
+    /// When a step from this load factor starts, and how long it takes. One that goes back along the path
+    /// takes its time, too.
+    fn period(&self, lambda: f64, rise: f64) -> (f64, f64) {
+        (self.at(lambda), rise.abs() * self.length)
+    }
+}
+
 /// What iterations work on.
 #[derive(Debug)]
 pub struct Newton<'a> {
@@ -176,9 +198,8 @@ impl<'a> Newton<'a> {
     pub fn step(
         &mut self,
         loads: &Loads,
-        lambda_start: f64,
-        lambda_end: f64,
-        time: f64,
+        [lambda_start, lambda_end]: [f64; 2],
+        clock: Clock,
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
         self.set_out(loads);
@@ -188,7 +209,7 @@ impl<'a> Newton<'a> {
             self.domain_forces = domain.forces_at(lambda_end);
         }
         let external = loads.external(lambda_end);
-        let period = (time, lambda_end - lambda_start);
+        let period = clock.period(lambda_start, lambda_end - lambda_start);
         let task = Task {
             external: self.places.gather(&external),
             imposed: self.imposed(&external),
@@ -218,19 +239,19 @@ impl<'a> Newton<'a> {
     pub fn step_along(
         &mut self,
         loads: &Loads,
-        [from, time]: [f64; 2],
+        (from, clock): (f64, Clock),
         (measure, distance): (&Measure, f64),
         guess: (Vec<f64>, f64),
     ) -> Result<(StepSuccess, f64), StepFailure> {
         self.set_out(loads);
-        let mut control = ArcLength::new(self, loads, [from, time], (measure, distance), guess);
+        let mut control = ArcLength::new(self, loads, (from, clock), (measure, distance), guess);
         let mut iterations = Vec::new();
         match self.iterate(&mut control, &mut iterations) {
             Ok(equilibrium) => {
                 let reached = from + equilibrium.state.rise;
                 Ok((equilibrium.reached(iterations, false), reached))
             }
-            Err(failure) => Err(self.explained(failure, iterations, from, (time + from, 0.0))),
+            Err(failure) => Err(self.explained(failure, iterations, from, clock.period(from, 0.0))),
         }
     }
 

@@ -8,7 +8,7 @@
 //!
 //! where G and K' are those of the law's elastic operator and ν_u is Poisson's ratio of the undrained
 //! ground. The law sees effective stresses σ'; the element carries σ' − u δ, with the tangent
-//! D + (K_w/n) δ δᵀ. Where it drains again, what is left of u goes in proportion to the phase's time.
+//! D + (K_w/n) δ δᵀ. Where it drains again, what is left of u goes in proportion to the phase's time, however long that is.
 
 use super::{Field, Group, PointFailure};
 use crate::problem::{Drainage, Water};
@@ -112,10 +112,11 @@ impl Group {
                 *u = u_0 - k * (volume(strain) - volume(strain_0));
             }
         } else {
-            let since = time - self.moment.step_start;
+            let since = (time - self.moment.step_start) / self.moment.step_length;
+            let share = time_increment / self.moment.step_length;
             let left = |share: f64| (1.0 - share).max(0.0);
             let share = if left(since) > 0.0 {
-                left(since + time_increment) / left(since)
+                left(since + share) / left(since)
             } else {
                 0.0
             };

@@ -368,6 +368,7 @@ fn phases(problem: &Problem, sides: &[Face]) -> Result<(), Refusal> {
         activation(problem, number, phase, &mut active)?;
         refuse_gone(problem, number, phase, sides, &active)?;
         ground(problem, number, phase)?;
+        time(number, phase)?;
         course(problem, number, phase)?;
         let there: HashMap<usize, usize> = edges_there(&problem.mesh, &active);
         pressures(problem, number, phase, &there, &faces)?;
@@ -493,6 +494,17 @@ fn ground(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal
         }
     }
     Ok(())
+}
+
+/// Longest time of a phase.
+pub(super) const LONGEST: f64 = 1e20;
+
+fn time(number: usize, phase: &Phase) -> Result<(), Refusal> {
+    let time = phase.length();
+    if time > 0.0 && time <= LONGEST {
+        return Ok(());
+    }
+    Err(Refusal::new(Item::Time(number), Cause::BadTime(time)))
 }
 
 fn course(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal> {

@@ -1,5 +1,6 @@
 //! Why a problem cannot be computed: what is wrong, and with which part of it.
 
+use super::check::LONGEST;
 use super::{Analysis, Axis, Formulation};
 use std::fmt;
 
@@ -37,6 +38,8 @@ pub enum Item {
     Rigid(usize, usize),
     /// The course of a phase.
     Course(usize),
+    /// The time of a phase.
+    Time(usize),
     /// A group that a phase activates or deactivates.
     Activation {
         /// The phase.
@@ -268,6 +271,8 @@ pub enum Cause {
     TwoForces(String),
     /// A line lies on elements that are not there.
     NotThere(String),
+    /// A phase that takes no time, or none that can be meant.
+    BadTime(f64),
     /// A course that does not lead from (0, 0) to time 1.
     BadCourse,
     /// A course under arc-length control, which has a time of its own.
@@ -532,6 +537,10 @@ impl fmt::Display for Cause {
                     "line `{line}` lies on elements that are not active in this phase"
                 )
             }
+            Self::BadTime(time) => write!(
+                f,
+                "`time` is {time}, expected above 0 and at most {LONGEST:e}: how long the phase takes"
+            ),
             Self::BadCourse => write!(
                 f,
                 "a `course` leads from [0, 0] to time 1: pairs [time, factor] with rising times"

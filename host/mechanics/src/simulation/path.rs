@@ -189,6 +189,7 @@ impl Simulation {
             method: Method::Newton,
             ..self.problem.settings
         };
+        let clock = self.clock(phase.number);
         let mut newton = Newton::new(
             (&equations.system, &equations.places),
             equations.domain.as_ref(),
@@ -198,10 +199,9 @@ impl Simulation {
             &mut phase.record.costs,
         );
         newton = newton.stopped_by(&self.stop);
-        let start = [course.lambda, self.time];
         newton.step_along(
             &course.loads,
-            start,
+            (course.lambda, clock),
             (&measure, distance),
             (guess, ratio * length),
         )

@@ -136,6 +136,16 @@ impl Simulation {
         if let Some(other) = method::other(self.problem.settings.method, &self.groups) {
             watch.warning(&other);
         }
+        let phase = &self.problem.phases[number];
+        let depends =
+            |group: &&Group| group.is_active && group.law.built.law.formulation().time_dependent;
+        let dependent = self.groups.iter().find(depends);
+        if let Some(group) = dependent.filter(|_| phase.time.is_none()) {
+            watch.warning(&Warning::NoTime {
+                phase: phase.name.clone(),
+                law: group.law.name.clone(),
+            });
+        }
         self.done = number;
         self.under_way = Some(UnderWay {
             number,
@@ -148,7 +158,7 @@ impl Simulation {
     /// Ends a phase, be it as it may.
     pub(super) fn end_phase(&mut self, phase: &UnderWay, watch: &mut dyn Watch) {
         self.keep_loads(phase.number, &phase.course.prescribed);
-        self.time += 1.0;
+        self.time += self.problem.phases[phase.number].length();
         self.done = phase.number + 1;
         self.report_phase(phase, watch);
     }

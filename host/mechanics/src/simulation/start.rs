@@ -27,9 +27,10 @@ impl Simulation {
         let phase = self.problem.phases[number].clone();
         let mut starts = vec![number == 0; self.groups.len()];
         let moment = Moment {
-            step: self.time as u32 + 1,
+            step: number as u32 + 1,
             increment: 1,
             step_start: self.time,
+            step_length: phase.length(),
             is_undrained: false,
         };
         let cannot_start = |failure| Error::CannotStart(Box::new(failure));

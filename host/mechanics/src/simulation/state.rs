@@ -22,7 +22,7 @@ pub struct State<'s> {
     loading: Cow<'s, [Loading; 2]>,
     force: Cow<'s, [f64]>,
     reaction: Cow<'s, [f64]>,
-    /// Pseudo-time at the start of the phase.
+    /// Time at the start of the phase.
     time: f64,
     largest_force: f64,
     course: Cow<'s, PhaseCourse>,

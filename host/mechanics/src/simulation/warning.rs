@@ -21,6 +21,13 @@ pub enum Warning {
         /// The one that was asked for.
         asked: Method,
     },
+    /// A law depends on the time, and a phase says none.
+    NoTime {
+        /// The phase.
+        phase: String,
+        /// Name of the law in the problem.
+        law: String,
+    },
     /// The tolerance of the residual is below round-off.
     RoundOff {
         /// The phase.
@@ -96,6 +103,10 @@ impl fmt::Display for Warning {
                 "the tangents of law `{law}` are approximate: method `{}` stands for `{}`",
                 method.name(),
                 asked.name()
+            ),
+            Self::NoTime { phase, law } => write!(
+                f,
+                "law `{law}` depends on the time, and phase `{phase}` says none: it takes 1"
             ),
             Self::RoundOff {
                 phase,

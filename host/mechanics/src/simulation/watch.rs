@@ -15,7 +15,7 @@ pub struct Increment {
     pub place: Place,
     /// Increments of its phase.
     pub of: usize,
-    /// Pseudo-time at its end: phases before it, and the share of its own.
+    /// Time at its end: that of the phases before it, and its own share of its phase's.
     pub time: f64,
     /// Iterations, failed attempts included.
     pub iterations: usize,

@@ -93,12 +93,16 @@ impl Times {
 
     /// Phase and increment at a time.
     fn label(&self, time: f64) -> String {
-        for (phase, times) in &self.0 {
-            if let Some((increment, _)) = times.iter().find(|(_, t)| (*t - time).abs() < 1e-9) {
-                return format!("{phase}, increment {increment}");
+        let all = self.0.iter();
+        let all = all.flat_map(|(phase, times)| times.iter().map(move |(i, t)| (phase, i, *t)));
+        let off = |t: f64| (t - time).abs();
+        let nearest = all.min_by(|a, b| off(a.2).total_cmp(&off(b.2)));
+        match nearest {
+            Some((phase, increment, t)) if off(t) <= 1e-9 * t.abs() => {
+                format!("{phase}, increment {increment}")
             }
+            _ => format!("time {time}"),
         }
-        format!("time {time}")
     }
 }
 

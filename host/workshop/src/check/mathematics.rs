@@ -66,7 +66,7 @@ pub(super) const CHECKS: &[Check] = &[
         id: "hypotheses-agree",
         family: Family::Mathematics,
         description: "Plane strain and axisymmetry give the stresses that 3D gives in a plane \
-                      (without 3D: plane strain those of axisymmetry).",
+                      (without 3D: plane strain those of axisymmetry); interfaces in two dimensions those of three.",
         needs: NEEDS,
         run: hypotheses_agree,
     },
@@ -576,6 +576,7 @@ fn hypotheses_agree(subject: &Subject) -> Found {
         let wanted = match specimen.hypothesis {
             Hypothesis::PlaneStrain => [Hypothesis::ThreeD, Hypothesis::Axisymmetric].as_slice(),
             Hypothesis::Axisymmetric => [Hypothesis::ThreeD].as_slice(),
+            Hypothesis::Interface2d => [Hypothesis::Interface3d].as_slice(),
             _ => continue,
         };
         let larger = wanted
@@ -626,7 +627,7 @@ fn hypotheses_agree(subject: &Subject) -> Found {
         }
     }
     if n == 0 {
-        return Err(skipped("no law offers two hypotheses of solids"));
+        return Err(skipped("no law offers two hypotheses of one kind"));
     }
     Ok(format!("{n} points"))
 }
@@ -648,13 +649,16 @@ fn disagreement(step: &Step, end: &PointEnd, size: usize) -> Option<String> {
 }
 
 fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
-    let mirror = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, -1.0]));
     let mut random = Random::new(subject.seed, "mirror");
     let mut n = 0;
     for specimen in subject.specimens_by_default(4, &mut random)? {
-        if specimen.hypothesis != Hypothesis::Interface2d {
+        if !specimen.hypothesis.is_interface() {
             continue;
         }
+        // The normal direction stays.
+        let mut signs = vec![-1.0; specimen.probe.n_components()];
+        signs[0] = 1.0;
+        let mirror = DMatrix::from_diagonal(&DVector::from_vec(signs));
         for _ in 0..TWINS {
             n += twin(&specimen, &mirror, &mirror, ROUND_OFF, &mut random)?.map_err(|unlike| {
                 let name = specimen.name();

@@ -107,7 +107,7 @@ impl Specimen {
 
     /// Normal components come first.
     pub(super) fn n_normal(&self) -> usize {
-        if self.probe.n_components() == 2 { 1 } else { 3 }
+        if self.hypothesis.is_interface() { 1 } else { 3 }
     }
 
     /// The same pressure on all normal components; tension if it is negative.

@@ -12,13 +12,13 @@
 //!
 //! - K δ_r = r, K δ_q = q = dr/dλ (prescribed displacements included, also in δ_q), dλ = (s − c·(Δu + δ_r)) / c·δ_q, δ = δ_r + dλ δ_q.
 
-use super::Newton;
 use super::failure::{Iterations, Reason, StepFailure};
 use super::iterate::{Control, Correction, State};
 use super::line_search::{LineSearch, Otherwise};
 use super::loads::Loads;
 use super::outcome::Iteration;
 use super::residual::Task;
+use super::{Clock, Newton};
 use crate::assembly::Places;
 use crate::group::Group;
 use crate::problem::Formulation;
@@ -89,9 +89,9 @@ pub(super) struct ArcLength<'c> {
     loads: &'c Loads,
     measure: &'c Measure,
     distance: f64,
-    /// Load factor at the start, and time at the phase's.
+    /// Load factor at the start, and the time of the phase.
     from: f64,
-    time: f64,
+    clock: Clock,
     /// Displacement increments and increment of the load factor to start from.
     guess: (Vec<f64>, f64),
     /// Change of the prescribed displacements with the load factor, by place.
@@ -105,7 +105,7 @@ impl<'c> ArcLength<'c> {
     pub(super) fn new(
         newton: &Newton<'_>,
         loads: &'c Loads,
-        [from, time]: [f64; 2],
+        (from, clock): (f64, Clock),
         (measure, distance): (&'c Measure, f64),
         guess: (Vec<f64>, f64),
     ) -> Self {
@@ -114,7 +114,7 @@ impl<'c> ArcLength<'c> {
             measure,
             distance,
             from,
-            time,
+            clock,
             guess,
             rate: newton.places.gather(&loads.prescribed_rate()),
             right: newton.load_rate(loads),
@@ -128,7 +128,7 @@ impl<'c> ArcLength<'c> {
             external: newton.places.gather(&external),
             imposed: newton.imposed(&external),
             prescribed: self.rate.iter().map(|rate| rise * rate).collect(),
-            period: (self.time + self.from, rise.abs()),
+            period: self.clock.period(self.from, rise),
         }
     }
 

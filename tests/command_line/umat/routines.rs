@@ -1,0 +1,513 @@
+//! What can be said of a routine before it is run in earnest: `inspect`, `new-sidecar`, `laws`, `check`.
+
+use super::{BAD_INPUT, DONE, PLUGIN_TROUBLE, Place, number, place, rows};
+use crate::program::Outcome;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+fn json(outcome: &Outcome) -> Value {
+    serde_json::from_str(&outcome.stdout).unwrap()
+}
+
+/// The place of a routine whose sidecar is gone.
+fn bare(name: &str) -> Option<Place> {
+    let place = place(name)?;
+    std::fs::remove_file(place.path(&format!("{name}.law.toml"))).unwrap();
+    Some(place)
+}
+
+#[test]
+fn who_supplies_what_a_routine_calls_is_said() {
+    let (Some(calls), Some(utilities)) = (place("externals"), place("utilities")) else {
+        return;
+    };
+    let outcome = calls.run(&["inspect", "libexternals.so"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let line = |start: &str| {
+        let mut lines = outcome.stdout.lines();
+        lines
+            .find(|line| line.starts_with(start))
+            .unwrap_or_default()
+    };
+    assert_eq!(line("missing"), "missing       getvrm_, mutexlock_");
+    assert_eq!(line("from Pilum"), "");
+    assert!(
+        outcome.stdout.contains("nobody provides 2 of its symbols"),
+        "{}",
+        outcome.stdout
+    );
+    assert!(
+        outcome.stdout.contains("`externals = \"trap\"`"),
+        "{}",
+        outcome.stdout
+    );
+    let found = json(&utilities.run(&["inspect", "libutilities.so", "--json"]));
+    let names = |what: &str| -> Vec<&str> {
+        found[what]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|name| name.as_str().unwrap())
+            .collect()
+    };
+    assert!(names("missing").is_empty(), "{found}");
+    for name in ["sinv_", "sprind_", "rotsig_"] {
+        assert!(names("from_pilum").contains(&name), "{found}");
+        assert!(names("undefined").contains(&name), "{found}");
+    }
+    // What Pilum is said to supply, it does: the routine runs.
+    let remarks = found["remarks"].to_string();
+    assert!(
+        remarks.contains("with the sidecar utilities.law.toml"),
+        "{remarks}"
+    );
+    // A law of the contract lacks nothing.
+    let deps = std::env::current_exe()
+        .unwrap()
+        .parent()
+        .unwrap()
+        .join("libelastic.so");
+    let found = json(&calls.run(&["inspect", deps.to_str().unwrap(), "--json"]));
+    assert_eq!(found["missing"], serde_json::json!([]), "{found}");
+}
+
+#[test]
+fn a_new_sidecar_can_be_used_at_once() {
+    let Some(place) = bare("elastic") else {
+        return;
+    };
+    let outcome = place.run(&["inspect", "libelastic.so"]);
+    assert!(
+        outcome
+            .stdout
+            .contains("without a sidecar: `pilum new-sidecar`"),
+        "{}",
+        outcome.stdout
+    );
+    let driver = "law = \"elastic\"\nadapter = \"umat\"\nlibrary = \"libelastic.so\"\n\
+                  hypothesis = \"axisymmetric\"\nparameters = { prop_1 = 2e4, prop_2 = 0.3 }\n\
+                  [[segment]]\nincrements = 2\ncontrol = { 22 = { strain = -1e-3 } }\n";
+    place.write("driver.toml", driver);
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let said = "--nprops N --nstatv M` writes one to fill in";
+    assert!(outcome.says(said), "{}", outcome.stderr);
+    let outcome = place.run(&["new-sidecar", "libelastic.so", "--nprops", "2"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let said = "sidecar in elastic.law.toml: 2 parameters, 0 internal variables";
+    assert!(outcome.stdout.starts_with(said), "{}", outcome.stdout);
+    let rows = rows(&place, driver);
+    let stress = number(rows.last().unwrap(), "stress_22");
+    assert!((stress + 20.0).abs() < 1e-9, "{stress}");
+    // It is not written over.
+    let before = std::fs::read(place.path("elastic.law.toml")).unwrap();
+    let outcome = place.run(&["new-sidecar", "libelastic.so", "--nprops", "3"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("elastic.law.toml is there already"),
+        "{}",
+        outcome.stderr
+    );
+    assert_eq!(
+        std::fs::read(place.path("elastic.law.toml")).unwrap(),
+        before
+    );
+}
+
+#[test]
+fn a_new_sidecar_names_as_much_as_it_is_told() {
+    let Some(place) = bare("joint_3d") else {
+        return;
+    };
+    let arguments = "new-sidecar libjoint_3d.so --nprops 3 --nstatv 4 --ntens 2,3 --out other.toml";
+    let outcome = place.run(&arguments.split(' ').collect::<Vec<_>>());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let driver = "law = \"joint_3d\"\nadapter = \"umat\"\nlibrary = \"libjoint_3d.so\"\n\
+                  sidecar = \"other.toml\"\nhypothesis = \"interface_3d\"\n\
+                  parameters = { prop_1 = 1e6, prop_2 = 1e5, prop_3 = 0.5 }\n\
+                  initial = { traction = { n = -100.0 }, internal = { statev_1 = 0.25 } }\n\
+                  [[segment]]\nincrements = 1\ncontrol = { s = { jump = 1e-3 } }\n";
+    let rows = rows(&place, driver);
+    let end = rows.last().unwrap();
+    // 50 kPa hold, 0.5 mm of the slip is elastic; the rest adds to what was there. NTENS is the fourth.
+    assert!((number(end, "traction_s") - 50.0).abs() < 1e-9);
+    assert!((number(end, "statev_1") - 0.2505).abs() < 1e-12);
+    assert_eq!(number(end, "statev_4"), 3.0);
+}
+
+#[test]
+fn what_a_sidecar_cannot_be_for_is_refused() {
+    let Some(place) = bare("elastic") else {
+        return;
+    };
+    place.write("libnothing.so", "no library");
+    let deps = std::env::current_exe()
+        .unwrap()
+        .parent()
+        .unwrap()
+        .join("libcoulomb_joint.so");
+    let joint = deps.to_str().unwrap();
+    for (arguments, code, said) in [
+        (
+            vec!["libelastic.so", "--nprops", "2", "--ntens", "4,5"],
+            BAD_INPUT,
+            "--ntens 5: expected 2, 3, 4 or 6",
+        ),
+        (
+            vec!["libelastic.so", "--nprops", "many"],
+            BAD_INPUT,
+            "invalid value 'many'",
+        ),
+        (
+            vec!["libelastic.so", "--nprops", "20000"],
+            BAD_INPUT,
+            "20000 is not in 0..=10000",
+        ),
+        (vec!["libelastic.so"], BAD_INPUT, "--nprops"),
+        (
+            vec!["libelastic.so", "--nprops", "2", "--symbol", "sand_"],
+            PLUGIN_TROUBLE,
+            "has no routine sand_; it exports hooke_, umat_",
+        ),
+        (
+            vec!["libelsewhere.so", "--nprops", "2"],
+            BAD_INPUT,
+            "libelsewhere.so",
+        ),
+        (
+            vec!["libnothing.so", "--nprops", "2"],
+            PLUGIN_TROUBLE,
+            "libnothing.so is no library",
+        ),
+        (
+            vec![joint, "--nprops", "2"],
+            PLUGIN_TROUBLE,
+            "has no routine umat_, umat, UMAT, UMAT_",
+        ),
+    ] {
+        let mut all = vec!["new-sidecar"];
+        all.extend(arguments);
+        let outcome = place.run(&all);
+        assert_eq!(outcome.code, Some(code), "{all:?}: {}", outcome.stderr);
+        assert!(outcome.says(said), "{all:?}: {}", outcome.stderr);
+    }
+    assert_eq!(place.contents(), ["libelastic.so", "libnothing.so"]);
+}
+
+#[test]
+fn laws_shows_a_routine_with_a_sidecar() {
+    let Some(place) = place("maxwell") else {
+        return;
+    };
+    let outcome = place.run(&["laws", "libmaxwell.so"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for said in [
+        "umat_maxwell: Maxwell body",
+        "relaxation_time",
+        "default 1000; > 0",
+        "depends on the time",
+        "adapter = \"umat\"\n  library = \"libmaxwell.so\"",
+    ] {
+        assert!(outcome.stdout.contains(said), "{said}: {}", outcome.stdout);
+    }
+    // The same by its id, where its folder is looked in, and in the list.
+    let folder = place.path("");
+    let folder = folder.to_str().unwrap();
+    let by_id = place.run(&["laws", "umat_maxwell", "--law-path", folder]);
+    assert!(
+        by_id.stdout.contains("umat_maxwell: Maxwell body"),
+        "{}",
+        by_id.stderr
+    );
+    let list = place.run(&["laws", "--law-path", folder]);
+    let line = list
+        .stdout
+        .lines()
+        .find(|line| line.starts_with("umat_maxwell "));
+    let line = line.unwrap_or_default();
+    assert!(
+        line.contains("plane_strain, axisymmetric, 3d, UMAT"),
+        "{}",
+        list.stdout
+    );
+    let page = json(&place.run(&["laws", "libmaxwell.so", "--json"]));
+    assert_eq!(page["id"], "umat_maxwell");
+    assert_eq!(page["formulations"][0]["time_dependent"], true);
+    // A sidecar that is wrong is told of at its place.
+    let sidecar = std::fs::read_to_string(place.path("maxwell.law.toml")).unwrap();
+    place.write("maxwell.law.toml", sidecar.replacen("ntens", "n_tens", 1));
+    let outcome = place.run(&["laws", "libmaxwell.so"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("maxwell.law.toml:5:1"), "{}", outcome.stderr);
+}
+
+/// Outcomes and details of all checks of a routine, and how the program ended.
+fn checked(place: &Place, name: &str, more: &[&str]) -> (BTreeMap<String, [String; 2]>, Outcome) {
+    let library = format!("lib{name}.so");
+    let mut arguments = vec!["check", &library, "--json"];
+    arguments.extend(more);
+    let outcome = place.run(&arguments);
+    let report: Value = serde_json::from_str(&outcome.stdout).unwrap_or(Value::Null);
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let checks = report["checks"].as_array().cloned().unwrap_or_default();
+    let checks = checks.iter().map(|check| {
+        (
+            text(&check["id"]),
+            [text(&check["outcome"]), text(&check["details"])],
+        )
+    });
+    (checks.collect(), outcome)
+}
+
+/// Routines that do what their sidecars say: nothing fails, and nothing is warned of but empty texts.
+#[test]
+fn sound_routines_pass_every_check() {
+    for (name, more) in [
+        ("elastic", &[][..]),
+        ("maxwell", &[]),
+        (
+            "joint",
+            &[
+                "--set",
+                "friction=0.6",
+                "--set",
+                "shear_stiffness=1e4",
+                "--set",
+                "normal_stiffness=1e5",
+            ],
+        ),
+        (
+            "joint_3d",
+            &[
+                "--set",
+                "friction=0.6",
+                "--set",
+                "shear_stiffness=1e4",
+                "--set",
+                "normal_stiffness=1e5",
+            ],
+        ),
+        (
+            "drucker_prager",
+            &[
+                "--set",
+                "young_modulus=1e4",
+                "--set",
+                "alpha=0.3",
+                "--set",
+                "beta=0.05",
+                "--set",
+                "k=4",
+            ],
+        ),
+        (
+            "elastic_tangent",
+            &[
+                "--set",
+                "young_modulus=1e4",
+                "--set",
+                "alpha=0.3",
+                "--set",
+                "beta=0.05",
+                "--set",
+                "k=4",
+            ],
+        ),
+        (
+            "mohr_coulomb",
+            &[
+                "--set",
+                "young_modulus=1e4",
+                "--set",
+                "cohesion=5",
+                "--set",
+                "friction_angle=30",
+                "--set",
+                "dilatancy_angle=5",
+            ],
+        ),
+        ("rows", &[]),
+    ] {
+        let Some(place) = place(name) else {
+            return;
+        };
+        let (checks, outcome) = checked(&place, name, more);
+        assert_eq!(outcome.code, Some(DONE), "{name}: {}", outcome.stderr);
+        assert!(checks.len() >= 12, "{name}: {checks:?}");
+        for (id, [found, details]) in &checks {
+            let is_well = matches!(found.as_str(), "passed" | "skipped");
+            assert!(
+                is_well || id == "description-is-complete",
+                "{name}: {id} {found}: {details}"
+            );
+        }
+        for id in [
+            "routine-answers",
+            "routine-stays-inside",
+            "routine-is-repeatable",
+        ] {
+            assert_eq!(checks[id][0], "passed", "{name}: {id}");
+        }
+    }
+}
+
+#[test]
+#[expect(clippy::too_many_lines, reason = "a table of faults")]
+fn faults_of_routines_are_found_by_name() {
+    // The routine, a change of its sidecar, the check that finds it, and what is said.
+    let cases: [(&str, [&str; 2], &str, &str, &str); 9] = [
+        (
+            "saves",
+            ["", ""],
+            "routine-is-repeatable",
+            "failed",
+            "the same call gives another result",
+        ),
+        (
+            "six",
+            [
+                "ntens = [6]
+expand = true
+",
+                "ntens = [4, 6]
+",
+            ],
+            "routine-answers",
+            "failed",
+            "writes beyond the end of STRESS",
+        ),
+        (
+            "elastic_tangent",
+            ["tangent = \"approximate\"\n", ""],
+            "ddsdde-matches-differences",
+            "failed",
+            "`tangent = \"approximate\"`",
+        ),
+        (
+            "rows",
+            ["tangent_order = \"rows\"\n", ""],
+            "ddsdde-matches-differences",
+            "failed",
+            "its transpose fits: `tangent_order`",
+        ),
+        (
+            "rows",
+            ["ntens = [4, 6]\n", "ntens = [4, 6]\nsymmetric = true\n"],
+            "ddsdde-matches-differences",
+            "failed",
+            "`symmetric = true`, and DDSDDE is off",
+        ),
+        (
+            "maxwell",
+            ["time_dependent = true\n", ""],
+            "time-as-declared",
+            "warning",
+            "say `time_dependent = true` in the sidecar",
+        ),
+        (
+            "elastic",
+            [
+                "thread_safe = true\n",
+                "thread_safe = true\ntime_dependent = true\n",
+            ],
+            "time-as-declared",
+            "warning",
+            "DTIME changes nothing",
+        ),
+        (
+            "elastic",
+            ["ntens = [4, 6]\n", "ntens = [4, 5]\n"],
+            "sidecar-is-read",
+            "failed",
+            "3d has NTENS = 6, which `ntens` lacks",
+        ),
+        (
+            "externals",
+            ["", ""],
+            "routine-answers",
+            "failed",
+            "`getvrm_`",
+        ),
+    ];
+    for (name, [from, to], id, expected, said) in cases {
+        let Some(place) = place(name) else {
+            return;
+        };
+        let file = format!("{name}.law.toml");
+        let sidecar = std::fs::read_to_string(place.path(&file)).unwrap();
+        assert!(sidecar.contains(from), "{name}: {from}");
+        place.write(&file, sidecar.replacen(from, to, 1));
+        let alpha = ["--set", "alpha=0.3", "--set", "beta=0.05", "--set", "k=4"];
+        let more = if name == "elastic_tangent" {
+            &alpha[..]
+        } else {
+            &[]
+        };
+        let (checks, outcome) = checked(&place, name, more);
+        let [found, details] = &checks[id];
+        assert_eq!(found, expected, "{name}: {id}: {details}\n{checks:?}");
+        assert!(details.contains(said), "{name}: {id}: {details}");
+        let fails = checks.values().any(|[outcome, _]| outcome == "failed");
+        let code = if fails { PLUGIN_TROUBLE } else { DONE };
+        assert_eq!(outcome.code, Some(code), "{name}: {}", outcome.stderr);
+        if expected == "failed" {
+            assert!(
+                outcome.says("is not what its sidecar says"),
+                "{}",
+                outcome.stderr
+            );
+            assert!(outcome.says(id), "{name}: {}", outcome.stderr);
+        }
+    }
+    // Without a sidecar the way to one is told.
+    let Some(place) = bare("elastic") else {
+        return;
+    };
+    let (checks, outcome) = checked(&place, "elastic", &[]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let [found, details] = &checks["sidecar-is-read"];
+    assert_eq!(found, "failed");
+    assert!(details.contains("has no sidecar"), "{details}");
+}
+
+#[test]
+fn checks_and_settings_that_do_not_fit_are_refused() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let cases = [
+        (
+            vec!["--set", "youngs_modulus=1e4"],
+            "the sidecar names no parameter `youngs_modulus`: did you mean `young_modulus`?",
+        ),
+        (
+            vec!["--set", "poisson_ratio=0.5"],
+            "0.5 is outside (-1, 0.5)",
+        ),
+        (
+            vec!["--only", "handshake-is-accepted"],
+            "this check is for libraries of the contract",
+        ),
+    ];
+    for (more, said) in cases {
+        let (_, outcome) = checked(&place, "elastic", &more);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(outcome.says(said), "{}", outcome.stderr);
+    }
+    let deps = std::env::current_exe()
+        .unwrap()
+        .parent()
+        .unwrap()
+        .join("libelastic.so");
+    let outcome = place.run(&["check", deps.to_str().unwrap(), "--only", "routine-answers"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("this check is for UMATs"),
+        "{}",
+        outcome.stderr
+    );
+    // One of them alone.
+    let (checks, outcome) = checked(&place, "elastic", &["--only", "time-as-declared"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_eq!(checks.keys().collect::<Vec<_>>(), ["time-as-declared"]);
+}
