@@ -271,8 +271,9 @@ impl<'a> Search<'a> {
         }
         let operator = &self.trial.operator;
         if largest(operator) == 0.0 {
-            // At its strength a law without hardening answers to the way back alone.
-            if largest(&flux) == 0.0 {
+            // At its strength a law without hardening answers to the way back alone. So does a routine
+            // that refuses what is too far for it, without a way to say so.
+            if largest(&flux) == 0.0 || self.law.library().foreign().is_some() {
                 return Ok(Some(true));
             }
             let back: Vector = std::array::from_fn(|i| 2.0 * start.gradient[i] - gradient[i]);
