@@ -188,8 +188,11 @@ fn every_kind_of_tangent_is_solved() {
     }
 }
 
+/// Texts, and what stands there instead.
+type Edits = &'static [(&'static str, &'static str)];
+
 /// A joint of 1e5 kPa/m that calls every update unreliable, its tangent by differences.
-const UNRELIABLE: [(&str, &str, &[(&str, &str)]); 3] = [
+const UNRELIABLE: [(&str, &str, Edits); 3] = [
     (
         "models/foreign/coulomb_joint.c",
         "coulomb_joint_c",

@@ -227,6 +227,11 @@ fn mistakes_are_said_where_they_are_made() {
         }
         assert!(outcome.says("case.toml"), "{to}: {}", outcome.stderr);
     }
+}
+
+#[test]
+fn what_cannot_be_a_zone_or_take_one_is_refused() {
+    let place = Place::new();
     // A zone of a zone; a solid of a zone.
     let nested = joint(&format!(
         "adapter = \"shear_zone\"\nlaw = \"other\"\nthickness = 0.01\n[laws.other]\n{ZONE}"

@@ -420,7 +420,8 @@ fn initial(simulation: &Simulation, name: &str, built: &BuiltLaw) -> Map<String,
     let of_groups = problem.groups.iter().map(|group| &group.material);
     let of_phases = problem.phases.iter().flat_map(|phase| &phase.materials);
     let mut all = of_groups.chain(of_phases.map(|(_, material)| material));
-    let same = all.find(|material| material.name == name && std::ptr::eq(&*material.built, built));
+    let same =
+        all.find(|material| material.name == name && std::ptr::eq(material.built.as_ref(), built));
     let variables = &built.law.formulation().internal_variables;
     let given = same.into_iter().flat_map(|material| &material.initial);
     given

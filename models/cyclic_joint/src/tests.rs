@@ -315,7 +315,8 @@ fn slip_without_contact_wears_nothing_down_whatever_contraction_is_left() {
 
 #[test]
 fn internal_variables_that_no_path_leads_to_are_refused() {
-    let variables: [(&str, fn(&mut State) -> &mut f64); 3] = [
+    type Of = fn(&mut State) -> &mut f64;
+    let variables: [(&str, Of); 3] = [
         ("plastic_slip", |s| &mut s.plastic_slip),
         ("plastic_contraction", |s| &mut s.plastic_contraction),
         ("gap", |s| &mut s.gap),

@@ -161,7 +161,7 @@ impl State {
             Some("stress_level is outside [0, 1]")
         } else if self.gap < 0.0 {
             Some("gap is below 0 m")
-        } else if self.broken != 0.0 && self.broken != 1.0 {
+        } else if self.broken * (1.0 - self.broken) != 0.0 {
             Some("broken is neither 0 nor 1")
         } else {
             None

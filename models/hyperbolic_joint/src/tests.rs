@@ -409,7 +409,8 @@ fn an_open_interface_has_no_elastic_shear_whatever_the_exponent() {
 
 #[test]
 fn internal_variables_that_no_path_leads_to_are_refused() {
-    let faults: [(&str, fn(&mut State)); 5] = [
+    type Make = fn(&mut State);
+    let faults: [(&str, Make); 5] = [
         ("stress_level", |s| s.stress_level = -0.1),
         ("stress_level", |s| s.stress_level = 1.1),
         ("gap", |s| s.gap = -1e-3),
