@@ -444,7 +444,8 @@ contains
   ! for each component. `size` is a strain or jump over which the response bends, such as strength
   ! over stiffness; where the response is smooth over 1e-5 of it and the update is good to round-off,
   ! the error is about 1e-10 of the stiffness. At a kink the result lies between those of its sides.
-  ! `update` is called with TANGENT_NONE; what fails there is the outcome.
+  ! `update` is called with TANGENT_NONE; what fails there is the outcome, and what is unreliable there
+  ! makes an outcome of PILUM_OK unreliable.
   subroutine differentiate(p, point, update, size, end, status)
     real(dp), intent(in) :: p(:), size
     type(point_type), intent(in) :: point
@@ -470,6 +471,10 @@ contains
           end%step_factor = trial%step_factor
           status = outcome
           return
+        end if
+        if (outcome == PILUM_OK_UNRELIABLE .and. status == PILUM_OK) then
+          end%reason = trial%reason
+          status = outcome
         end if
         flux(:n, side) = trial%flux(:n)
       end do

@@ -265,11 +265,19 @@ template <class Law> struct Exported {
         if constexpr (HasDifferences<Law>::value) {
             if (tangent == PILUM_TANGENT_CONSISTENT) {
                 pilum_status status = update_once(opaque, point, PILUM_TANGENT_NONE, end);
-                if (status != PILUM_OK) {
+                if (status != PILUM_OK && status != PILUM_OK_UNRELIABLE) {
                     return status;
                 }
                 double size = reinterpret_cast<const Instance *>(opaque)->law.difference_size();
-                return pilum_differentiate(opaque, point, update_once, size, end);
+                const char *reason = end->reason;
+                pilum_status differences =
+                    pilum_differentiate(opaque, point, update_once, size, end);
+                if (status == PILUM_OK ||
+                    (differences != PILUM_OK && differences != PILUM_OK_UNRELIABLE)) {
+                    return differences;
+                }
+                end->reason = reason;
+                return status;
             }
         }
         return update_once(opaque, point, tangent, end);

@@ -323,13 +323,15 @@ static inline pilum_status pilum_each_point(const pilum_instance *instance,
  * for each component. `size` is a strain or jump over which the response bends, such as strength
  * over stiffness; where the response is smooth over 1e-5 of it and the update is good to round-off,
  * the error is about 1e-10 of the stiffness. At a kink the result lies between those of its sides.
- * `update` is called with PILUM_TANGENT_NONE. Its outcome, if one of the updates fails. */
+ * `update` is called with PILUM_TANGENT_NONE. Its outcome, if one of the updates fails;
+ * PILUM_OK_UNRELIABLE with its reason, if one of them is unreliable. */
 static inline pilum_status pilum_differentiate(const pilum_instance *instance,
                                                const pilum_point *point, pilum_update update,
                                                double size, pilum_response *end) {
     const double step = 6e-6 * size;
     const uint32_t n = point->n;
     pilum_point moved = *point;
+    pilum_status all = PILUM_OK;
     for (uint32_t column = 0; column < n; column++) {
         double flux[2][PILUM_MAX_COMPONENTS], increment[2];
         for (int side = 0; side < 2; side++) {
@@ -343,6 +345,10 @@ static inline pilum_status pilum_differentiate(const pilum_instance *instance,
                 end->step_factor = trial.step_factor;
                 return status;
             }
+            if (status == PILUM_OK_UNRELIABLE) {
+                end->reason = trial.reason;
+                all = status;
+            }
             for (uint32_t row = 0; row < n; row++) {
                 flux[side][row] = trial.flux[row];
             }
@@ -353,7 +359,7 @@ static inline pilum_status pilum_differentiate(const pilum_instance *instance,
                 (flux[1][row] - flux[0][row]) / (increment[1] - increment[0]);
         }
     }
-    return PILUM_OK;
+    return all;
 }
 
 /* A gradient or flux: a tensor in Voigt order, or with `PILUM_VECTOR` normal first. */

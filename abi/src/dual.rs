@@ -163,7 +163,8 @@ pub trait Number:
     #[must_use]
     fn powf(self, n: f64) -> Self {
         let x = self.value();
-        self.chained(x.powf(n), n * x.powf(n - 1.0))
+        let derivative = if n == 0.0 { 0.0 } else { n * x.powf(n - 1.0) };
+        self.chained(x.powf(n), derivative)
     }
     /// From degrees to radians.
     #[must_use]
@@ -213,7 +214,7 @@ impl<const N: usize> Dual<N> {
     fn of_two(value: f64, by_a: f64, a: &Self, by_b: f64, b: &Self) -> Self {
         Self {
             value,
-            rates: std::array::from_fn(|k| by_a * a.rates[k] + by_b * b.rates[k]),
+            rates: std::array::from_fn(|k| times(by_a, a.rates[k]) + times(by_b, b.rates[k])),
         }
     }
 }
@@ -227,9 +228,15 @@ impl<const N: usize> Number for Dual<N> {
     fn chained(self, value: f64, derivative: f64) -> Self {
         Self {
             value,
-            rates: self.rates.map(|rate| derivative * rate),
+            rates: self.rates.map(|rate| times(derivative, rate)),
         }
     }
+}
+
+/// A derivative times a rate: what does not change adds nothing, though the derivative be infinite.
+#[inline]
+fn times(derivative: f64, rate: f64) -> f64 {
+    if rate == 0.0 { 0.0 } else { derivative * rate }
 }
 
 impl<const N: usize> From<f64> for Dual<N> {
@@ -296,7 +303,7 @@ macro_rules! operation {
 operation!(Add add: |a, b| a + b, 1.0, 1.0);
 operation!(Sub sub: |a, b| a - b, 1.0, -1.0);
 operation!(Mul mul: |a, b| a * b, b, a);
-operation!(Div div: |a, b| a / b, 1.0 / b, -a / (b * b));
+operation!(Div div: |a, b| a / b, 1.0 / b, -(a / b) / b);
 
 impl<const N: usize> AddAssign for Dual<N> {
     #[inline]
@@ -623,6 +630,30 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// At 0 a root has no derivative, but a number that does not change has none to lose.
+    #[test]
+    #[expect(clippy::float_cmp, reason = "zeros are exact")]
+    fn constants_stay_constant_where_a_derivative_is_infinite() {
+        let zero = Dual::<1>::constant(0.0);
+        for (value, result) in [
+            (0.0, zero.sqrt()),
+            (0.0, zero.powf(0.5)),
+            (f64::NEG_INFINITY, zero.ln()),
+            (1.0, zero.powf(0.0)),
+            (0.0, zero * Dual::constant(f64::INFINITY).powf(-1.0)),
+        ] {
+            assert_eq!((result.value, result.rates), (value, [0.0]));
+        }
+        let x = Dual::<1>::variable(0.0, 0);
+        assert_eq!(x.powf(0.0).rates, [0.0]);
+        assert_eq!(x.sqrt().rates, [f64::INFINITY]);
+        // 1e-200 over 1e-200: the square of the divisor is no number any more.
+        let tiny = Dual::<1>::variable(1e-200, 0);
+        let ratio = Dual::constant(2e-200) / tiny;
+        assert_eq!((ratio.value, ratio.rates[0]), (2.0, -2e200));
+        assert_eq!((tiny / tiny).rates, [0.0]);
     }
 
     #[test]

@@ -148,7 +148,8 @@ impl Schema {
         for (key, value) in keys {
             // In axisymmetry, another name for the same.
             let other = match key.as_str() {
-                "r" | "z" if same(keys.get("x"), keys.get("r")) => continue,
+                "r" if same(keys.get("x"), keys.get("r")) => continue,
+                "z" if same(keys.get("y"), keys.get("z")) => continue,
                 "x" if keys.contains_key("r") => Some("r"),
                 "y" if keys.contains_key("z") => Some("z"),
                 _ => None,

@@ -11,6 +11,8 @@
 
 use crate::compilers::{library, repository};
 use crate::program::pilum;
+use abi::Hypothesis;
+use law::{End, Moment, Operator, SearchPath, Start, Strided};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
@@ -183,5 +185,108 @@ fn every_kind_of_tangent_is_solved() {
             _ => "tangent unsymmetric, approximate",
         };
         assert!(page.stdout.contains(says), "{}{}", page.stdout, page.stderr);
+    }
+}
+
+/// Texts, and what stands there instead.
+type Edits = &'static [(&'static str, &'static str)];
+
+/// A joint of 1e5 kPa/m that calls every update unreliable, its tangent by differences.
+const UNRELIABLE: [(&str, &str, Edits); 3] = [
+    (
+        "models/foreign/coulomb_joint.c",
+        "coulomb_joint_c",
+        &[(
+            "pilum_tangent tangent, pilum_response *end) {\n    carry(",
+            "pilum_tangent tangent, pilum_response *end) {\n    end->reason = \"coarse\";\n    for (int i = 0; \
+             i < 2; i++) { end->flux[i] = point->flux[i] + 1e5 * point->increment[i]; }\n    if (tangent == \
+             PILUM_TANGENT_CONSISTENT) { return pilum_differentiate(joint, point, update, 1e-3, end); }\n    \
+             if (tangent == PILUM_TANGENT_NONE) { return PILUM_OK_UNRELIABLE; }\n    carry(",
+        )],
+    ),
+    (
+        "tests/authors/two_laws.cpp",
+        "counter_cpp",
+        &[
+            (
+                "explicit Counter(",
+                "double difference_size() const { return 1e-3; }\n    explicit Counter(",
+            ),
+            (
+                "            end.tangent[3 * i] = 1e5;\n",
+                "            end.reason = \"coarse\";\n",
+            ),
+            (
+                "        return PILUM_OK;\n    }\n};\n\nPILUM",
+                "        return PILUM_OK_UNRELIABLE;\n    }\n};\n\nPILUM",
+            ),
+        ],
+    ),
+    (
+        "tests/authors/two_laws.f90",
+        "counter_fortran",
+        &[
+            ("  subroutine counter(", "  recursive subroutine counter("),
+            (
+                "    call elastic(1e5_dp, point, end)\n",
+                "    end%flux = point%flux + 1e5_dp*point%increment\n    end%reason = 'coarse'\n    \
+                 if (tangent == TANGENT_NONE) status = PILUM_OK_UNRELIABLE\n    \
+                 if (tangent == TANGENT_CONSISTENT) call differentiate(p, point, counter, 1e-3_dp, end, status)\n",
+            ),
+        ],
+    ),
+];
+
+#[test]
+fn a_tangent_by_differences_of_unreliable_updates_is_there_and_called_unreliable() {
+    for (source, id, edits) in UNRELIABLE {
+        let mut text = std::fs::read_to_string(repository(source)).unwrap();
+        for (from, to) in edits {
+            assert!(text.contains(from), "{source}: {from}");
+            text = text.replacen(from, to, 1);
+        }
+        let folder = TempDir::new().unwrap();
+        let changed = folder.path().join(Path::new(source).file_name().unwrap());
+        std::fs::write(&changed, text).unwrap();
+        if library(&changed, id, folder.path()).is_none() {
+            continue;
+        }
+        let law = SearchPath::new(&[folder.path().to_owned()])
+            .law(id)
+            .unwrap();
+        let parameters: &[f64] = match law.description().parameters.len() {
+            0 => &[],
+            _ => &[1e5, 1e5, 0.0, 30.0, 0.0, 0.0],
+        };
+        let built = law.build(Hypothesis::Interface2d, parameters).unwrap();
+        let rows = Strided::rows(2);
+        let state = built.initial_state(1, (&[0.0; 2], rows)).unwrap();
+        let (mut flux, mut state_end, mut operator) = ([0.0; 2], state.clone(), [0.0; 4]);
+        let success = built
+            .integrate(
+                &Start {
+                    n_points: 1,
+                    gradient: (&[0.0; 2], rows),
+                    gradient_end: (&[-1e-3, 0.0], rows),
+                    flux: (&[0.0; 2], rows),
+                    state: &state,
+                    time: 0.0,
+                    time_increment: 1.0,
+                    moment: Moment::default(),
+                    sites: &[],
+                },
+                Operator::Consistent,
+                End {
+                    flux: (&mut flux, rows),
+                    state: &mut state_end,
+                    operator: &mut operator,
+                },
+            )
+            .unwrap();
+        let (_, why) = success.unreliable.expect(id);
+        assert!(why.contains("coarse"), "{id}: {why}");
+        for (found, expected) in operator.iter().zip([1e5, 0.0, 0.0, 1e5]) {
+            assert!((found - expected).abs() < 1e-3, "{id}: {operator:?}");
+        }
     }
 }

@@ -229,3 +229,42 @@ fn drivers_and_studies_take_settings() {
         outcome.stderr
     );
 }
+
+#[test]
+fn an_initial_stress_of_the_command_line_is_refused_there() {
+    let place = Place::new();
+    let driver = "law = \"mepi\"\nhypothesis = \"interface_2d\"\nparameters = { k_n = 0.86e5, k_t = \
+                  0.37e5, n = 0.55, mu_0 = 0.27, mu_p = 0.7, mu_c0 = 0.46, a = 0.008, c_0 = 40.0, t = \
+                  0.002 }\ninitial = { traction = { n = -100.0, t = 0.0 } }\n\
+                  segment = [{ increments = 1, control = { t = { jump = 1e-4 } } }]\n";
+    place.write("driver.toml", driver);
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let setting = "initial.traction.n=50";
+    let outcome = place.run(&["point", "driver.toml", "--set", setting]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    for words in ["[--set:1:1]", setting] {
+        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
+    }
+    // In the file it is shown there.
+    place.write("driver.toml", driver.replace("n = -100.0", "n = 50.0"));
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(outcome.says("[driver.toml:4:"), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_number_of_increments_is_a_whole_number() {
+    let place = Place::new();
+    let driver = "law = \"elastic\"\nhypothesis = \"plane_strain\"\nparameters = { young_modulus = 1e4, \
+                  poisson_ratio = 0.3 }\nsegment = [{ increments = 2.5, control = { 11 = { strain = 1e-4 } \
+                  } }]\n";
+    place.write("driver.toml", driver);
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    assert!(
+        outcome.says("expected a whole number"),
+        "{}",
+        outcome.stderr
+    );
+}

@@ -153,6 +153,21 @@ fn mistakes_are_said_where_they_are_made() {
             &["`thickness`: 0 m is outside (0, ∞)"],
         ),
         (
+            ("thickness = 0.01", "thickness = 1e-20"),
+            &["`thickness`: 1e-20 m is below 1e-9 m", "case.toml:"],
+        ),
+        (
+            ("law = \"elastic\"\nthickness", "law = \"soul\"\nthickness"),
+            &["no library with law `soul`", "did you mean `soil`?"],
+        ),
+        (
+            (
+                "adapter = \"shear_zone\"\nlaw = \"elastic\"\nthickness = 0.01",
+                "law = \"elastic\"",
+            ),
+            &["`adapter = \"shear_zone\"` with a `thickness` makes"],
+        ),
+        (
             ("thickness = 0.01", "thickness = 0.01\nlateral_ratio = -1.0"),
             &["`lateral_ratio`: -1 is outside [0, ∞)"],
         ),
@@ -212,6 +227,11 @@ fn mistakes_are_said_where_they_are_made() {
         }
         assert!(outcome.says("case.toml"), "{to}: {}", outcome.stderr);
     }
+}
+
+#[test]
+fn what_cannot_be_a_zone_or_take_one_is_refused() {
+    let place = Place::new();
     // A zone of a zone; a solid of a zone.
     let nested = joint(&format!(
         "adapter = \"shear_zone\"\nlaw = \"other\"\nthickness = 0.01\n[laws.other]\n{ZONE}"
@@ -227,7 +247,7 @@ fn mistakes_are_said_where_they_are_made() {
     let outcome = place.run_case(solid);
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(
-        outcome.says("is made for interface_2d"),
+        outcome.says("law `joint` is a shear zone, made for interface_2d"),
         "{}",
         outcome.stderr
     );
@@ -241,4 +261,98 @@ fn mistakes_are_said_where_they_are_made() {
     let outcome = place.run(&["point", "driver.toml"]);
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     assert!(outcome.says("law `soil` is not used"), "{}", outcome.stderr);
+}
+
+#[test]
+fn thicknesses_that_are_seldom_meant_are_warned_of() {
+    let place = Place::new();
+    let layer = |thickness: &str| {
+        let text = edited(&[]).replacen(OWN, ZONE, 1);
+        text.replacen("thickness = 0.01", thickness, 1)
+    };
+    let about = ["the layer of elements is 0.010000 m thick", "usual range"];
+    for (thickness, said) in [
+        ("thickness = 0.01", [false, false]),
+        ("thickness = 0.02", [true, false]),
+        ("thickness = 5.0", [true, true]),
+        ("thickness = 5e-5", [true, true]),
+    ] {
+        let outcome = place.run_case(layer(thickness));
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        for (words, said) in about.iter().zip(said) {
+            assert_eq!(outcome.says(words), said, "{thickness}: {}", outcome.stderr);
+        }
+    }
+    // At one point there is no layer.
+    let zone = "law = \"elastic\"\nadapter = \"shear_zone\"\nhypothesis = \"interface_2d\"\n\
+                thickness = 5.0\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n\
+                segment = [{ increments = 1, control = { t = { jump = 1e-3 } } }]\n";
+    place.write("driver.toml", zone);
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(
+        outcome.says("thickness = 5 m of its shear zone is outside its usual range [1e-4, 0.5]"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn what_a_case_gives_to_start_from_is_looked_at_without_stress_too() {
+    let place = Place::new();
+    let zone = ZONE.replace("\"elastic\"", "\"mohr_coulomb\"").replace(
+        "poisson_ratio = 0.3 }",
+        "poisson_ratio = 0.3, cohesion = 5.0, friction_angle = 30.0, dilatancy_angle = 0.0 }\n\
+         initial = { zone_stress_11 = -500.0 }",
+    );
+    let outcome = place.run_case(joint(&zone));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for words in [
+        "law `joint` takes over group `layer`",
+        "where it found none",
+    ] {
+        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
+    }
+    let outcome = place.run_case(joint(&zone.replace("-500.0", "0.0")));
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(!outcome.says("takes over"), "{}", outcome.stderr);
+}
+
+/// At 1e12 kPa/m and more, displacements are told to 1e-16 of their size, and stresses to as much.
+#[test]
+fn a_stress_that_round_off_keeps_from_its_goal_is_told() {
+    let place = Place::new();
+    let driver = |young: &str| {
+        format!(
+            "law = \"mohr_coulomb\"\nhypothesis = \"plane_strain\"\nparameters = {{ young_modulus = {young}, \
+             poisson_ratio = 0.3, cohesion = 0.0, friction_angle = 35.0, dilatancy_angle = 0.0 }}\n\
+             initial = {{ stress = {{ 11 = -100.0, 22 = -100.0, 33 = -100.0 }} }}\n\
+             segment = [{{ increments = 100, control = {{ 12 = {{ strain = 5e-4 }}, 11 = {{ strain = 0.0 }}, \
+             33 = {{ strain = 0.0 }} }} }}]\n"
+        )
+    };
+    for (young, said) in [("20e3", false), ("2e24", true)] {
+        place.write("driver.toml", driver(young));
+        let outcome = place.run(&["point", "driver.toml"]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let words = "is so stiff that rounding the strain changes the stress by as much";
+        assert_eq!(outcome.says(words), said, "{young}: {}", outcome.stderr);
+    }
+}
+
+/// A base at its resistance answers to no further movement, but to the way back.
+#[test]
+fn a_strength_that_is_reached_is_not_called_a_law_that_takes_no_notice() {
+    let place = Place::new();
+    place.write(
+        "driver.toml",
+        "law = \"qz_curve\"\nhypothesis = \"interface_2d\"\nparameters = { pressuremeter_modulus = 12e3, \
+         diameter = 0.6, soil = \"fine\", base_resistance = 2e3, shear_stiffness = 0.0 }\n\
+         segment = [{ increments = 10, control = { n = { jump = -0.5 } } }]\n",
+    );
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let last = *column(&place.path("out.csv"), "traction_n").last().unwrap();
+    assert!((last + 2e3).abs() < 1e-9, "{last}");
+    assert!(!outcome.says("takes no notice"), "{}", outcome.stderr);
 }

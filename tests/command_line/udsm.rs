@@ -288,6 +288,16 @@ fn what_a_routine_does_wrong_is_named() {
             "the routine overwrites Props, which is an input",
         ),
         (5.0, PLUGIN_TROUBLE, "the law ended its process"),
+        (
+            6.0,
+            PLUGIN_TROUBLE,
+            "the routine leaves D unwritten in task 6",
+        ),
+        (
+            7.0,
+            PLUGIN_TROUBLE,
+            "the routine returns a stress yz or zx of 1e0",
+        ),
     ] {
         place.write("driver.toml", skewed(ROWS, wrong, STRAINED));
         let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
@@ -377,7 +387,10 @@ fn mistakes_are_said_where_they_are_made() {
             "\"plane_strain\"",
             "\"interface_2d\"",
             BAD_INPUT,
-            &["is made for plane_strain, axisymmetric, 3d"],
+            &[
+                "is made for plane_strain, axisymmetric, 3d",
+                "`adapter = \"shear_zone\"` with a `thickness` makes",
+            ],
         ),
     ] {
         assert!(text.contains(from), "{from}");

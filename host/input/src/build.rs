@@ -3,7 +3,9 @@
 
 use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
 use crate::ground::{ProfileInput, level};
-use crate::material::{LawTables, ParameterValue, place_failure, try_law};
+use crate::material::{
+    LawTables, ParameterValue, ZONE, is_solid_at_interface, place_failure, try_law,
+};
 use crate::mesh::{self, Built, MeshFile};
 use crate::{Error, figures, pile, probes};
 use abi::Hypothesis;
@@ -209,7 +211,42 @@ impl Case {
 
     /// What is plausible in the case but seldom meant, beside what its problem is warned of.
     pub fn warnings(&self, simulation: &Simulation) -> Vec<String> {
-        probes::reactions(self, simulation.problem())
+        let mut warnings = probes::reactions(self, simulation.problem());
+        warnings.extend(self.forgetful_swaps(simulation.problem()));
+        warnings
+    }
+
+    /// Swaps to a law of the same id that cannot go on from the internal variables it finds.
+    fn forgetful_swaps(&self, problem: &Problem) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for (number, group) in problem.groups.iter().enumerate() {
+            let mut before = &group.material;
+            for (phase, input) in problem.phases.iter().enumerate() {
+                let own = input.materials.iter().find(|(of, _)| *of == number);
+                let Some((_, material)) = own else { continue };
+                let why = material.built.law.cannot_go_on_from(&before.built.law);
+                // The laws of the first phase are those that the groups start with.
+                if let Some(why) = why.filter(|_| phase > 0) {
+                    let item = Item::LawOf {
+                        group: number,
+                        phase: Some(phase),
+                    };
+                    let at = self.span(&item, &Cause::NoPhase);
+                    warnings.push(format!(
+                        "{}: phase `{}`: law `{}` of group `{}` has the id of law `{}`, `{}`, and starts \
+                         anew from the stress it finds: {why}",
+                        self.source.place(&at),
+                        input.name,
+                        material.name,
+                        group.name,
+                        before.name,
+                        before.built.law.description().id,
+                    ));
+                }
+                before = material;
+            }
+        }
+        warnings
     }
 
     /// An error of the case's problem or simulation, at its place in the file where it has one.
@@ -252,7 +289,11 @@ impl Case {
                     Key::Integration => group.integration.as_ref().map(Spanned::span),
                     Key::Normal => group.normal.as_ref().map(Spanned::span),
                     Key::InPlane => group.in_plane.as_ref().map(Spanned::span),
-                    Key::InitialStress => group.initial_stress.as_ref().map(Spanned::span),
+                    Key::InitialStress => {
+                        let path = format!("groups.{}.initial_stress", name.get_ref());
+                        let setting = self.source.setting_of(&path);
+                        setting.or_else(|| group.initial_stress.as_ref().map(Spanned::span))
+                    }
                     Key::UnitWeight => group.unit_weight.as_ref().map(Spanned::span),
                     Key::Drainage => group.drainage.as_ref().map(Spanned::span),
                     Key::UndrainedPoissonRatio => {
@@ -347,11 +388,19 @@ impl Case {
     fn cannot_start(&self, failure: Box<PointFailure>) -> Error {
         let mut laws = self.file.laws.iter();
         let entry = laws.find(|(key, _)| key.get_ref() == &failure.law);
-        let outcome = failure.failure.outcome;
+        let (outcome, group) = (failure.failure.outcome, failure.group.clone());
         let error = mechanics::Error::CannotStart(failure);
         match entry {
-            Some((_, law)) if matches!(outcome, Outcome::Domain | Outcome::Parameter) => {
-                let span = law.get_ref().law.span();
+            Some((name, law)) if matches!(outcome, Outcome::Domain | Outcome::Parameter) => {
+                let law = law.get_ref();
+                // What the file gives to start from is what the law can refuse first.
+                let given = law.initial.values().next().map(Spanned::span);
+                let paths = [
+                    format!("laws.{}.initial", name.get_ref()),
+                    format!("groups.{group}.initial_stress"),
+                ];
+                let setting = paths.iter().find_map(|path| self.source.setting_of(path));
+                let span = setting.or(given).unwrap_or_else(|| law.law.span());
                 self.source.error(span, error.to_string()).into()
             }
             _ => error.into(),
@@ -510,10 +559,25 @@ impl<'a> LawShelf<'a> {
             let loaded = self.loaded(entry)?;
             let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
                 let error = place_failure(self.source, &entry.law, parameters, &failure);
-                if matches!(failure.cause, BuildCause::Hypothesis { .. }) {
-                    self.explain(error, group_name, group, name)
-                } else {
+                if !matches!(failure.cause, BuildCause::Hypothesis { .. }) {
                     error
+                } else if let Some(adapter) =
+                    entry.adapter.as_ref().filter(|_| entry.is_shear_zone())
+                {
+                    let message = format!(
+                        "law `{}` is a shear zone, made for interface_2d, expected {}",
+                        name.get_ref(),
+                        hypothesis.name()
+                    );
+                    let error = self.source.error(adapter.span(), message);
+                    self.explain(error.into(), group_name, group, name)
+                } else {
+                    let error = self.explain(error, group_name, group, name);
+                    if is_solid_at_interface(&failure) {
+                        error.with_hint(ZONE)
+                    } else {
+                        error
+                    }
                 }
             })?;
             let built = Arc::new(built);

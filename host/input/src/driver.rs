@@ -270,10 +270,11 @@ impl Driver {
     ) -> Result<Self, Error> {
         let hypothesis = hypothesis(source, &file.hypothesis)?;
         let segments = segments(source, &file, hypothesis)?;
-        let place_of_initial = file
+        let in_file = file
             .initial
             .as_ref()
             .map_or_else(|| file.law.span(), Spanned::span);
+        let place_of_initial = source.setting_of("initial").unwrap_or(in_file);
         let none = Initial::default();
         let initial = file.initial.as_ref().map_or(&none, Spanned::get_ref);
         let flux = initial_flux(source, initial, hypothesis)?;

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use text::{Named, Source};
+use text::{Named, Source, suggestion};
 use toml::Spanned;
 
 /// The value of a parameter as written in a file.
@@ -64,8 +64,29 @@ pub fn build_law(
         let message = "one point has no height for a parameter to vary with";
         return Err(source.error(value.span(), message).into());
     }
-    try_law(loaded, hypothesis, parameters)
-        .map_err(|failure| place_failure(source, id, parameters, &failure))
+    try_law(loaded, hypothesis, parameters).map_err(|failure| {
+        let error = place_failure(source, id, parameters, &failure);
+        if is_solid_at_interface(&failure) {
+            error.with_hint(ZONE)
+        } else {
+            error
+        }
+    })
+}
+
+/// What makes a law of solids one of interfaces.
+pub(crate) const ZONE: &str =
+    "`adapter = \"shear_zone\"` with a `thickness` makes an interface law of a law of solids";
+
+/// Whether a law is made for solids alone and an interface is to take it.
+pub(crate) fn is_solid_at_interface(failure: &BuildFailure) -> bool {
+    let interface = Hypothesis::Interface2d;
+    match &failure.cause {
+        BuildCause::Hypothesis { offered, wanted } => {
+            *wanted == interface && !offered.contains(interface.name())
+        }
+        _ => false,
+    }
 }
 
 /// The same, with what does not fit as data.
@@ -188,7 +209,16 @@ impl<'a> LawTables<'a> {
             return find_law(source, search, &entry.law, foreign.as_ref());
         };
         let law = match self.filler(entry) {
-            None => find_law(source, search, &entry.law, None)?,
+            None => find_law(source, search, &entry.law, None).map_err(|error| {
+                let others = self.tables.iter();
+                let others = others.filter(|(_, table)| !table.get_ref().is_shear_zone());
+                let names: Vec<&str> = others.map(|(name, _)| name.get_ref().as_str()).collect();
+                if names.is_empty() {
+                    return error;
+                }
+                let tables = suggestion(entry.law.get_ref(), names);
+                error.with_hint(&format!("of the tables under [laws]: {tables}"))
+            })?,
             Some(table) if table.is_shear_zone() => {
                 let message = format!("law `{}` is a shear zone itself", entry.law.get_ref());
                 return Err(source.error(entry.law.span(), message).into());

@@ -244,6 +244,8 @@ impl LoadedLaw {
             failure(parameter, BuildCause::Refused(refusal.reason.clone()))
         })?;
         let id = &description.id;
+        let zone = self.shear_zone();
+        warnings.extend(zone.and_then(|zone| zone.implausible(id)));
         warnings.extend(law.changes().iter().map(|it| format!("law `{id}`: {it}")));
         Ok(BuiltLaw {
             law,

@@ -109,6 +109,42 @@ impl Law {
         &self.parameters
     }
 
+    /// Why internal variables of another law with the same id mean nothing to this one; `None` if they
+    /// are the same ones, of the same library, and where the ids differ.
+    pub fn cannot_go_on_from(&self, other: &Self) -> Option<String> {
+        if self.description().id != other.description().id {
+            return None;
+        }
+        if self.hypothesis != other.hypothesis {
+            let [to, from] = [self, other].map(|law| law.hypothesis.name());
+            return Some(format!("it is made for {to}, the law before for {from}"));
+        }
+        let names = |law: &Self| {
+            let variables = law.formulation.internal_variables.iter();
+            variables.map(|v| v.id.clone()).collect::<Vec<_>>()
+        };
+        let (own, others) = (names(self), names(other));
+        if own != others {
+            let said = |names: &[String]| match names {
+                [] => "none".to_owned(),
+                names => format!("`{}`", names.join("`, `")),
+            };
+            return Some(format!(
+                "its internal variables are {}, those found are {}",
+                said(&own),
+                said(&others)
+            ));
+        }
+        let (to, from) = (self.library(), other.library());
+        let is_same = to.sha256 == from.sha256 || to.path == from.path;
+        let adapter = |library: &Library| library.foreign().map(|foreign| foreign.adapter);
+        let is_same = is_same && adapter(to) == adapter(from);
+        (!is_same && !own.is_empty()).then(|| {
+            let (to, from) = (to.path.display(), from.path.display());
+            format!("it is one of library {to}, the law before is one of {from}")
+        })
+    }
+
     /// Whether a failure that no smaller step helps is trouble with the library, and not a limit of
     /// what the law can follow: numbers that are not finite under a claim of success, which is all
     /// that is numeric about routines made for other programs.

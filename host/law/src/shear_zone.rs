@@ -30,11 +30,18 @@ const OF_ZONE: [usize; 4] = [0, 2, 4, 5];
 /// Those that the initial stress is written to.
 const LATERAL: [usize; 2] = [0, 2];
 
+/// Least thickness, m: that of a sheet of clay mineral. Displacements of 1 m are rounded to 1.1e-16 m,
+/// and jumps are differences of them: over less than this, round-off alone strains the zone by more
+/// than 1e-7, a ten-thousandth of what soil yields at.
+const LEAST: f64 = 1e-9;
+/// From the asperities of a smooth wall to a shear zone in gravel, m.
+const USUAL: [f64; 2] = [1e-4, 0.5];
+
 /// A zone of an interface that a law of solids fills.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShearZone {
-    /// Thickness, m; above 0.
+    /// Thickness, m; at least 1e-9.
     pub thickness: f64,
     /// Stress along the zone and out of plane over the normal traction, at the start.
     pub lateral_ratio: f64,
@@ -51,11 +58,43 @@ impl ShearZone {
             let why = format!("`thickness`: {thickness} m is outside (0, ∞)");
             return Some(("thickness", why));
         }
+        if thickness < LEAST {
+            let why = format!(
+                "`thickness`: {thickness:e} m is below {LEAST:e} m: rounding displacements of 1 m strains \
+                 so thin a zone by {:.1e}",
+                0.5 * f64::EPSILON / thickness
+            );
+            return Some(("thickness", why));
+        }
         if !(lateral_ratio >= 0.0 && lateral_ratio.is_finite()) {
             let why = format!("`lateral_ratio`: {lateral_ratio} is outside [0, ∞)");
             return Some(("lateral_ratio", why));
         }
         None
+    }
+}
+
+impl ShearZone {
+    /// What is seldom meant, in words.
+    pub(crate) fn implausible(self, law: &str) -> Option<String> {
+        let [least, most] = USUAL;
+        let thickness = self.thickness;
+        let about = if thickness < least {
+            "slip up to the strength is in proportion to it"
+        } else if thickness > most {
+            "are millimetres meant?"
+        } else {
+            return None;
+        };
+        let number = if thickness < 1e-3 {
+            format!("{thickness:e}")
+        } else {
+            thickness.to_string()
+        };
+        Some(format!(
+            "law `{law}`: thickness = {number} m of its shear zone is outside its usual range [{least:e}, \
+             {most}]: {about}"
+        ))
     }
 }
 

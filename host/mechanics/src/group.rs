@@ -138,6 +138,47 @@ impl std::fmt::Display for PointFailure {
     }
 }
 
+/// Faces of an interface that stand apart, or touch without stress, as another law takes over, which
+/// is not told of gaps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parted {
+    /// Name of the group.
+    pub group: String,
+    /// Names of the two laws in the case file.
+    pub laws: [String; 2],
+    /// Points without stress, and all of the group.
+    pub points: [usize; 2],
+    /// Coordinates of the first of them.
+    pub position: [f64; 2],
+    /// Largest normal jump among them, m, since the law before took over.
+    pub opening: f64,
+}
+
+impl std::fmt::Display for Parted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            group,
+            laws: [from, to],
+            points: [points, all],
+            position: [x, y],
+            opening,
+        } = self;
+        write!(
+            f,
+            "interface `{group}` carries nothing at {points} of {all} points, the first at ({x:.4}, \
+             {y:.4}), where law `{to}` takes over from `{from}`"
+        )?;
+        if *opening > 0.0 {
+            write!(f, ", open by up to {opening:.3e} m")?;
+        }
+        write!(
+            f,
+            ": a law that starts is not told of gaps, so that faces which stand apart are in contact \
+             again as soon as they approach"
+        )
+    }
+}
+
 /// What a group carries from one increment to the next.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GroupState<'g> {
@@ -252,15 +293,52 @@ impl Group {
     }
 
     /// Swaps the law. The stress stays; internal variables stay if the law is the same one (with
-    /// other parameters), else the new law starts from the current stress and jumps are counted
-    /// from here. Initial values that the case file gives hold in both cases.
+    /// other parameters): its id, its library and its variables are the same. Else the new law starts
+    /// from the current stress and jumps are counted from here. Initial values that the case file gives
+    /// hold in both cases.
+    ///
+    /// Returns what a law that starts anew knows nothing of.
     ///
     /// # Errors
     /// The law cannot start from the stress.
-    pub fn set_law(&mut self, law: Material) -> Result<(), PointFailure> {
-        let same = law.built.law.description().id == self.law.built.law.description().id;
-        let kept = same.then(|| std::mem::take(&mut self.internal.committed));
-        self.start_law(law, kept)
+    pub fn set_law(&mut self, law: Material) -> Result<Option<Parted>, PointFailure> {
+        let [old, new] = [&self.law, &law].map(|material| &material.built.law);
+        let same = new.description().id == old.description().id;
+        let kept = same && new.cannot_go_on_from(old).is_none();
+        let parted = if kept { None } else { self.parted(&law) };
+        let kept = kept.then(|| std::mem::take(&mut self.internal.committed));
+        self.start_law(law, kept)?;
+        Ok(parted)
+    }
+
+    /// Points of an interface that have moved and carry nothing.
+    fn parted(&self, law: &Material) -> Option<Parted> {
+        let old = &self.law.built.law;
+        if !self.is_active || old.n_components() != 2 {
+            return None;
+        }
+        let place = self.flux_place();
+        let jumps = match &self.layer {
+            Some(layer) => &layer.jump.committed,
+            None => &self.strain.committed,
+        };
+        let is_parted = |point: usize| {
+            let first = place.offset + point * place.point;
+            let carried = [0, 1].map(|c| self.stress.committed[first + c * place.component]);
+            let jump = &jumps[2 * point..][..2];
+            carried.iter().all(|t| *t == 0.0) && jump.iter().any(|u| *u != 0.0)
+        };
+        let all = self.kinematics.n_points();
+        let points: Vec<usize> = (0..all).filter(|&point| is_parted(point)).collect();
+        let first = *points.first()?;
+        let widest = points.iter().map(|&point| jumps[2 * point]);
+        Some(Parted {
+            group: self.name.clone(),
+            laws: [self.law.name.clone(), law.name.clone()],
+            points: [points.len(), all],
+            position: self.kinematics.position(first),
+            opening: widest.fold(f64::NEG_INFINITY, f64::max),
+        })
     }
 
     /// The committed state; with the tangents of the last evaluation if they are wanted.

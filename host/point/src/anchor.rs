@@ -39,6 +39,11 @@ impl Anchor {
         self.modulus = self.modulus.max(modulus);
     }
 
+    /// The largest flux that the path started from or was asked for.
+    pub(crate) fn largest_flux(&self) -> f64 {
+        self.flux
+    }
+
     /// A flux that was found, as far as what was given explains it.
     pub(crate) fn flux_of(&self, found: f64) -> f64 {
         let explained = MARGIN * (self.flux + self.modulus * self.reach);

@@ -4,7 +4,7 @@ use crate::driver::Driver;
 use crate::error::{Cause, Error, NoEquilibrium, Place, Warning};
 use crate::frame::Frame;
 use crate::path::{Control, Segment};
-use crate::state::Point;
+use crate::state::{Goal, Point};
 use crate::walk::{Halt, Walk};
 use law::{Moment, words};
 
@@ -67,7 +67,7 @@ impl Driver {
     ) -> Result<Course, E> {
         let (point, search, mut warnings) = self.start()?;
         let mut walk = Walk::new(point, search);
-        let mut strayed = None;
+        let (mut strayed, mut blurred) = (None, None);
         let n = self.law.n_components();
         let mut row = |point: &Point, (increment, time), iterations| {
             sink(&Row {
@@ -121,6 +121,9 @@ impl Driver {
                     }
                     return Err(self.failure(place, self.cause(halt), warnings).into());
                 }
+                if blurred.is_none() {
+                    blurred = self.blurred(&walk, &next, place);
+                }
                 if strayed.is_none() {
                     strayed = self.strayed(&walk, place);
                 }
@@ -141,6 +144,7 @@ impl Driver {
             }
         }
         warnings.extend(strayed);
+        warnings.extend(blurred);
         warnings.extend(walk.silence.warning(&self.law));
         walk.change_frame(Frame::Cartesian, &mut held);
         let (times, first) = &walk.search.unreliable;
@@ -173,6 +177,23 @@ impl Driver {
         let step = segments.first().map(|segment| segment.step);
         let of_step = segments.iter().take_while(|s| Some(s.step) == step);
         of_step.map(Segment::length).sum()
+    }
+
+    /// What to say of a point that round-off keeps from its goal.
+    fn blurred(&self, walk: &Walk<'_>, goal: &Goal, place: Place) -> Option<Warning> {
+        if walk.search.is_restricted() {
+            return None;
+        }
+        let miss = walk.search.blurred(&walk.point, goal)?;
+        let hypothesis = self.law.hypothesis();
+        Some(Warning::Blurred {
+            place,
+            law: self.law.description().id.clone(),
+            hypothesis,
+            component: walk.search.frame().component(miss.component, hypothesis),
+            found: miss.flux,
+            goal: miss.goal,
+        })
     }
 
     /// What to say of a point that went farther than what it was led to explains.

@@ -187,6 +187,22 @@ pub enum Warning {
         /// Where it has come to.
         gradient: f64,
     },
+    /// A controlled flux stays away from its goal by what rounding the gradients makes of the law's
+    /// stiffness.
+    Blurred {
+        /// Where first.
+        place: Place,
+        /// Id of the law.
+        law: String,
+        /// Its hypothesis.
+        hypothesis: Hypothesis,
+        /// The component.
+        component: &'static str,
+        /// The flux found, kPa.
+        found: f64,
+        /// What it was to be.
+        goal: f64,
+    },
     /// The gradient moved; flux and internal variables stayed to the last bit.
     Ignored {
         /// Where first.

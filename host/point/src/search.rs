@@ -163,6 +163,11 @@ impl<'a> Search<'a> {
         self.anchor.modulus(self.elastic_norm);
     }
 
+    /// Whether restrictions stand in the place of controlled components.
+    pub(crate) fn is_restricted(&self) -> bool {
+        self.restricted.is_some()
+    }
+
     /// Whether the elastic operator of the initial state is zero.
     pub(crate) fn is_without_stiffness(&self) -> bool {
         largest(&self.elastic_cartesian) == 0.0
@@ -245,7 +250,8 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the law took no notice of the step found: the gradient moved, flux and internal
-    /// variables stayed to the last bit, and its operator is zero or says that they should not have.
+    /// variables stayed to the last bit, and its operator is zero, on the way back as well, or says that
+    /// they should not have.
     /// `None`: the gradient did not move.
     pub(crate) fn is_ignored(&mut self, step: &Step<'_>) -> Result<Option<bool>, Fatal> {
         let (start, end) = (step.start, &self.base.point);
@@ -255,7 +261,7 @@ impl<'a> Search<'a> {
         if !same(&start.flux, &end.flux) || !same(&start.internal, &end.internal) {
             return Ok(Some(false));
         }
-        let gradient = end.gradient;
+        let (gradient, flux, internal) = (end.gradient, end.flux, end.internal.clone());
         // What the law says of the same step now must not be counted twice.
         let unreliable = self.unreliable.0;
         let answers = self.evaluate(step, gradient, self.tangent);
@@ -265,7 +271,18 @@ impl<'a> Search<'a> {
         }
         let operator = &self.trial.operator;
         if largest(operator) == 0.0 {
-            return Ok(Some(true));
+            // At its strength a law without hardening answers to the way back alone. So does a routine
+            // that refuses what is too far for it, without a way to say so.
+            if largest(&flux) == 0.0 || self.law.library().foreign().is_some() {
+                return Ok(Some(true));
+            }
+            let back: Vector = std::array::from_fn(|i| 2.0 * start.gradient[i] - gradient[i]);
+            let unreliable = self.unreliable.0;
+            let answers = self.evaluate(step, back, Operator::None);
+            self.unreliable.0 = unreliable;
+            let point = &self.trial.point;
+            let is_same = same(&flux, &point.flux) && same(&internal, &point.internal);
+            return Ok(Some(!answers? || is_same));
         }
         let moved: Vector = std::array::from_fn(|i| gradient[i] - start.gradient[i]);
         let expected = operator.chunks_exact(self.n).map(|row| {

@@ -254,6 +254,21 @@ impl Display for Warning {
                      {flux}, which is all but the strength of law `{law}`"
                 )
             }
+            Self::Blurred {
+                place,
+                law,
+                hypothesis,
+                component,
+                found,
+                goal,
+            } => {
+                let (gradient, flux) = words(*hypothesis);
+                write!(
+                    f,
+                    "{place}: {flux} `{component}` is {found:.6e} where {goal:.6e} is asked for, and comes no \
+                     nearer: law `{law}` is so stiff that rounding the {gradient} changes the {flux} by as much"
+                )
+            }
             Self::Ignored {
                 first,
                 increments: n,

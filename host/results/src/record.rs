@@ -103,6 +103,20 @@ impl Settings {
             let path = ["laws", id, "parameters", parameter];
             self.with_unit([&section, parameter], Some(&path), value, unit);
         }
+        for (name, value) in entries(&law["shear_zone"]) {
+            let unit = if name == "thickness" { "m" } else { "" };
+            let path = ["laws", id, name];
+            self.with_unit(
+                [&section, &name.replace('_', " ")],
+                Some(&path),
+                value,
+                unit,
+            );
+        }
+        for (variable, value) in entries(&law["initial"]) {
+            let path = ["laws", id, "initial", variable];
+            self.add(&section, &format!("initial {variable}"), Some(&path), value);
+        }
         let digest = text(&law["sha256"]);
         let short = Value::from(digest.get(..12).unwrap_or(digest));
         let path = ["laws", id, "sha256"];

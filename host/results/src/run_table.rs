@@ -108,6 +108,16 @@ impl Run {
         }
     }
 
+    /// Whether it has the law that a path below `laws` is about: then there is its `law` as well.
+    fn has_law(&self, path: &str) -> bool {
+        let ids = self
+            .settings
+            .keys()
+            .filter_map(|key| key.strip_suffix("law"));
+        let mut tables = ids.filter(|table| table.starts_with("laws.") && table.ends_with('.'));
+        tables.any(|table| path.starts_with(table))
+    }
+
     /// How it ended.
     fn status(&self) -> &str {
         match text(&self.summary["status"]) {
@@ -126,8 +136,15 @@ fn differing(runs: &[Run]) -> Vec<&str> {
         .collect();
     let differs = |path: &&str| {
         let is_of_law = path.starts_with("laws.");
-        let values = runs.iter().map(|run| run.settings.get(*path));
-        let mut values = values.filter(|value| value.is_some() || !is_of_law);
+        // A law that is not given a variable to start from gives it itself.
+        let is_initial = path.contains(".initial.");
+        let counts = |run: &&Run| {
+            run.settings.contains_key(*path) || !is_of_law || is_initial && run.has_law(path)
+        };
+        let mut values = runs
+            .iter()
+            .filter(counts)
+            .map(|run| run.settings.get(*path));
         let first = values.next();
         values.any(|value| Some(value) != first)
     };
@@ -253,5 +270,24 @@ mod tests {
         assert_eq!(shown(&json!(2.1e8)), "2.1e8");
         assert_eq!(shown(&json!(20)), "20");
         assert_eq!(shown(&json!([1, 2])), "[1,2]");
+    }
+
+    /// What one file leaves out and the other gives differs; a law that one run lacks is no column.
+    #[test]
+    fn what_a_law_is_made_and_started_with_differs() {
+        let with = |zone: Value, initial: Value| {
+            let law = json!({
+                "law": "l", "parameters": { "c": 1.0 }, "shear_zone": zone, "initial": initial,
+            });
+            Run::of(json!({ "status": "done", "laws": { "a (interface_2d)": law } }))
+        };
+        let zone = |ratio: f64| json!({ "thickness": 0.005, "lateral_ratio": ratio });
+        let runs = [
+            with(zone(1.0), json!({})),
+            with(zone(0.5), json!({ "zone_stress_11": -40.0 })),
+            Run::of(json!({ "status": "done", "laws": { "other (solid_2d)": { "law": "m" } } })),
+        ];
+        let expected = ["laws.a.lateral_ratio", "laws.a.initial.zone_stress_11"];
+        assert_eq!(differing(&runs), expected);
     }
 }

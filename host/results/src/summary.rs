@@ -97,7 +97,14 @@ impl Summary {
         let laws: Map<String, Value> = about
             .laws
             .iter()
-            .map(|((name, hypothesis), built)| (format!("{name} ({hypothesis})"), law(built)))
+            .map(|((name, hypothesis), built)| {
+                let mut entry = law(built);
+                let initial = initial(simulation, name, built);
+                if !initial.is_empty() {
+                    entry["initial"] = initial.into();
+                }
+                (format!("{name} ({hypothesis})"), entry)
+            })
             .collect();
         let of_groups = simulation.groups().iter();
         let elements: Map<String, Value> = of_groups
@@ -405,6 +412,21 @@ fn figures(figures: &[Figure]) -> Value {
     };
     let of_probes = figures.iter().filter(|f| f.is_of_columns());
     of_probes.map(figure).collect()
+}
+
+/// What the case gives a law to start from, by internal variable.
+fn initial(simulation: &Simulation, name: &str, built: &BuiltLaw) -> Map<String, Value> {
+    let problem = simulation.problem();
+    let of_groups = problem.groups.iter().map(|group| &group.material);
+    let of_phases = problem.phases.iter().flat_map(|phase| &phase.materials);
+    let mut all = of_groups.chain(of_phases.map(|(_, material)| material));
+    let same =
+        all.find(|material| material.name == name && std::ptr::eq(material.built.as_ref(), built));
+    let variables = &built.law.formulation().internal_variables;
+    let given = same.into_iter().flat_map(|material| &material.initial);
+    given
+        .filter_map(|&(number, value)| Some((variables.get(number)?.id.clone(), json!(value))))
+        .collect()
 }
 
 fn law(built: &BuiltLaw) -> Value {

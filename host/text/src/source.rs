@@ -111,6 +111,16 @@ impl Source {
         self.parts().skip(self.files.len() - self.n_settings)
     }
 
+    /// Where the last setting stands that gives this key, or one below it; dots between the keys.
+    pub fn setting_of(&self, path: &str) -> Option<Range<usize>> {
+        let gives = |range: &Range<usize>| {
+            let key = self.text[range.clone()].split('=').next();
+            let below = key.and_then(|key| key.trim().strip_prefix(path));
+            below.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        self.settings().filter(gives).last()
+    }
+
     /// Where files and settings stand in the text.
     fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         (0..self.files.len()).map(|number| {

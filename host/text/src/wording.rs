@@ -250,6 +250,7 @@ fn found_in_words(found: &str) -> String {
 fn expected_in_words(expected: &str) -> String {
     match expected {
         "usize" | "u32" | "u64" => "a whole number, not negative".to_owned(),
+        "i64" => "a whole number".to_owned(),
         "f64" => "a number".to_owned(),
         "a boolean" => "true or false".to_owned(),
         "a string" => "a text in quotes".to_owned(),

@@ -31,11 +31,11 @@ abi::parameters! {
             .below(90.0)
             .usual(0.0, 50.0),
         /// Accumulated slip after which 1/e of the way from peak to residual friction is left.
-        friction_slip: Parameter::new(c"ξ_φ", c"m").above(0.0).usual(1e-4, 1e2),
+        friction_slip: Parameter::new(c"ξ_φ", c"m").above(0.0).usual(1e-4, 1.0),
         /// Angle of contraction before any slip.
         contraction_angle: Parameter::new(c"ψ_c", c"deg").at_least(0.0).below(90.0).usual(0.0, 30.0),
         /// Accumulated slip after which 1/e of the contraction is left to come.
-        contraction_slip: Parameter::new(c"ξ_c", c"m").above(0.0).usual(1e-4, 1e2),
+        contraction_slip: Parameter::new(c"ξ_c", c"m").above(0.0).usual(1e-4, 1.0),
     }
 }
 
@@ -106,12 +106,31 @@ impl InterfaceLaw for CyclicJoint {
         point: &InterfacePoint<State>,
         tangent: Tangent,
     ) -> Result<InterfaceResponse<State>, Failure> {
+        if let Some(fault) = point.state.fault() {
+            return Err(Failure::Domain(fault));
+        }
         let mut end = self.end(point)?;
         if tangent == Tangent::Elastic {
             // Eq. (1).
             end.tangent = [[self.normal_stiffness, 0.0], [0.0, self.shear_stiffness]];
         }
         Ok(end)
+    }
+}
+
+impl State {
+    /// What no path leads to.
+    #[inline]
+    fn fault(&self) -> Option<&'static str> {
+        if self.plastic_slip < 0.0 {
+            Some("plastic_slip is below 0 m")
+        } else if self.plastic_contraction < 0.0 {
+            Some("plastic_contraction is below 0 m")
+        } else if self.gap < 0.0 {
+            Some("gap is below 0 m")
+        } else {
+            None
+        }
     }
 }
 

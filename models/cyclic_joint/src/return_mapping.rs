@@ -116,6 +116,10 @@ impl CyclicJoint {
 
     /// The further slip by which so much contraction has come, by Eq. (4), if it ever does.
     fn slip_of(&self, contraction: f64, xi: f64) -> Option<f64> {
+        // Also of a joint that no longer contracts.
+        if contraction <= 0.0 {
+            return Some(0.0);
+        }
         let rate = self.contraction_rate * (-xi / self.contraction_slip).exp();
         let share = contraction / (rate * self.contraction_slip);
         (share < 1.0).then(|| -self.contraction_slip * (-share).ln_1p())

@@ -273,6 +273,63 @@ fn contraction_at_constant_volume_uses_up_the_normal_stress() {
 }
 
 #[test]
+fn slip_without_contact_wears_nothing_down_whatever_contraction_is_left() {
+    let never = Parameters {
+        contraction_angle: 0.0,
+        ..SAND
+    };
+    // ξ_c so small that exp(−ξ/ξ_c) is 0 after 10 m.
+    let done = Parameters {
+        contraction_slip: 1e-6,
+        ..SAND
+    };
+    for (p, slipped) in [(never, 0.0), (done, 10.0)] {
+        let mut touching = Walker::new(joint(p), [0.0; 2]);
+        touching.state.plastic_slip = slipped;
+        let mut apart = Walker::new(joint(p), [-100.0, 0.0]);
+        apart.state.plastic_slip = slipped;
+        apart.step([100.0 / K_N + 1e-3, 0.0]);
+        for mut walker in [touching, apart] {
+            let before = walker.state;
+            for slip in [0.02, -0.05, 1.0] {
+                walker.step([0.0, slip]);
+                assert_eq!((walker.traction, walker.state), ([0.0; 2], before));
+            }
+            // Opening while it slips: nothing has held.
+            walker.step([1e-4, 0.3]);
+            assert_eq!(walker.state.plastic_slip, slipped);
+            // Pressed again it has the friction of before.
+            let gap = walker.state.gap;
+            walker.step([-gap - 50.0 / K_N, 0.0]);
+            walker.step([0.0, 1e-3]);
+            let xi = walker.state.plastic_slip;
+            assert!(xi - slipped < 1e-3, "{xi}");
+            assert_relative_eq!(
+                walker.traction[1],
+                50.0 * friction(&p, xi),
+                max_relative = 1e-6
+            );
+        }
+    }
+}
+
+#[test]
+fn internal_variables_that_no_path_leads_to_are_refused() {
+    type Of = fn(&mut State) -> &mut f64;
+    let variables: [(&str, Of); 3] = [
+        ("plastic_slip", |s| &mut s.plastic_slip),
+        ("plastic_contraction", |s| &mut s.plastic_contraction),
+        ("gap", |s| &mut s.gap),
+    ];
+    for (name, of) in variables {
+        let mut walker = Walker::new(joint(SAND), [-100.0, 0.0]);
+        *of(&mut walker.state) = -1e-3;
+        let failure = walker.respond([0.0; 2], Tangent::None).unwrap_err();
+        assert!(failure.reason().starts_with(name), "{failure:?}");
+    }
+}
+
+#[test]
 fn opens_in_tension_and_closes_where_contact_was_lost() {
     let mut walker = Walker::new(joint(SAND), [-100.0, 0.0]);
     walker.step([100.0 / K_N + 3e-5, 0.0]);

@@ -136,13 +136,36 @@ impl InterfaceLaw for HyperbolicJoint {
         point: &InterfacePoint<State>,
         tangent: Tangent,
     ) -> Result<InterfaceResponse<State>, Failure> {
+        if let Some(fault) = point.state.fault() {
+            return Err(Failure::Domain(fault));
+        }
         let mut end = self.carry(point);
         if tangent == Tangent::Elastic {
             // Eq. (1), (3).
-            let unloading = self.at(-end.traction[0], end.state.broken).unloading;
+            let unloading = if end.state.gap > 0.0 {
+                0.0
+            } else {
+                self.at(-end.traction[0], end.state.broken).unloading
+            };
             end.tangent = [[self.normal_stiffness, 0.0], [0.0, unloading]];
         }
         Ok(end)
+    }
+}
+
+impl State {
+    /// What no path leads to.
+    #[inline]
+    fn fault(&self) -> Option<&'static str> {
+        if !(0.0..=1.0).contains(&self.stress_level) {
+            Some("stress_level is outside [0, 1]")
+        } else if self.gap < 0.0 {
+            Some("gap is below 0 m")
+        } else if self.broken * (1.0 - self.broken) != 0.0 {
+            Some("broken is neither 0 nor 1")
+        } else {
+            None
+        }
     }
 }
 

@@ -391,6 +391,49 @@ fn the_elastic_operator_is_that_of_unloading() {
     }
 }
 
+#[test]
+fn an_open_interface_has_no_elastic_shear_whatever_the_exponent() {
+    for stiffness_exponent in [0.0, 0.5] {
+        let law = joint(Parameters {
+            stiffness_exponent,
+            ..SAND
+        });
+        let mut walker = Walker::new(law, [-100.0, 0.0]);
+        walker.step([1e-1, 0.0]);
+        let open = walker.respond([1e-3, 1e-3], Tangent::Elastic);
+        assert_eq!(open.tangent, [[K_N, 0.0], [0.0, 0.0]]);
+        let closed = walker.respond([-2e-1, 0.0], Tangent::Elastic);
+        assert!(closed.tangent[1][1] > 0.0);
+    }
+}
+
+#[test]
+fn internal_variables_that_no_path_leads_to_are_refused() {
+    type Make = fn(&mut State);
+    let faults: [(&str, Make); 5] = [
+        ("stress_level", |s| s.stress_level = -0.1),
+        ("stress_level", |s| s.stress_level = 1.1),
+        ("gap", |s| s.gap = -1e-3),
+        ("broken", |s| s.broken = 0.5),
+        ("broken", |s| s.broken = -1.0),
+    ];
+    for (name, make) in faults {
+        let mut walker = Walker::new(joint(SAND), [-100.0, 0.0]);
+        make(&mut walker.state);
+        let point = InterfacePoint {
+            jump: [0.0; 2],
+            jump_increment: [0.0; 2],
+            traction: walker.traction,
+            state: walker.state,
+            time: 0.0,
+            time_increment: 0.0,
+            step_time: 0.0,
+        };
+        let failure = walker.law.update(&point, Tangent::None).unwrap_err();
+        assert!(failure.reason().starts_with(name), "{failure:?}");
+    }
+}
+
 /// A linear congruential generator (Knuth's MMIX constants), uniform in [a, b).
 fn random(seed: &mut u64, a: f64, b: f64) -> f64 {
     *seed = seed

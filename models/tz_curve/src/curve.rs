@@ -52,12 +52,13 @@ impl Curve {
         }
     }
 
-    /// After a movement, and the tangent. Eq. (4).
+    /// After a movement, and the tangent. Eq. (4). What the sliders carry beyond their strengths at the
+    /// start is lost before they move.
     #[inline]
     pub(crate) fn moved(&self, start: Mobilised, movement: f64) -> (Mobilised, f64) {
         let slider = |stress: f64, slope: f64, strength: f64| {
             let (k, limit) = (slope * self.slope, strength * self.strength);
-            let trial = stress + k * movement;
+            let trial = stress.clamp(-limit, limit) + k * movement;
             if trial.abs() <= limit {
                 (trial, k)
             } else {

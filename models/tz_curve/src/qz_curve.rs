@@ -72,6 +72,9 @@ impl InterfaceLaw for QzCurve {
         point: &InterfacePoint<State>,
         tangent: Tangent,
     ) -> Result<InterfaceResponse<State>, Failure> {
+        if point.state.gap < 0.0 {
+            return Err(Failure::Domain("gap is below 0 m"));
+        }
         let mut end = self.carry(point);
         if tangent == Tangent::Elastic {
             end.tangent = [[self.curve.slope, 0.0], [0.0, self.shear_stiffness]];
@@ -85,6 +88,8 @@ impl QzCurve {
     #[inline]
     fn carry(&self, point: &InterfacePoint<State>) -> InterfaceResponse<State> {
         let State { stiff_part, gap } = point.state;
+        // A tension is there at the start only: faces that stand apart by as much.
+        let gap = gap.max(point.traction[0] / self.curve.slope);
         let (traction, part) = if gap > 0.0 {
             match InContact::after_closure(gap, point.jump_increment) {
                 Ok(part) => ([0.0; 2], part),

@@ -237,6 +237,71 @@ fn initial_tractions_count_as_mobilised() {
 }
 
 #[test]
+fn a_base_pulled_at_the_start_closes_and_follows_first_loading() {
+    let law = base(0.0);
+    let k = 11.0 * E_M / D;
+    for pull in [1.0, 500.0, 1e4] {
+        for share in [0.3, 0.6, 1.7, 5.0] {
+            let z = share * Q_B / k;
+            let closing = -(pull / k + z);
+            let q = first_loading(k, Q_B, z);
+            for n in [1, 7] {
+                let mut walker = Walker::new(&law, [pull, 30.0]).walk([closing, 0.0], n);
+                assert_relative_eq!(walker.traction[0], -q, max_relative = 1e-9);
+                assert_eq!(walker.traction[1], 0.0);
+                // A nil increment first changes nothing.
+                let mut asked = Walker::new(&law, [pull, 30.0]);
+                asked.step([0.0; 2]);
+                assert_relative_eq!(asked.state.gap, pull / k, max_relative = 1e-14);
+                walker = asked.walk([closing, 0.0], n);
+                assert_relative_eq!(walker.traction[0], -q, max_relative = 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_exceeds_the_strength_at_the_start_is_lost_before_the_first_movement() {
+    let law = shaft(0.0);
+    let k = 2.0 * E_M / D;
+    for start in [2.0 * Q_S, 1.005 * Q_S, -3.0 * Q_S] {
+        let asked = |nil: bool| {
+            let mut walker = Walker::new(&law, [0.0, start]);
+            if nil {
+                walker.step([0.0; 2]);
+            }
+            let back = -0.5 * Q_S / k * start.signum();
+            walker.walk([0.0, back], 1).traction[1]
+        };
+        // From the strength back by half of it along the first slope.
+        assert_relative_eq!(
+            asked(true),
+            0.5 * Q_S * start.signum(),
+            max_relative = 1e-12
+        );
+        assert_relative_eq!(asked(false), asked(true), max_relative = 1e-14);
+    }
+}
+
+#[test]
+fn a_gap_below_nothing_is_refused() {
+    let law = base(0.0);
+    let mut walker = Walker::new(&law, [-100.0, 0.0]);
+    walker.state.gap = -1e-3;
+    let point = InterfacePoint {
+        jump: [0.0; 2],
+        jump_increment: [0.0; 2],
+        traction: walker.traction,
+        state: walker.state,
+        time: 0.0,
+        time_increment: 0.0,
+        step_time: 0.0,
+    };
+    let failure = law.update(&point, Tangent::None).unwrap_err();
+    assert!(failure.reason().contains("gap"), "{failure:?}");
+}
+
+#[test]
 fn huge_increments_end_at_the_limits() {
     let (shaft, base) = (shaft(0.0), base(0.0));
     for z in [1e6, 1e100] {

@@ -188,7 +188,8 @@ fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), Str
     }
     if !(0..=MOST_STATES).contains(&n_states) {
         return Err(format!(
-            "model `{id}` says that it has {n_states} state variables"
+            "model `{id}` says by task 4 that it has {n_states} state variables; 0 to {MOST_STATES} are \
+             allowed"
         ));
     }
     let mut internal_variables: Vec<InternalVariable> = Vec::new();
@@ -562,7 +563,11 @@ impl Instance {
         if let Some(stress) = rest.find(|v| v.abs() > OUT_OF_PLANE * largest) {
             return Err(Refusal::error(
                 raw::PILUM_E_UNSUPPORTED,
-                format!("a stress yz or zx of {stress:e} arises, which a plane problem lacks"),
+                format!(
+                    "the routine returns a stress yz or zx of {stress:e} for strains without yz and zx, and a \
+                     plane problem has none: either its material is not symmetric about the plane, or it does \
+                     not keep to the order xx yy zz xy yz zx"
+                ),
             ));
         }
         for (to, place) in end.flux.iter_mut().zip(PLACE) {
@@ -584,7 +589,20 @@ impl Instance {
             block.set(A::Sig, &stress);
             block.set(A::StVar, &state);
         }
+        let asked = block.clone();
         self.call(block)?;
+        if block.reals(A::D).all(|entry| entry == 0.0) {
+            // No stiffness, or no word about it: what is not written shows.
+            block.words.clone_from(&asked.words);
+            block.set(A::D, &[f64::NAN; N * N]);
+            self.call(block)?;
+            if block.reals(A::D).all(f64::is_nan) {
+                let message = format!("the routine leaves D unwritten in task {}", task as i32);
+                return Err(Refusal::error(raw::PILUM_E_INTERNAL, message));
+            }
+            block.words.clone_from(&asked.words);
+            self.call(block)?;
+        }
         finite(block, A::D, is_at_rest)?;
         let stiffness: Vec<f64> = block.reals(A::D).collect();
         for i in 0..self.n {

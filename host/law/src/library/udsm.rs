@@ -55,8 +55,10 @@ impl Routine {
     pub(crate) fn open(path: &Path, image: Image, traps: bool) -> Result<Self, String> {
         let library = open_private(path, image, traps)?;
         // SAFETY: the user says by the adapter that a symbol of this name is a `User_Mod`.
-        let function = unsafe { find::<Function>(library, "User_Mod") }
-            .ok_or_else(|| "it has no routine User_Mod".to_owned())?;
+        let function = unsafe { find::<Function>(library, "User_Mod") }.ok_or_else(|| {
+            let names = spellings("User_Mod").join(", ");
+            format!("it has no routine User_Mod: it exports none of {names}")
+        })?;
         Ok(Self { function, library })
     }
 

@@ -20,7 +20,8 @@ pub struct TakeOver {
     pub law: String,
     /// Largest change of a stress (2-norm of its components).
     pub change: f64,
-    /// The same, relative to the largest stress that the law found in the group.
+    /// The same, relative to the largest stress that the law found in the group; infinite where it found
+    /// none.
     pub relative: f64,
     /// Points with another stress, and all of the group.
     pub points: [usize; 2],
@@ -47,12 +48,16 @@ impl std::fmt::Display for TakeOver {
             traction,
             ..
         } = self;
+        write!(f, "law `{law}` takes over group `{group}` with stresses ")?;
+        if relative.is_finite() {
+            let percent = 100.0 * relative;
+            write!(f, "up to {percent:.3} % different from those it found")?;
+        } else {
+            write!(f, "where it found none")?;
+        }
         write!(
             f,
-            "law `{law}` takes over group `{group}` with stresses up to {:.3} % different from \
-             those it found ({change:.4} kPa at element {element}, point {point} at ({x:.4}, \
-             {y:.4})",
-            100.0 * relative
+            " ({change:.4} kPa at element {element}, point {point} at ({x:.4}, {y:.4})"
         )?;
         if let Some([[n_0, t_0], [n, t]]) = traction {
             write!(f, ": normal {n_0:.4} to {n:.4}, shear {t_0:.4} to {t:.4}")?;
@@ -65,14 +70,16 @@ impl Group {
     /// Asks a law that starts what it makes of the stresses it finds, at the same strain and time,
     /// and makes that the committed state. `None`, and not a bit changed: they stay as they are.
     ///
-    /// Laws whose stress is linear in the strain, and points without stress, are not asked.
+    /// Laws whose stress is linear in the strain are not asked, nor are points without stress unless the
+    /// case gives internal variables to start from.
     ///
     /// # Errors
     /// The law fails over a nil increment. The committed state is untouched.
     pub fn take_over(&mut self) -> Result<Option<TakeOver>, PointFailure> {
         let answered = std::mem::take(&mut self.is_asked);
         let has_stress = self.stress.committed.iter().any(|&stress| stress != 0.0);
-        let answer = if self.tangents_are_constant || !has_stress {
+        let is_told = has_stress || !self.law.initial.is_empty();
+        let answer = if self.tangents_are_constant || !is_told {
             Ok(None)
         } else if answered {
             Ok(self.taken_over())

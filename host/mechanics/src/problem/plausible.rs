@@ -329,22 +329,24 @@ fn other_thickness(group: &Group, law: &Material) -> Option<String> {
     if built.law.n_components() != 2 {
         return None;
     }
-    let description = built.law.description();
-    let declared = description.parameters.iter().zip(&built.parameters);
-    let (parameter, used) = declared.into_iter().find(|(p, _)| means_thickness(p))?;
+    let (key, value, what) = if let Some(zone) = built.law.loaded().shear_zone() {
+        ("thickness", zone.thickness, "of its shear zone")
+    } else {
+        let description = built.law.description();
+        let declared = description.parameters.iter().zip(&built.parameters);
+        let (parameter, used) = declared.into_iter().find(|(p, _)| means_thickness(p))?;
+        let doc = parameter.doc.trim_end_matches('.');
+        (parameter.id.as_str(), used.value, doc)
+    };
     let elements = 0..group.kinematics.n_elements();
     let first = |element| group.kinematics.points_of(element).start;
     let thickness = elements.filter_map(|element| group.thickness(first(element)));
-    let off = |t: &f64| (used.value / t - 1.0).abs();
+    let off = |t: &f64| (value / t - 1.0).abs();
     let worst = thickness.max_by(|a, b| off(a).total_cmp(&off(b)))?;
     (off(&worst) > SAME_THICKNESS).then(|| {
         format!(
-            "group `{}`: law `{}` has {} = {} m ({}), the layer of elements is {worst:.6} m thick",
-            group.name,
-            law.name,
-            parameter.id,
-            used.value,
-            parameter.doc.trim_end_matches('.')
+            "group `{}`: law `{}` has {key} = {value} m ({what}), the layer of elements is {worst:.6} m thick",
+            group.name, law.name,
         )
     })
 }

@@ -9,6 +9,7 @@ use crate::ground::beside_joints;
 use crate::group::Group;
 use crate::model::Model;
 use crate::problem::{Cause, InitialStress, Item, Key, Refusal};
+use abi::status::Outcome;
 use law::Moment;
 
 /// Change of stress, relative to the largest of its group, that is worth a word.
@@ -51,7 +52,10 @@ impl Simulation {
         for (group, law) in self.swaps[number].clone() {
             starts[group] = true;
             self.groups[group].moment = moment;
-            self.groups[group].set_law(law).map_err(cannot_start)?;
+            let parted = self.groups[group].set_law(law).map_err(cannot_start)?;
+            if let Some(parted) = parted {
+                watch.warning(&Warning::Parted(phase.name.clone(), parted));
+            }
         }
         for (&group, stress) in phase.activate.iter().zip(beside) {
             starts[group] = true;
@@ -178,6 +182,10 @@ impl Simulation {
                 Ok(())
             }
             Err(point) => {
+                let is_given = !self.groups[group].law.initial.is_empty();
+                if is_given && point.failure.outcome == Outcome::Domain {
+                    return Err(Error::CannotStart(Box::new(point)));
+                }
                 let failure = StepFailure::from(point);
                 if failure.defect().is_some() {
                     let place = Place {

@@ -1,7 +1,7 @@
 //! What a simulation should tell those who started it.
 
 use crate::error::Place;
-use crate::group::TakeOver;
+use crate::group::{Parted, TakeOver};
 use crate::settings::Method;
 use std::fmt;
 
@@ -62,6 +62,8 @@ pub enum Warning {
     },
     /// A law changed the process, which was set right.
     Restored(Place, String),
+    /// A law starts in this phase where an interface is open.
+    Parted(String, Parted),
     /// What a law, which starts in this phase, makes of the stresses it finds.
     TookOver(String, TakeOver),
     /// A law could not be asked that; this is what it says.
@@ -147,6 +149,7 @@ impl fmt::Display for Warning {
                  of balance by that share, displacements are uncertain by up to a tenth of the increment"
             ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
+            Self::Parted(phase, parted) => write!(f, "phase `{phase}`: {parted}"),
             Self::TookOver(phase, change) => write!(
                 f,
                 "phase `{phase}`: {change}, carried to equilibrium in the phase's course"

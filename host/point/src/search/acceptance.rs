@@ -14,6 +14,8 @@ const RELATIVE_TOLERANCE: f64 = 1e-10;
 /// Residuals that summing fluxes and rounding gradients leave behind: a law computes the flux from
 /// the difference of two totals, each known to half a unit in the last place.
 const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+/// Distance from a goal that is worth a word, relative to the largest flux.
+const WORTH_A_WORD: f64 = 1e-6;
 /// Iterations spent on coming closer than [`RELATIVE_TOLERANCE`] of the largest flux.
 pub(super) const MAX_POLISH: usize = 3;
 
@@ -114,6 +116,26 @@ impl Search<'_> {
             })
         });
         missed.max_by(|a, b| a.residual.abs().total_cmp(&b.residual.abs()))
+    }
+
+    /// The controlled component of a point that round-off alone keeps from its goal, by more than is worth
+    /// a word. [`Self::unmet`] is `None`.
+    pub(crate) fn blurred(&self, point: &Point, goal: &Goal) -> Option<Miss> {
+        let answer = self.answer(point);
+        let found = largest(&point.flux[..self.n]);
+        let mut controlled = self.free[..self.n_free].iter();
+        controlled.find_map(|&i| {
+            let spring = self.stiffness[i] * (point.gradient[i] - self.origin[i]);
+            let residual = answer[i] + spring - goal.flux[i];
+            let tolerance = WORTH_A_WORD * self.anchor.largest_flux().max(found);
+            (residual.abs() > tolerance).then_some(Miss {
+                component: i,
+                flux: answer[i],
+                goal: goal.flux[i] - spring,
+                residual,
+                tolerance,
+            })
+        })
     }
 
     /// The controlled component that went farther than its goal explains.
