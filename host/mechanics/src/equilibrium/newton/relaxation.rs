@@ -49,12 +49,12 @@ const INNER: f64 = 0.1;
 const NEGLIGIBLE: f64 = 0.3;
 /// Where one correction was enough, α falls by the factor; if it is then below its first value, a viscous step that is
 /// not as easy is taken back.
-const FALLS: f64 = 0.1;
+const FALLS: f64 = 0.3;
 /// α below this counts as none.
 const LEAST: f64 = 1e-3;
 /// Viscous steps of one motion, and how many without the residual falling to half end it.
 const MAX_STEPS: usize = 200;
-const IDLE: usize = 25;
+const IDLE: usize = 40;
 /// Lengths of a correction that are tried.
 const LENGTHS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// A motion of more viscous steps lets expect another one in the next step.
@@ -315,7 +315,7 @@ impl Newton<'_> {
                 }
                 _ => {
                     is_repeated = true;
-                    motion.viscosity = (FAILED * motion.viscosity).clamp(VISCOSITY, MOST);
+                    motion.viscosity = (FAILED * motion.viscosity).clamp(LEAST, MOST);
                     motion.increment.clone_from(&start);
                     *balance = self.evaluate(&start, task, Operator::Consistent)?;
                 }
@@ -465,6 +465,8 @@ impl Motion {
         } else if went.corrections == 1 && !went.is_repeated {
             let less = FALLS * self.viscosity;
             if less < LEAST { 0.0 } else { less }
+        } else if self.viscosity < VISCOSITY {
+            self.viscosity
         } else {
             (self.viscosity / HARD).max(VISCOSITY)
         };
