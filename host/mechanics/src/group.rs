@@ -72,6 +72,11 @@ impl Field {
     }
 }
 
+/// What a group has committed: of strains, stresses, internal variables, jumps of a layer, and pore
+/// pressures.
+#[derive(Clone, Debug)]
+pub struct Committed(Vec<Vec<f64>>);
+
 /// How often a group has called a law, calls included that came to nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LawCalls {
@@ -886,6 +891,22 @@ impl Group {
     /// Makes the trial state the committed one.
     pub fn commit(&mut self) {
         self.fields().for_each(Field::commit);
+    }
+
+    /// The committed state of all points, to be restored.
+    pub fn committed(&self) -> Committed {
+        let jump = self.layer.as_ref().map(|layer| &layer.jump);
+        let excess = self.pores.as_ref().map(|pores| &pores.excess);
+        let own = [&self.strain, &self.stress, &self.internal];
+        let fields = own.into_iter().chain(jump).chain(excess);
+        Committed(fields.map(|field| field.committed.clone()).collect())
+    }
+
+    /// Takes a committed state back.
+    pub fn restore_committed(&mut self, committed: Committed) {
+        for (field, committed) in self.fields().zip(committed.0) {
+            field.committed = committed;
+        }
     }
 
     /// Gives up the room of the trial state until the next one is computed.

@@ -114,6 +114,8 @@ pub struct Newton<'a> {
     kept: Kept,
     /// Forces of the domain at the end of the step if its boundary stays where it is.
     domain_forces: Vec<f64>,
+    /// Displacement increments of the step that are committed already, by place.
+    base: Option<Vec<f64>>,
     /// Room for displacements and forces by degree of freedom; the forces are zero between
     /// evaluations.
     displacement: Vec<f64>,
@@ -154,6 +156,7 @@ impl<'a> Newton<'a> {
             tangents: Operator::None,
             kept: Kept::default(),
             domain_forces: Vec::new(),
+            base: None,
             displacement: vec![0.0; system.n_dofs()],
             force: vec![0.0; system.n_dofs()],
             stop: Stop::never(),
@@ -204,6 +207,7 @@ impl<'a> Newton<'a> {
     ) -> Result<StepSuccess, StepFailure> {
         self.set_out(loads);
         let contraction = guess.as_ref().and_then(|guess| guess.contraction);
+        let is_expected = guess.as_ref().is_some_and(|guess| guess.was_motion);
         self.kept.contraction = contraction.unwrap_or(f64::INFINITY);
         if let Some(domain) = self.domain {
             self.domain_forces = domain.forces_at(lambda_end);
@@ -218,14 +222,20 @@ impl<'a> Newton<'a> {
                 .gather(&loads.prescribed_increments(lambda_start, lambda_end)),
             period,
         };
-        let mut control = LoadControl::new(self, task, guess.map(|guess| guess.increment));
+        let guess = guess.map(|guess| guess.increment);
+        let mut control = LoadControl::new(self, task, guess, is_expected);
         let mut iterations = Vec::new();
         let outcome = self.iterate(&mut control, &mut iterations);
         self.end(outcome.is_ok());
         match outcome {
             Ok(equilibrium) => {
-                let relaxed = control.relaxation.is_under_way();
-                Ok(equilibrium.reached(iterations, relaxed))
+                let relaxation = &control.relaxation;
+                let relaxed = relaxation.has_arrived();
+                let was_motion = relaxation.lets_expect_another();
+                Ok(StepSuccess {
+                    was_motion,
+                    ..equilibrium.reached(iterations, relaxed)
+                })
             }
             Err(failure) => Err(self.explained(failure, iterations, lambda_start, period)),
         }
@@ -266,6 +276,7 @@ impl<'a> Newton<'a> {
         self.given = Given::default();
         self.changes = Vec::new();
         self.runaway = None;
+        self.base = None;
         self.begin();
     }
 }
@@ -279,6 +290,7 @@ impl Equilibrium {
             iterations,
             unreliable: balance.unreliable,
             relaxed,
+            was_motion: false,
             round_off: self.round_off,
             tolerated: self.tolerated,
             scales: balance.scales,

@@ -22,6 +22,8 @@ pub(super) struct History {
     /// What the first correction of the latest step that needed one left of the residual, as a
     /// fraction.
     contraction: Option<f64>,
+    /// The latest step was a motion of many viscous steps.
+    was_motion: bool,
 }
 
 /// A step in equilibrium.
@@ -40,6 +42,7 @@ impl History {
             let is_plain = first.step_length >= 1.0 && first.viscosity <= 0.0;
             self.contraction = is_plain.then(|| first.residual / start.residual);
         }
+        self.was_motion = success.was_motion;
         // One more than the polynomial takes: what it would have made of the latest step.
         self.steps.truncate(DEGREE + 1);
         self.steps.push_front(Step {
@@ -85,6 +88,7 @@ impl History {
         Some(Guess {
             increment,
             contraction: self.contraction,
+            was_motion: self.was_motion,
         })
     }
 
@@ -116,6 +120,7 @@ mod tests {
                 iterations: Vec::new(),
                 unreliable: None,
                 relaxed: false,
+                was_motion: false,
                 tolerated: 0.0,
                 round_off: 0.0,
                 scales: Vec::new(),

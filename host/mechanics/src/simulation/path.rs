@@ -66,6 +66,7 @@ impl Simulation {
                 let guess = Guess {
                     increment: beyond.increment.iter().map(|u| ratio * u).collect(),
                     contraction: None,
+                    was_motion: false,
                 };
                 let onto = self.attempt(phase, [from, target], Some(guess));
                 step = onto.map(|success| (success, target));

@@ -35,20 +35,28 @@ pub(super) struct LoadControl {
     pub(super) relaxation: Relaxation,
     /// Displacement increments that left the least out of balance, and how much, relative.
     least: Option<(Vec<f64>, f64)>,
+    /// The first iterate, where it did not come from the tangent.
+    first: Option<Vec<f64>>,
     /// Size of the first iterate's displacement increments.
     predicted: Option<f64>,
 }
 
 impl LoadControl {
     /// A step to this end.
-    pub(super) fn new(newton: &Newton<'_>, task: Task, guess: Option<Vec<f64>>) -> Self {
+    pub(super) fn new(
+        newton: &Newton<'_>,
+        task: Task,
+        guess: Option<Vec<f64>>,
+        is_expected: bool,
+    ) -> Self {
         let is_quasi = newton.settings.method == Method::QuasiNewton;
         Self {
             task,
             guess,
             acceleration: is_quasi.then(Acceleration::default),
-            relaxation: Relaxation::new(newton.settings),
+            relaxation: Relaxation::new(newton.settings, is_expected),
             least: None,
+            first: None,
             predicted: None,
         }
     }
@@ -68,6 +76,55 @@ impl LoadControl {
             rise: 0.0,
         })
     }
+
+    /// The next iterate of Newton's method.
+    fn newton_correction(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<State, StepFailure> {
+        if let Some(acceleration) = &self.acceleration {
+            newton.kept.stalls = acceleration.stalls(iterations);
+        }
+        if newton.renew(self.series(iterations), &state.increment, &self.task)?
+            && let Some(acceleration) = &mut self.acceleration
+        {
+            // What moves with another matrix achieved says nothing of this one.
+            *acceleration = Acceleration::since(iterations.len() - 1);
+        }
+        if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
+            iterations.push(taken);
+            return Ok(next);
+        }
+        let correction = self.correction(newton, state)?;
+        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
+        let ends = newton.probably_ends(state.balance.relative, size);
+        let (length, next) = newton.search(self, state, &correction, ends)?;
+        if let Some(acceleration) = &mut self.acceleration {
+            acceleration.took(&correction.increment, length);
+        }
+        iterations.push(newton.took(&next, &correction.increment, length));
+        Ok(next)
+    }
+
+    /// The equilibrium that a motion leads to, if it does.
+    fn relieve(
+        &mut self,
+        newton: &mut Newton<'_>,
+        rise: f64,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<Option<State>, StepFailure> {
+        let first = self.first.as_deref();
+        let reached = self
+            .relaxation
+            .relieve(newton, &self.task, first, iterations)?;
+        Ok(reached.map(|(increment, balance)| State {
+            increment,
+            rise,
+            balance,
+        }))
+    }
 }
 
 impl Control for LoadControl {
@@ -78,6 +135,9 @@ impl Control for LoadControl {
             None => newton.predict(&self.task)?,
         };
         newton.starts_from(&increment, from_tangent);
+        if !from_tangent && self.relaxation.is_wanted() {
+            self.first = Some(increment.clone());
+        }
         let operator = newton.operator();
         self.evaluate(newton, (increment, self.task.period.1), operator)
     }
@@ -102,6 +162,9 @@ impl Control for LoadControl {
         state: &State,
         iterations: &[Iteration],
     ) -> Option<f64> {
+        if self.relaxation.has_arrived() {
+            return Some(0.0);
+        }
         if newton.is_equilibrium(&state.balance, iterations.last()?) {
             return Some(0.0);
         }
@@ -121,39 +184,24 @@ impl Control for LoadControl {
         state: &State,
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
-        let relaxed = self
-            .relaxation
-            .relieve(newton, &self.task, &state.increment, iterations)?;
-        if let Some((increment, balance)) = relaxed {
-            let rise = state.rise;
-            return Ok(State {
-                increment,
-                rise,
-                balance,
-            });
+        if self.relaxation.is_due(iterations) {
+            if let Some(state) = self.relieve(newton, state.rise, iterations)? {
+                return Ok(state);
+            }
+            let at = (state.increment.clone(), state.rise);
+            return self.evaluate(newton, at, Operator::Consistent);
         }
-        if let Some(acceleration) = &self.acceleration {
-            newton.kept.stalls = acceleration.stalls(iterations);
+        match self.newton_correction(newton, state, iterations) {
+            // What has lost its stiffness may be at rest with that of the step's start.
+            Err(failure) if failure.is_singular() && self.relaxation.is_ready() => {
+                if self.has_settled(newton, state) {
+                    return Err(failure);
+                }
+                let relieved = self.relieve(newton, state.rise, iterations)?;
+                relieved.ok_or(failure)
+            }
+            corrected => corrected,
         }
-        if newton.renew(self.series(iterations), &state.increment, &self.task)?
-            && let Some(acceleration) = &mut self.acceleration
-        {
-            // What moves with another matrix achieved says nothing of this one.
-            *acceleration = Acceleration::since(iterations.len() - 1);
-        }
-        if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
-            iterations.push(taken);
-            return Ok(next);
-        }
-        let correction = self.correction(newton, state)?;
-        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
-        let ends = newton.probably_ends(state.balance.relative, size);
-        let (length, next) = newton.search(self, state, &correction, ends)?;
-        if let Some(acceleration) = &mut self.acceleration {
-            acceleration.took(&correction.increment, length);
-        }
-        iterations.push(newton.took(&next, &correction.increment, length));
-        Ok(next)
     }
 
     fn line_search(&self, newton: &Newton<'_>, from: &State) -> LineSearch {

@@ -104,6 +104,17 @@ impl Newton<'_> {
         outcome.map_err(|_| Reason::Singular(None).into())
     }
 
+    /// K_fp Δp with the tangents that the groups hold, by equation.
+    pub(super) fn coupling(&mut self, prescribed: &[f64]) -> Vec<f64> {
+        let start = Instant::now();
+        let mut coupling = vec![0.0; self.places.free.len()];
+        self.places.scatter(prescribed, &mut self.displacement);
+        let (system, increment) = (self.system, &self.displacement);
+        system.prescribed_forces(self.groups, increment, &mut coupling);
+        self.costs.assembly += start.elapsed();
+        coupling
+    }
+
     /// Solves K δ = residual − K_fp Δp with the factorised matrix.
     ///
     /// # Errors
@@ -113,14 +124,10 @@ impl Newton<'_> {
         residual: &[f64],
         prescribed: Option<&[f64]>,
     ) -> Result<Vec<f64>, StepFailure> {
-        let start = Instant::now();
-        let mut coupling = vec![0.0; residual.len()];
-        if let Some(increment) = prescribed {
-            self.places.scatter(increment, &mut self.displacement);
-            let (system, increment) = (self.system, &self.displacement);
-            system.prescribed_forces(self.groups, increment, &mut coupling);
-        }
-        self.costs.assembly += start.elapsed();
+        let coupling = match prescribed {
+            Some(increment) => self.coupling(increment),
+            None => vec![0.0; residual.len()],
+        };
         let start = Instant::now();
         let right: Vec<f64> = residual.iter().zip(&coupling).map(|(r, c)| r - c).collect();
         let solution = self.solver.solve(&right);

@@ -12,6 +12,8 @@ pub struct Guess {
     /// Fraction of the residual that the first correction will probably leave, as it did in the
     /// last step; `None` if nothing is known.
     pub contraction: Option<f64>,
+    /// The last step was a motion of many viscous steps: this one begins with one.
+    pub was_motion: bool,
 }
 
 /// One iteration, for the log.
@@ -60,6 +62,8 @@ pub struct StepSuccess {
     pub unreliable: Option<String>,
     /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
     pub relaxed: bool,
+    /// It took many viscous steps.
+    pub was_motion: bool,
     /// Relative residual that had to be taken for round-off, above the tolerance; else 0.
     pub round_off: f64,
     /// Relative residual that is tolerated above the tolerance, where iterations had come to a standstill;

@@ -2,7 +2,7 @@
 
 use super::{Newton, ROUND_OFF};
 use crate::assembly::norms;
-use crate::group::{Group, PointFailure};
+use crate::group::{Committed, Group, PointFailure};
 use law::Operator;
 use std::time::Instant;
 
@@ -102,12 +102,43 @@ impl Newton<'_> {
         operator: Operator,
     ) -> Result<(Vec<f64>, Option<String>), PointFailure> {
         self.costs.evaluations += 1;
-        self.places.scatter(increment, &mut self.displacement);
-        let outcome = self.evaluate_groups(task.period, operator);
+        let mut period = task.period;
+        if let Some(base) = &self.base {
+            // What is committed has taken the time of the step.
+            let since: Vec<f64> = increment.iter().zip(base).map(|(u, u_0)| u - u_0).collect();
+            self.places.scatter(&since, &mut self.displacement);
+            period = (period.0 + period.1, 0.0);
+        } else {
+            self.places.scatter(increment, &mut self.displacement);
+        }
+        let outcome = self.evaluate_groups(period, operator);
         let mut internal = self.places.take(&mut self.force);
         let unreliable = outcome?;
         self.places.fold(&mut internal);
         Ok((internal, unreliable))
+    }
+
+    /// Commits the trial state, which belongs to these displacement increments, within the step.
+    pub(super) fn commit(&mut self, increment: &[f64]) {
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            if self.system.includes(number) {
+                group.commit();
+            }
+        }
+        self.base = Some(increment.to_vec());
+    }
+
+    /// The committed state of the groups.
+    pub(super) fn committed(&self) -> Vec<Committed> {
+        self.groups.iter().map(Group::committed).collect()
+    }
+
+    /// Takes back what was committed within the step.
+    pub(super) fn restore(&mut self, committed: Vec<Committed>) {
+        for (group, committed) in self.groups.iter_mut().zip(committed) {
+            group.restore_committed(committed);
+        }
+        self.base = None;
     }
 
     /// Forces by body that count as none where no force has ever acted: round-off of K u.
