@@ -139,7 +139,10 @@ pub fn places_json(search: &SearchPath) -> Result<String, Error> {
 fn sidecars(search: &SearchPath) -> Vec<(PathBuf, Result<LawDescription, law::Error>)> {
     let mut found = Vec::new();
     for place in search.places() {
-        let entries = std::fs::read_dir(&place.folder).into_iter().flatten().flatten();
+        let entries = std::fs::read_dir(&place.folder)
+            .into_iter()
+            .flatten()
+            .flatten();
         let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
         paths.sort();
         for path in paths {

@@ -71,7 +71,12 @@ fn of_driver(driver: &Driver) -> Result<Vec<Specimen>, Verdict> {
     let point = driver.point();
     let segments = point.segments().iter();
     let times: Vec<f64> = segments
-        .flat_map(|segment| std::iter::repeat_n(segment.time_increment, segment.increments))
+        .flat_map(|segment| {
+            std::iter::repeat_n(
+                segment.length() / segment.increments as f64,
+                segment.increments,
+            )
+        })
         .collect();
     let mut courses: Vec<(f64, Vec<PointStart>)> = Vec::new();
     let mut last: Option<PointStart> = None;
