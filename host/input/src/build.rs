@@ -280,6 +280,7 @@ impl Case {
     fn span(&self, item: &Item, cause: &Cause) -> Range<usize> {
         let file = &self.file;
         let group = |number: usize| file.groups.get_index(number);
+        let phase = |number: &usize| file.phases.get(*number);
         let found = match item {
             Item::Problem => None,
             Item::Group(number) => group(*number).map(|(name, _)| name.span()),
@@ -339,14 +340,8 @@ impl Case {
                 .phases
                 .get(*phase)
                 .and_then(|phase| Some(phase.rigid.get(*number)?.span())),
-            Item::Time(phase) => file
-                .phases
-                .get(*phase)
-                .and_then(|phase| Some(phase.time.as_ref()?.span())),
-            Item::Course(phase) => file
-                .phases
-                .get(*phase)
-                .and_then(|phase| Some(phase.course.as_ref()?.span())),
+            Item::Time(number) => phase(number).and_then(|of| Some(of.time.as_ref()?.span())),
+            Item::Course(number) => phase(number).and_then(|of| Some(of.course.as_ref()?.span())),
             Item::Activation {
                 phase,
                 group: of,

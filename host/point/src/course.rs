@@ -147,14 +147,7 @@ impl Driver {
         warnings.extend(blurred);
         warnings.extend(walk.silence.warning(&self.law));
         walk.change_frame(Frame::Cartesian, &mut held);
-        let (times, first) = &walk.search.unreliable;
-        if *times > 0 {
-            warnings.push(Warning::Unreliable {
-                law: self.law.description().id.clone(),
-                times: *times,
-                first: first.clone(),
-            });
-        }
+        warnings.extend(self.unreliable(&walk));
         warnings.extend(self.law.take_notes().into_iter().map(Warning::Note));
         let Point {
             gradient,
@@ -177,6 +170,16 @@ impl Driver {
         let step = segments.first().map(|segment| segment.step);
         let of_step = segments.iter().take_while(|s| Some(s.step) == step);
         of_step.map(Segment::length).sum()
+    }
+
+    /// What to say of results that the law calls inaccurate.
+    fn unreliable(&self, walk: &Walk<'_>) -> Option<Warning> {
+        let (times, first) = &walk.search.unreliable;
+        (*times > 0).then(|| Warning::Unreliable {
+            law: self.law.description().id.clone(),
+            times: *times,
+            first: first.clone(),
+        })
     }
 
     /// What to say of a point that round-off keeps from its goal.

@@ -109,7 +109,7 @@ mod tests {
                 1.234_567_4,
                 9.999_999_7,
                 6.022_140_76,
-                3.141_592_653_589_793,
+                std::f64::consts::PI,
             ] {
                 for value in [digits, -digits].map(|value| value * 10_f64.powi(exponent)) {
                     let written: f64 = format!("{value:.6e}").parse().unwrap();
@@ -117,7 +117,10 @@ mod tests {
                 }
             }
         }
-        assert_eq!(rounded(f64::MIN_POSITIVE, 7), 2.225_074e-308);
+        assert_eq!(
+            rounded(f64::MIN_POSITIVE, 7).to_bits(),
+            2.225_074e-308_f64.to_bits()
+        );
     }
 
     #[test]

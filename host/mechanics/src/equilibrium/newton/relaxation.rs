@@ -268,12 +268,11 @@ impl Newton<'_> {
         let coupling = self.coupling(&task.prescribed);
         let pairs = coupling.iter().zip(&before.residual);
         let given = pairs.map(|(coupling, change)| coupling - change).collect();
-        let increment = match guess {
-            Some(guess) => guess.to_vec(),
-            None => {
-                self.factorise(elastic.clone(), 1.0)?;
-                self.answer_to(&before.residual, task)?
-            }
+        let increment = if let Some(guess) = guess {
+            guess.to_vec()
+        } else {
+            self.factorise(elastic.clone(), 1.0)?;
+            self.answer_to(&before.residual, task)?
         };
         Ok(Motion {
             elastic,
