@@ -153,6 +153,9 @@ pub enum Control {
     /// The load factor; where it leads no further, the arc length of the path of equilibrium, on
     /// which the load may fall and rise again.
     ArcLength,
+    /// The load factor; where Newton iterations stand still, the path of a body that creeps to its next
+    /// equilibrium, committed step by step.
+    Creep,
 }
 
 /// How the equations of a phase are set up.

@@ -484,7 +484,7 @@ impl Simulation {
                         }
                     }
                     // A motion takes many iterations, and steps of any length.
-                    if success.relaxed || success.iterations.len() as f64 <= easy {
+                    if success.was_motion || success.iterations.len() as f64 <= easy {
                         phase.course.step = (REGROWTH * step).min(1.0 / n as f64);
                     }
                     self.take_over(success, end, place, phase, watch, &mut done)?;

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | [`iterate`] | the loop: predict, evaluate, accept, correct |
 //! | [`load`], [`path`] | what it asks: steps to a load factor, steps along the path of equilibrium |
-//! | [`kept`], [`acceleration`], [`relaxation`] | strategies of steps to a load factor |
+//! | [`kept`], [`acceleration`], [`relaxation`], [`creep`] | strategies of steps to a load factor |
 //! | [`line_search`] | how far a correction is followed |
 //! | [`residual`], [`matrix`] | evaluation; assembly, factorisation, solution |
 //! | [`acceptance`] | when a state counts as equilibrium, of numbers alone |
@@ -18,6 +18,7 @@
 mod acceleration;
 mod acceptance;
 mod cause;
+mod creep;
 mod failure;
 mod given;
 mod iterate;
@@ -229,9 +230,9 @@ impl<'a> Newton<'a> {
         self.end(outcome.is_ok());
         match outcome {
             Ok(equilibrium) => {
-                let relaxation = &control.relaxation;
-                let relaxed = relaxation.has_arrived();
-                let was_motion = relaxation.lets_expect_another();
+                let creep = &control.creep;
+                let relaxed = control.relaxation.is_under_way() || creep.has_arrived();
+                let was_motion = creep.lets_expect_another();
                 Ok(StepSuccess {
                     was_motion,
                     ..equilibrium.reached(iterations, relaxed)

@@ -1,9 +1,10 @@
 //! Steps whose load factor is given: the strategies of Newton's method under load control.
 //!
-//! A standstill is [relaxed](super::relaxation); a [kept matrix](super::kept) is tried before that of
+//! A standstill is [relaxed](super::relaxation) or [crept](super::creep) away; a [kept matrix](super::kept) is tried before that of
 //! the present state; slow corrections are [accelerated](super::acceleration).
 
 use super::acceleration::Acceleration;
+use super::creep::Creep;
 use super::failure::StepFailure;
 use super::iterate::{Control, Correction, State};
 use super::line_search::{LineSearch, Otherwise};
@@ -33,10 +34,11 @@ pub(super) struct LoadControl {
     /// With a quasi-Newton matrix only.
     acceleration: Option<Acceleration>,
     pub(super) relaxation: Relaxation,
-    /// Displacement increments that left the least out of balance, and how much, relative.
-    least: Option<(Vec<f64>, f64)>,
+    pub(super) creep: Creep,
     /// The first iterate, where it did not come from the tangent.
     first: Option<Vec<f64>>,
+    /// Displacement increments that left the least out of balance, and how much, relative.
+    least: Option<(Vec<f64>, f64)>,
     /// Size of the first iterate's displacement increments.
     predicted: Option<f64>,
 }
@@ -54,7 +56,8 @@ impl LoadControl {
             task,
             guess,
             acceleration: is_quasi.then(Acceleration::default),
-            relaxation: Relaxation::new(newton.settings, is_expected),
+            relaxation: Relaxation::new(newton.settings),
+            creep: Creep::new(newton.settings, is_expected),
             least: None,
             first: None,
             predicted: None,
@@ -76,55 +79,6 @@ impl LoadControl {
             rise: 0.0,
         })
     }
-
-    /// The next iterate of Newton's method.
-    fn newton_correction(
-        &mut self,
-        newton: &mut Newton<'_>,
-        state: &State,
-        iterations: &mut Vec<Iteration>,
-    ) -> Result<State, StepFailure> {
-        if let Some(acceleration) = &self.acceleration {
-            newton.kept.stalls = acceleration.stalls(iterations);
-        }
-        if newton.renew(self.series(iterations), &state.increment, &self.task)?
-            && let Some(acceleration) = &mut self.acceleration
-        {
-            // What moves with another matrix achieved says nothing of this one.
-            *acceleration = Acceleration::since(iterations.len() - 1);
-        }
-        if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
-            iterations.push(taken);
-            return Ok(next);
-        }
-        let correction = self.correction(newton, state)?;
-        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
-        let ends = newton.probably_ends(state.balance.relative, size);
-        let (length, next) = newton.search(self, state, &correction, ends)?;
-        if let Some(acceleration) = &mut self.acceleration {
-            acceleration.took(&correction.increment, length);
-        }
-        iterations.push(newton.took(&next, &correction.increment, length));
-        Ok(next)
-    }
-
-    /// The equilibrium that a motion leads to, if it does.
-    fn relieve(
-        &mut self,
-        newton: &mut Newton<'_>,
-        rise: f64,
-        iterations: &mut Vec<Iteration>,
-    ) -> Result<Option<State>, StepFailure> {
-        let first = self.first.as_deref();
-        let reached = self
-            .relaxation
-            .relieve(newton, &self.task, first, iterations)?;
-        Ok(reached.map(|(increment, balance)| State {
-            increment,
-            rise,
-            balance,
-        }))
-    }
 }
 
 impl Control for LoadControl {
@@ -135,7 +89,7 @@ impl Control for LoadControl {
             None => newton.predict(&self.task)?,
         };
         newton.starts_from(&increment, from_tangent);
-        if !from_tangent && self.relaxation.is_wanted() {
+        if !from_tangent && self.creep.is_wanted() {
             self.first = Some(increment.clone());
         }
         let operator = newton.operator();
@@ -162,7 +116,7 @@ impl Control for LoadControl {
         state: &State,
         iterations: &[Iteration],
     ) -> Option<f64> {
-        if self.relaxation.has_arrived() {
+        if self.creep.has_arrived() {
             return Some(0.0);
         }
         if newton.is_equilibrium(&state.balance, iterations.last()?) {
@@ -184,24 +138,57 @@ impl Control for LoadControl {
         state: &State,
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
-        if self.relaxation.is_due(iterations) {
-            if let Some(state) = self.relieve(newton, state.rise, iterations)? {
-                return Ok(state);
-            }
-            let at = (state.increment.clone(), state.rise);
-            return self.evaluate(newton, at, Operator::Consistent);
+        if self.creep.is_due(iterations) {
+            let first = self.first.as_deref();
+            let reached = self.creep.relieve(newton, &self.task, first, iterations)?;
+            let (increment, balance) = if let Some(reached) = reached {
+                reached
+            } else {
+                // Newton iterations go on where they stood.
+                let increment = state.increment.clone();
+                let balance = newton.evaluate(&increment, &self.task, Operator::Consistent)?;
+                (increment, balance)
+            };
+            let rise = state.rise;
+            return Ok(State {
+                increment,
+                rise,
+                balance,
+            });
         }
-        match self.newton_correction(newton, state, iterations) {
-            // What has lost its stiffness may be at rest with that of the step's start.
-            Err(failure) if failure.is_singular() && self.relaxation.is_ready() => {
-                if self.has_settled(newton, state) {
-                    return Err(failure);
-                }
-                let relieved = self.relieve(newton, state.rise, iterations)?;
-                relieved.ok_or(failure)
-            }
-            corrected => corrected,
+        let relaxed = self
+            .relaxation
+            .relieve(newton, &self.task, &state.increment, iterations)?;
+        if let Some((increment, balance)) = relaxed {
+            let rise = state.rise;
+            return Ok(State {
+                increment,
+                rise,
+                balance,
+            });
         }
+        if let Some(acceleration) = &self.acceleration {
+            newton.kept.stalls = acceleration.stalls(iterations);
+        }
+        if newton.renew(self.series(iterations), &state.increment, &self.task)?
+            && let Some(acceleration) = &mut self.acceleration
+        {
+            // What moves with another matrix achieved says nothing of this one.
+            *acceleration = Acceleration::since(iterations.len() - 1);
+        }
+        if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
+            iterations.push(taken);
+            return Ok(next);
+        }
+        let correction = self.correction(newton, state)?;
+        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
+        let ends = newton.probably_ends(state.balance.relative, size);
+        let (length, next) = newton.search(self, state, &correction, ends)?;
+        if let Some(acceleration) = &mut self.acceleration {
+            acceleration.took(&correction.increment, length);
+        }
+        iterations.push(newton.took(&next, &correction.increment, length));
+        Ok(next)
     }
 
     fn line_search(&self, newton: &Newton<'_>, from: &State) -> LineSearch {
@@ -214,7 +201,11 @@ impl Control for LoadControl {
     }
 
     fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
-        self.relaxation.series(iterations)
+        if self.creep.is_wanted() {
+            self.creep.series(iterations)
+        } else {
+            self.relaxation.series(iterations)
+        }
     }
 
     fn has_settled(&self, newton: &mut Newton<'_>, state: &State) -> bool {
@@ -266,7 +257,7 @@ impl Control for LoadControl {
         iterations: &[Iteration],
     ) -> StepFailure {
         let correction = iterations.last().and_then(|last| last.correction);
-        let in_vain = self.relaxation.was_in_vain();
+        let in_vain = self.relaxation.was_in_vain() || self.creep.was_in_vain();
         newton.no_equilibrium(self, state, &self.task, correction, in_vain)
     }
 }

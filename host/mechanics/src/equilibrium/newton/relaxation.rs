@@ -3,62 +3,40 @@
 //! Newton's method assumes an equilibrium nearby. In a material whose flow is not associated, or
 //! whose contacts open, the branch of equilibria may end where one point reaches another piece of
 //! its law: followed on, neither piece leads to an equilibrium. Iterations then alternate between
-//! the two for ever, however small the step. What a real body does there is to move on, quickly,
-//! until it finds the next stable equilibrium. The relaxation follows that motion. Beside the
-//! stress of the law stands an overstress of Duvaut–Lions' kind (G. Duvaut, J. L. Lions 1972; J. C.
-//! Simo, J. G. Kennedy, S. Govindjee, Int. J. Numer. Meth. Engng 26, 1988),
+//! the two for ever, however small the step (the residual of the cycle is proportional to the
+//! step). What a real body does there is to move on, quickly,
+//! until it finds the next stable equilibrium. The relaxation follows that motion with a
+//! viscosity proportional to the elastic stiffness,
 //!
-//!   σ = σ_law + s, ṡ = D_e ε̇ − σ̇_law − s/τ,
+//!   α K_e u̇ = r(u),    an implicit step of unit time: (K + α K_e) δ = r,
 //!
-//! whose nodal forces are what σ_law leaves out of balance, r. An implicit step of time Δt, in which
-//! α = τ/Δt, from the committed state on is
-//!
-//!   r(Δu) = α (K_e Δu − Δf),    tangent K + α K_e,
-//!
-//! with the step's change Δf of the forces in the first one and none afterwards, while the body
-//! comes to rest. Every viscous step is solved and **its state committed**: laws see the path of a
-//! body that creeps to its equilibrium, not one increment tried again and again. Above
-//! α = (1/cos θ − 1)/2, θ the angle between yield and flow in energy, a step's matrix is positive definite
-//! and its answer the only one; where a viscous step turns out to be linear nothing yields or unloads
-//! any more, and α falls, at last to nothing: a Newton correction. The same tolerances decide. What
-//! is accepted is an equilibrium of the laws alone, without overstress.
+//! from the elastic answer to the step on, the residual growing where it must; if that leads nowhere,
+//! from where Newton iterations stood still. α follows the residual: steps of time grow longer as the
+//! motion slows down (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal.
+//! 35, 1998). The motion leaves
+//! equilibria that are not stable and ends at one that is. Newton iterations are tried whenever
+//! the residual has fallen; they alone decide on convergence, by the same tolerances. The motion
+//! changes the path within the step only: laws still see one increment from the last equilibrium.
 
+use super::Newton;
 use super::failure::{Iterations, Reason, StepFailure};
 use super::outcome::Iteration;
 use super::residual::{Balance, Task};
-use super::{Newton, norm};
-use crate::assembly::norms;
 use crate::settings::{Control, Settings};
 use law::Operator;
 
-/// α at first, and where states change. The chambers with Mohr–Coulomb sand and the bored pile settle
-/// with it; a quarter of it leads the pile to other equilibria, with more dilation.
+/// α at first. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
+/// of D + α D_e is positive definite for α above (1/cos θ − 1)/2. This value was found by trial:
+/// the chambers with Mohr–Coulomb sand settle with it; 0.1 and 1 are much slower there.
 const VISCOSITY: f64 = 0.05;
 /// Largest α.
-const MOST: f64 = 1.0;
-/// Factor by which α grows where a viscous step is hard, and where it found no answer.
-const HARD: f64 = 2.0;
-const FAILED: f64 = 3.0;
-/// Corrections of a viscous step that are many, and those that are too many; with less than the first viscosity.
-const MANY: usize = 3;
-const TOO_MANY: usize = 8;
-const FEW: usize = 3;
-/// What a viscous step leaves of its own equation, relative to the residual of the laws or to the
-/// force tolerance.
-const INNER: f64 = 0.1;
-const NEGLIGIBLE: f64 = 0.3;
-/// Where one correction was enough, α falls by the factor; if it is then below its first value, a viscous step that is
-/// not as easy is taken back.
-const FALLS: f64 = 0.3;
-/// α below this counts as none.
-const LEAST: f64 = 1e-3;
-/// Viscous steps of one motion, and how many without the residual falling to half end it.
-const MAX_STEPS: usize = 200;
-const IDLE: usize = 40;
-/// Lengths of a correction that are tried.
-const LENGTHS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-/// A motion of more viscous steps lets expect another one in the next step.
-const SHORT: usize = 3;
+const MOST: f64 = 0.2;
+/// Least and largest factor by which α follows the residual from one viscous step to the next.
+const FOLLOWS: [f64; 2] = [0.3, 2.0];
+/// Newton iterations are tried each time the residual has fallen to this fraction.
+const FALL: f64 = 0.1;
+/// Viscous steps of one motion.
+const MAX_STEPS: usize = 40;
 /// Newton iterations without a new least residual that count as a standstill.
 const STANDSTILL: usize = 6;
 /// Iterations before a standstill is looked for.
@@ -70,52 +48,40 @@ const PROGRESS: f64 = 0.9;
 #[derive(Debug)]
 pub(super) struct Relaxation {
     course: Course,
-    /// The last step was a motion: this one begins with it.
-    is_expected: bool,
     /// Where the last series of Newton iterations starts.
     first: usize,
+    /// Where Newton iterations first came to a standstill: displacement increments, and how many
+    /// iterations they were.
+    standstill: (Vec<f64>, usize),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 enum Course {
     /// The settings want none.
     Off,
     /// Newton iterations have not come to a standstill yet.
     Ready,
-    /// It led to the present state, in so many viscous steps.
-    Arrived(usize),
+    UnderWay(Motion),
     /// It led nowhere. Newton iterations had to go on alone.
     InVain,
 }
 
-/// A motion: where it is, relative to the last viscous step.
+/// A motion under way.
 #[derive(Debug)]
 struct Motion {
     /// Elastic stiffness, in the matrix's pattern; without the domain.
     elastic: Vec<f64>,
-    /// K_e of the prescribed displacements less Δf, by equation; nil after the first viscous step.
-    given: Vec<f64>,
-    /// Displacement increments of the step up to the last viscous step, by place; none in the first
-    /// one.
-    from: Vec<f64>,
-    /// Those reached.
+    /// Displacement increments reached.
     increment: Vec<f64>,
-    viscosity: f64,
-}
-
-/// How a viscous step went.
-#[derive(Clone, Copy, Debug, Default)]
-struct Went {
-    corrections: usize,
-    /// A correction was shortened.
-    is_cut: bool,
-    /// It found its answer with another viscosity only.
-    is_repeated: bool,
+    /// It started where Newton iterations stood still, as the one from the elastic answer led nowhere.
+    is_second: bool,
+    /// Viscous steps so far.
+    steps: usize,
 }
 
 impl Relaxation {
-    /// Of a step to a given load factor, after a motion or not.
-    pub(super) fn new(settings: &Settings, is_expected: bool) -> Self {
+    /// Of a step to a given load factor.
+    pub(super) fn new(settings: &Settings) -> Self {
         // Methods that keep their matrix are slow without having come to an end. Arc-length control
         // has a way of its own to leave a branch.
         let is_wanted =
@@ -126,72 +92,68 @@ impl Relaxation {
             } else {
                 Course::Off
             },
-            is_expected,
             first: 0,
+            standstill: (Vec::new(), 0),
         }
     }
 
-    /// The last series of Newton iterations, with the state that it started from.
+    /// The last series of Newton iterations, with the state that it started from. A relaxed state
+    /// is allowed as many as the first one was.
     pub(super) fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
         &iterations[self.first..]
     }
 
-    /// Whether it may be asked for.
-    pub(super) fn is_wanted(&self) -> bool {
-        self.course != Course::Off
-    }
-
-    /// Whether it led to the present state, which is an equilibrium.
-    pub(super) fn has_arrived(&self) -> bool {
-        matches!(self.course, Course::Arrived(_))
-    }
-
-    /// Whether the next step should begin with it.
-    pub(super) fn lets_expect_another(&self) -> bool {
-        matches!(self.course, Course::Arrived(steps) if steps > SHORT)
+    /// Whether it led to the present state.
+    pub(super) fn is_under_way(&self) -> bool {
+        matches!(self.course, Course::UnderWay(_))
     }
 
     /// Whether it was tried and led nowhere.
     pub(super) fn was_in_vain(&self) -> bool {
-        self.course == Course::InVain
+        matches!(self.course, Course::InVain)
     }
 
-    /// Whether Newton iterations have come to a standstill, and where they led a motion is still to be
-    /// tried.
-    pub(super) fn is_due(&self, iterations: &[Iteration]) -> bool {
-        let series = self.series(iterations);
-        self.course == Course::Ready
-            && (stands_still(series) || (self.is_expected && series.len() == 1))
-    }
-
-    /// Whether a motion may be tried.
-    pub(super) fn is_ready(&self) -> bool {
-        self.course == Course::Ready
-    }
-
-    /// The equilibrium that a motion leads to; `None` if it leads to none: then the state is that at the
-    /// start of the step again, and Newton iterations may go on for as many as are left to them.
+    /// Where Newton iterations stand still, the state that they go on from: a relaxed one or, if
+    /// there is none, that of the first standstill. `None` where they get on.
     ///
     /// # Errors
-    /// The step is stopped.
+    /// The step is stopped, or a law fails.
     pub(super) fn relieve(
         &mut self,
         newton: &mut Newton<'_>,
         task: &Task,
-        first: Option<&[f64]>,
+        increment: &[f64],
         iterations: &mut Vec<Iteration>,
     ) -> Result<Option<(Vec<f64>, Balance)>, StepFailure> {
-        let so_many = iterations.len();
-        let committed = newton.committed();
-        if let Ok((steps, increment, balance)) = newton.relax(task, first, iterations) {
-            self.course = Course::Arrived(steps);
-            return Ok(Some((increment, balance)));
+        let series = self.series(iterations);
+        if matches!(self.course, Course::Off | Course::InVain) || !stands_still(series) {
+            return Ok(None);
         }
-        newton.restore(committed);
+        if matches!(self.course, Course::Ready) {
+            self.standstill = (increment.to_vec(), series.len());
+            let motion = newton.start_motion(task);
+            self.course = motion.map_or(Course::InVain, Course::UnderWay);
+        }
+        while let Course::UnderWay(motion) = &mut self.course {
+            if let Ok(relaxed) = newton.relax(motion, task, iterations) {
+                self.first = iterations.len() - 1;
+                return Ok(Some(relaxed));
+            }
+            newton.may_go_on()?;
+            if motion.is_second {
+                break;
+            }
+            motion.increment.clone_from(&self.standstill.0);
+            motion.is_second = true;
+            motion.steps = 0;
+        }
         newton.may_go_on()?;
+        // Newton iterations go on where they stood, for as many as are left to them.
         self.course = Course::InVain;
+        let (increment, so_many) = std::mem::take(&mut self.standstill);
+        let balance = newton.evaluate(&increment, task, Operator::Consistent)?;
         self.first = iterations.len() - so_many;
-        Ok(None)
+        Ok(Some((increment, balance)))
     }
 }
 
@@ -212,267 +174,70 @@ pub(super) fn stands_still(iterations: &[Iteration]) -> bool {
 }
 
 impl Newton<'_> {
-    /// The motion from the state at the start of the step to an equilibrium under its end's loads:
-    /// how many viscous steps it took, and where it leads. The first one is answered starting from
-    /// `guess`, or from elasticity. The states of all but the last one are committed.
+    /// The motion from the elastic answer to the step; `None` if a law has no elastic
+    /// operator or elasticity alone leaves the equations singular.
+    fn start_motion(&mut self, task: &Task) -> Option<Motion> {
+        let still = vec![0.0; task.external.len()];
+        let before = self.evaluate(&still, task, Operator::Elastic).ok()?;
+        let elastic = self.stiffness();
+        self.factorise(elastic.clone(), 1.0).ok()?;
+        Some(Motion {
+            elastic,
+            increment: self.answer_to(&before.residual, task).ok()?,
+            is_second: false,
+            steps: 0,
+        })
+    }
+
+    /// Carries a motion on until the residual has fallen enough to try Newton iterations.
     ///
     /// # Errors
     /// The residual did not fall, or a law or the equations failed.
     fn relax(
         &mut self,
+        motion: &mut Motion,
         task: &Task,
-        guess: Option<&[f64]>,
         iterations: &mut Vec<Iteration>,
-    ) -> Result<(usize, Vec<f64>, Balance), StepFailure> {
-        let mut motion = self.start_motion(task, guess)?;
+    ) -> Result<(Vec<f64>, Balance), StepFailure> {
         let mut balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
-        let mut residuals: Vec<f64> = Vec::new();
-        for step in 1..=MAX_STEPS {
+        let mut largest = balance.relative;
+        let mut viscosity = VISCOSITY;
+        while motion.steps < MAX_STEPS {
+            self.may_go_on()?;
+            motion.steps += 1;
+            let correction =
+                self.viscous_correction(&balance.residual, (viscosity, &motion.elastic))?;
+            for (u, d) in motion.increment.iter_mut().zip(&correction) {
+                *u += d;
+            }
             let before = balance.relative;
-            let went = self.viscous_step(&mut motion, &mut balance, task, iterations)?;
-            residuals.push(balance.relative);
-            let ratio = if step == 1 {
-                1.0
-            } else {
-                balance.relative / before
-            };
-            if self.has_come_to_rest(&motion, &balance, ratio) {
-                // Nothing of K + α K_e is left to the steps that follow.
-                self.matrix.held = false;
-                return Ok((step, motion.increment, balance));
-            }
-            let idle = residuals.len().checked_sub(IDLE + 1);
-            if idle.is_some_and(|idle| balance.relative > 0.5 * residuals[idle]) {
-                break;
-            }
-            if step < MAX_STEPS {
-                self.commit(&motion.increment);
-                motion.from.clone_from(&motion.increment);
-                motion.given.fill(0.0);
-                motion.go_on(&went);
+            balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
+            let taken = self.took_to(&balance, &correction, &motion.increment, 1.0);
+            iterations.push(Iteration { viscosity, ..taken });
+            let [least, most] = FOLLOWS;
+            let factor = (balance.relative / before).clamp(least, most);
+            viscosity = (factor * viscosity).min(MOST);
+            largest = largest.max(balance.relative);
+            if balance.relative < before && balance.relative <= FALL * largest {
+                return Ok((motion.increment.clone(), balance));
             }
         }
         let correction = iterations.last().and_then(|last| last.correction);
         let unmet = self.unmet(&balance, correction);
-        Err(Reason::Unmet(Iterations::Relaxation(residuals.len()), unmet).into())
-    }
-
-    /// The motion before its first viscous step.
-    ///
-    /// # Errors
-    /// A law has no elastic operator, or elasticity alone leaves the equations singular.
-    fn start_motion(&mut self, task: &Task, guess: Option<&[f64]>) -> Result<Motion, StepFailure> {
-        let still = vec![0.0; task.external.len()];
-        let before = self.evaluate(&still, task, Operator::Elastic)?;
-        let elastic = self.stiffness();
-        let coupling = self.coupling(&task.prescribed);
-        let pairs = coupling.iter().zip(&before.residual);
-        let given = pairs.map(|(coupling, change)| coupling - change).collect();
-        let increment = if let Some(guess) = guess {
-            guess.to_vec()
-        } else {
-            self.factorise(elastic.clone(), 1.0)?;
-            self.answer_to(&before.residual, task)?
-        };
-        Ok(Motion {
-            elastic,
-            given,
-            from: still,
-            increment,
-            viscosity: VISCOSITY,
-        })
-    }
-
-    /// Solves one viscous step, with a larger viscosity where that of the motion leads to no answer.
-    ///
-    /// # Errors
-    /// None does, or a law or the equations failed.
-    fn viscous_step(
-        &mut self,
-        motion: &mut Motion,
-        balance: &mut Balance,
-        task: &Task,
-        iterations: &mut Vec<Iteration>,
-    ) -> Result<Went, StepFailure> {
-        let start = motion.increment.clone();
-        let mut is_repeated = false;
-        loop {
-            let went = self.try_viscous_step(motion, balance, task, iterations);
-            match went {
-                Ok(Some(went)) => {
-                    return Ok(Went {
-                        is_repeated,
-                        ..went
-                    });
-                }
-                Err(failure) if failure.is_stop() || motion.viscosity >= MOST => {
-                    return Err(failure);
-                }
-                Ok(None) if motion.viscosity >= MOST => {
-                    let unmet = self.unmet(balance, None);
-                    return Err(Reason::Unmet(Iterations::Relaxation(TOO_MANY), unmet).into());
-                }
-                _ => {
-                    is_repeated = true;
-                    motion.viscosity = (FAILED * motion.viscosity).clamp(LEAST, MOST);
-                    motion.increment.clone_from(&start);
-                    *balance = self.evaluate(&start, task, Operator::Consistent)?;
-                }
-            }
-        }
-    }
-
-    /// The same with this viscosity; `None` if it leads to no answer.
-    fn try_viscous_step(
-        &mut self,
-        motion: &mut Motion,
-        balance: &mut Balance,
-        task: &Task,
-        iterations: &mut Vec<Iteration>,
-    ) -> Result<Option<Went>, StepFailure> {
-        let mut went = Went::default();
-        let most = if motion.viscosity < VISCOSITY {
-            FEW
-        } else {
-            TOO_MANY
-        };
-        let mut residual = self.viscous_residual(motion, &motion.increment, balance);
-        while went.corrections < most {
-            self.may_go_on()?;
-            went.corrections += 1;
-            let correction = self.viscous_correction(&residual, motion)?;
-            let size = norm(&residual);
-            for length in LENGTHS {
-                let next = moved(&motion.increment, length, &correction);
-                let at = self.evaluate(&next, task, Operator::Consistent)?;
-                residual = self.viscous_residual(motion, &next, &at);
-                // The shortest is taken whatever it leaves.
-                if norm(&residual) < size || length <= LENGTHS[LENGTHS.len() - 1] {
-                    went.is_cut |= length < 1.0;
-                    if went.is_cut && motion.viscosity < VISCOSITY {
-                        return Ok(None);
-                    }
-                    let taken = self.took_to(&at, &correction, &next, length);
-                    iterations.push(Iteration {
-                        viscosity: motion.viscosity,
-                        ..taken
-                    });
-                    motion.increment = next;
-                    *balance = at;
-                    break;
-                }
-            }
-            let is_negligible = || {
-                let share = self.relative(&residual, &balance.scales);
-                share <= NEGLIGIBLE * self.settings.force_tolerance
-            };
-            if norm(&residual) <= INNER * norm(&balance.residual) || is_negligible() {
-                return Ok(Some(went));
-            }
-        }
-        Ok(None)
-    }
-
-    /// r − α (K_e Δu − Δf), by equation.
-    fn viscous_residual(&self, motion: &Motion, increment: &[f64], balance: &Balance) -> Vec<f64> {
-        let moved: Vec<f64> = increment
-            .iter()
-            .zip(&motion.from)
-            .map(|(u, u_0)| u - u_0)
-            .collect();
-        let forces = self.elastic_forces(&motion.elastic, &moved);
-        let sums = forces.iter().zip(&motion.given);
-        let pairs = balance.residual.iter().zip(sums);
-        pairs
-            .map(|(r, (force, given))| r - motion.viscosity * (force + given))
-            .collect()
-    }
-
-    /// K_e of displacements of the free places, by equation; with the domain.
-    fn elastic_forces(&self, elastic: &[f64], moved: &[f64]) -> Vec<f64> {
-        let pattern = &self.system.pattern;
-        let mut by_place = vec![0.0; moved.len()];
-        if let Some(domain) = self.domain {
-            let boundary = &self.places.boundary;
-            let moved: Vec<f64> = boundary.iter().map(|&place| moved[place]).collect();
-            let mut forces = vec![0.0; boundary.len()];
-            domain.add_product(&moved, &mut forces);
-            for (&place, force) in boundary.iter().zip(forces) {
-                by_place[place] = force;
-            }
-        }
-        let free = &self.places.free;
-        let mut forces: Vec<f64> = free.iter().map(|&place| by_place[place]).collect();
-        for (column, &place) in free.iter().enumerate() {
-            let rows = pattern.column(column);
-            for (&row, stiffness) in rows.iter().zip(&elastic[pattern.places(column)]) {
-                forces[row as usize] += stiffness * moved[place];
-            }
-        }
-        forces
+        Err(Reason::Unmet(Iterations::Relaxation(MAX_STEPS), unmet).into())
     }
 
     /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation.
-    fn viscous_correction(
+    pub(super) fn viscous_correction(
         &mut self,
         residual: &[f64],
-        motion: &Motion,
+        (viscosity, elastic): (f64, &[f64]),
     ) -> Result<Vec<f64>, StepFailure> {
         let mut values = self.stiffness();
-        for (value, elastic) in values.iter_mut().zip(&motion.elastic) {
-            *value += motion.viscosity * elastic;
+        for (value, elastic) in values.iter_mut().zip(elastic) {
+            *value += viscosity * elastic;
         }
-        self.factorise(values, 1.0 + motion.viscosity)?;
+        self.factorise(values, 1.0 + viscosity)?;
         self.solve(residual, None)
     }
-
-    /// Whether a viscous step ends in equilibrium: by the residual, and by what is left of the way if
-    /// residuals go on falling in this ratio.
-    fn has_come_to_rest(&self, motion: &Motion, balance: &Balance, ratio: f64) -> bool {
-        let moved = moved(&motion.increment, -1.0, &motion.from);
-        let left = if motion.viscosity > 0.0 {
-            ratio / (1.0 - ratio).max(f64::MIN_POSITIVE)
-        } else {
-            1.0
-        };
-        let way = left * norm(&moved);
-        balance.relative <= self.settings.force_tolerance
-            && !balance.away.contains(&true)
-            && way <= self.settings.displacement_tolerance * norm(&motion.increment)
-    }
-
-    /// A residual by equation relative to these forces by body.
-    fn relative(&self, residual: &[f64], scales: &[f64]) -> f64 {
-        let bodies = &self.places.bodies;
-        let sizes = norms(&bodies.of_equation, bodies.n, residual);
-        let pairs = sizes.iter().zip(scales);
-        pairs.fold(0.0, |largest, (size, &scale)| {
-            if scale > 0.0 {
-                largest.max(size / scale)
-            } else {
-                largest
-            }
-        })
-    }
-}
-
-impl Motion {
-    /// The viscosity of the next viscous step, after one that went like this.
-    fn go_on(&mut self, went: &Went) {
-        self.viscosity = if went.is_cut || went.corrections > MANY {
-            (HARD * self.viscosity).clamp(VISCOSITY, MOST)
-        } else if went.corrections == 1 && !went.is_repeated {
-            let less = FALLS * self.viscosity;
-            if less < LEAST { 0.0 } else { less }
-        } else if self.viscosity < VISCOSITY {
-            self.viscosity
-        } else {
-            (self.viscosity / HARD).max(VISCOSITY)
-        };
-    }
-}
-
-/// u + length d.
-fn moved(u: &[f64], length: f64, d: &[f64]) -> Vec<f64> {
-    u.iter().zip(d).map(|(u, d)| u + length * d).collect()
 }
