@@ -6,9 +6,9 @@
 //! Boundary    as there; confined in 10 increments, the head pushed by 2 mm in 20, the law swapped as that starts
 //! Law         mohr_coulomb without cohesion (not associated), mepi in the interface
 //! Asserts     equilibrium of the loads, every increment ended by Newton iterations within the
-//!             tolerance; without relaxation, exit code 2 and the point that alternates
+//!             tolerance, by relaxation and by creep; without, exit code 2 and the point that alternates
 
-use crate::setup::{Results, assert_close, fail, run};
+use crate::setup::{Finished, Results, assert_close, fail, run};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -47,6 +47,33 @@ fn chamber(solver: &str) -> String {
     text + solver
 }
 
+/// Every increment of the loading has ended within the tolerance, and reactions balance loads.
+fn assert_equilibria(finished: &Finished) {
+    let iterations = finished.events("iteration");
+    let loading: Vec<_> = iterations
+        .iter()
+        .filter(|e| e["phase"] == "loading")
+        .collect();
+    for increment in 1..=20 {
+        let mut own = loading.iter().filter(|e| e["increment"] == increment);
+        let last = own.next_back().expect("an iteration");
+        assert!(last["residual"].as_f64().unwrap() <= 1e-9, "{last}");
+    }
+    let plate = 100.0 * PI * 0.262 * 0.262;
+    let (top, head) = (
+        finished.in_phase("loading", "top"),
+        finished.in_phase("loading", "q_t"),
+    );
+    // The force that the swap of the law frees is taken off in proportion to the phase.
+    let freed = (head[0] - top[0] - plate) / 0.95;
+    assert!(freed.abs() < 1e-5 * plate, "{freed}");
+    for (i, (top, head)) in top.iter().zip(&head).enumerate() {
+        let left = freed * (1.0 - 0.05 * (i + 1) as f64);
+        assert_close("loads", head - top, plate + left, 1e-8, plate);
+    }
+    assert!(head.windows(2).all(|pair| pair[1] > pair[0]), "{head:?}");
+}
+
 #[test]
 fn relaxation_finds_the_next_equilibrium() {
     let finished = run(&chamber(""));
@@ -63,29 +90,30 @@ fn relaxation_finds_the_next_equilibrium() {
             .iter()
             .any(|e| e["viscosity"].as_f64().unwrap() > 0.0)
     );
-    for increment in 1..=20 {
-        let mut own = loading.iter().filter(|e| e["increment"] == increment);
-        let last = own.next_back().expect("an iteration");
-        assert!(last["residual"].as_f64().unwrap() <= 1e-9, "{last}");
-        assert_eq!(last["viscosity"], 0.0, "{last}");
+    assert_equilibria(&finished);
+    // Newton iterations decide.
+    let ends = |pair: &[&serde_json::Value]| pair[0]["increment"] != pair[1]["increment"];
+    for pair in loading.windows(2).filter(|pair| ends(pair)) {
+        assert_eq!(pair[0]["viscosity"], 0.0, "{}", pair[0]);
     }
-    let plate = 100.0 * PI * 0.262 * 0.262;
-    let (top, head) = (
-        finished.in_phase("loading", "top"),
-        finished.in_phase("loading", "q_t"),
-    );
-    // The force that the swap of the law frees is taken off in proportion to the phase.
-    let freed = (head[0] - top[0] - plate) / 0.95;
-    assert!(freed.abs() < 1e-5 * plate, "{freed}");
-    for (i, (top, head)) in top.iter().zip(&head).enumerate() {
-        let left = freed * (1.0 - 0.05 * (i + 1) as f64);
-        assert_close("loads", head - top, plate + left, 1e-8, plate);
-    }
-    assert!(head.windows(2).all(|pair| pair[1] > pair[0]), "{head:?}");
     // The state depends on the course of the relaxation, and says so.
     let warnings = &finished.observer.warnings;
     let says = |warning: &String| warning.contains("others may lie near");
     assert!(warnings.iter().any(says), "{warnings:?}");
+}
+
+/// The same by creep: its states are equilibria by the same tolerance, the head gains load all the way, and
+/// ends within 1 % of where the relaxation ends (several equilibria exist).
+#[test]
+fn creep_finds_the_next_equilibrium() {
+    let crept = run(&chamber("\n[solver]\ncontrol = \"creep\"\n"));
+    let loading = &crept.summary()["phases"][1];
+    assert!(loading["relaxed_steps"].as_u64().unwrap() >= 1, "{loading}");
+    assert_equilibria(&crept);
+    let relaxed = run(&chamber(""));
+    let end = |results: &Finished| *results.in_phase("loading", "q_t").last().unwrap();
+    let head = end(&relaxed);
+    assert_close("head", end(&crept), head, 0.01, head);
 }
 
 #[test]

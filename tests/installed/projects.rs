@@ -16,7 +16,7 @@ fn follow(language: &str, compilers: Compilers) {
     let commands: Vec<&str> = blocks
         .flat_map(|block| block.split("```").next().unwrap().lines())
         .collect();
-    assert_eq!(commands.len(), 5, "{commands:?}");
+    assert_eq!(commands.len(), 6, "{commands:?}");
     for command in commands {
         place.done("slider", command);
     }

@@ -225,6 +225,8 @@ int main(int argc, char **argv) {
     for (uint32_t f = 0; f < law->n_formulations; f++) {
         const pilum_formulation *formulation = law->formulation + f;
         int kind = formulation->hypothesis;
+        /* Entries of other programs are for interfaces in the plane. */
+        if (kind == PILUM_H_INTERFACE_3D) continue;
         pilum_instance *instance = 0;
         char message[256] = "";
         if (law->create(law, &host, f, parameter, law->n_parameters, &instance, message, sizeof message)) {
