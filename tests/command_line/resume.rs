@@ -133,7 +133,11 @@ fn killed_and_resumed(text: &str, rows: usize, kills: u32) {
         if whole_rows(&place) == rows {
             // Resumed often enough to have come to its end: the next run starts anew.
             // The process that did the work may take a moment to follow the one that was killed, and
-            // writes until then.
+            // writes until then, by path: a checkpoint would come into the next run's folder. It holds
+            // this lock to its end.
+            std::fs::File::open(place.path("out/history.csv"))
+                .and_then(|history| history.lock())
+                .unwrap();
             let since = Instant::now();
             while let Err(why) = std::fs::remove_dir_all(place.path("out")) {
                 assert!(since.elapsed() < Duration::from_secs(5), "{why}");
