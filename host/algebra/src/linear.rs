@@ -163,7 +163,7 @@ impl LinearSolver {
     /// # Errors
     /// [`Singular`].
     pub fn factorise_with(&mut self, values: Vec<f64>, share: f64) -> Result<(), Singular> {
-        self.values = values;
+        let before = std::mem::replace(&mut self.values, values);
         self.proven = false;
         if let Some(block) = &mut self.block {
             block.share = share;
@@ -176,7 +176,7 @@ impl LinearSolver {
             return Ok(());
         }
         self.factorisations += 1;
-        self.factorised = self.factorise_fast().is_ok();
+        self.factorised = self.factorise_fast(&before).is_ok();
         if self.factorised {
             Ok(())
         } else {
@@ -195,12 +195,14 @@ impl LinearSolver {
     }
 
     /// Factorises with row exchanges inside supernodes only, and among the equations of the block.
-    fn factorise_fast(&mut self) -> Result<(), Singular> {
+    /// `before` are the values of the last matrix.
+    fn factorise_fast(&mut self, before: &[f64]) -> Result<(), Singular> {
         let Some(block) = &self.block else {
-            return self.multifrontal.factorise(&self.values);
+            return self.multifrontal.factorise_after(before, &self.values);
         };
         let values = block.values().iter().map(|value| block.share * value);
-        self.multifrontal.factorise_onto(values, &self.values)?;
+        self.multifrontal
+            .factorise_onto(values, before, &self.values)?;
         let n = block.equations.len();
         let matrix = MatMut::from_column_major_slice_mut(self.multifrontal.schur_mut(), n, n);
         dense::factorise(matrix, &mut self.exchanges)

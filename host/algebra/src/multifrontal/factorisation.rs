@@ -1,7 +1,7 @@
 //! The numerical factorisation: front after front, branches of the tree in parallel.
 
-use super::kernels::{TASK, extend, pack, subtract_product, subtract_square};
-use super::{Gathered, Kind, Multifrontal};
+use super::kernels::{WORTHWHILE, extend, pack, subtract_product, subtract_square};
+use super::{Front, Gathered, Kind, Multifrontal};
 use crate::{Singular, dense};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor as cholesky_kernel;
@@ -9,6 +9,7 @@ use faer::linalg::triangular_solve as triangular;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{MatMut, Par, Spec};
 use rayon::prelude::*;
+use std::sync::PoisonError;
 
 /// Values of a matrix.
 #[derive(Clone, Copy)]
@@ -19,18 +20,47 @@ enum Values<'v> {
     OfFronts(&'v [f64]),
 }
 
+/// What becomes of a front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Task {
+    /// Its factors and its update are those of the last matrix.
+    TakeOver,
+    /// As [`Self::TakeOver`], but its update is gone and wanted again, and kept from now on.
+    Restore,
+    /// Its entries have changed, or those of a descendant.
+    Compute,
+}
+
+impl Front {
+    /// The parent has taken what this front leaves.
+    fn update_is_taken(&mut self) {
+        if !self.is_retained {
+            self.update = Vec::new();
+        }
+    }
+}
+
 impl Multifrontal {
     /// Factorises a matrix of the analysed pattern.
     ///
     /// # Errors
     /// [`Singular`]: a pivot vanishes, or a symmetric matrix is not positive definite.
     pub fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
-        self.clear_schur();
-        self.add_kept(values);
-        self.eliminate_all(Values::OfPattern(values))
+        self.factorise_after(&[], values)
     }
 
-    /// As [`Self::factorise`]; the Schur complement is added to a matrix of the kept equations
+    /// As [`Self::factorise`], for the same bits with less work: `before` are the values of the
+    /// last matrix.
+    ///
+    /// # Errors
+    /// As [`Self::factorise`].
+    pub fn factorise_after(&mut self, before: &[f64], values: &[f64]) -> Result<(), Singular> {
+        self.clear_schur();
+        self.add_kept(values);
+        self.eliminate_all(before, Values::OfPattern(values))
+    }
+
+    /// As [`Self::factorise_after`]; the Schur complement is added to a matrix of the kept equations
     /// (column-major).
     ///
     /// # Errors
@@ -38,12 +68,13 @@ impl Multifrontal {
     pub fn factorise_onto(
         &mut self,
         block: impl Iterator<Item = f64>,
+        before: &[f64],
         values: &[f64],
     ) -> Result<(), Singular> {
         self.schur.clear();
         self.schur.extend(block);
         self.add_kept(values);
-        self.eliminate_all(Values::OfPattern(values))
+        self.eliminate_all(before, Values::OfPattern(values))
     }
 
     /// Takes what counts of the values of the last matrix there will be, and gives up what only
@@ -61,7 +92,7 @@ impl Multifrontal {
     /// # Errors
     /// As [`Self::factorise`].
     pub fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
-        self.eliminate_all(Values::OfFronts(&values.0))?;
+        self.eliminate_all(&[], Values::OfFronts(&values.0))?;
         self.analysis.targets = Vec::new();
         self.analysis.relative = Vec::new();
         Ok(())
@@ -80,20 +111,68 @@ impl Multifrontal {
         }
     }
 
-    fn eliminate_all(&mut self, values: Values<'_>) -> Result<(), Singular> {
+    /// What becomes of every front after a matrix with the values `before`.
+    fn tasks(&mut self, before: &[f64], values: Values<'_>) -> Vec<Task> {
+        let (shapes, sources) = (&self.analysis.fronts, &self.analysis.sources);
+        let mut tasks = vec![Task::Compute; shapes.len()];
+        let Values::OfPattern(values) = values else {
+            return tasks;
+        };
+        if !self.is_complete || before.len() != values.len() {
+            return tasks;
+        }
+        let is_same = |&at: &u32| before[at as usize].to_bits() == values[at as usize].to_bits();
+        // Children come before their parents.
+        for (front, shape) in shapes.iter().enumerate() {
+            if sources[shape.entries.clone()].iter().all(is_same)
+                && shape.children.iter().all(|&c| tasks[c] == Task::TakeOver)
+            {
+                tasks[front] = Task::TakeOver;
+            }
+        }
+        // The Schur complement is added up anew, and so is what a computed front takes from below.
+        let fronts = &mut self.fronts;
+        let mut want = |front: usize, tasks: &mut Vec<Task>| {
+            let front_of = fronts[front]
+                .get_mut()
+                .unwrap_or_else(PoisonError::into_inner);
+            if tasks[front] == Task::TakeOver && !front_of.is_retained {
+                tasks[front] = Task::Restore;
+            }
+        };
+        for &root in &self.analysis.roots {
+            if !shapes[root].rows.is_empty() {
+                want(root, &mut tasks);
+            }
+        }
+        for (front, shape) in shapes.iter().enumerate().rev() {
+            if tasks[front] != Task::TakeOver {
+                for &child in &shape.children {
+                    want(child, &mut tasks);
+                }
+            }
+        }
+        tasks
+    }
+
+    fn eliminate_all(&mut self, before: &[f64], values: Values<'_>) -> Result<(), Singular> {
+        let tasks = self.tasks(before, values);
+        self.is_complete = false;
+        self.computed = tasks.iter().filter(|&&task| task != Task::TakeOver).count();
         let n = self.analysis.kept.len();
         let mut schur = std::mem::take(&mut self.schur);
         let analysis = &self.analysis;
-        let updates: Vec<_> = analysis
+        let results: Vec<_> = analysis
             .roots
             .par_iter()
             .with_max_len(1)
-            .map(|&root| self.branch(root, values).map(|update| (root, update)))
+            .map(|&root| self.branch(root, &tasks, values))
             .collect();
-        for update in updates {
-            let (root, update) = update?;
+        results.into_iter().collect::<Result<(), _>>()?;
+        for &root in &analysis.roots {
             let relative = &analysis.relative[analysis.fronts[root].rows.clone()];
             let m = relative.len();
+            let mut front = self.front(root);
             for (j, &column) in relative.iter().enumerate() {
                 let first = if analysis.kind == Kind::Symmetric {
                     j
@@ -101,9 +180,10 @@ impl Multifrontal {
                     0
                 };
                 for i in first..m {
-                    schur[column as usize * n + relative[i] as usize] += update[j * m + i];
+                    schur[column as usize * n + relative[i] as usize] += front.update[j * m + i];
                 }
             }
+            front.update_is_taken();
         }
         if analysis.kind == Kind::Symmetric {
             for j in 0..n {
@@ -113,56 +193,59 @@ impl Multifrontal {
             }
         }
         self.schur = schur;
+        self.is_complete = true;
         Ok(())
     }
 
-    /// Factorises a front after its descendants. Returns its update matrix.
-    fn branch(&self, front: usize, values: Values<'_>) -> Result<Vec<f64>, Singular> {
+    /// Factorises a front after its descendants, where that is its task.
+    fn branch(&self, front: usize, tasks: &[Task], values: Values<'_>) -> Result<(), Singular> {
+        if tasks[front] == Task::TakeOver {
+            return Ok(());
+        }
         let shape = &self.analysis.fronts[front];
         // Deep trees are walked without recursion where there is nothing to gain.
-        if shape.work < TASK {
-            return self.small_branch(front, values);
+        if shape.work < WORTHWHILE {
+            return self.small_branch(front, tasks, values);
         }
-        let updates: Vec<Result<Vec<f64>, Singular>> = if shape.children.len() > 1 {
-            shape
+        if shape.children.len() > 1 {
+            let results: Vec<_> = shape
                 .children
                 .par_iter()
                 .with_max_len(1)
-                .map(|&child| self.branch(child, values))
-                .collect()
-        } else {
-            let children = shape.children.iter();
-            children.map(|&child| self.branch(child, values)).collect()
-        };
-        let updates = updates.into_iter().collect::<Result<Vec<_>, _>>()?;
-        self.eliminate(front, values, &updates)
+                .map(|&child| self.branch(child, tasks, values))
+                .collect();
+            results.into_iter().collect::<Result<(), _>>()?;
+        } else if let Some(&child) = shape.children.first() {
+            self.branch(child, tasks, values)?;
+        }
+        self.eliminate(front, tasks[front], values)
     }
 
-    fn small_branch(&self, front: usize, values: Values<'_>) -> Result<Vec<f64>, Singular> {
+    fn small_branch(
+        &self,
+        front: usize,
+        tasks: &[Task],
+        values: Values<'_>,
+    ) -> Result<(), Singular> {
         // Every front is visited twice: before its children, and after them.
         let mut todo = vec![(front, false)];
-        let mut done: Vec<Vec<f64>> = Vec::new();
         while let Some((front, children_done)) = todo.pop() {
+            if tasks[front] == Task::TakeOver {
+                continue;
+            }
             let children = &self.analysis.fronts[front].children;
             if children_done || children.is_empty() {
-                let updates = done.split_off(done.len() - children.len());
-                done.push(self.eliminate(front, values, &updates)?);
+                self.eliminate(front, tasks[front], values)?;
             } else {
                 todo.push((front, true));
                 todo.extend(children.iter().rev().map(|&child| (child, false)));
             }
         }
-        done.pop().ok_or(Singular)
+        Ok(())
     }
 
-    /// Assembles a front from the matrix and the updates of its children, eliminates its pivots,
-    /// and returns what it leaves to its parent (m × m, column-major; the lower half if symmetric).
-    fn eliminate(
-        &self,
-        number: usize,
-        values: Values<'_>,
-        updates: &[Vec<f64>],
-    ) -> Result<Vec<f64>, Singular> {
+    /// Assembles a front from the matrix and the updates of its children, and eliminates its pivots.
+    fn eliminate(&self, number: usize, task: Task, values: Values<'_>) -> Result<(), Singular> {
         let analysis = &self.analysis;
         let shape = &analysis.fronts[number];
         let (k, m) = (shape.pivots.len(), shape.rows.len());
@@ -170,6 +253,7 @@ impl Multifrontal {
         let symmetric = analysis.kind == Kind::Symmetric;
         let mut guard = self.front(number);
         let front = &mut *guard;
+        front.is_retained = task == Task::Restore;
         front.values.clear();
         front
             .values
@@ -188,11 +272,14 @@ impl Multifrontal {
                 }
             }
         }
-        let mut update = vec![0.0; m * m];
+        front.update = vec![0.0; m * m];
+        let update = &mut front.update;
         let (l, u) = front.values.split_at_mut(n * k);
-        for (&child, of_child) in shape.children.iter().zip(updates) {
+        for &child in &shape.children {
             let relative = &analysis.relative[analysis.fronts[child].rows.clone()];
-            extend(relative, of_child, k, n, symmetric, l, u, &mut update);
+            let mut child = self.front(child);
+            extend(relative, &child.update, k, n, symmetric, l, u, update);
+            child.update_is_taken();
         }
         let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
         let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
@@ -213,9 +300,9 @@ impl Multifrontal {
                 below.rb_mut().transpose_mut(),
                 Par::Seq,
             );
-            subtract_square(&mut update, m, below.rb());
+            subtract_square(update, m, below.rb());
             pack(&mut front.values, n, k);
-            return Ok(update);
+            return Ok(());
         }
         dense::factorise(pivots.rb_mut(), &mut front.exchanges)?;
         let mut exchanged = vec![0.0; k];
@@ -232,7 +319,7 @@ impl Multifrontal {
             below.rb_mut().transpose_mut(),
             Par::Seq,
         );
-        subtract_product(&mut update, m, below.rb(), right.rb());
-        Ok(update)
+        subtract_product(update, m, below.rb(), right.rb());
+        Ok(())
     }
 }

@@ -5,9 +5,10 @@ use faer::linalg::matmul::triangular::{BlockStructure, matmul as triangular_matm
 use faer::prelude::ReborrowMut;
 use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Branches with fewer floating-point operations than this are not worth a task of their own.
-pub(super) const TASK: f64 = 4e6;
+pub(super) const WORTHWHILE: f64 = 4e6;
 /// Columns of an update matrix that are computed as one piece. Fixed, so that the result is the
 /// same for any number of threads.
 const PIECE: usize = 256;
@@ -55,27 +56,59 @@ pub(super) fn extend(
     let size = relative.len();
     let m = n - k;
     let inside = relative.partition_point(|&at| (at as usize) < k);
+    let runs = runs(relative, inside);
     for (j, &column) in relative.iter().enumerate() {
         let source = &of_child[j * size..(j + 1) * size];
         let column = column as usize;
         let first = if symmetric { j } else { 0 };
         if column < k {
             let target = &mut l[column * n..(column + 1) * n];
-            for (value, &row) in source[first..].iter().zip(&relative[first..]) {
-                target[row as usize] += value;
-            }
+            add(&runs, first, size, source, target, 0);
         } else {
             let column = column - k;
             if !symmetric {
                 let target = &mut u[column * k..(column + 1) * k];
-                for (value, &row) in source[..inside].iter().zip(&relative[..inside]) {
-                    target[row as usize] += value;
-                }
+                add(&runs, 0, inside, source, target, 0);
             }
-            let first = first.max(inside);
             let target = &mut update[column * m..(column + 1) * m];
-            for (value, &row) in source[first..].iter().zip(&relative[first..]) {
-                target[row as usize - k] += value;
+            add(&runs, first.max(inside), size, source, target, k);
+        }
+    }
+}
+
+/// Rows that are neighbours in a child and in its parent.
+struct Run {
+    /// In the child.
+    rows: Range<usize>,
+    /// Where the first one stands in the parent.
+    at: usize,
+}
+
+/// The runs of a child's rows; one ends where those that its parent eliminates end.
+fn runs(relative: &[u32], inside: usize) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (row, &at) in relative.iter().enumerate() {
+        let at = at as usize;
+        match runs.last_mut() {
+            Some(run) if row != inside && run.at + run.rows.len() == at => run.rows.end += 1,
+            _ => runs.push(Run {
+                rows: row..row + 1,
+                at,
+            }),
+        }
+    }
+    runs
+}
+
+/// Adds rows `from..to` of a child's column to its parent's, which begins with row `top`.
+fn add(runs: &[Run], from: usize, to: usize, source: &[f64], target: &mut [f64], top: usize) {
+    for Run { rows, at } in runs {
+        let (start, end) = (rows.start.max(from), rows.end.min(to));
+        if start < end {
+            let at = at + start - rows.start - top;
+            let target = &mut target[at..at + end - start];
+            for (target, value) in target.iter_mut().zip(&source[start..end]) {
+                *target += value;
             }
         }
     }
@@ -141,7 +174,7 @@ fn in_pieces(
     if m == 0 {
         return;
     }
-    if m > PIECE && 2.0 * (m * m) as f64 * k as f64 > TASK {
+    if m > PIECE && 2.0 * (m * m) as f64 * k as f64 > WORTHWHILE {
         update
             .par_chunks_mut(PIECE * m)
             .enumerate()

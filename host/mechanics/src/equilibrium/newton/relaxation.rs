@@ -227,17 +227,23 @@ impl Newton<'_> {
         Err(Reason::Unmet(Iterations::Relaxation(MAX_STEPS), unmet).into())
     }
 
-    /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation.
+    /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation, as
+    /// (K + α K_e)/(1 + α) δ = residual/(1 + α): where ground stays elastic its entries are those of
+    /// K_e whatever α is, bit for bit, and what they leave is taken over from the last matrix.
     pub(super) fn viscous_correction(
         &mut self,
         residual: &[f64],
         (viscosity, elastic): (f64, &[f64]),
     ) -> Result<Vec<f64>, StepFailure> {
+        let share = 1.0 / (1.0 + viscosity);
         let mut values = self.stiffness();
         for (value, elastic) in values.iter_mut().zip(elastic) {
-            *value += viscosity * elastic;
+            if value.to_bits() != elastic.to_bits() {
+                *value = share * (*value + viscosity * elastic);
+            }
         }
-        self.factorise(values, 1.0 + viscosity)?;
-        self.solve(residual, None)
+        self.factorise(values, 1.0)?;
+        let residual: Vec<f64> = residual.iter().map(|r| share * r).collect();
+        self.solve(&residual, None)
     }
 }
