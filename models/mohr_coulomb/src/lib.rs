@@ -20,6 +20,7 @@ use elasticity::Elasticity;
 use nalgebra::Vector3;
 use return_mapping::Returned;
 use spectral::{MohrCircle, Pair, Spatial};
+use std::array;
 use surface::Pyramid;
 
 abi::parameters! {
@@ -38,6 +39,8 @@ abi::parameters! {
         /// Bound on the largest principal stress, at most c cot φ; none if left out.
         tensile_strength: Parameter::new(c"R_t", c"kPa").at_least(0.0).optional(),
         ..scheme: SchemeParameters,
+        /// Time in which an overstress falls to 1/e; the law depends on no time if left out.
+        relaxation_time: Parameter::new(c"τ", c"s").at_least(0.0).default(0.0),
     }
 }
 
@@ -58,6 +61,7 @@ pub struct MohrCoulomb {
     elasticity: Elasticity,
     pyramid: Pyramid,
     scheme: Scheme,
+    relaxation_time: f64,
 }
 
 impl ContinuumLaw for MohrCoulomb {
@@ -84,6 +88,7 @@ impl ContinuumLaw for MohrCoulomb {
             elasticity,
             pyramid: Pyramid::new(&elasticity, &strength),
             scheme: Scheme::new(p.scheme)?,
+            relaxation_time: p.relaxation_time,
         })
     }
 
@@ -100,6 +105,23 @@ impl ContinuumLaw for MohrCoulomb {
         if !trial.iter().map(|s| s * s).sum::<f64>().is_finite() {
             return Err(Failure::Numeric("the elastic predictor overflows"));
         }
+        let rested = self.without_viscosity(point, trial, tangent)?;
+        if self.relaxation_time > 0.0 {
+            return Ok(self.overstressed(point, &trial, rested, tangent));
+        }
+        Ok(rested)
+    }
+}
+
+impl MohrCoulomb {
+    /// The update once all overstress has relaxed.
+    #[inline]
+    fn without_viscosity<const N: usize>(
+        &self,
+        point: &SolidPoint<N, State>,
+        trial: [f64; N],
+        tangent: Tangent,
+    ) -> Result<SolidResponse<N, State>, Failure> {
         let operator = |consistent: &dyn Fn() -> [[f64; N]; N]| match tangent {
             Tangent::None => [[0.0; N]; N],
             Tangent::Elastic => self.elasticity.operator(),
@@ -175,15 +197,46 @@ impl ContinuumLaw for MohrCoulomb {
             Ok(plastic(s, &end, stress, operator(&consistent)))
         }
     }
+
+    /// The update with the overstress that the time of the increment leaves, Eqs. (17) and (18).
+    #[cold]
+    fn overstressed<const N: usize>(
+        &self,
+        point: &SolidPoint<N, State>,
+        trial: &[f64; N],
+        rested: SolidResponse<N, State>,
+        tangent: Tangent,
+    ) -> SolidResponse<N, State> {
+        let relaxed = point.time_increment / (self.relaxation_time + point.time_increment);
+        let between = |all: f64, none: f64| none + relaxed * (all - none);
+        let D = self.elasticity.operator::<N>();
+        SolidResponse {
+            stress: array::from_fn(|i| between(rested.stress[i], trial[i])),
+            state: State {
+                plastic_strain: between(rested.state.plastic_strain, point.state.plastic_strain),
+                plastic_dilation: between(
+                    rested.state.plastic_dilation,
+                    point.state.plastic_dilation,
+                ),
+            },
+            tangent: match tangent {
+                Tangent::None | Tangent::Elastic => rested.tangent,
+                Tangent::Consistent => array::from_fn(|i| {
+                    array::from_fn(|j| between(rested.tangent[i][j], D[i][j]))
+                }),
+            },
+            unreliable: rested.unreliable,
+        }
+    }
 }
 
 /// An array whose length the compiler does not know to be `N`.
 #[inline]
 fn resized<T: Copy, const M: usize, const N: usize>(values: [T; M]) -> [T; N] {
-    std::array::from_fn(|i| values[i])
+    array::from_fn(|i| values[i])
 }
 
 abi::export_laws!(continuum MohrCoulomb);
 bridges::export!(continuum MohrCoulomb,
     properties: [YoungModulus PoissonRatio Cohesion FrictionAngle DilatancyAngle],
-    parameters: [TensileStrength Scheme Substeps SchemeTolerance]);
+    parameters: [TensileStrength Scheme Substeps SchemeTolerance RelaxationTime]);

@@ -1,5 +1,5 @@
 //! Unit tests of the mathematics: `zones` by hand, `reference` against an independent solution,
-//! `sweep` over random states, `tangent` against differences.
+//! `sweep` over random states, `tangent` against differences, `viscosity` against the exponential.
 #![expect(
     clippy::float_cmp,
     reason = "what must not change is compared bit for bit"
@@ -9,6 +9,7 @@ mod reference;
 mod schemes;
 mod sweep;
 mod tangent;
+mod viscosity;
 mod zones;
 
 use crate::return_mapping::{Returned, Zone};
@@ -29,6 +30,7 @@ fn handy(tensile_strength: Option<f64>) -> Parameters {
         dilatancy_angle: 0.0,
         tensile_strength: tensile_strength.unwrap_or(f64::NAN),
         scheme: IMPLICIT,
+        relaxation_time: 0.0,
     }
 }
 
@@ -188,6 +190,7 @@ impl Random {
             dilatancy_angle: friction_angle * self.one_of(&[0.0, 0.0, 0.4, 1.0]),
             tensile_strength: share * apex.min(3.0) * scale,
             scheme: IMPLICIT,
+            relaxation_time: 0.0,
         }
     }
 }

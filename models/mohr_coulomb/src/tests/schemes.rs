@@ -15,6 +15,7 @@ const SAND: Parameters = Parameters {
     dilatancy_angle: 12.0,
     tensile_strength: f64::NAN,
     scheme: IMPLICIT,
+    relaxation_time: 0.0,
 };
 
 fn in_steps(substeps: f64) -> SchemeParameters {

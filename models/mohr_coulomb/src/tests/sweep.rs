@@ -120,6 +120,7 @@ fn survives_a_long_path_of_huge_increments() {
                 dilatancy_angle: 0.0,
                 tensile_strength: f64::NAN,
                 scheme: super::IMPLICIT,
+                relaxation_time: 0.0,
             };
             let law = law(p);
             let mut point = rested([0.0; 4], [0.0; 4]);
@@ -147,6 +148,7 @@ fn tresca_stands_any_predictor() {
         dilatancy_angle: 0.0,
         tensile_strength: f64::NAN,
         scheme: super::IMPLICIT,
+        relaxation_time: 0.0,
     };
     let law = law(p);
     for _ in 0..10_000 {
