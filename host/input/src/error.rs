@@ -93,6 +93,24 @@ fn hint(error: &mechanics::Error) -> Option<&'static str> {
             Some("a law must accept a zero increment when its phase begins")
         }
         mechanics::Error::Singular { .. } => Some("a part of the model is not supported"),
+        mechanics::Error::NoEquilibrium(failure)
+            if matches!(
+                failure.failure.reason,
+                mechanics::equilibrium::Reason::Unmet(
+                    mechanics::equilibrium::Iterations::Newton(
+                        _,
+                        Some(mechanics::equilibrium::Motion::Relaxation)
+                    ),
+                    _
+                )
+            ) =>
+        {
+            Some(
+                "`control = \"creep\"` in [solver] follows the motion to the next equilibrium as a path, and may get \
+                 on; results up to the last whole increment in equilibrium are written, the last \
+                 equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
+            )
+        }
         mechanics::Error::NoEquilibrium(_) => Some(
             "results up to the last whole increment in equilibrium are written, the last \
              equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",

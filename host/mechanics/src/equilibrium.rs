@@ -8,7 +8,7 @@ mod newton;
 pub use linear_domain::{LinearDomain, LookedAt, Reuse, Standing};
 pub use newton::{
     Clock, Costs, Criterion, Culprit, DomainFailure, Guess, Imbalance, Iteration, Iterations,
-    Loads, Matrix, Measure, Newton, PointPlace, Reason, Runaway, Singularity, StepFailure,
-    StepSuccess, Symptom, Unmet,
+    Loads, Matrix, Measure, Motion, Newton, Open, PointPlace, Reason, Runaway, Singularity,
+    StepFailure, StepSuccess, Symptom, Unmet,
 };
 pub(crate) use newton::{ROUND_OFF, STILL_SMALL, norm};

@@ -22,6 +22,8 @@ pub struct Settings {
     /// said, and counted in the summary. 0 tolerates none.
     #[serde(deserialize_with = "tolerated")]
     pub tolerated_residual: f64,
+    /// What counts as equilibrium.
+    pub convergence: Convergence,
     /// Iterations after which an increment is cut back; those of the method if left out.
     #[serde(deserialize_with = "iterations")]
     pub max_iterations: Option<usize>,
@@ -79,6 +81,21 @@ impl Settings {
     }
 }
 
+impl Settings {
+    /// What the iterations are asked for: without a limit to the last correction where the residual alone
+    /// decides.
+    #[must_use]
+    pub fn in_force(self) -> Self {
+        match self.convergence {
+            Convergence::Both => self,
+            Convergence::Force => Self {
+                displacement_tolerance: f64::INFINITY,
+                ..self
+            },
+        }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -86,6 +103,7 @@ impl Default for Settings {
             force_tolerance: 1e-9,
             displacement_tolerance: 1e-7,
             tolerated_residual: 1e-3,
+            convergence: Convergence::Both,
             max_iterations: None,
             max_halvings: 10,
             line_search: true,
@@ -141,6 +159,19 @@ impl Method {
             Self::QuasiNewton => 100,
         }
     }
+}
+
+/// Which tolerances a state has to meet.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Convergence {
+    /// Those of the residual and of the last correction.
+    #[default]
+    Both,
+    /// That of the residual alone, for curves whose displacements drift while the load is known: with a
+    /// `force_tolerance` of 1e-2 to 1e-4 the tolerated error of geotechnical programs. What the corrections
+    /// leave open is said at the end of the phase; reactions and loads have to balance all the same.
+    Force,
 }
 
 /// What leads from one equilibrium to the next.

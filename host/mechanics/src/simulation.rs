@@ -288,7 +288,7 @@ impl Simulation {
         let given = self.problem.settings;
         Settings {
             method: method::resolved(given.method, &self.groups),
-            ..given
+            ..given.in_force()
         }
     }
 
@@ -556,6 +556,12 @@ impl Simulation {
                     tolerance: self.problem.settings.force_tolerance,
                 });
             }
+        }
+        if let Some(open) = &success.open
+            && open.correction > self.problem.settings.displacement_tolerance
+        {
+            record.by_force += 1;
+            record.open = record.open.and(open);
         }
         if let Some(why) = &success.unreliable {
             record.unreliable += 1;

@@ -266,6 +266,12 @@ impl Summary {
                     "relaxed_steps": p.relaxed,
                     "tolerated_steps": p.tolerated,
                     "tolerated_residual": p.tolerated_residual,
+                    "by_force_steps": p.by_force,
+                    "by_force_open": {
+                        "residual": p.open.residual,
+                        "correction": p.open.correction,
+                        "nodes": p.open.nodes,
+                    },
                     "arc_length_steps": p.arc_length,
                     "factorisations": p.factorisations,
                     "fallbacks": p.fallbacks,

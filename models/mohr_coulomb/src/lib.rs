@@ -221,9 +221,9 @@ impl MohrCoulomb {
             },
             tangent: match tangent {
                 Tangent::None | Tangent::Elastic => rested.tangent,
-                Tangent::Consistent => array::from_fn(|i| {
-                    array::from_fn(|j| between(rested.tangent[i][j], D[i][j]))
-                }),
+                Tangent::Consistent => {
+                    array::from_fn(|i| array::from_fn(|j| between(rested.tangent[i][j], D[i][j])))
+                }
             },
             unreliable: rested.unreliable,
         }

@@ -35,12 +35,12 @@ mod round_off;
 mod verdict;
 
 pub use failure::{
-    Criterion, Culprit, DomainFailure, Imbalance, Iterations, PointPlace, Reason, Runaway,
+    Criterion, Culprit, DomainFailure, Imbalance, Iterations, Motion, PointPlace, Reason, Runaway,
     Singularity, StepFailure, Symptom, Unmet,
 };
 pub use loads::Loads;
 pub use matrix::Matrix;
-pub use outcome::{Costs, Guess, Iteration, StepSuccess};
+pub use outcome::{Costs, Guess, Iteration, Open, StepSuccess};
 pub use path::Measure;
 pub(super) use round_off::{ACCEPTED_ROUND_OFF, last_bit_scattered};
 pub(crate) use round_off::{ROUND_OFF, STILL_SMALL};
@@ -233,8 +233,10 @@ impl<'a> Newton<'a> {
                 let creep = &control.creep;
                 let relaxed = control.relaxation.is_under_way() || creep.has_arrived();
                 let was_motion = creep.lets_expect_another();
+                let open = self.open(&equilibrium.state.balance, &iterations);
                 Ok(StepSuccess {
                     was_motion,
+                    open,
                     ..equilibrium.reached(iterations, relaxed)
                 })
             }
@@ -295,6 +297,7 @@ impl Equilibrium {
             round_off: self.round_off,
             tolerated: self.tolerated,
             scales: balance.scales,
+            open: None,
         }
     }
 }

@@ -183,6 +183,13 @@ impl Simulation {
                 largest: record.tolerated_residual,
             });
         }
+        if record.by_force > 0 {
+            watch.warning(&Warning::ByForce {
+                phase: record.name.clone(),
+                steps: record.by_force,
+                open: record.open,
+            });
+        }
         let of_domain = equations
             .domain
             .as_ref()

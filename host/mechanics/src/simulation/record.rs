@@ -1,6 +1,6 @@
 //! What a phase took.
 
-use crate::equilibrium::Costs;
+use crate::equilibrium::{Costs, Open};
 use crate::settings::Method;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +29,10 @@ pub struct PhaseRecord {
     pub tolerated: usize,
     /// The largest of these residuals, relative.
     pub tolerated_residual: f64,
+    /// Steps whose last correction is above its tolerance: the residual alone decided.
+    pub by_force: usize,
+    /// The most that they left open.
+    pub open: Open,
     /// Largest relative residual that was taken for round-off in the steps' iterations.
     pub round_off: f64,
     /// Steps along the path of equilibrium under arc-length control.

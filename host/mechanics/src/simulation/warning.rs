@@ -1,5 +1,6 @@
 //! What a simulation should tell those who started it.
 
+use crate::equilibrium::Open;
 use crate::error::Place;
 use crate::group::{Parted, TakeOver};
 use crate::settings::Method;
@@ -59,6 +60,15 @@ pub enum Warning {
         residual: f64,
         /// The tolerance.
         tolerance: f64,
+    },
+    /// The residual alone decided in so many steps of a phase.
+    ByForce {
+        /// The phase.
+        phase: String,
+        /// How many.
+        steps: usize,
+        /// The most that they left open.
+        open: Open,
     },
     /// A law changed the process, which was set right.
     Restored(Place, String),
@@ -123,8 +133,8 @@ impl fmt::Display for Warning {
                 f,
                 "{place}: Newton iterations came to a standstill; viscous relaxation led to the next \
                  equilibrium; others may lie near, and which one is found depends on the course of \
-                 the relaxation: run it with other increments, or in another unit of stress, and hold \
-                 the results against each other"
+                 the relaxation: run it with other increments, or with another `control` (`load`, `creep`), and \
+                 hold the results against each other"
             ),
             Self::RelaxedOften(phase, steps) => write!(
                 f,
@@ -147,6 +157,13 @@ impl fmt::Display for Warning {
                 "{place}: iterations came to a standstill short of the tolerances, with a residual of \
                  {residual:.1e} ({tolerance:.1e} asked for); `tolerated_residual` accepts it: forces are out \
                  of balance by that share, displacements are uncertain by up to a tenth of the increment"
+            ),
+            Self::ByForce { phase, steps, open } => write!(
+                f,
+                "phase `{phase}`: equilibrium by forces alone in {steps} steps: residuals of at most {:.1e}, \
+                 last corrections of at most {:.1e} of their increment, at most {} nodes out of balance by \
+                 more than the tolerance: loads are known to that share, displacements are not",
+                open.residual, open.correction, open.nodes
             ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::Parted(phase, parted) => write!(f, "phase `{phase}`: {parted}"),

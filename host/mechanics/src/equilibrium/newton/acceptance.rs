@@ -117,7 +117,10 @@ impl Measures {
         let share = if criteria.is_stale { STALE } else { 1.0 };
         let is_small = |change: Change| change.relative <= share * criteria.displacement;
         let small_residual = self.residual <= share * criteria.force;
+        // Where corrections are free, whole ones are no better than others.
+        let is_free = criteria.displacement.is_infinite() && !criteria.is_stale;
         self.is_exact(criteria)
+            || (small_residual && !self.is_away && is_free)
             || (small_residual && !self.is_away && self.whole.is_some_and(is_small))
     }
 }

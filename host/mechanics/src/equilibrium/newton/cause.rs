@@ -1,7 +1,7 @@
 //! What is found out about a step that found no equilibrium.
 
 use super::Newton;
-use super::failure::{Culprit, Iterations, Reason, StepFailure};
+use super::failure::{Culprit, Iterations, Motion, Reason, StepFailure};
 use super::iterate::{Control, Correction, State};
 use super::outcome::Iteration;
 use super::residual::Task;
@@ -39,7 +39,7 @@ impl Newton<'_> {
         state: &State,
         task: &Task,
         correction: Option<f64>,
-        relaxed_in_vain: bool,
+        in_vain: Option<Motion>,
     ) -> StepFailure {
         let n = self.settings.max_iterations();
         let unmet = self.unmet(&state.balance, correction);
@@ -49,7 +49,7 @@ impl Newton<'_> {
         self.runaway = runaway;
         StepFailure {
             culprit,
-            ..Reason::Unmet(Iterations::Newton(n, relaxed_in_vain), unmet).into()
+            ..Reason::Unmet(Iterations::Newton(n, in_vain), unmet).into()
         }
     }
 

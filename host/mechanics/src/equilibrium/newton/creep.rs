@@ -394,7 +394,8 @@ impl Newton<'_> {
         let way = left * norm(&moved);
         balance.relative <= self.settings.force_tolerance
             && !balance.away.contains(&true)
-            && way <= self.settings.displacement_tolerance * norm(&motion.increment)
+            && (self.settings.displacement_tolerance.is_infinite()
+                || way <= self.settings.displacement_tolerance * norm(&motion.increment))
     }
 
     /// A residual by equation relative to these forces by body.

@@ -49,11 +49,20 @@ pub enum Singularity {
     Unknown,
 }
 
+/// A motion to another equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Viscous relaxation.
+    Relaxation,
+    /// Creep.
+    Creep,
+}
+
 /// Which iterations came to an end short of equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Iterations {
-    /// So many; and whether viscous relaxation was tried in vain.
-    Newton(usize, bool),
+    /// So many; and what else was tried in vain.
+    Newton(usize, Option<Motion>),
     /// So many along the path of equilibrium.
     Path(usize),
     /// So many steps of viscous relaxation.

@@ -5,7 +5,7 @@
 
 use super::acceleration::Acceleration;
 use super::creep::Creep;
-use super::failure::StepFailure;
+use super::failure::{Motion, StepFailure};
 use super::iterate::{Control, Correction, State};
 use super::line_search::{LineSearch, Otherwise};
 use super::outcome::Iteration;
@@ -257,7 +257,12 @@ impl Control for LoadControl {
         iterations: &[Iteration],
     ) -> StepFailure {
         let correction = iterations.last().and_then(|last| last.correction);
-        let in_vain = self.relaxation.was_in_vain() || self.creep.was_in_vain();
+        let in_vain = if self.creep.was_in_vain() {
+            Some(Motion::Creep)
+        } else {
+            let in_vain = self.relaxation.was_in_vain();
+            in_vain.then_some(Motion::Relaxation)
+        };
         newton.no_equilibrium(self, state, &self.task, correction, in_vain)
     }
 }

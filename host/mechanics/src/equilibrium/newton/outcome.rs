@@ -71,6 +71,32 @@ pub struct StepSuccess {
     pub tolerated: f64,
     /// What the residual was measured against, by body.
     pub scales: Vec<f64>,
+    /// What is left open where the residual alone decides.
+    pub open: Option<Open>,
+}
+
+/// What a state leaves open that the residual alone made an equilibrium.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Open {
+    /// Relative residual.
+    pub residual: f64,
+    /// Last correction, relative to the increment.
+    pub correction: f64,
+    /// Nodes whose force out of balance is above the force tolerance times the root mean square of the
+    /// nodal forces in play.
+    pub nodes: usize,
+}
+
+impl Open {
+    /// The larger of each.
+    #[must_use]
+    pub fn and(self, other: &Self) -> Self {
+        Self {
+            residual: self.residual.max(other.residual),
+            correction: self.correction.max(other.correction),
+            nodes: self.nodes.max(other.nodes),
+        }
+    }
 }
 
 /// Seconds by part, and counts.

@@ -5,9 +5,11 @@ use super::Newton;
 use super::acceptance::{Criteria, EXACT, Measures, STALE};
 use super::failure::{Criterion, Unmet};
 use super::iterate::State;
-use super::outcome::Iteration;
+use super::outcome::{Iteration, Open};
 use super::residual::{Balance, Task};
+use crate::settings::Convergence;
 use law::Operator;
+use std::collections::BTreeMap;
 
 impl Newton<'_> {
     /// Notes a correction, or a fraction of it, that was taken.
@@ -69,6 +71,36 @@ impl Newton<'_> {
             last.correction.is_some() && last.step_length >= 1.0 && last.viscosity <= 0.0;
         let bodies = self.measures(balance, is_whole);
         bodies.iter().all(|body| body.is_equilibrium(criteria))
+    }
+
+    /// What a state of equilibrium leaves open, if the residual alone has made it one.
+    pub(super) fn open(&self, balance: &Balance, iterations: &[Iteration]) -> Option<Open> {
+        if self.settings.convergence != Convergence::Force {
+            return None;
+        }
+        let bodies = &self.places.bodies;
+        let body_of = |equation: usize| match bodies.of_equation.get(equation) {
+            Some(&body) => body as usize,
+            None => 0,
+        };
+        let mut squares: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        let by_equation = self.system.free().iter().zip(&balance.residual);
+        for (equation, (&dof, force)) in by_equation.enumerate() {
+            *squares.entry((body_of(equation), dof / 2)).or_default() += force * force;
+        }
+        let nodes_of = |body: usize| squares.keys().filter(|(of, _)| *of == body).count();
+        let allowed: Vec<f64> = (balance.scales.iter().enumerate())
+            .map(|(body, scale)| {
+                let mean_square = scale * scale / nodes_of(body).max(1) as f64;
+                self.settings.force_tolerance.powi(2) * mean_square
+            })
+            .collect();
+        let is_off = |((body, _), square): &(&(usize, usize), &f64)| **square > allowed[*body];
+        Some(Open {
+            residual: balance.relative,
+            correction: iterations.last()?.correction.unwrap_or(0.0),
+            nodes: squares.iter().filter(is_off).count(),
+        })
     }
 
     /// Whether a correction of this relative size will probably be the last one.

@@ -1,8 +1,8 @@
 //! The words for why a step failed.
 
 use super::{
-    Criterion, Culprit, DomainFailure, Imbalance, Iterations, PointPlace, Reason, Singularity,
-    Symptom, Unmet,
+    Criterion, Culprit, DomainFailure, Imbalance, Iterations, Motion, PointPlace, Reason,
+    Singularity, Symptom, Unmet,
 };
 use std::fmt;
 
@@ -13,6 +13,10 @@ impl fmt::Display for Unmet {
             self.residual, self.residual_tolerance
         );
         let correction = match self.correction {
+            Some(correction) if self.correction_tolerance.is_infinite() => {
+                format!("last correction {correction:.1e} of the increment")
+            }
+            None if self.correction_tolerance.is_infinite() => "no correction yet".to_owned(),
             Some(correction) => format!(
                 "last correction {correction:.1e} of the increment, tolerance {:.1e}",
                 self.correction_tolerance
@@ -33,10 +37,10 @@ impl fmt::Display for Iterations {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Newton(n, in_vain) => {
-                let tried = if *in_vain {
-                    ", nor by viscous relaxation"
-                } else {
-                    ""
+                let tried = match in_vain {
+                    Some(Motion::Relaxation) => ", nor by viscous relaxation",
+                    Some(Motion::Creep) => ", nor by creep",
+                    None => "",
                 };
                 write!(f, "no equilibrium after {n} iterations{tried}")
             }
