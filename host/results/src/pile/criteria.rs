@@ -47,7 +47,7 @@ pub struct Resistances {
     pub davisson: Found,
     /// By Chin's inverse slope.
     pub chin: Found,
-    /// Settlement, head, shaft and base load where the phase starts, if settlements are counted from there.
+    /// Settlement, head, shaft and base load where the phase starts.
     start: Option<[f64; 4]>,
     /// Weight of the pile, kN.
     weight: Option<f64>,
@@ -76,9 +76,9 @@ impl Curve {
         }
     }
 
-    /// Number of the last phase in which the head moves down, and the curve to its end: from where
-    /// settlements are counted.
-    fn last_push(&self) -> Option<(&OfPhase, Vec<[f64; 4]>)> {
+    /// The last phase in which the head moves down, the state that it starts from, and the curve to its end:
+    /// from where settlements are counted.
+    fn last_push(&self) -> Option<(&OfPhase, [f64; 4], Vec<[f64; 4]>)> {
         let before = |number: usize| -> Option<[f64; 4]> {
             let last = self.0[..number]
                 .iter()
@@ -106,7 +106,12 @@ impl Curve {
                 .iter()
                 .flat_map(|phase| &phase.points),
         );
-        Some((&self.0[number], points))
+        let own = if first == number {
+            points[0]
+        } else {
+            before(number).unwrap_or(points[0])
+        };
+        Some((&self.0[number], own, points))
     }
 
     /// Resistances of a pile with this course.
@@ -118,7 +123,7 @@ impl Curve {
     }
 
     fn of(&self, [length, diameter]: [f64; 2], unit: &'static str) -> Resistances {
-        let Some((phase, points)) = self.last_push() else {
+        let Some((phase, start, points)) = self.last_push() else {
             let why = "the head moves down in no phase".to_owned();
             return Resistances {
                 phase: None,
@@ -141,7 +146,7 @@ impl Curve {
                 .ok_or_else(|| "the law of the pile's head has no elastic operator".to_owned())
                 .and_then(|stiffness| davisson(&points, length / stiffness, diameter)),
             chin: chin(&points),
-            start: points.first().copied().filter(|_| phase.resets),
+            start: Some(start),
             weight: Some(phase.weight),
         }
     }
