@@ -36,7 +36,7 @@ struct Head<'a> {
 #[derive(Serialize, Deserialize)]
 struct Line<'a> {
     settings: Cow<'a, str>,
-    cpu_seconds: f64,
+    cpu_seconds: Cow<'a, str>,
     counts: Cow<'a, [u64]>,
     names: Cow<'a, [String]>,
     bits: Vec<Vec<Vec<u64>>>,
@@ -91,7 +91,7 @@ impl Kept {
         let stretches = trial.rows.stretches.iter();
         self.line(&Line {
             settings: settings.as_str().into(),
-            cpu_seconds: trial.seconds,
+            cpu_seconds: trial.seconds.to_string().into(),
             counts: trial.counts.as_slice().into(),
             names: trial.rows.names.as_slice().into(),
             bits: stretches.map(|s| s.iter().map(bits).collect()).collect(),
@@ -143,7 +143,7 @@ fn read(path: &Path, identity: &str) -> Result<BTreeMap<String, Trial>, Error> {
                     names: line.names.into_owned(),
                     stretches: line.bits.into_iter().map(stretch).collect(),
                 },
-                seconds: line.cpu_seconds,
+                seconds: line.cpu_seconds.parse().unwrap_or(f64::NAN),
                 counts: line.counts.into_owned(),
             };
             (line.settings.into_owned(), trial)
