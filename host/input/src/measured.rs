@@ -133,10 +133,10 @@ impl Table<'_> {
     /// out blank lines.
     fn line(&self, from: usize) -> usize {
         let (before, rest) = self.bytes.split_at(from.min(self.bytes.len()));
-        let newlines = |bytes: &[u8]| bytes.iter().filter(|byte| **byte == b'\n').count();
+        let is_end = |byte: &u8| *byte == b'\n';
         let is_no_row = |line: &&[u8]| line.trim_ascii().is_empty() || line.starts_with(b"#");
-        let skipped = rest.split(|&byte| byte == b'\n').take_while(is_no_row);
-        newlines(before) + skipped.count() + 1
+        let skipped = rest.split(is_end).take_while(is_no_row);
+        before.split(is_end).count() + skipped.count()
     }
 
     /// The number in a cell; `None` if it is empty.

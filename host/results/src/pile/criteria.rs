@@ -53,6 +53,15 @@ pub struct Resistances {
     weight: Option<f64>,
 }
 
+/// The last phase in which the head moves down.
+struct Push<'c> {
+    phase: &'c OfPhase,
+    /// The state that it starts from.
+    start: [f64; 4],
+    /// The curve to its end, from where settlements are counted.
+    points: Vec<[f64; 4]>,
+}
+
 impl Curve {
     /// Whether the next increment is the first of its phase.
     pub(crate) fn begins(&self, phase: &str) -> bool {
@@ -76,9 +85,8 @@ impl Curve {
         }
     }
 
-    /// The last phase in which the head moves down, the state that it starts from, and the curve to its end:
-    /// from where settlements are counted.
-    fn last_push(&self) -> Option<(&OfPhase, [f64; 4], Vec<[f64; 4]>)> {
+    /// The last phase in which the head moves down, if there is one.
+    fn last_push(&self) -> Option<Push<'_>> {
         let before = |number: usize| -> Option<[f64; 4]> {
             let last = self.0[..number]
                 .iter()
@@ -111,7 +119,11 @@ impl Curve {
         } else {
             before(number).unwrap_or(points[0])
         };
-        Some((&self.0[number], own, points))
+        Some(Push {
+            phase: &self.0[number],
+            start: own,
+            points,
+        })
     }
 
     /// Resistances of a pile with this course.
@@ -123,7 +135,12 @@ impl Curve {
     }
 
     fn of(&self, [length, diameter]: [f64; 2], unit: &'static str) -> Resistances {
-        let Some((phase, start, points)) = self.last_push() else {
+        let Some(Push {
+            phase,
+            start,
+            points,
+        }) = self.last_push()
+        else {
             let why = "the head moves down in no phase".to_owned();
             return Resistances {
                 phase: None,
