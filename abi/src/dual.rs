@@ -320,7 +320,31 @@ impl<const N: usize> SubAssign for Dual<N> {
 }
 
 /// The derivative of an update by its increment, row by row, and the flux: one evaluation with
-/// numbers that carry `N` derivatives.
+/// numbers that carry `N` derivatives. The update is written once, for any [`Number`]; whatever it
+/// branches on, the derivative is that of the branch it took:
+///
+/// ```
+/// use abi::Failure;
+/// use abi::dual::{Number, tangent};
+///
+/// /// Traction of a joint whose friction rises to `mu` (1 − exp(−slip/scale)), per kPa.
+/// fn traction<T: Number>([closing, slip]: [T; 2]) -> Result<[T; 2], Failure> {
+///     let (stiffness, mu, scale) = (1e5, 0.6, 1e-3);
+///     let normal = closing * stiffness;
+///     let mobilised = -(-slip.abs() / scale).exp() + 1.0;
+///     let friction = -normal * mobilised * mu;
+///     Ok([normal, if slip.value() < 0.0 { -friction } else { friction }])
+/// }
+///
+/// let jump = [-1e-3, 2e-3];
+/// let (end, rows) = tangent(&jump, traction)?;
+/// // The update is that of plain numbers, to the last bit.
+/// assert_eq!(end, traction(jump)?);
+/// // ∂t/∂slip = 100 kPa · mu exp(−slip/scale)/scale, by hand.
+/// assert!((rows[1][1] / (100.0 * 0.6 * f64::exp(-2.0) / 1e-3) - 1.0).abs() < 1e-14);
+/// assert_eq!(rows[0], [1e5, 0.0]);
+/// # Ok::<(), Failure>(())
+/// ```
 ///
 /// # Errors
 /// What `update` fails with.

@@ -118,6 +118,12 @@ pub(crate) enum Command {
         /// Divide the mesh of a case by 4 too, not only by 2.
         #[arg(long)]
         fine: bool,
+        /// Try all settings of a case, however long one run takes.
+        #[arg(long)]
+        thorough: bool,
+        /// Go on with the study of a case that was stopped.
+        #[arg(long)]
+        resume: bool,
         /// Most increments per segment of a driver.
         #[arg(long, default_value_t = 1000)]
         max_increments: usize,

@@ -85,6 +85,8 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             set,
             out,
             fine,
+            thorough,
+            resume,
             max_increments,
             interface_stiffness,
         } => {
@@ -93,6 +95,8 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
                 settings: set,
                 out,
                 fine,
+                thorough,
+                resume,
                 most_increments: max_increments,
                 interface_stiffness,
                 stop: stop_on_signals()?,

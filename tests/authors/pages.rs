@@ -382,6 +382,7 @@ how_to! {
     how_to_choose_an_accuracy: "choose-accuracy",
     how_to_get_forces: "forces",
     how_to_get_a_pile: "pile",
+    how_to_compute_a_pile_by_load_transfer: "tz-pile",
     how_to_debug_a_law: "debug-a-law",
 }
 

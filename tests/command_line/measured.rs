@@ -59,6 +59,11 @@ fn what_cannot_be_drawn_is_refused_at_its_key() {
     place.write("test.csv", "# of 1998\nw,load\n1,10\n2,ten\n3,1e400\n");
     place.write("comma.csv", "w;load\n1,5;10\n");
     place.write("empty.csv", "w,load\n,1\n");
+    // Blank lines and remarks are lines, before and between the rows.
+    place.write(
+        "blank.csv",
+        "\n# a test\nw,load\n\n1,10\n\r\n\n# later\n2,ten\n",
+    );
     for (measured, at, says) in [
         (
             "{ file = ^\"tset.csv\", x = \"w\", y = \"load\" }",
@@ -73,6 +78,11 @@ fn what_cannot_be_drawn_is_refused_at_its_key() {
         (
             "{ file = \"test.csv\", x = \"w\", y = ^\"load\" }",
             "test.csv, line 4: `ten` in column `load` is no number",
+            "",
+        ),
+        (
+            "{ file = \"blank.csv\", x = \"w\", y = ^\"load\" }",
+            "blank.csv, line 9: `ten` in column `load` is no number",
             "",
         ),
         (

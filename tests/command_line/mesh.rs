@@ -229,6 +229,18 @@ fn refuses_keys_of_other_formulations() {
         BAD_INPUT,
         &[
             (
+                "earth pressure of a layer",
+                &[(
+                    "\"thin_layer\"\n",
+                    "\"thin_layer\"\ninitial_stress = ^{ k_0 = 0.5 }\n",
+                )],
+                &[
+                    "earth pressure at rest (`k_0`, `ocr`, …) is that of `solid` groups, not of the formulation \
+                     `thin_layer`",
+                    "give its stresses",
+                ],
+            ),
+            (
                 "line of a solid",
                 &[("\"solid\"\n", "\"solid\"\nline = ^\"top\"\n")],
                 &["`line` only belongs to the formulation `zero_thickness`"],

@@ -405,3 +405,41 @@ fn a_dry_run_of_variants_reports_each() {
         assert!(report.contains(&format!("<td>{level}</td>")), "{variant}");
     }
 }
+
+#[test]
+fn laws_that_no_group_takes_are_noted() {
+    let spare = "[laws.spare]\nlaw = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n\n[laws.soil]";
+    let text = crate::program::CASE.replacen("[laws.soil]", spare, 1);
+    let note = "no group takes the laws `spare` of [laws]";
+    let place = Place::new();
+    let outcome = place.run_case(&text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says(note), "{}", outcome.stderr);
+    // A file may be the base of others, which take them.
+    place.write("more.toml", "base = \"case.toml\"\n");
+    let outcome = place.run(&["run", "more.toml", "--out", "out"]);
+    assert!(!outcome.says("no group takes"), "{}", outcome.stderr);
+    let taken = format!(
+        "{text}\n[[phase]]\nname = \"later\"\nincrements = 1\nlaws = {{ soil = \"spare\" }}\n"
+    );
+    let outcome = place.run_case(taken);
+    assert!(!outcome.says("no group takes"), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_report_of_a_folder_without_results_says_what_is_missing() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("empty")).unwrap();
+    for (folder, says) in [
+        ("empty", "empty has no results of a run (`history.csv`)"),
+        ("nowhere", "nowhere is no folder"),
+    ] {
+        let outcome = place.run(&["report", folder]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(
+            outcome.says(says) && outcome.says("pilum run"),
+            "{}",
+            outcome.stderr
+        );
+    }
+}

@@ -591,3 +591,170 @@ fn an_interface_does_not_outlive_its_pile() {
         assert!(outcome.says(said), "{said}: {}", outcome.stderr);
     }
 }
+
+/// A tube holds more outside than inside: its mean friction is that by their girths.
+#[test]
+fn the_friction_of_a_tube_is_the_mean_by_girth() {
+    let (inside, outside) = (10.0, 30.0);
+    let text = PILE
+        .replace("columns = [{ n = 2, to = 0.4 }", "columns = [{ n = 2, to = 0.2 }, { n = 1, to = 0.4 }")
+        .replace("r = [0.0, 0.4]", "r = [0.2, 0.4]")
+        .replace("[laws]\n", &format!("inner = {{ r = 0.2, z = [-5.0, 0.0] }}\n[laws]\nrough = {{ law = \"coulomb_joint\", parameters = {{ normal_stiffness = 1e6, shear_stiffness = 2e5, cohesion = {inside}, friction_angle = 0.0, dilatancy_angle = 0.0 }} }}\n"))
+        .replace("cohesion = 8.0, friction_angle = 15.0", &format!("cohesion = {outside}, friction_angle = 0.0"))
+        .replace(
+            "toe = {",
+            "inner = { formulation = \"zero_thickness\", line = \"inner\", law = \"rough\", active = false }\ntoe = {",
+        )
+        .replace("[\"upper\", \"lower\", \"toe\"]", "[\"upper\", \"lower\", \"inner\", \"toe\"]")
+        .replace("shaft = [\"upper\", \"lower\"]", "shaft = [\"upper\", \"lower\", \"inner\"]")
+        // What is inside stays where it is.
+        .replace("line = \"axis\"\nfixed = [\"r\"]", "line = \"axis\"\nfixed = [\"r\", \"z\"]");
+    let (place, _) = run(&text);
+    let stations = rows(&place.path("out/pile.csv"));
+    let last = stations
+        .iter()
+        .filter(|row| row["phase"] == "push" && row["increment"] == "12");
+    // Both sides slide.
+    let expected = (0.2 * inside + 0.4 * outside) / 0.6;
+    let slides = last.filter(|row| (value(row, "shaft_friction") - expected).abs() < 1e-6);
+    assert!(slides.count() >= 3, "{expected}: {stations:?}");
+    assert_closes(&place, |row| match row["phase"].as_str() {
+        "rest" => PI * 0.12 * (17.0 * 1.3 + 20.0 * 3.7),
+        "built" => {
+            let ground = PI * 0.12 * (17.0 * 1.3 + 20.0 * 3.7);
+            ground + value(row, "increment") / 3.0 * (PI * 0.12 * 5.0 * 24.0 - ground)
+        }
+        _ => PI * 0.12 * 5.0 * 24.0,
+    });
+}
+
+#[test]
+fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
+    let plane = "analysis = \"plane_strain\"";
+    for (edit, says) in [
+        (("", ""), None),
+        (
+            ("shaft = [\"upper\", \"lower\"]", "shaft = [\"upper\"]"),
+            Some(
+                "group `lower` touches the pile between z = -5.0000 and -3.0000 m and is not among its `shaft`",
+            ),
+        ),
+        (
+            (
+                "head = { r = [0.0, 0.4], z = 0.0 }",
+                "head = { r = [0.0, 0.2], z = 0.0 }",
+            ),
+            Some("head line `head` leaves out part of the pile's top, from x = 0.3000 to 0.4000"),
+        ),
+        (
+            (
+                "head = { r = [0.0, 0.4], z = 0.0 }",
+                "head = { r = [0.0, 0.4], z = -1.0 }",
+            ),
+            Some(
+                "the pile's groups reach up to z = 0.0000 m, above its head line `head` at -1.0000 m",
+            ),
+        ),
+        (
+            (
+                "upper = { r = 0.4, z = [-3.0, 0.0] }",
+                "upper = { r = 0.4, z = [-6.0, 0.0] }",
+            ),
+            Some("elements of shaft `upper` do not touch the pile"),
+        ),
+        (
+            ("analysis = \"axisymmetric\"", plane),
+            Some("the half's width of 0.4 m, unless `diameter` names another, such as 0.8"),
+        ),
+        (
+            ("head = \"head\"\n", "head = \"head\"\ndiameter = 0.8\n"),
+            None,
+        ),
+    ] {
+        let place = Place::new();
+        assert!(PILE.contains(edit.0), "{edit:?}");
+        let mut text = PILE.replacen(edit.0, edit.1, 1);
+        if edit.1.contains("-6.0") {
+            let lower = "lower = { formulation = \"zero_thickness\", line = \"lower\", law = \"skin\", active = false }\n";
+            text = text
+                .replace(lower, "")
+                .replace("\"upper\", \"lower\"", "\"upper\"");
+            text = text.replace(
+                "{ n = 3, to = -5.0 }",
+                "{ n = 2, to = -6.0 }, { n = 1, to = -5.0 }",
+            );
+        }
+        place.write("pile.toml", text);
+        let outcome = place.run(&["run", "pile.toml", "--out", "out", "--dry-run"]);
+        assert_eq!(outcome.code, Some(DONE), "{edit:?}: {}", outcome.stderr);
+        match says {
+            Some(says) => assert!(outcome.says(says), "{says}: {}", outcome.stderr),
+            None => assert!(!outcome.says("[pile]:"), "{edit:?}: {}", outcome.stderr),
+        }
+    }
+}
+
+/// The picture of the test begins where the test does: at the state that the phase before it left, or
+/// at its own zero where settlements are counted anew.
+#[test]
+fn the_curve_of_a_test_begins_where_the_phase_before_it_ended() {
+    let (before, rest) = PILE.split_once("[[phase]]\nname = \"pull\"").unwrap();
+    let (_, pile) = rest.split_once("[pile]").unwrap();
+    let force = "force = [{ line = \"head\", z = -300.0 }]";
+    let pushed = format!("{before}[pile]{pile}")
+        .replace("displacement = [{ line = \"head\", z = -0.09 }]", force);
+    assert!(pushed.contains(force));
+    for resets in [true, false] {
+        let keep = if resets {
+            "reset_displacements = true\n"
+        } else {
+            ""
+        };
+        let text = pushed.replace("reset_displacements = true\n", keep);
+        let (place, _) = run(&text);
+        let history = rows(&place.path("out/history.csv"));
+        let before = history.iter().rfind(|row| row["phase"] == "built").unwrap();
+        let start = &summary(&place)["pile"]["start"];
+        let settled = if resets {
+            0.0
+        } else {
+            value(before, "pile_settlement")
+        };
+        let loads = ["pile_head_load", "pile_shaft_load", "pile_base_load"];
+        let expected = std::iter::once(settled).chain(loads.map(|name| value(before, name)));
+        for (i, expected) in expected.enumerate() {
+            let found = start[i].as_f64().unwrap();
+            assert!(
+                (found - expected).abs() <= 1e-9 * expected.abs(),
+                "{start}: {expected}"
+            );
+        }
+    }
+}
+
+/// Earth pressure beyond the ground's strength is refused by a dry run as by a run.
+#[test]
+fn a_dry_run_asks_the_laws_for_their_strength() {
+    let ground =
+        "ground = { law = \"elastic\", parameters = { young_modulus = 2e4, poisson_ratio = 0.3 } }";
+    let sand = "ground = { law = \"mohr_coulomb\", parameters = { young_modulus = 2e4, poisson_ratio = 0.3, cohesion = 0.0, friction_angle = 30.0, dilatancy_angle = 0.0 } }";
+    // Between 1/3 and 3 the ratio is within the strength.
+    for (k_0, code) in [("0.5", DONE), ("0.2", BAD_INPUT), ("4.0", BAD_INPUT)] {
+        let place = Place::new();
+        assert!(PILE.contains(ground));
+        let text = PILE
+            .replacen(ground, sand, 1)
+            .replace("k_0 = 0.5", &format!("k_0 = {k_0}"));
+        place.write("pile.toml", text);
+        let outcome = place.run(&["run", "pile.toml", "--out", "out", "--dry-run"]);
+        assert_eq!(outcome.code, Some(code), "{k_0}: {}", outcome.stderr);
+        if code == BAD_INPUT {
+            assert!(
+                outcome.says("outside the strength of law"),
+                "{}",
+                outcome.stderr
+            );
+            assert!(outcome.says("pile.toml:"), "{}", outcome.stderr);
+        }
+    }
+}

@@ -138,6 +138,11 @@ fn what_does_not_fit_is_said_at_its_place_in_the_setting() {
             "1:24",
             "nan is no finite number",
         ),
+        (
+            "laws.my joint.parameters.cohesion=1",
+            "1:1",
+            "--set 'laws.\"my joint\".parameters.cohesion=…'",
+        ),
         ("base=other.toml", "1:1", "`base` cannot be set"),
         ("solver.max_iterations", "1:1", "expected KEY=VALUE"),
     ] {

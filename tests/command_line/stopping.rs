@@ -193,6 +193,85 @@ fn studies_say_how_far_they_are_and_stop() {
     }
 }
 
+/// A study that is stopped has a table of the settings that are done, and goes on from there.
+#[test]
+fn a_stopped_study_has_its_rows_and_goes_on() {
+    let place = Place::new();
+    place.write("case.toml", edited(crate::trade_off::HARDENING));
+    let arguments = ["trade-off", "case.toml", "--out", "out"];
+    let stop_after = |arguments: &[&str], until: &str| {
+        let mut child = start(&place, arguments);
+        wait_for(&place, until);
+        send("-INT", &format!("-{}", child.id()));
+        assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+        let rows = tests::case::table(&place.path("out/trade_off.csv"));
+        let measured = rows.into_iter().map(|row| {
+            let [setting, error, cost] =
+                ["setting", "error", "cpu_seconds"].map(|c| row[c].clone());
+            assert!(!error.is_empty() || !row["failure"].is_empty(), "{row:?}");
+            (setting, error, cost)
+        });
+        measured.collect::<Vec<_>>()
+    };
+    let first = stop_after(&arguments, "increments × 4 (");
+    let settings: Vec<&str> = first.iter().map(|(setting, ..)| setting.as_str()).collect();
+    for done in ["as in the file", "the file's mesh", "increments × 0.25"] {
+        assert!(settings.contains(&done), "{settings:?}");
+    }
+    assert!(
+        said(&place).contains("--resume goes on from there"),
+        "{}",
+        said(&place)
+    );
+    for file in ["trade_off.svg", "trade_off.html", "trials.jsonl"] {
+        assert!(place.path("out").join(file).is_file(), "{file}");
+    }
+    let resumed = [&arguments[..], &["--resume"]].concat();
+    // What was done is not done again: its costs are the same to the last digit.
+    let second = stop_after(&resumed, "tolerance 1e-4");
+    assert!(second.len() > first.len(), "{second:?}");
+    for row in &first {
+        assert!(second.contains(row), "{row:?} in {second:?}");
+    }
+    let other = [&resumed[..], &["--set", "solver.max_iterations=21"]].concat();
+    let outcome = place.run(&other);
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+    assert!(
+        outcome.says("it belongs to another case"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+/// The study for an accuracy has a row for every run, and does not repeat them.
+#[test]
+fn a_stopped_search_for_an_accuracy_goes_on() {
+    let place = Place::new();
+    // A pile's loads stand for probes.
+    place.write(
+        "pile.toml",
+        format!("accuracy = 0.2\n{}", crate::pile::PILE),
+    );
+    let mut child = start(&place, &["run", "pile.toml", "--out", "out"]);
+    wait_for(&place, "accuracy: run 3");
+    send("-INT", &format!("-{}", child.id()));
+    assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
+    let rows = || tests::case::table(&place.path("out/accuracy.csv"));
+    let first = rows();
+    assert!(first.len() >= 2, "{first:?}");
+    let outcome = place.run(&["run", "pile.toml", "--out", "out", "--resume"]);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let second = rows();
+    assert!(second.len() > first.len(), "{second:?}");
+    assert_eq!(second[..first.len()], first);
+    assert_eq!(second[0]["setting"], "increments × 0.25");
+    // Of three runs on there is an estimate.
+    assert!(
+        second[2]["error"].parse::<f64>().unwrap() > 0.0,
+        "{second:?}"
+    );
+}
+
 #[test]
 fn a_child_does_not_outlive_the_program() {
     let Some(place) = troubled::place("") else {

@@ -30,7 +30,7 @@ control = { t = { jump = 5.0e-3 }, n = { stiffness = 1.0e5 } }
 "#;
 
 /// Edits that make the layer of the case harden, sheared far enough, in more increments.
-const HARDENING: &[(&str, &str)] = &[
+pub(crate) const HARDENING: &[(&str, &str)] = &[
     ("law = \"coulomb_joint\"", "law = \"mepi\""),
     (
         "normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
@@ -155,7 +155,7 @@ fn draws_the_diagram_and_the_page() {
 #[ignore = "a minute and a half: a study of all settings of a case"]
 fn a_case_is_measured_on_its_mesh_and_against_a_finer_one() {
     let place = Place::new();
-    let outcome = study(&place, "case.toml", &edited(HARDENING), &[]);
+    let outcome = study(&place, "case.toml", &edited(HARDENING), &["--thorough"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let rows = rows(&place);
     let error = |label: &str| {

@@ -222,6 +222,32 @@ fn a_stiffness_by_rows_is_read_by_rows() {
     assert!(most(ROWS) < most(""), "the tangent is that of the routine");
 }
 
+/// `iTimeDep`: the model is given true times, and a segment without one is told of.
+#[test]
+fn a_model_that_depends_on_the_time_is_given_it() {
+    let Some(place) = place("clock", &["udsm/clock.c"]) else {
+        return;
+    };
+    let of_skew = skewed(ROWS, 0.0, STRAINED);
+    let text = of_skew.replace("libskew", "libclock");
+    let (g, lambda) = (2e4 / 2.6, 2e4 * 0.3 / (1.3 * 0.4));
+    let strained = -90.0 + (lambda + 2.0 * g) * -2e-3 + lambda * 1e-3 + 5e3 * 1e-3;
+    for (time, passed) in [("time = 30.0\n", 30.0), ("", 4.0)] {
+        let text = text.replacen("increments = 4\n", &format!("increments = 4\n{time}"), 1);
+        place.write("driver.toml", text);
+        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let found = *column(&place.path("out.csv"), "stress_22").last().unwrap();
+        let expected = strained - 2.0 * passed;
+        assert!(
+            (found - expected).abs() < 1e-9,
+            "{passed}: {found}, not {expected}"
+        );
+        let is_told = outcome.says("depends on the time");
+        assert_eq!(is_told, time.is_empty(), "{}", outcome.stderr);
+    }
+}
+
 #[test]
 fn an_undrained_group_says_so() {
     let Some(place) = skew() else {

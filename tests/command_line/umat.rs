@@ -384,6 +384,52 @@ fn a_routine_that_ends_its_process_ends_an_increment() {
 }
 
 #[test]
+fn a_tangent_that_is_left_unset_is_named() {
+    let Some(place) = place("unset") else {
+        return;
+    };
+    // Strains alone need no tangent; a stress does.
+    let text = driver("unset", "", "");
+    assert_eq!(rows(&place, &text).len(), 11);
+    place.write(
+        "driver.toml",
+        text.replacen("11 = { strain = 1e-3 }", "11 = { stress = -10.0 }", 1),
+    );
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+    assert!(outcome.says("DDSDDE of a UMAT"), "{}", outcome.stderr);
+    assert!(!outcome.says("beyond strength"), "{}", outcome.stderr);
+    let outcome = place.run(&["check", "libunset.so"]);
+    assert!(
+        outcome.stdout.contains("the routine leaves it unset"),
+        "{}",
+        outcome.stdout
+    );
+}
+
+#[test]
+fn a_zone_has_no_two_variables_of_one_name() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
+    let variable = "[[internal]]\nid = \"zone_stress_11\"\nunit = \"kPa\"\ndoc = \"a stress\"\n";
+    place.write("elastic.law.toml", format!("{sidecar}\n{variable}"));
+    let zone = "law = \"soil\"\nadapter = \"shear_zone\"\nthickness = 0.01\nhypothesis = \"interface_2d\"\n\
+                segment = [{ increments = 4, control = { t = { jump = 1e-3 } } }]\n[laws.soil]\nlaw = \"umat_elastic\"\n\
+                adapter = \"umat\"\nlibrary = \"libelastic.so\"\nparameters = { young_modulus = 2e4 }\n";
+    place.write("zone.toml", zone);
+    let outcome = place.run(&["point", "zone.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+    assert!(
+        outcome
+            .says("internal variable `zone_stress_11`, as the zone calls one of its own stresses"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
 fn a_routine_without_an_answer_is_the_librarys_fault() {
     let Some(place) = place("stops") else {
         return;

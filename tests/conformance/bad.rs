@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 69] = [
+const GALLERY: [(&str, &str, &str, Point); 70] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -25,6 +25,12 @@ const GALLERY: [(&str, &str, &str, Point); 69] = [
     ),
     (
         "bad_truncated_plugin",
+        "description-is-readable",
+        "failed",
+        Refuses,
+    ),
+    (
+        "bad_tangent_flags",
         "description-is-readable",
         "failed",
         Refuses,

@@ -111,7 +111,7 @@ static int integrate(BehaviourData &data) {
     }
     if (damage - before > parameters[2]) {
         *data.rdt = std::min(*data.rdt, 0.5);
-        std::snprintf(data.error_message, 512, "the damage grows by %g", damage - before);
+        std::snprintf(data.error_message, 512, "the damage grows by %g in %.17g", damage - before, data.dt);
         return -1;
     }
     if (!predicts) {

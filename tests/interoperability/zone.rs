@@ -110,6 +110,69 @@ fn its_own_parameters_are_set_and_its_refusals_cut_steps() {
 }
 
 #[test]
+fn it_opens_in_space_as_in_the_plane() {
+    let jumps = [("n", 2e-5), ("t", 3e-5), ("s", -4e-5)];
+    let control = jumps.map(|(name, jump)| format!("{name} = {{ jump = {jump:?} }}"));
+    let text = zone("", &[(8, &control.join(", "))]).replacen("interface_2d", "interface_3d", 1);
+    let (rows, report) = rows(&text);
+    assert_eq!(report.hypothesis, "interface_3d");
+    let end = &rows[8];
+    let w = jumps
+        .map(|(_, jump)| jump * jump)
+        .iter()
+        .sum::<f64>()
+        .sqrt();
+    assert_close(end["Damage"], damage(w), 1e-12, "damage");
+    for (name, jump) in jumps {
+        let stiffness = if name == "n" { K_N } else { K_T };
+        let expected = (1.0 - damage(w)) * stiffness * jump;
+        assert_close(
+            end[format!("traction_{name}").as_str()],
+            expected,
+            1e-12,
+            name,
+        );
+    }
+}
+
+/// It refuses every growth of damage, and says the time of the increment that it was given.
+#[test]
+fn it_is_given_the_time_of_its_increments() {
+    let refused = |time: &str| -> f64 {
+        let text = zone(
+            "LargestDamageIncrement = 0.0",
+            &[(4, "n = { jump = 4e-5 }")],
+        );
+        let text = text.replacen("increments = 4\n", &format!("increments = 4\n{time}"), 1);
+        let driver = Driver::from_source(&Source::new("driver.toml", text)).unwrap();
+        let outcome = runs::point::write_csv(&driver, Vec::new(), std::path::Path::new("table"));
+        let message = format!("{}", outcome.unwrap_err())
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
+        let (_, after) = message.split_once("the damage grows by ").unwrap();
+        let (_, time) = after.split_once(" in ").unwrap();
+        let number = time
+            .split(|c: char| !c.is_ascii_digit() && !".e-".contains(c))
+            .next()
+            .unwrap();
+        number.trim_end_matches('.').parse().unwrap()
+    };
+    // As many halvings each; an increment of four takes a quarter of the segment, one of which nothing is
+    // said takes 1.
+    let of_20 = refused("time = 20.0\n");
+    assert_close(
+        refused("time = 60.0\n") / of_20,
+        3.0,
+        1e-12,
+        "three times the time",
+    );
+    assert_close(refused("") / of_20, 0.2, 1e-12, "no time");
+    let halvings = (5.0 / of_20).log2();
+    assert_close(halvings, halvings.round(), 1e-12, "halvings");
+}
+
+#[test]
 fn its_bounds_are_kept() {
     let path: &[(usize, &str)] = &[(1, "n = { jump = 1e-6 }")];
     let text = zone("", path).replacen("NormalStiffness = 10000000.0", "NormalStiffness = -1.0", 1);

@@ -45,6 +45,8 @@ fn study(input: &Path, interface_stiffness: bool) -> (TempDir, String) {
         settings: Vec::new(),
         out: Some(place.path().to_owned()),
         fine: true,
+        thorough: true,
+        resume: false,
         most_increments: 1000,
         interface_stiffness,
         stop: law::Stop::never(),

@@ -154,9 +154,33 @@ impl Case {
             notes: mesh_file
                 .iter()
                 .flat_map(|file| file.notes.clone())
+                .chain(self.unused_laws())
                 .collect(),
             mesh_file,
         })
+    }
+
+    /// Laws that no group takes, where the file stands alone: those of a base, or of a file with variants,
+    /// may be for others.
+    fn unused_laws(&self) -> Option<String> {
+        let Self { source, file, .. } = self;
+        if self.variant.is_some() || source.files().count() > 1 {
+            return None;
+        }
+        let own = file
+            .groups
+            .values()
+            .map(|group| group.get_ref().law.get_ref());
+        let later = file.phases.iter().flat_map(|phase| phase.laws.values());
+        let used: Vec<&String> = own.chain(later.map(Spanned::get_ref)).collect();
+        let unused = file
+            .laws
+            .keys()
+            .map(Spanned::get_ref)
+            .filter(|name| !used.contains(name));
+        let names: Vec<String> = unused.map(|name| format!("`{name}`")).collect();
+        (!names.is_empty())
+            .then(|| format!("no group takes the laws {} of [laws]", names.join(", ")))
     }
 
     /// The results that the file asks for, of its simulation.

@@ -31,6 +31,7 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
     let table = Table {
         source,
         path: &path,
+        bytes: &bytes,
         columns,
     };
     let [x, y] = [
@@ -105,6 +106,7 @@ fn begin(bytes: &[u8]) -> csv::Result<(Reader<&[u8]>, Vec<String>)> {
 struct Table<'a> {
     source: &'a Source,
     path: &'a Path,
+    bytes: &'a [u8],
     columns: Vec<String>,
 }
 
@@ -127,6 +129,16 @@ impl Table<'_> {
         })
     }
 
+    /// Number of the line, from 1, of the row that is read from here on. The reader's own number leaves
+    /// out blank lines.
+    fn line(&self, from: usize) -> usize {
+        let (before, rest) = self.bytes.split_at(from.min(self.bytes.len()));
+        let is_end = |byte: &u8| *byte == b'\n';
+        let is_no_row = |line: &&[u8]| line.trim_ascii().is_empty() || line.starts_with(b"#");
+        let skipped = rest.split(is_end).take_while(is_no_row);
+        before.split(is_end).count() + skipped.count()
+    }
+
     /// The number in a cell; `None` if it is empty.
     fn number(
         &self,
@@ -144,7 +156,7 @@ impl Table<'_> {
                 let message = format!(
                     "{}, line {}: `{cell}` in column `{}` is no number",
                     self.path.display(),
-                    row.position().map_or(0, csv::Position::line),
+                    row.position().map_or(0, |at| self.line(at.byte() as usize)),
                     name.get_ref()
                 );
                 let error = self.source.error(name.span(), message);

@@ -487,6 +487,21 @@ fn describe_formulation(
             ));
         }
     }
+    // A tangent is one thing: all of the response, near the derivative of the update, or none.
+    let flags = [
+        (raw::PILUM_T_LINEAR, "PILUM_T_LINEAR"),
+        (
+            raw::PILUM_T_TANGENT_APPROXIMATE,
+            "PILUM_T_TANGENT_APPROXIMATE",
+        ),
+        (raw::PILUM_T_NO_TANGENT, "PILUM_T_NO_TANGENT"),
+    ];
+    let mut set = flags
+        .iter()
+        .filter(|(flag, _)| formulation.flags & flag != 0);
+    if let (Some((_, one)), Some((_, other))) = (set.next(), set.next()) {
+        return Err(format!("{name}: {one} and {other} contradict each other"));
+    }
     let mut internal_variables = Vec::new();
     for variable in table(
         formulation.state,

@@ -158,6 +158,15 @@ impl LoadedLaw {
                 law.hypotheses()
             ));
         };
+        let inner = law.formulation(solid).into_iter();
+        let mut inner = inner.flat_map(|formulation| &formulation.internal_variables);
+        let own: Vec<String> = variables(solid).map(|variable| variable.id).collect();
+        let taken = inner.find_map(|variable| own.iter().find(|own| **own == variable.id));
+        if let Some(taken) = taken {
+            return Err(format!(
+                "law `{id}` has an internal variable `{taken}`, as the zone calls one of its own stresses"
+            ));
+        }
         let formulation = law.formulation(solid).into_iter();
         let formulation = formulation.map(|solid_formulation| FormulationDescription {
             hypothesis: Hypothesis::Interface2d.name(),

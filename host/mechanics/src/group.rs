@@ -80,7 +80,7 @@ pub struct Committed(Vec<Vec<f64>>);
 /// How often a group has called a law, calls included that came to nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LawCalls {
-    /// Id of the law.
+    /// Name of the law in the case: two may have one library and id.
     pub law: String,
     /// Points carried through an increment.
     pub points: u64,
@@ -440,10 +440,10 @@ impl Group {
         self.law = law;
         self.watched = calls::name(&format!("group `{}`", self.name));
         let law = &self.law.built.law;
-        let id = &law.description().id;
-        if self.law_calls.last().is_none_or(|calls| calls.law != *id) {
+        let name = &self.law.name;
+        if self.law_calls.last().is_none_or(|calls| calls.law != *name) {
             self.law_calls.push(LawCalls {
-                law: id.clone(),
+                law: name.clone(),
                 ..LawCalls::default()
             });
         }

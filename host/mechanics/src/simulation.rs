@@ -301,6 +301,18 @@ impl Simulation {
         Ok(())
     }
 
+    /// Starts the first phase and goes no further: whether the laws stand their initial stresses, and what
+    /// they make of them.
+    ///
+    /// # Errors
+    /// As [`Self::step`], as far as it comes before the first increment.
+    pub fn try_start(mut self, watch: &mut dyn Watch) -> Result<(), Error> {
+        if self.problem.phases.is_empty() {
+            return Ok(());
+        }
+        self.begin_phase(watch)
+    }
+
     /// Goes on by one increment, into the next phase where one is over. `None` after the last.
     ///
     /// # Errors

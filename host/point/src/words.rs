@@ -172,6 +172,8 @@ impl Failure {
     /// What the user could do, if something is known.
     pub fn hint(&self) -> Option<String> {
         let own = match &self.cause {
+            // A stress without stiffness is not one beyond strength.
+            Cause::NoEquilibrium(_) if self.is_without_stiffness() => None,
             Cause::NoEquilibrium(why) => why.unmet.and_then(|unmet| self.instead_of(&unmet)),
             _ => None,
         };
@@ -179,6 +181,11 @@ impl Failure {
             (Some(own), Some(advice)) => Some(format!("{own}; {advice}")),
             (own, advice) => own.or_else(|| advice.clone()),
         }
+    }
+
+    fn is_without_stiffness(&self) -> bool {
+        let mut warnings = self.warnings.iter();
+        warnings.any(|warning| matches!(warning, Warning::NoStiffness { .. }))
     }
 
     fn instead_of(&self, unmet: &Unmet) -> Option<String> {
@@ -285,7 +292,11 @@ impl Display for Warning {
                 )
             }
             Self::NoStiffness { law } => {
-                write!(f, "law `{law}` has no stiffness in the initial state")
+                write!(
+                    f,
+                    "law `{law}` has no stiffness in the initial state: its operator is zero there, as that of a \
+                     routine that leaves its tangent unset (DDSDDE of a UMAT), and no stress can be imposed by it"
+                )
             }
             Self::Unreliable { law, times, first } => write!(
                 f,

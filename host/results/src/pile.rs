@@ -14,6 +14,7 @@
 
 mod criteria;
 mod geometry;
+mod oddities;
 mod table;
 
 pub use criteria::{Curve, Resistances};
@@ -23,7 +24,7 @@ pub(crate) use table::Stations;
 use geometry::{Facet, Geometry};
 use mechanics::Simulation;
 use mechanics::group::Group;
-use mechanics::problem::Formulation;
+use mechanics::problem::{Analysis, Formulation};
 use mechanics::simulation::{Part, Snapshot};
 
 /// Columns of `history.csv` that a pile has.
@@ -172,12 +173,16 @@ impl Pile {
             Base::Line(line) => format!("line `{line}`"),
         };
         format!(
-            "pile {}: shaft {}, base {base}, head line `{}`; length {:.4} m, diameter {:.4} m for the criteria \
+            "pile {}: shaft {}, base {base}, head line `{}`; length {:.4} m, {} {:.4} m for the criteria \
              of its resistance",
             names(&self.parts.groups),
             names(&self.parts.shaft),
             self.parts.head,
             self.length(),
+            match self.geometry.analysis {
+                Analysis::Axisymmetric => "diameter",
+                Analysis::PlaneStrain => "width",
+            },
             self.diameter()
         )
     }
@@ -406,13 +411,14 @@ impl Pile {
     }
 
     /// Friction, effective normal stress (compression positive) and slip at a station: the means over the
-    /// elements of the shaft there, each with the mean of its integration points that are nearest.
+    /// elements of the shaft there, by their girth (a tube holds more outside than inside), each with the
+    /// mean of its integration points that are nearest.
     fn at(&self, snapshot: &Snapshot<'_>, split: &Split<'_>, z: f64) -> [Option<f64>; 3] {
         let close = 1e-9 * self.geometry.length();
         let there = split.segments.iter();
         let there = there.filter(|(facet, _)| facet.z[0] - close <= z && z <= facet.z[1] + close);
         let mut sums = [0.0; 3];
-        let mut count = 0.0;
+        let mut whole = 0.0;
         for (facet, force) in there {
             let group = &snapshot.groups[facet.group];
             let height = |point: usize| (group.kinematics.position(point)[1] - z).abs();
@@ -438,12 +444,13 @@ impl Pile {
                     .for_each(|(own, value)| *own += value);
             }
             let n = points.len().max(1) as f64;
+            let girth = facet.area / f64::max(facet.z[1] - facet.z[0], close);
             sums.iter_mut()
                 .zip(own)
-                .for_each(|(sum, own)| *sum += own / n);
-            count += 1.0;
+                .for_each(|(sum, own)| *sum += girth * own / n);
+            whole += girth;
         }
-        sums.map(|sum| (count > 0.0).then(|| sum / count))
+        sums.map(|sum| (whole > 0.0).then(|| sum / whole))
     }
 }
 

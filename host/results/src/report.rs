@@ -84,11 +84,22 @@ pub fn write_dry(
 /// path. If `out` is a folder, the report goes into it.
 ///
 /// # Errors
-/// [`Error::Usage`] without a folder; [`Error::Unreadable`] if one has no `history.csv`,
+/// [`Error::Usage`] without a folder, or if one has no results; [`Error::Unreadable`] if one has no `history.csv`,
 /// [`Error::Input`] if that is not the history of a run; [`Error::Unwritable`].
 pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
     if folders.is_empty() {
         return Err(Error::Usage("name at least one results folder".to_owned()));
+    }
+    if let Some(folder) = folders.iter().find(|f| !has_results(f)) {
+        let why = if folder.is_dir() {
+            "has no results of a run (`history.csv`)"
+        } else {
+            "is no folder"
+        };
+        return Err(Error::Usage(format!(
+            "{} {why}: `pilum run CASE --out FOLDER` writes them",
+            folder.display()
+        )));
     }
     let budget = Budget::of(folders.len());
     let named = record::names(folders).into_iter().zip(folders);

@@ -329,7 +329,7 @@ impl Summary {
     }
 }
 
-/// Points carried through every law, and how many of them with an operator, by the law's id.
+/// Points carried through every law, and how many of them with an operator, by the law's name in the case.
 fn law_calls(groups: &[Group]) -> Value {
     let mut totals: BTreeMap<&str, [u64; 2]> = BTreeMap::new();
     for calls in groups.iter().flat_map(|group| &group.law_calls) {

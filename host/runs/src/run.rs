@@ -13,6 +13,7 @@ use mechanics::settings::Method;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
 use mechanics::{Place, Simulation, State, Watch};
 use results::pile::Resistances;
+use results::wanted::Wanted;
 use results::{Checkpoint, Fault, Figures, Recorder, report};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -84,28 +85,56 @@ pub fn dry_run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Resul
         mesh_file,
         notes,
     } = case.pose()?;
-    let simulation = Simulation::new(problem).map_err(|error| case.place(error))?;
+    let simulation = Simulation::new(problem.clone()).map_err(|error| case.place(error))?;
     let wanted = case.wanted(&simulation)?;
     let about = case.about(&laws, mesh_file.as_ref());
-    let warnings = all_warnings(case, &laws, &simulation, notes);
+    let mut warnings = all_warnings(case, &laws, (&simulation, &wanted), notes);
     for warning in &warnings {
         observer.warning(warning);
     }
+    // What the laws make of the initial stress is known once the first phase starts. The report shows
+    // what is before that, so another simulation starts.
+    let mut start = Start {
+        observer: &mut *observer,
+        warnings: &mut warnings,
+    };
+    let started = Simulation::new(problem).and_then(|trial| trial.try_start(&mut start));
+    started.map_err(|error| case.place(error))?;
     let report = report::write_dry(folder, &about, &wanted, &simulation, &warnings)?;
     Ok(report)
+}
+
+/// Follows the start of a phase that goes no further.
+struct Start<'a> {
+    observer: &'a mut dyn Observer,
+    warnings: &'a mut Vec<String>,
+}
+
+impl Watch for Start<'_> {
+    fn at_rest(&mut self, phase: &str, share: f64) {
+        self.observer.at_rest(phase, share);
+    }
+
+    fn warning(&mut self, warning: &Warning) {
+        let message = warning.to_string();
+        self.observer.warning(&message);
+        self.warnings.push(message);
+    }
 }
 
 /// What is to be said of a case before its first phase.
 fn all_warnings(
     case: &Case,
     laws: &Laws,
-    simulation: &Simulation,
+    (simulation, wanted): (&Simulation, &Wanted),
     notes: Vec<String>,
 ) -> Vec<String> {
     let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
     let mut all: Vec<String> = of_laws.chain(simulation.warnings().to_vec()).collect();
     all.extend(notes);
     all.extend(case.warnings(simulation));
+    let pile = wanted.pile.iter();
+    all.extend(pile.flat_map(|pile| pile.oddities(simulation)));
     all
 }
 
@@ -176,7 +205,7 @@ pub fn run_reusing(
         simulation.go_to(state.into_owned())?;
         results
     } else {
-        let all = all_warnings(case, &laws, &simulation, notes);
+        let all = all_warnings(case, &laws, (&simulation, &wanted), notes);
         for warning in &all {
             observer.warning(warning);
         }
@@ -400,6 +429,14 @@ impl Keeper {
         }
         Ok(())
     }
+}
+
+/// What must be the same for a study of a case to go on.
+pub(crate) fn identity_of(case: &Case) -> Result<String, Error> {
+    let Posed {
+        laws, mesh_file, ..
+    } = case.pose()?;
+    Ok(identity(case, &laws, mesh_file.as_ref()))
 }
 
 /// What must be the same for a run to go on: the program, the case with its variant, the bytes of

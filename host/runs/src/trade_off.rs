@@ -10,6 +10,7 @@ mod clock;
 mod diagram;
 mod division;
 mod driver_study;
+mod kept;
 mod pace;
 mod page;
 mod pareto;
@@ -25,8 +26,10 @@ pub use sampled::Convergence;
 pub use study::{Measurement, Reference, Row, Study};
 
 use crate::Error;
+use crate::run::identity_of;
 use crate::variants::keep;
 use input::{Case, Driver, is_driver};
+use kept::Kept;
 use law::{Opener, Stop};
 use std::path::{Path, PathBuf};
 use text::write::replace;
@@ -43,6 +46,10 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Divide meshes by 4 too.
     pub fine: bool,
+    /// Try all settings of a case, however long it runs.
+    pub thorough: bool,
+    /// Go on with the study of a case that was stopped.
+    pub resume: bool,
     /// Most increments per segment of a driver, the reference excepted.
     pub most_increments: usize,
     /// Study the stiffness of zero-thickness interfaces instead.
@@ -69,6 +76,10 @@ pub fn run(
         let message = "--max-increments is 0, expected at least 1";
         return Err(Error::usage(message.to_owned()));
     }
+    if options.resume && options.interface_stiffness {
+        let message = "--resume goes on with a study of settings, not with --interface-stiffness";
+        return Err(Error::usage(message.to_owned()));
+    }
     let path = if path.is_dir() {
         path.join("case.toml")
     } else {
@@ -77,6 +88,10 @@ pub fn run(
     if is_driver(&path)? {
         if options.interface_stiffness {
             let message = "--interface-stiffness needs a case: a driver has no elements beside it";
+            return Err(Error::usage(message.to_owned()));
+        }
+        if options.resume {
+            let message = "--resume needs a case: the study of a driver always starts anew";
             return Err(Error::usage(message.to_owned()));
         }
         run_drivers(&path, options, show, say)
@@ -103,12 +118,12 @@ fn run_drivers(
     let folder = options.folder(&stem);
     for driver in &drivers {
         let name = options.full_name(&stem, driver.point().variant());
-        let study = driver_study::study(driver, &name, options.most_increments, stop, say)?;
-        finish(
-            &study,
-            &options.place(&folder, driver.point().variant()),
-            show,
-        )?;
+        let place = options.place(&folder, driver.point().variant());
+        let mut study = Study::new(&name, driver.title(), driver_study::COUNTS);
+        let mut done = |study: &Study| write_table(study, &place);
+        let most = options.most_increments;
+        let outcome = driver_study::study(driver, &mut study, most, stop, (&mut done, say));
+        finish(&mut study, &place, outcome, show)?;
     }
     Ok(())
 }
@@ -133,11 +148,23 @@ fn run_cases(
             stiffness::run(case, &name, (&place, &options.stop), show, say)?;
             continue;
         }
-        let study = {
-            let scratch = Scratch::new(&place, &options.stop)?;
-            case_study::study(case, &name, options.fine, &scratch, say)?
-        };
-        finish(&study, &place, show)?;
+        let kept = Kept::begin(&place, &identity_of(case)?, options.resume)?;
+        let scratch = Scratch::new(&place, &options.stop)?.keeping(kept);
+        if scratch.kept() > 0 {
+            say(&format!("{} trials are done already", scratch.kept()));
+        }
+        let mut study = Study::new(&name, &case.file.title, trial::COUNTS);
+        let mut done = |study: &Study| write_table(study, &place);
+        let extent = (options.fine, options.thorough);
+        let outcome = case_study::study(case, &mut study, extent, &scratch, (&mut done, say));
+        match scratch.kept() {
+            kept if outcome.is_err() && kept > 0 => say(&format!(
+                "{kept} trials are kept in {}: --resume goes on from there",
+                place.display()
+            )),
+            _ => scratch.end(),
+        }
+        finish(&mut study, &place, outcome, show)?;
     }
     Ok(())
 }
@@ -164,20 +191,38 @@ impl Options {
     }
 }
 
-/// Writes table, diagram and page, and shows the table.
-fn finish(study: &Study, folder: &Path, show: &mut dyn FnMut(&str)) -> Result<(), Error> {
+/// Writes table, diagram and page, and shows the table: of a study that was stopped what there is.
+fn finish(
+    study: &mut Study,
+    folder: &Path,
+    outcome: Result<(), Error>,
+    show: &mut dyn FnMut(&str),
+) -> Result<(), Error> {
+    match &outcome {
+        Ok(()) => (),
+        Err(error) if error.is_stop() && !study.references.is_empty() => {
+            let n = study.rows.len();
+            let note = format!("the study was stopped: these are the first {n} settings of it");
+            study.notes.push(note);
+        }
+        Err(_) => return outcome,
+    }
+    write_table(study, folder)?;
     let diagram = study.diagram().map_err(Error::internal)?;
     let page = study.page(&diagram)?;
-    std::fs::create_dir_all(folder).map_err(|source| text::Error::unwritable(folder, source))?;
-    let table = folder.join("trade_off.csv");
-    study
-        .write_csv(&table)
-        .map_err(|error| text::Error::unwritable(&table, std::io::Error::other(error)))?;
     write(&folder.join("trade_off.svg"), &diagram)?;
     write(&folder.join("trade_off.html"), &page)?;
     show(&study.text());
     show(&format!("results in {}", folder.display()));
-    Ok(())
+    outcome
+}
+
+/// Writes the rows that there are.
+fn write_table(study: &Study, folder: &Path) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(|source| text::Error::unwritable(folder, source))?;
+    let table = folder.join("trade_off.csv");
+    let written = study.write_csv(&table);
+    Ok(written.map_err(|error| text::Error::unwritable(&table, std::io::Error::other(error)))?)
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Error> {

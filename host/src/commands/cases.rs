@@ -145,8 +145,14 @@ fn run_accurately(
     reuse: &mut Reuse,
     options: Options,
 ) -> Result<Figures, Error> {
-    let studied =
-        trade_off::reach_until(case, folder, &progress.stop, &mut |doing| say!("{doing}"))?;
+    let studied = trade_off::reach_until(
+        case,
+        (folder, options.resume),
+        &progress.stop,
+        &mut |doing| {
+            say!("{doing}");
+        },
+    )?;
     let case = studied.as_ref().unwrap_or(case);
     if let Some(chosen) = &case.file.chosen {
         let increments: Vec<String> = chosen

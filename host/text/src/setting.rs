@@ -205,10 +205,32 @@ fn equals_sign(text: &str) -> Option<usize> {
     None
 }
 
+/// A dotted path whose names with blanks stand in quotes; `None` if there is no such name, or if some
+/// are quoted already.
+fn with_quotes(path: &str) -> Option<String> {
+    let path = path.trim();
+    if path.contains(['"', '\'']) || !path.contains(char::is_whitespace) {
+        return None;
+    }
+    let names = path.split('.').map(|name| key(name.trim()));
+    Some(names.collect::<Vec<_>>().join("."))
+}
+
 /// The keys of a dotted path.
 fn keys<'i>(source: &Source, path: &str) -> Result<Vec<Spanned<DeString<'i>>>, Error> {
     let text = format!("{path}=0");
-    let table = DeTable::parse(&text).map_err(|error| toml_error(source, &error))?;
+    let table = DeTable::parse(&text).map_err(|error| match with_quotes(path) {
+        Some(quoted) => source
+            .error(
+                path.len() - path.trim_start().len()..path.len(),
+                "a name with blanks stands in quotes",
+            )
+            .hint(format!(
+                "quotes of the shell around those of the name: --set '{quoted}=…'"
+            ))
+            .into(),
+        None => toml_error(source, &error),
+    })?;
     let mut keys = Vec::new();
     let mut below = Some(table.get_ref());
     while let Some(table) = below {
@@ -256,7 +278,7 @@ fn only_value(table: Spanned<DeTable<'_>>, depth: usize) -> Option<Spanned<DeVal
     Some(value)
 }
 
-/// A word without quotes stands for a text. What else starts like one is refused with an error of
+/// A word or a path without quotes stands for a text. What else starts like one is refused with an error of
 /// its own. `start` is where the setting starts.
 fn bare_word<'i>(
     source: &Source,
@@ -271,10 +293,12 @@ fn bare_word<'i>(
         let error = source.error(span, "there is no value after the `=`");
         return Err(Some(error.into()));
     }
-    if !word.starts_with(|c: char| c.is_alphabetic()) {
+    // A path stands for itself, as a word does.
+    let is_path = word.starts_with(['.', '/']) && word.contains('/');
+    if !is_path && !word.starts_with(|c: char| c.is_alphabetic()) {
         return Err(None);
     }
-    let is_part = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    let is_part = |c: char| c.is_alphanumeric() || "_-./".contains(c);
     if word.chars().all(is_part) {
         return Ok(Spanned::new(span, DeValue::String(word.to_owned().into())));
     }
@@ -355,6 +379,11 @@ mod tests {
     fn a_word_without_quotes_is_a_text() {
         assert_eq!(only("a=arc-length")["a"], Value::from("arc-length"));
         assert_eq!(only("a= soil_2.v1 ")["a"], Value::from("soil_2.v1"));
+        for path in ["./x", "../laws/libx.so", "/tmp/x.so", "laws/libx.so"] {
+            assert_eq!(only(&format!("a={path}"))["a"], Value::from(path));
+        }
+        // What is neither stays what it is.
+        assert!(with(FILE, &["a=./two words"]).is_err() && with(FILE, &["a=.5"]).is_err());
         let refused = with(FILE, &["a=two words"]).unwrap_err();
         assert_eq!(
             refused,

@@ -355,7 +355,7 @@ fn sound_routines_pass_every_check() {
 #[expect(clippy::too_many_lines, reason = "a table of faults")]
 fn faults_of_routines_are_found_by_name() {
     // The routine, a change of its sidecar, the check that finds it, and what is said.
-    let cases: [(&str, [&str; 2], &str, &str, &str); 9] = [
+    let cases: [(&str, [&str; 2], &str, &str, &str); 10] = [
         (
             "saves",
             ["", ""],
@@ -389,6 +389,13 @@ expand = true
             "ddsdde-matches-differences",
             "failed",
             "its transpose fits: `tangent_order`",
+        ),
+        (
+            "rows",
+            ["tangent_order = \"rows\"\n", "tangent = \"approximate\"\n"],
+            "ddsdde-matches-differences",
+            "failed",
+            "the transpose of DDSDDE is the derivative of STRESS",
         ),
         (
             "rows",

@@ -277,7 +277,7 @@ fn check_group(number: usize, group: &ElementGroup, is_undrained: bool) -> Resul
             refuse(Key::InitialStress, Cause::NotFinite("`initial_stress`"))
         }
         Some(InitialStress::AtRest(_)) if !is_solid => {
-            let cause = Cause::Misplaced(Key::InitialStress, group.formulation);
+            let cause = Cause::AtRestInInterface(group.formulation);
             refuse(Key::InitialStress, cause)
         }
         Some(InitialStress::AtRest(at_rest)) => match unlikely(&at_rest.ratio) {

@@ -136,6 +136,8 @@ pub enum Cause {
     LayerOfTriangles(String),
     /// Something that does not go with the formulation.
     Misplaced(Key, Formulation),
+    /// Earth pressure at rest in an interface.
+    AtRestInInterface(Formulation),
     /// An element is degenerate or reaches the other side of the axis.
     BadShape(String),
     /// A layer whose normal goes along it; sizes in m.
@@ -386,6 +388,12 @@ impl fmt::Display for Cause {
                 f,
                 "{} does not go with the formulation `{}`",
                 key.name(),
+                formulation.name()
+            ),
+            Self::AtRestInInterface(formulation) => write!(
+                f,
+                "`initial_stress`: earth pressure at rest (`k_0`, `ocr`, …) is that of `solid` groups, not of the \
+                 formulation `{}`",
                 formulation.name()
             ),
             Self::BadShape(group) => write!(
@@ -669,6 +677,12 @@ impl Cause {
             }
             Self::ImpossibleLayer(_) => {
                 "raise the normal stiffness, or set `in_plane = \"none\"` for the group"
+            }
+            Self::AtRestInInterface(Formulation::ThinLayer) => {
+                "give its stresses: `stress_11`, `stress_22`, `stress_33`, each a number or values over the height"
+            }
+            Self::AtRestInInterface(_) => {
+                "leave it out: an interface starts with the stress of the ground beside it"
             }
             Self::AtRestOutsideStrength { .. } => {
                 "K_0 lies between active and passive pressure: at the surface cohesion, or another K_0"

@@ -47,10 +47,19 @@ pub struct Resistances {
     pub davisson: Found,
     /// By Chin's inverse slope.
     pub chin: Found,
-    /// Settlement, head, shaft and base load where the phase starts, if settlements are counted from there.
+    /// Settlement, head, shaft and base load where the phase starts.
     start: Option<[f64; 4]>,
     /// Weight of the pile, kN.
     weight: Option<f64>,
+}
+
+/// The last phase in which the head moves down.
+struct Push<'c> {
+    phase: &'c OfPhase,
+    /// The state that it starts from.
+    start: [f64; 4],
+    /// The curve to its end, from where settlements are counted.
+    points: Vec<[f64; 4]>,
 }
 
 impl Curve {
@@ -76,9 +85,8 @@ impl Curve {
         }
     }
 
-    /// Number of the last phase in which the head moves down, and the curve to its end: from where
-    /// settlements are counted.
-    fn last_push(&self) -> Option<(&OfPhase, Vec<[f64; 4]>)> {
+    /// The last phase in which the head moves down, if there is one.
+    fn last_push(&self) -> Option<Push<'_>> {
         let before = |number: usize| -> Option<[f64; 4]> {
             let last = self.0[..number]
                 .iter()
@@ -106,7 +114,16 @@ impl Curve {
                 .iter()
                 .flat_map(|phase| &phase.points),
         );
-        Some((&self.0[number], points))
+        let own = if first == number {
+            points[0]
+        } else {
+            before(number).unwrap_or(points[0])
+        };
+        Some(Push {
+            phase: &self.0[number],
+            start: own,
+            points,
+        })
     }
 
     /// Resistances of a pile with this course.
@@ -118,7 +135,12 @@ impl Curve {
     }
 
     fn of(&self, [length, diameter]: [f64; 2], unit: &'static str) -> Resistances {
-        let Some((phase, points)) = self.last_push() else {
+        let Some(Push {
+            phase,
+            start,
+            points,
+        }) = self.last_push()
+        else {
             let why = "the head moves down in no phase".to_owned();
             return Resistances {
                 phase: None,
@@ -141,7 +163,7 @@ impl Curve {
                 .ok_or_else(|| "the law of the pile's head has no elastic operator".to_owned())
                 .and_then(|stiffness| davisson(&points, length / stiffness, diameter)),
             chin: chin(&points),
-            start: points.first().copied().filter(|_| phase.resets),
+            start: Some(start),
             weight: Some(phase.weight),
         }
     }

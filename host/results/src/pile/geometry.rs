@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 use std::f64::consts::PI;
 
 /// Stations closer than this fraction of the pile's length are one.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 
 /// Why there is no such pile.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,7 +95,7 @@ fn place(mesh: &Mesh, node: usize) -> [u64; 2] {
 }
 
 /// Sides of an element: first end, second end, middle.
-fn sides(nodes: &[usize], is_joint: bool) -> Vec<[usize; 3]> {
+pub(super) fn sides(nodes: &[usize], is_joint: bool) -> Vec<[usize; 3]> {
     if is_joint {
         return vec![
             [nodes[0], nodes[1], nodes[2]],

@@ -2,20 +2,24 @@
 //!
 //! Increments are doubled from a quarter of the file's on until the estimated error of the finest
 //! run is below the target; of the runs made, the coarsest that is good enough is chosen. The
-//! error of the mesh is not part of it.
+//! error of the mesh is not part of it. Every run is a row of `accuracy.csv` as soon as it is done, and
+//! kept, so that a study that is stopped goes on from there.
 
 use super::case_study::law_schemes;
+use super::driver_study::in_one_line;
+use super::kept::Kept;
 use super::pace::in_words;
 use super::sampled::Sampled;
 use super::scheme::Scheme;
-use super::trial::{Scratch, Settings, Trial, trial};
+use super::trial::{Scratch, Settings, Timing, Trial};
 use crate::Error;
+use crate::run::identity_of;
 use input::case::Chosen;
 use input::material::ParameterValue;
 use input::{Case, Kind};
 use law::Stop;
-use std::path::Path;
-use std::time::Instant;
+use std::path::{Path, PathBuf};
+use text::write::replace;
 
 /// Factors of the file's increments.
 const FACTORS: [f64; 9] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
@@ -27,10 +31,11 @@ const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 const SHARES: [f64; 2] = [0.85, 0.1];
 /// The finest run has to be better than the target by this factor before any run is chosen.
 const MARGIN: f64 = 0.7;
-/// Another scheme than the file's has to be cheaper by this factor.
+/// Of other schemes than the file's one has to be cheaper than another by this factor.
 const WORTH_A_CHANGE: f64 = 0.8;
-/// CPU seconds of a run below which no other scheme is looked for: looking costs more than it saves.
-const QUICK: f64 = 0.5;
+/// An error that is still this many times the target at the most increments, would it fall in proportion
+/// to them, does not get there.
+const HOPELESS: f64 = 4.0;
 /// Bounds of the order that is extrapolated with. A larger one is not relied on.
 const ORDERS: [f64; 2] = [0.3, 1.0];
 
@@ -40,16 +45,17 @@ const ORDERS: [f64; 2] = [0.3, 1.0];
 /// # Errors
 /// Bad input before anything is written; no equilibrium with any settings; [`text::Error::Unwritable`].
 pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
-    reach_until(case, folder, &Stop::never(), &mut |_| ())
+    reach_until(case, (folder, false), &Stop::never(), &mut |_| ())
 }
 
-/// As [`reach`], to be stopped on its way. `say` takes what is being done.
+/// As [`reach`], to be stopped on its way, and to go on (`resume`) with what is kept of an earlier study
+/// in the folder. `say` takes what is being done.
 ///
 /// # Errors
-/// As [`reach`]; [`law::Stopped`].
+/// As [`reach`]; [`law::Stopped`]; what is kept belongs to another case.
 pub fn reach_until(
     case: &Case,
-    folder: &Path,
+    (folder, resume): (&Path, bool),
     stop: &Stop,
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<Case>, Error> {
@@ -57,16 +63,19 @@ pub fn reach_until(
         return Ok(None);
     };
     crate::run::check(case)?;
-    if case.file.probes.is_empty() {
-        let message = "`accuracy` is the error of the [probes], and there are none";
+    if case.file.probes.is_empty() && case.file.pile.is_none() {
+        let message =
+            "`accuracy` is the error of the [probes] and of the [pile], and there are none";
         return Err(case.source.error(accuracy.span(), message).into());
     }
-    let scratch = Scratch::new(folder, stop)?;
+    let kept = Kept::begin(folder, &identity_of(case)?, resume)?;
+    let scratch = Scratch::new(folder, stop)?.keeping(kept);
     let mut search = Search {
         case,
         scratch: &scratch,
         asked: *accuracy.get_ref(),
         runs: 0,
+        table: Table::begin(folder)?,
         say,
     };
     let (settings, found) = search.best()?;
@@ -121,19 +130,66 @@ struct Search<'a> {
     scratch: &'a Scratch,
     asked: f64,
     runs: usize,
+    table: Table,
     say: &'a mut dyn FnMut(&str),
 }
 
+/// `accuracy.csv`: a row for every run of the study.
+struct Table {
+    path: PathBuf,
+    text: String,
+}
+
+impl Table {
+    /// Begins the table in a folder.
+    fn begin(folder: &Path) -> Result<Self, Error> {
+        let table = Self {
+            path: folder.join("accuracy.csv"),
+            text: "run,setting,cpu_seconds,iterations,change,error,failure\n".to_owned(),
+        };
+        table.write()?;
+        Ok(table)
+    }
+
+    /// Adds a run: its trial, by how much it differs from the one before it, the error that is estimated
+    /// for it.
+    fn row(
+        &mut self,
+        (run, settings): (usize, &Settings),
+        outcome: Result<&Trial, &Error>,
+        [change, error]: [Option<f64>; 2],
+    ) -> Result<(), Error> {
+        let number = |value: Option<f64>| value.map(|v| format!("{v:e}")).unwrap_or_default();
+        let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+        let label = quoted(&settings.label());
+        self.text += &match outcome {
+            Ok(trial) => format!(
+                "{run},{label},{:e},{},{},{},\n",
+                trial.seconds,
+                trial.counts[0],
+                number(change),
+                number(error)
+            ),
+            Err(error) => format!("{run},{label},,,,,{}\n", quoted(&in_one_line(error))),
+        };
+        self.write()
+    }
+
+    fn write(&self) -> Result<(), Error> {
+        Ok(replace(&self.path, &self.text)?)
+    }
+}
+
 impl Search<'_> {
-    /// Of the file's scheme and the others, the cheapest that is good enough. Others are not looked for
-    /// where the file's is good enough and quick.
+    /// The file's scheme, if it is good enough: looking for a better one costs more runs than it saves. Else
+    /// of the others the cheapest that is.
     fn best(&mut self) -> Result<(Settings, Found), Error> {
         let aim = SHARES[0] * self.asked;
         let good = |found: &Found| found.error <= aim;
         let plain = Settings::default();
         let found = self.with(&plain, FACTORS[FACTORS.len() - 1], None)?;
         let mut best = (plain, found);
-        let schemes: Vec<(String, Scheme)> = if good(&best.1) && best.1.trial.seconds < QUICK {
+        let schemes: Vec<(String, Scheme)> = if good(&best.1) {
             Vec::new()
         } else {
             (self.say)(&format!("{STUDY}: which schemes of the laws there are"));
@@ -145,7 +201,7 @@ impl Search<'_> {
                 law: Some(scheme.of(law)),
                 ..Settings::default()
             };
-            // More increments than the file's scheme needs do not pay.
+            // More increments than the best so far needs do not pay.
             let cheap = WORTH_A_CHANGE * best.1.trial.seconds;
             let limit = good(&best.1).then_some(cheap);
             let found = self.with(&settings, f64::max(best.1.factor, 1.0), limit);
@@ -197,13 +253,21 @@ impl Search<'_> {
                 ),
                 None => doing,
             });
-            let started = Instant::now();
-            let outcome = trial(self.case, &settings, self.scratch, false);
-            last = Some((factor, started.elapsed().as_secs_f64()));
+            let outcome = self.scratch.trial(self.case, &settings, Timing::Once, 0);
             match outcome {
                 Ok(trial) => {
+                    last = Some((factor, trial.seconds));
                     let is_dear = limit.is_some_and(|limit| trial.seconds > limit);
                     levels.push((factor, trial));
+                    let [.., (_, done)] = levels.as_slice() else {
+                        continue;
+                    };
+                    let change = levels.len().checked_sub(2).map(|before| {
+                        let before = &levels[before].1.rows;
+                        before.difference(&done.rows, &done.rows.largest())
+                    });
+                    let found = [change, finest_error(&levels)];
+                    self.table.row((self.runs, &settings), Ok(done), found)?;
                     if levels.len() == 1 && is_dear {
                         break;
                     }
@@ -211,15 +275,18 @@ impl Search<'_> {
                 Err(error) if error.kind() == Kind::NoEquilibrium => {
                     // Finer runs are not compared with coarser ones across a gap.
                     levels.clear();
+                    self.table
+                        .row((self.runs, &settings), Err(&error), [None; 2])?;
                     failure = Some(error);
                     continue;
                 }
                 Err(error) => return Err(error),
             }
-            if let Some(estimated) = finest_error(&levels)
-                && estimated <= MARGIN * self.asked
-            {
-                break;
+            if let Some(estimated) = finest_error(&levels) {
+                let at_most_increments = estimated * factor / FACTORS[FACTORS.len() - 1];
+                if estimated <= MARGIN * self.asked || at_most_increments > HOPELESS * self.asked {
+                    break;
+                }
             }
         }
         let Some((_, finest)) = levels.last() else {
@@ -265,12 +332,18 @@ impl Search<'_> {
             };
             self.runs += 1;
             (self.say)(&format!("{STUDY}: run {}, {}", self.runs, loose.label()));
-            let trial = match trial(self.case, &loose, self.scratch, false) {
+            let trial = match self.scratch.trial(self.case, &loose, Timing::Once, 0) {
                 Ok(trial) => trial,
-                Err(error) if error.kind() == Kind::NoEquilibrium => continue,
+                Err(error) if error.kind() == Kind::NoEquilibrium => {
+                    self.table
+                        .row((self.runs, &loose), Err(&error), [None; 2])?;
+                    continue;
+                }
                 Err(error) => return Err(error),
             };
             let change = trial.rows.difference(&found.trial.rows, &found.scale);
+            let told = [Some(change), Some(found.error + change)];
+            self.table.row((self.runs, &loose), Ok(&trial), told)?;
             if change <= SHARES[1] * self.asked && trial.counts[0] < found.trial.counts[0] {
                 return Ok((loose, change));
             }

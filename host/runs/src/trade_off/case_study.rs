@@ -1,94 +1,162 @@
 //! The study of a case: one setting at a time away from the file's, and some together.
 
 use super::driver_study::in_one_line;
-use super::pace::Pace;
+use super::pace::{Pace, in_words};
 use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
-use super::study::{Measurement, Reference, Row, Study};
-use super::trial::{COUNTS, SOLVER_CHOICES, Scratch, Settings, Trial, repetitions, trial};
+use super::study::{Done, Measurement, Reference, Row, Study};
+use super::trial::{SOLVER_CHOICES, Scratch, Settings, Timing, Trial, repetitions};
 use crate::Error;
 use crate::run::begin;
 use input::Case;
 use law::BuiltLaw;
 use mechanics::equilibrium::Reuse;
 use mechanics::problem::{Formulation, Integration};
+use std::time::Duration;
 
-/// Factors of the increments.
-const FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
-/// Factors of the increments of the reference, coarse to fine.
-const REFERENCE_FACTORS: [f64; 3] = [4.0, 8.0, 16.0];
-/// Tolerances of the residual.
-const TOLERANCES: [f64; 6] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10];
-/// Tolerance of the reference.
-const TIGHT: f64 = 1e-10;
-/// Rounds over all settings after the first, so that other work on the machine hits all alike.
-const MORE_ROUNDS: usize = 3;
+/// Seconds of a run above which a study is shorter, so that it ends while somebody waits.
+const LONG: f64 = 0.3;
 /// A probe that the finest runs disagree about by more is nothing but round-off.
 const MEANINGLESS: f64 = 0.5;
 
-/// Runs the study. `fine`: the mesh is also divided by 4.
+/// What a study tries.
+#[derive(Debug)]
+struct Plan {
+    /// Factors of the increments.
+    factors: &'static [f64],
+    /// Factors of the increments of the reference, coarse to fine.
+    reference_factors: [f64; 3],
+    /// Tolerances of the residual.
+    tolerances: &'static [f64],
+    /// Those that are tried with fewer increments.
+    loose_tolerances: &'static [f64],
+    /// Rounds over all settings after the first, so that other work on the machine hits all alike.
+    more_rounds: usize,
+    /// Whether schemes of laws are looked for.
+    schemes: bool,
+    /// Choices of the solver, and all else, are given up after this many times the CPU time of the file's
+    /// settings.
+    patience: Option<[f64; 2]>,
+}
+
+/// All there is to try.
+const WHOLE: Plan = Plan {
+    factors: &[0.25, 0.5, 2.0, 4.0],
+    reference_factors: [4.0, 8.0, 16.0],
+    tolerances: &[1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10],
+    loose_tolerances: &[1e-3, 1e-4, 1e-6],
+    more_rounds: 3,
+    schemes: true,
+    patience: None,
+};
+
+/// What tells the errors of increments, tolerance and mesh, and the cost of the solver's choices.
+const SHORT: Plan = Plan {
+    factors: &[0.25, 0.5],
+    reference_factors: [0.5, 1.0, 2.0],
+    tolerances: &[1e-3, 1e-6],
+    loose_tolerances: &[1e-3],
+    more_rounds: 0,
+    schemes: false,
+    patience: Some([5.0, 30.0]),
+};
+
+/// Tolerance of the reference.
+const TIGHT: f64 = 1e-10;
+
+/// Runs the study, and hands it to `done` after every row. `fine`: the mesh is also divided by 4.
+/// `thorough`: all settings are tried, however long they take.
 pub(super) fn study(
     case: &Case,
-    name: &str,
-    fine: bool,
+    study: &mut Study,
+    (fine, thorough): (bool, bool),
     scratch: &Scratch,
-    say: &mut dyn FnMut(&str),
-) -> Result<Study, Error> {
-    if case.file.probes.is_empty() {
-        let message = "there are no [probes], so there is nothing to measure the error of";
-        return Err(case.source.error(0..0, message).into());
-    }
+    (done, say): (&mut Done<'_>, &mut dyn FnMut(&str)),
+) -> Result<(), Error> {
+    refuse_without_probes(case, "there is nothing to measure the error of")?;
     let mut cases = Cases {
         case,
         scratch,
         say,
-        pace: Pace::new(1.0),
+        plan: &WHOLE,
+        pace: Pace::new(0.0),
         unit: 1.0,
+        tight: 1.0,
+        left: Vec::new(),
     };
-    let mut default = cases.run(&Settings::default(), true)?;
+    let mut default = cases.run(&Settings::default(), Timing::Repeated, 0)?;
     // Counted in runs with the file's settings; that one was repeated.
     cases.unit = default.seconds;
-    let divisions: &[usize] = if fine { &[2, 4] } else { &[2] };
-    cases.expect(REFERENCE_FACTORS.iter().sum());
-    for &division in divisions {
-        cases.expect(cases.weight(&divided(division), true));
+    study.columns.clone_from(&default.rows.names);
+    study.rows.push(Row {
+        family: "as in the file".to_owned(),
+        label: "as in the file".to_owned(),
+        is_default: true,
+        reference: 0,
+        outcome: Ok(measurement(
+            &default,
+            &default.rows,
+            &default.rows.largest(),
+        )),
+    });
+    done(study)?;
+    if cases.unit > LONG && !thorough {
+        cases.plan = &SHORT;
+        let note = format!(
+            "a run takes {}: a shorter study, without the schemes of the laws, of one round; \
+             --thorough tries everything",
+            in_words(cases.unit)
+        );
+        (cases.say)(&note);
+        study.notes.push(note);
     }
-    let laws = law_schemes(case, scratch)?;
+    let divisions: &[usize] = if fine { &[2, 4] } else { &[2] };
+    for increments in cases.plan.reference_factors {
+        cases.expect(
+            &Settings {
+                increments,
+                ..cases.tight()
+            },
+            Timing::Once,
+        );
+    }
+    for &division in divisions {
+        cases.expect(&divided(division), Timing::Repeated);
+    }
+    let laws = if cases.plan.schemes {
+        (cases.say)("which schemes of the laws there are");
+        law_schemes(case, scratch)?
+    } else {
+        Vec::new()
+    };
+    let settings = settings_on_this_mesh(case, &laws, cases.plan);
+    for (_, settings) in &settings {
+        cases.expect(settings, Timing::Repeated);
+        for _ in 0..cases.plan.more_rounds {
+            cases.expect(settings, Timing::Once);
+        }
+    }
     let (mut reference, path) = cases.path_reference(&laws)?;
     let mut scale = path.rows.largest();
-    let notes = path.leave_out_round_off(&mut scale);
+    study.notes.extend(path.leave_out_round_off(&mut scale));
     reference.convergence = path.convergence(&scale);
-    let mut study = Study {
-        name: name.to_owned(),
-        title: case.file.title.clone(),
-        columns: path.rows.names.clone(),
-        counts: COUNTS,
-        references: vec![reference],
-        rows: vec![Row {
-            family: "as in the file".to_owned(),
-            label: "as in the file".to_owned(),
-            is_default: true,
-            reference: 0,
-            outcome: Ok(measurement(&default, &path.rows, &scale)),
-        }],
-        notes,
-    };
+    study.references.push(reference);
+    study.rows[0].outcome = Ok(measurement(&default, &path.rows, &scale));
+    study.judge();
+    done(study)?;
+    cases.meshes(study, &default, &scale, divisions, done)?;
     let mut timed = vec![(0, Settings::default())];
-    let settings = settings_on_this_mesh(case, &laws);
-    for (_, settings) in &settings {
-        let again = MORE_ROUNDS as f64 * cases.weight(settings, false);
-        cases.expect(cases.weight(settings, true) + again);
-    }
     for (family, settings) in settings {
         timed.push((study.rows.len(), settings.clone()));
-        study
-            .rows
-            .push(cases.row(family, &settings, 0, &path.rows, &scale)?);
+        let row = cases.row(family, &settings, 0, &path.rows, &scale)?;
+        study.rows.push(row);
+        study.judge();
+        done(study)?;
     }
-    for _ in 0..MORE_ROUNDS {
+    for round in 1..=cases.plan.more_rounds {
         for (number, settings) in &timed {
             if let Ok(measured) = &mut study.rows[*number].outcome {
-                let seconds = cases.run(settings, false)?.seconds;
+                let seconds = cases.run(settings, Timing::Once, round)?.seconds;
                 measured.seconds = measured.seconds.min(seconds);
             }
         }
@@ -96,13 +164,29 @@ pub(super) fn study(
     if let Ok(measured) = &study.rows[0].outcome {
         default.seconds = measured.seconds;
     }
-    cases.meshes(&mut study, &default, &scale, divisions)?;
+    let defaults = study.rows.iter_mut().filter(|row| row.is_default);
+    for measured in defaults.filter_map(|row| row.outcome.as_mut().ok()) {
+        measured.seconds = default.seconds;
+    }
     study.judge();
-    Ok(study)
+    Ok(())
+}
+
+/// Refuses a case whose history has nothing but its increments.
+pub(super) fn refuse_without_probes(case: &Case, so: &str) -> Result<(), Error> {
+    if case.file.probes.is_empty() && case.file.pile.is_none() {
+        let message = format!("there are no [probes] and no [pile], so {so}");
+        return Err(case.source.error(0..0, &message).into());
+    }
+    Ok(())
 }
 
 /// Settings that leave mesh and elements as they are, by family.
-fn settings_on_this_mesh(case: &Case, laws: &[(String, Scheme)]) -> Vec<(String, Settings)> {
+fn settings_on_this_mesh(
+    case: &Case,
+    laws: &[(String, Scheme)],
+    plan: &Plan,
+) -> Vec<(String, Settings)> {
     let mut all = Vec::new();
     let default = Settings::default();
     let mut add = |family: &str, settings: Settings| all.push((family.to_owned(), settings));
@@ -110,12 +194,12 @@ fn settings_on_this_mesh(case: &Case, laws: &[(String, Scheme)]) -> Vec<(String,
         increments: factor,
         ..default.clone()
     };
-    for factor in FACTORS {
+    for &factor in plan.factors {
         add("increments", fewer_or_more(factor));
     }
     let file = &case.file.solver;
     let is_new = |tolerance: &f64| (tolerance / file.force_tolerance - 1.0).abs() > 1e-9;
-    for tolerance in TOLERANCES.into_iter().filter(is_new) {
+    for tolerance in plan.tolerances.iter().copied().filter(is_new) {
         let settings = Settings {
             tolerance: Some(tolerance),
             ..default.clone()
@@ -123,7 +207,7 @@ fn settings_on_this_mesh(case: &Case, laws: &[(String, Scheme)]) -> Vec<(String,
         add("tolerance", settings);
     }
     for factor in [0.25, 0.5] {
-        for tolerance in [1e-3, 1e-4, 1e-6] {
+        for &tolerance in plan.loose_tolerances {
             let settings = Settings {
                 tolerance: Some(tolerance),
                 ..fewer_or_more(factor)
@@ -197,9 +281,14 @@ struct Cases<'a> {
     case: &'a Case,
     scratch: &'a Scratch,
     say: &'a mut dyn FnMut(&str),
+    plan: &'static Plan,
     pace: Pace,
     /// Seconds of a run with the file's settings.
     unit: f64,
+    /// How many times as long a tighter tolerance takes.
+    tight: f64,
+    /// What is left to do, as far as it is known.
+    left: Vec<(Settings, Timing)>,
 }
 
 fn divided(division: usize) -> Settings {
@@ -210,28 +299,77 @@ fn divided(division: usize) -> Settings {
 }
 
 impl Cases<'_> {
-    fn run(&mut self, settings: &Settings, timed: bool) -> Result<Trial, Error> {
+    fn run(&mut self, settings: &Settings, timing: Timing, round: usize) -> Result<Trial, Error> {
+        if let Some(next) = self.left.iter().position(|(of, _)| of.is(settings)) {
+            self.left.remove(next);
+        }
+        if self.scratch.has(settings, round) {
+            return self.scratch.trial(self.case, settings, timing, round);
+        }
+        let left = self
+            .left
+            .iter()
+            .map(|(of, timing)| self.weight(of, *timing));
+        let rest = left.sum::<f64>() + self.weight(settings, timing);
+        self.pace.left(rest);
         (self.say)(&self.pace.line(&settings.label()));
-        let outcome = trial(self.case, settings, self.scratch, timed);
-        self.pace.did(self.weight(settings, timed));
+        let bounded = self.bounded(settings, timing);
+        let outcome = self.scratch.trial(self.case, settings, bounded, round);
+        if let Ok(trial) = &outcome
+            && self.is_tight(settings)
+        {
+            self.tight *= trial.seconds / self.unit / self.weight(settings, Timing::Once);
+        }
+        self.pace.did(self.weight(settings, timing));
         // Whatever became of it, the study goes no further once it is to stop.
         self.scratch.stop.check("the study")?;
         outcome
     }
 
+    fn is_tight(&self, settings: &Settings) -> bool {
+        let own = self.case.file.solver.force_tolerance;
+        settings.tolerance.is_some_and(|tolerance| tolerance < own)
+    }
+
     /// Probable cost of a trial, in runs with the file's settings. An element more costs time, and
     /// an equation more bandwidth.
-    fn weight(&self, settings: &Settings, timed: bool) -> f64 {
-        let once = settings.increments * (settings.division as f64).powi(3);
-        if timed {
+    fn weight(&self, settings: &Settings, timing: Timing) -> f64 {
+        let tight = if self.is_tight(settings) {
+            self.tight
+        } else {
+            1.0
+        };
+        let once = tight * settings.increments * (settings.division as f64).powi(3);
+        if timing == Timing::Repeated {
             once * repetitions(once * self.unit)
         } else {
             once
         }
     }
 
-    fn expect(&mut self, more: f64) {
-        self.pace.add(more);
+    /// How a setting is measured: within bounds, where everything was to be.
+    fn bounded(&self, settings: &Settings, timing: Timing) -> Timing {
+        let Some([of_solver, of_others]) = self.plan.patience else {
+            return timing;
+        };
+        let times = if settings.solver.is_some() {
+            of_solver
+        } else {
+            of_others * settings.increments.max(1.0)
+        };
+        Timing::Within(Duration::from_secs_f64(times * self.unit))
+    }
+
+    fn expect(&mut self, settings: &Settings, timing: Timing) {
+        self.left.push((settings.clone(), timing));
+    }
+
+    /// The file's settings with the tolerance of the reference.
+    fn tight(&self) -> Settings {
+        Settings {
+            tolerance: Some(TIGHT.min(self.case.file.solver.force_tolerance)),
+            ..Settings::default()
+        }
     }
 
     fn row(
@@ -242,7 +380,7 @@ impl Cases<'_> {
         reference: &Sampled,
         scale: &[f64],
     ) -> Result<Row, Error> {
-        let outcome = self.run(settings, true);
+        let outcome = self.run(settings, Timing::Repeated, 0);
         self.scratch.stop.check("the study")?;
         let outcome = outcome.map(|trial| measurement(&trial, reference, scale));
         Ok(Row {
@@ -257,10 +395,7 @@ impl Cases<'_> {
     /// The finest run on the file's mesh: many increments, a tight tolerance, and the scheme that
     /// changes least when the increments are halved.
     fn path_reference(&mut self, laws: &[(String, Scheme)]) -> Result<(Reference, Finest), Error> {
-        let tight = Settings {
-            tolerance: Some(TIGHT.min(self.case.file.solver.force_tolerance)),
-            ..Settings::default()
-        };
+        let tight = self.tight();
         let mut candidates = vec![tight.clone()];
         let finest = laws.iter().filter(|(_, s)| s.is_finest && !s.is_default);
         candidates.extend(finest.map(|(law, scheme)| Settings {
@@ -281,9 +416,12 @@ impl Cases<'_> {
             rated.sort_by(|(a, _), (b, _)| a.total_cmp(b));
             candidates = rated.into_iter().map(|(_, candidate)| candidate).collect();
         }
+        // What is not found that tightly is found as tightly as in the file.
+        candidates.push(Settings::default());
         let mut failure = None;
         for candidate in candidates {
-            let [coarse, middle, fine] = REFERENCE_FACTORS.map(|f| self.at(&candidate, f));
+            let [coarse, middle, fine] =
+                self.plan.reference_factors.map(|f| self.at(&candidate, f));
             self.scratch.stop.check("the study")?;
             match (coarse, middle, fine) {
                 (Ok(coarse), Ok(middle), Ok(fine)) => {
@@ -294,7 +432,7 @@ impl Cases<'_> {
                         };
                         settings.label()
                     };
-                    let [_, next, finest] = REFERENCE_FACTORS.map(label);
+                    let [_, next, finest] = self.plan.reference_factors.map(label);
                     let scale = fine.rows.largest();
                     let runs = [&coarse.rows, &middle.rows, &fine.rows];
                     let reference = Reference::new([next, finest], runs, &scale);
@@ -317,7 +455,7 @@ impl Cases<'_> {
             increments,
             ..settings.clone()
         };
-        self.run(&settings, false)
+        self.run(&settings, Timing::Once, 0)
     }
 
     /// Divided meshes, and other integrations of thin layers, against the finest mesh.
@@ -327,19 +465,20 @@ impl Cases<'_> {
         default: &Trial,
         scale: &[f64],
         divisions: &[usize],
+        done: &mut Done<'_>,
     ) -> Result<(), Error> {
         let mut trials = vec![(divided(1), Ok(default.clone()))];
         for &division in divisions {
             let settings = divided(division);
-            let run = self.run(&settings, true);
+            let run = self.run(&settings, Timing::Repeated, 0);
             self.scratch.stop.check("the study")?;
             trials.push((settings, run));
         }
-        let done: Vec<(&Settings, &Trial)> = trials
+        let ran: Vec<(&Settings, &Trial)> = trials
             .iter()
             .filter_map(|(settings, run)| Some((settings, run.as_ref().ok()?)))
             .collect();
-        let [.., (next, before), (finest, reference)] = done.as_slice() else {
+        let [.., (next, before), (finest, reference)] = ran.as_slice() else {
             for (settings, run) in &trials {
                 if let Err(error) = run {
                     let why = in_one_line(error);
@@ -349,7 +488,7 @@ impl Cases<'_> {
             return Ok(());
         };
         let rows = reference.rows.clone();
-        let coarse = done.len().checked_sub(3).map(|i| done[i].1);
+        let coarse = ran.len().checked_sub(3).map(|i| ran[i].1);
         let number = study.references.len();
         study.references.push(Reference {
             label: finest.label(),
@@ -381,9 +520,13 @@ impl Cases<'_> {
                 outcome: outcome.map_err(in_one_line),
             });
         }
+        study.judge();
+        done(study)?;
         for settings in self.integrations() {
             let row = self.row("integration".to_owned(), &settings, number, &rows, scale)?;
             study.rows.push(row);
+            study.judge();
+            done(study)?;
         }
         Ok(())
     }
@@ -426,7 +569,7 @@ pub(super) fn law_schemes(case: &Case, scratch: &Scratch) -> Result<Vec<(String,
                 law: Some((name.clone(), values.clone(), String::new())),
                 ..Settings::default()
             };
-            let run = trial(case, &settings, scratch, false).ok()?;
+            let run = scratch.trial(case, &settings, Timing::Once, 0).ok()?;
             Some(run.rows)
         };
         let mut all = schemes(

@@ -4,7 +4,7 @@ use super::clock::seconds_of_a_call;
 use super::pace::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Scheme, schemes};
-use super::study::{Measurement, ROWS, Reference, Row, Study};
+use super::study::{Done, Measurement, ROWS, Reference, Row, Study};
 use crate::Error;
 use input::Driver;
 use law::Stop;
@@ -16,16 +16,16 @@ const FINER: usize = 16;
 /// Increments per segment at which schemes are told apart.
 const FEW: usize = 10;
 /// What is counted.
-const COUNTS: &[&str] = &[ROWS, "law_calls", "cut_backs"];
+pub(super) const COUNTS: &[&str] = &[ROWS, "law_calls", "cut_backs"];
 
-/// Runs the matrix. `most` bounds the increments per segment.
+/// Runs the matrix. `most` bounds the increments per segment, `done` takes the study after every row.
 pub(super) fn study(
     driver: &Driver,
-    name: &str,
+    study: &mut Study,
     most: usize,
     stop: &Stop,
-    say: &mut dyn FnMut(&str),
-) -> Result<Study, Error> {
+    (done, say): (&mut Done<'_>, &mut dyn FnMut(&str)),
+) -> Result<(), Error> {
     let n_segments = driver.point().segment_increments().len();
     // The file's own setting has to run, whatever becomes of the others.
     follow(driver)?;
@@ -49,15 +49,9 @@ pub(super) fn study(
     stop.check("the study")?;
     say("the reference");
     let found = find_reference(&drivers, n_segments, finest)?;
-    let mut study = Study {
-        name: name.to_owned(),
-        title: driver.title().to_owned(),
-        columns: found.rows.names.clone(),
-        counts: COUNTS,
-        references: vec![found.reference],
-        rows: Vec::new(),
-        notes: found.notes,
-    };
+    study.columns.clone_from(&found.rows.names);
+    study.references.push(found.reference);
+    study.notes = found.notes;
     let own = driver.point().segment_increments();
     // What does not depend on the increments is as long as some of them.
     let weight = |increments: &[usize]| 100.0 + increments.iter().sum::<usize>() as f64;
@@ -87,10 +81,11 @@ pub(super) fn study(
                 reference: 0,
                 outcome: outcome.map_err(|error| in_one_line(&error)),
             });
+            study.judge();
+            done(study)?;
         }
     }
-    study.judge();
-    Ok(study)
+    Ok(())
 }
 
 struct Found {

@@ -6,10 +6,11 @@
 //! on the softer side. Which parameters of the law are stiffnesses is found by trying: those with
 //! the unit of a stiffness that scale the elastic operator.
 
+use super::case_study::refuse_without_probes;
 use super::pace::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
-use super::trial::{Scratch, Settings, measure};
+use super::trial::{Scratch, Settings, Timing, measure};
 use super::write;
 use crate::Error;
 use crate::run::begin;
@@ -51,21 +52,19 @@ pub(super) fn run(
                        follows from its thickness";
         return Err(Error::usage(message.to_owned()));
     }
-    if case.file.probes.is_empty() {
-        let message = "there are no [probes], so no change of the answer can be measured";
-        return Err(case.source.error(0..0, message).into());
-    }
+    refuse_without_probes(case, "no change of the answer can be measured")?;
     let mut text = String::new();
     let mut rows = Vec::new();
     for (number, group) in interfaces {
         let interface = Interface::new(&simulation, number, group)?;
         let scratch = Scratch::new(folder, stop)?;
-        let tried = interface.try_all(case, &scratch, say)?;
-        text += &interface.table(name, &tried);
-        rows.extend(tried.into_iter().map(|t| (group.name.clone(), t)));
+        let before = rows.len();
+        interface.try_all(case, &scratch, say, |one| {
+            rows.push(one);
+            write(&folder.join("interface_stiffness.csv"), &csv(&rows))
+        })?;
+        text += &interface.table(name, &rows[before..]);
     }
-    std::fs::create_dir_all(folder).map_err(|source| text::Error::unwritable(folder, source))?;
-    write(&folder.join("interface_stiffness.csv"), &csv(&rows))?;
     show(&text);
     show(&format!("results in {}", folder.display()));
     Ok(())
@@ -90,6 +89,8 @@ struct Interface<'a> {
 
 /// What became of one factor.
 struct Tried {
+    /// Name of the interface.
+    group: String,
     factor: f64,
     stiffness: [f64; 2],
     conditioning: f64,
@@ -149,9 +150,9 @@ impl<'a> Interface<'a> {
         case: &Case,
         scratch: &Scratch,
         say: &mut dyn FnMut(&str),
-    ) -> Result<Vec<Tried>, Error> {
+        mut done: impl FnMut(Tried) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let mut pace = Pace::new(FACTORS.len() as f64);
-        let mut tried = Vec::new();
         let mut before: Option<Sampled> = None;
         for factor in FACTORS {
             say(&pace.line(&format!("interface stiffness, factor {}", short(factor))));
@@ -166,14 +167,15 @@ impl<'a> Interface<'a> {
                 });
             scratch.stop.check("the study")?;
             pace.did(1.0);
-            tried.push(Tried {
+            done(Tried {
+                group: self.group.name.clone(),
                 factor,
                 stiffness,
                 conditioning: self.conditioning(stiffness),
                 outcome: outcome.map_err(|error| super::driver_study::in_one_line(&error)),
-            });
+            })?;
         }
-        Ok(tried)
+        Ok(())
     }
 
     fn run(
@@ -199,7 +201,7 @@ impl<'a> Interface<'a> {
             profile: When::Phases,
             ..Output::default()
         };
-        let trial = measure(&mut case, scratch, false)?;
+        let trial = measure(&mut case, scratch, Timing::Once, &scratch.stop)?;
         let pressure = largest_pressure(&scratch.folder().join("profile.csv"), &self.group.name)?;
         let answer = Answer {
             penetration: pressure / stiffness[0] / self.size,
@@ -298,10 +300,10 @@ fn plateau(tried: &[Tried]) -> String {
     )
 }
 
-fn csv(rows: &[(String, Tried)]) -> String {
+fn csv(rows: &[Tried]) -> String {
     let mut text =
         String::from("group,factor,k_n,k_t,penetration,conditioning,iterations,change,failure\n");
-    for (group, one) in rows {
+    for one in rows {
         let [k_n, k_t] = one.stiffness;
         let (cells, failure) = match &one.outcome {
             Ok(a) => {
@@ -317,8 +319,8 @@ fn csv(rows: &[(String, Tried)]) -> String {
         };
         let _ = writeln!(
             text,
-            "{group},{},{k_n:e},{k_t:e},{cells},{failure}",
-            one.factor
+            "{},{},{k_n:e},{k_t:e},{cells},{failure}",
+            one.group, one.factor
         );
     }
     text

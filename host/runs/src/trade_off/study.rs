@@ -24,6 +24,9 @@ pub struct Study {
     pub notes: Vec<String>,
 }
 
+/// Takes a study whenever a row is done.
+pub(super) type Done<'a> = dyn FnMut(&Study) -> Result<(), crate::Error> + 'a;
+
 /// What errors are measured against.
 #[derive(Clone, Debug)]
 pub struct Reference {
@@ -115,6 +118,19 @@ impl Reference {
 }
 
 impl Study {
+    /// Nothing measured yet.
+    pub(super) fn new(name: &str, title: &str, counts: &'static [&'static str]) -> Self {
+        Self {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            columns: Vec::new(),
+            counts,
+            references: Vec::new(),
+            rows: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
     /// Marks what lies below the uncertainty of its reference, and what nothing beats.
     pub(super) fn judge(&mut self) {
         for number in 0..self.references.len() {

@@ -66,15 +66,19 @@ impl Study {
         let failure = std::iter::once("failure".to_owned());
         writer.write_record(header.chain(counts).chain(errors).chain(failure))?;
         for row in &self.rows {
+            let reference = self.references.get(row.reference);
+            let label = reference.map(|reference| reference.label.clone());
             let mut cells = vec![
                 row.family.clone(),
                 row.label.clone(),
                 row.is_default.to_string(),
-                self.references[row.reference].label.clone(),
+                label.unwrap_or_default(),
             ];
             match &row.outcome {
                 Ok(m) => {
-                    cells.push(format!("{:e}", m.error));
+                    // Without a reference so far there is no error to tell.
+                    let error = reference.map(|_| format!("{:e}", m.error));
+                    cells.push(error.unwrap_or_default());
                     cells.push(m.is_below.to_string());
                     cells.push(m.is_optimal.to_string());
                     cells.push(format!("{:e}", m.seconds));

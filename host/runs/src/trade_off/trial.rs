@@ -2,6 +2,8 @@
 
 use super::clock::cpu_seconds;
 use super::division::divide;
+use super::kept::Kept;
+use super::pace::in_words;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
 use crate::Error;
@@ -15,7 +17,9 @@ use mechanics::problem::{Formulation, Integration};
 use mechanics::settings::{Equations, Method};
 use results::wanted::Output;
 use serde_json::Value;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// A choice of the solver: key and value in the case file, and how it is set.
 pub(super) struct SolverChoice {
@@ -85,6 +89,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Whether they are the same.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        key(self, 0) == key(other, 0)
+    }
+
     /// In words, as far as they differ from the file.
     pub(super) fn label(&self) -> String {
         let mut words = Vec::new();
@@ -182,6 +191,8 @@ pub(super) struct Scratch {
     folder: PathBuf,
     /// Who may want what is done there to stop.
     pub(super) stop: Stop,
+    /// Trials that are done.
+    kept: Option<RefCell<Kept>>,
 }
 
 impl Scratch {
@@ -195,14 +206,71 @@ impl Scratch {
             path: folder.clone(),
             source,
         })?;
-        let stop = stop.clone();
-        Ok(Self { folder, stop })
+        Ok(Self {
+            folder,
+            stop: stop.clone(),
+            kept: None,
+        })
+    }
+
+    /// Keeps what is done, and does not do again what was.
+    pub(super) fn keeping(mut self, kept: Kept) -> Self {
+        self.kept = Some(RefCell::new(kept));
+        self
+    }
+
+    /// Whether a trial is done.
+    pub(super) fn has(&self, settings: &Settings, round: usize) -> bool {
+        let key = key(settings, round);
+        let kept = self.kept.as_ref();
+        kept.is_some_and(|kept| kept.borrow().find(&key).is_some())
+    }
+
+    /// How many trials are done.
+    pub(super) fn kept(&self) -> usize {
+        self.kept.as_ref().map_or(0, |kept| kept.borrow().len())
+    }
+
+    /// The study has come to its end: its trials are not kept any longer.
+    pub(super) fn end(mut self) {
+        if let Some(kept) = self.kept.take() {
+            kept.into_inner().end();
+        }
+    }
+
+    /// Runs a case under some settings as [`trial`] does, unless that was done before: in the same
+    /// round, if it is done several times.
+    ///
+    /// # Errors
+    /// Those of the run; what is done cannot be kept.
+    pub(super) fn trial(
+        &self,
+        case: &Case,
+        settings: &Settings,
+        timing: Timing,
+        round: usize,
+    ) -> Result<Trial, Error> {
+        let Some(kept) = &self.kept else {
+            return trial(case, settings, self, timing);
+        };
+        let key = key(settings, round);
+        if let Some(found) = kept.borrow().find(&key) {
+            return Ok(found.clone());
+        }
+        let done = trial(case, settings, self, timing)?;
+        kept.borrow_mut().keep(key, &done)?;
+        Ok(done)
     }
 
     /// The folder.
     pub(super) fn folder(&self) -> &Path {
         &self.folder
     }
+}
+
+/// What a trial is kept under.
+fn key(settings: &Settings, round: usize) -> String {
+    format!("{settings:?}, round {round}")
 }
 
 impl Drop for Scratch {
@@ -237,34 +305,73 @@ pub(super) fn repetitions(seconds: f64) -> f64 {
         .clamp(1.0, MOST_REPETITIONS as f64)
 }
 
-/// Runs a case under some settings: once, or until its CPU time is known.
+/// How often a case runs, and how long it may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Timing {
+    /// Until its CPU time is known.
+    Repeated,
+    /// Once.
+    Once,
+    /// Once, unless it takes more CPU time.
+    Within(Duration),
+}
+
+/// Runs a case under some settings.
 ///
 /// # Errors
-/// Those of the run.
+/// Those of the run; it takes too long.
 pub(super) fn trial(
     case: &Case,
     settings: &Settings,
     scratch: &Scratch,
-    timed: bool,
+    timing: Timing,
 ) -> Result<Trial, Error> {
     let mut case = settings.apply(case)?;
     case.file.output = Output::default();
-    measure(&mut case, scratch, timed)
+    let Timing::Within(most) = timing else {
+        return measure(&mut case, scratch, timing, &scratch.stop);
+    };
+    let (asked, beat) = (scratch.stop.clone(), scratch.stop.clone());
+    let started = cpu_seconds();
+    let stop = Stop::asked_by(
+        move || asked.is_asked() || cpu_seconds() - started > most.as_secs_f64(),
+        move |took| beat.beat(took),
+    );
+    let outcome = measure(&mut case, scratch, timing, &stop);
+    outcome.map_err(|error| {
+        if error.is_stop() && !scratch.stop.is_asked() {
+            return Error::usage(format!(
+                "takes more than {} of CPU time, given up",
+                in_words(most.as_secs_f64())
+            ));
+        }
+        error
+    })
 }
 
 /// Runs a case as it is, but for its figures.
 ///
 /// # Errors
 /// Those of the run.
-pub(super) fn measure(case: &mut Case, scratch: &Scratch, timed: bool) -> Result<Trial, Error> {
+pub(super) fn measure(
+    case: &mut Case,
+    scratch: &Scratch,
+    timing: Timing,
+    stop: &Stop,
+) -> Result<Trial, Error> {
     case.file.figures.clear();
     let mut seconds = f64::INFINITY;
     let mut spent = 0.0;
-    for _ in 0..if timed { MOST_REPETITIONS } else { 1 } {
+    let most = if timing == Timing::Repeated {
+        MOST_REPETITIONS
+    } else {
+        1
+    };
+    for _ in 0..most {
         scratch.stop.check("the study")?;
         let mut meter = Meter {
             started: None,
-            stop: scratch.stop.clone(),
+            stop: stop.clone(),
         };
         run(case, scratch.folder(), &mut meter)?;
         let took = cpu_seconds() - meter.started.unwrap_or_default();

@@ -323,7 +323,10 @@ impl Routine {
     fn walk(&self, random: &mut Random) -> Result<Vec<Step>, Verdict> {
         let (origin, stiffness) = self.origin()?;
         if stiffness <= 0.0 {
-            return Err(self.fails("DDSDDE of a call without any strain is zero"));
+            return Err(self.fails(
+                "DDSDDE of a call without any strain is zero: the routine leaves it unset, and without it there is no \
+                 iteration; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar",
+            ));
         }
         let size = PRESSURE / stiffness;
         let mut steps = Vec::new();
@@ -554,7 +557,18 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
                     )));
                 }
             }
+            let transposed: Vec<f64> = (0..n * n).map(|k| tangent[(k % n) * n + k / n]).collect();
             if formulation.tangent != Tangent::Consistent {
+                // One that is near the derivative may be off, but not by rows for columns.
+                let is_right =
+                    |tangent: &[f64]| matches!(slope(routine, step, tangent, scale), Slope::Right);
+                if is_right(&transposed) && !is_right(tangent) {
+                    return Err(routine.fails(format!(
+                        "the transpose of DDSDDE is the derivative of STRESS, DDSDDE is not: `tangent_order` in the \
+                         sidecar, at {:?}",
+                        step.point
+                    )));
+                }
                 continue;
             }
             compared += 1;
@@ -562,8 +576,6 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
                 Slope::Right => {}
                 Slope::Kink => n_kinks += 1,
                 Slope::Wrong(row, column, by_routine, by_differences) => {
-                    let transposed: Vec<f64> =
-                        (0..n * n).map(|k| tangent[(k % n) * n + k / n]).collect();
                     let hint = if matches!(slope(routine, step, &transposed, scale), Slope::Right) {
                         "; its transpose fits: `tangent_order` in the sidecar"
                     } else {
