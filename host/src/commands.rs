@@ -39,6 +39,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
                 resume,
                 checkpoints: Some(Duration::from_secs_f64(checkpoint)),
                 ends_without: false,
+                reports: true,
             };
             if dry_run {
                 return dry_run_cases(&opener, (&case, &set), variant.as_deref(), out.as_deref());

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A bar on a terminal, plain lines elsewhere; both on the error stream.
 pub(crate) struct Progress {
-    /// Number of the case, from 1, and where its results go; 0, where that was said already.
+    /// Number of the case, from 1, and where its results go.
     place: (usize, PathBuf),
     pub(crate) stop: Stop,
     bar: Option<ProgressBar>,
@@ -30,11 +30,6 @@ impl Progress {
             cut_backs: 0,
             has_begun: false,
         }
-    }
-
-    /// Whoever called has said where the results go.
-    pub(crate) fn folder_is_known(&mut self) {
-        self.place.0 = 0;
     }
 
     pub(crate) fn say(&self, line: &str) {
@@ -56,9 +51,7 @@ impl Observer for Progress {
         self.finish();
         self.cut_backs = 0;
         self.has_begun = true;
-        if self.place.0 > 0 {
-            supervision::case_begun(self.place.0, &self.place.1);
-        }
+        supervision::case_begun(self.place.0, &self.place.1);
         if std::io::stderr().is_terminal() {
             let bar = ProgressBar::new(increments as u64);
             let template = "{prefix:16} {bar:32} {pos}/{len}  {msg}  {eta} left";

@@ -14,7 +14,7 @@ use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 use text::Error;
-use text::write::replace;
+use text::write::replace_whole;
 
 /// What a study is, in its folder.
 pub const RECORD: &str = "study.json";
@@ -246,16 +246,7 @@ pub fn take_table(folder: &Path) -> Result<Option<File>, Error> {
 
 fn write_run(folder: &Path, record: &RunRecord) -> Result<(), Error> {
     let text = serde_json::to_string(record).map_err(|e| Error::Internal(e.to_string()))?;
-    write_whole(&folder.join(RUN), text + "\n")
-}
-
-/// Writes a file whole or not at all.
-pub(crate) fn write_whole(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Error> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".part");
-    let partial = PathBuf::from(partial);
-    replace(&partial, text)?;
-    std::fs::rename(&partial, path).map_err(|error| Error::unwritable(path, error))
+    replace_whole(&folder.join(RUN), text + "\n")
 }
 
 fn read_run(folder: &Path) -> Option<RunRecord> {
@@ -357,7 +348,7 @@ impl Record {
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
         let text = serde_json::to_string_pretty(self);
         let text = text.map_err(|error| Error::Internal(error.to_string()))?;
-        write_whole(&folder.join(RECORD), text + "\n")
+        replace_whole(&folder.join(RECORD), text + "\n")
     }
 
     /// Writes the table of runs.
@@ -369,7 +360,7 @@ impl Record {
         let table = self
             .table(rows)
             .map_err(|error| Error::unwritable(&path, io::Error::other(error)))?;
-        write_whole(&path, table)
+        replace_whole(&path, table)
     }
 
     fn table(&self, rows: &[Row]) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {

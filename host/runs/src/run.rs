@@ -52,6 +52,8 @@ pub struct Options {
     pub checkpoints: Option<Duration>,
     /// A run that has come to its end leaves no checkpoint that says so.
     pub ends_without: bool,
+    /// A report is written while the run goes on, if that takes more than a second.
+    pub reports: bool,
 }
 
 /// A case's simulation before its first phase, with its laws.
@@ -267,6 +269,7 @@ fn carry_out(
         results,
         keeper,
         warnings,
+        report: options.reports.then(|| report::Running::new(folder)),
         fault: None,
     };
     let outcome = simulation.run(&mut follower);
@@ -308,6 +311,8 @@ struct Follower<'a> {
     /// Warnings so far, for the summary.
     warnings: Vec<String>,
     stop: Stop,
+    /// The report of what there is so far.
+    report: Option<report::Running>,
     /// Why no more is wanted.
     fault: Option<Fault>,
 }
@@ -368,6 +373,12 @@ impl Watch for Follower<'_> {
             let place = &increment.place;
             self.observer
                 .increment(place, increment.of, increment.iterations);
+            if let Some(report) = &mut self.report
+                && report.write_if_due().is_err()
+            {
+                // A run does not end for its sake; the report at the end says what is wrong.
+                self.report = None;
+            }
         }
         self.kept(written)
     }

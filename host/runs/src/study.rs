@@ -192,13 +192,13 @@ impl Plan {
         }
     }
 
-    /// Checks the study and writes its record and the table of its runs; whoever calls holds the table.
-    /// What was done of them in earlier calls is kept, unless they are to be carried out `anew`.
+    /// Writes the record of the study, which [`Plan::check`] returned, and the table of its runs; whoever
+    /// calls holds the table. What was done of them in earlier calls is kept, unless they are to be carried
+    /// out `anew`.
     ///
     /// # Errors
-    /// As [`Plan::check`]; runs of another study in the folder; files that cannot be written.
-    pub fn prepare(&self, anew: bool) -> Result<(Record, Vec<Row>), Error> {
-        let record = self.check()?;
+    /// Runs of another study in the folder; files that cannot be written.
+    pub fn prepare(&self, record: &Record, anew: bool) -> Result<Vec<Row>, Error> {
         let indices = 1..=self.rows.len();
         if anew {
             for index in indices.clone() {
@@ -216,7 +216,7 @@ impl Plan {
         let rows: Vec<Row> = indices.map(|index| self.row(index)).collect();
         record.write(&self.folder)?;
         record.write_table(&self.folder, &rows)?;
-        Ok((record, rows))
+        Ok(rows)
     }
 
     /// The row of a run in the table, as its folder has it.

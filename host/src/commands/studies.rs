@@ -1,12 +1,13 @@
 //! `pilum study`: many runs of one case, or one of them.
 
 use super::cases::write_report;
-use crate::progress::Progress;
 use crate::say::{print, say};
 use indicatif::{ProgressBar, ProgressStyle};
 use input::Error;
 use law::{Opener, Stop};
+use mechanics::Place;
 use results::study::{Row, State};
+use runs::run::Observer;
 use runs::study::{Event, Jobs, Once, Plan, carry_out, run_one, stop_of_worker};
 use std::collections::BTreeMap;
 use std::io::IsTerminal as _;
@@ -42,6 +43,7 @@ pub(super) fn study(
     match what {
         What::Plan => {
             say_warnings(&plan);
+            let record = plan.check()?;
             let Some(_table) = results::study::take_table(plan.folder())? else {
                 let message = format!(
                     "{}: another process carries out this study",
@@ -49,7 +51,7 @@ pub(super) fn study(
                 );
                 return Err(Error::usage(message));
             };
-            plan.prepare(how.anew)?;
+            plan.prepare(&record, how.anew)?;
             let table = plan.folder().join(results::study::TABLE);
             print(&format!(
                 "{} runs\ntable in {}\n",
@@ -94,19 +96,33 @@ fn arguments(opener: &Opener, how: &How) -> Vec<std::ffi::OsString> {
     arguments.into_iter().map(Into::into).collect()
 }
 
+/// Of one run among many only what should be known is said.
+struct Quiet(Stop);
+
+impl Observer for Quiet {
+    fn phase(&mut self, _name: &str, _increments: usize) {}
+
+    fn increment(&mut self, _place: &Place, _of: usize, _iterations: usize) {}
+
+    fn cut_back(&mut self, _place: &Place, _reason: &str) {}
+
+    fn warning(&mut self, message: &str) {
+        say!("warning: {message}");
+    }
+
+    fn stop(&self) -> Stop {
+        self.0.clone()
+    }
+}
+
 fn one(plan: &Plan, index: usize, how: &How, stop: Stop) -> Result<(), Error> {
-    let stop = stop_of_worker(stop);
-    let mut progress = Progress::new(1, plan.folder(), &stop);
-    progress.folder_is_known();
+    let mut quiet = Quiet(stop_of_worker(stop));
     let once = Once {
         anew: how.anew,
         checkpoints: Duration::from_secs_f64(how.checkpoint),
     };
-    let run = run_one(plan, index, once, &mut progress, &mut |doing| {
-        say!("{doing}")
-    });
-    progress.finish();
-    let what = if run? { "done" } else { "done already" };
+    let run = run_one(plan, index, once, &mut quiet, &mut |_| {})?;
+    let what = if run { "done" } else { "done already" };
     print(&format!("run {index}: {what}\n"))
 }
 

@@ -1,14 +1,14 @@
 //! The report of a study: what its parameters do to what counts, and every curve in the colour of a
 //! parameter.
 
-use super::page::STYLE;
+use super::budget::Budget;
+use super::page::{STYLE, running};
+use super::results::Run;
 use super::short::{Short, display, thinned};
-use crate::record::{entries, text};
 use crate::study::{Effect, History, Output, ParameterRecord, Record, Row, State, Take, effects};
 use indexmap::{IndexMap, IndexSet};
 use minijinja::{Environment, Value as Template, context};
 use serde::Serialize;
-use serde_json::Value;
 use std::path::Path;
 use text::Error;
 
@@ -66,19 +66,30 @@ struct Curve {
     values: Vec<Vec<Short>>,
 }
 
-/// The text of the page of the study in a folder.
-pub(super) fn render(folder: &Path) -> Result<String, Error> {
+/// The text of the page of the study in a folder; while it is carried out with the present time, in seconds
+/// since 1970.
+pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
     let internal = |why: String| Error::Internal(format!("report: {why}"));
     let record = Record::read(folder)?;
     let rows = record.runs(folder)?;
     let histories: Vec<History> = rows
         .iter()
-        .map(|row| History::read_if(row.standing.state != State::Planned, &folder.join(&row.folder)))
+        .map(|row| {
+            History::read_if(
+                row.standing.state != State::Planned,
+                &folder.join(&row.folder),
+            )
+        })
         .collect();
     let numbers: Vec<Vec<Option<f64>>> = record
         .outputs
         .iter()
-        .map(|output| histories.iter().map(|history| history.output(output)).collect())
+        .map(|output| {
+            histories
+                .iter()
+                .map(|history| history.output(output))
+                .collect()
+        })
         .collect();
     let parameters: Vec<Varied> = (0..)
         .zip(&record.parameters)
@@ -106,7 +117,8 @@ pub(super) fn render(folder: &Path) -> Result<String, Error> {
             })
             .collect(),
         units: {
-            let of = |output: &Output| Some((output.name.clone(), units.get(&output.probe)?.clone()));
+            let of =
+                |output: &Output| Some((output.name.clone(), units.get(&output.probe)?.clone()));
             let mut all = units.clone();
             all.extend(record.outputs.iter().filter_map(of));
             all
@@ -118,7 +130,7 @@ pub(super) fn render(folder: &Path) -> Result<String, Error> {
         parameters,
     };
     let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
-    let page = page(&record, &rows, &numbers, &drawn, left_out, &data);
+    let page = page(&record, &rows, &numbers, &drawn, (left_out, now), &data);
     let mut environment = Environment::new();
     environment
         .add_template("report.html", TEMPLATE)
@@ -127,18 +139,22 @@ pub(super) fn render(folder: &Path) -> Result<String, Error> {
         .map_err(|error| internal(format!("{error:#}")))
 }
 
-/// Units of the probes, as the first run that has a summary says them.
+/// Units of the probes, as the first run that can be read has them.
 fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
-    let begun = rows.iter().filter(|row| row.standing.state != State::Planned);
-    let mut summaries = begun.filter_map(|row| {
-        let summary = std::fs::read(folder.join(&row.folder).join("summary.json")).ok()?;
-        serde_json::from_slice::<Value>(&summary).ok()
+    let begun = rows
+        .iter()
+        .filter(|row| row.standing.state != State::Planned);
+    let mut runs = begun.filter_map(|row| {
+        let place = folder.join(&row.folder);
+        Run::read(&row.folder, &place, &Budget::of(rows.len().max(2))).ok()
     });
-    let Some(summary) = summaries.next() else {
+    let Some(run) = runs.next() else {
         return IndexMap::new();
     };
-    let units = entries(&summary["units"]);
-    units.map(|(name, unit)| (name.to_owned(), text(unit).to_owned())).collect()
+    let units = run.units().into_iter();
+    units
+        .map(|(name, unit)| (name.to_owned(), unit.to_owned()))
+        .collect()
 }
 
 fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
@@ -150,7 +166,10 @@ fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
             let texts: IndexSet<&str> = values().collect();
             let number = |value| texts.get_index_of(value).unwrap_or(0) as f64;
             let numbers = values().map(number).collect();
-            (numbers, Some(texts.iter().map(ToString::to_string).collect()))
+            (
+                numbers,
+                Some(texts.iter().map(ToString::to_string).collect()),
+            )
         }
     };
     Varied {
@@ -171,9 +190,16 @@ fn curves(histories: &[History]) -> (Curves, Option<usize>) {
         .iter()
         .flat_map(|history| history.phases.iter().map(String::as_str))
         .collect();
-    let n_runs = histories.iter().filter(|history| !history.phases.is_empty()).count();
+    let n_runs = histories
+        .iter()
+        .filter(|history| !history.phases.is_empty())
+        .count();
     let most = (MOST_NUMBERS / (n_runs * (names.len() + 1)).max(1)).max(8);
-    let longest = histories.iter().map(|history| history.phases.len()).max().unwrap_or(0);
+    let longest = histories
+        .iter()
+        .map(|history| history.phases.len())
+        .max()
+        .unwrap_or(0);
     let curve = |(run, history): (usize, &History)| {
         let of = &history.phases;
         // The last row of a phase is where it ends.
@@ -181,17 +207,26 @@ fn curves(histories: &[History]) -> (Curves, Option<usize>) {
         let shown = thinned(of.len(), most, is_end);
         Curve {
             run,
-            phase: shown.iter().filter_map(|&row| phases.get_index_of(of[row].as_str())).collect(),
+            phase: shown
+                .iter()
+                .filter_map(|&row| phases.get_index_of(of[row].as_str()))
+                .collect(),
             values: names
                 .iter()
                 .map(|name| {
                     let column = history.column(name).unwrap_or_default();
-                    shown.iter().map(|&row| Short(column.get(row).copied().flatten())).collect()
+                    shown
+                        .iter()
+                        .map(|&row| Short(column.get(row).copied().flatten()))
+                        .collect()
                 })
                 .collect(),
         }
     };
-    let runs = histories.iter().enumerate().filter(|(_, history)| !history.phases.is_empty());
+    let runs = histories
+        .iter()
+        .enumerate()
+        .filter(|(_, history)| !history.phases.is_empty());
     let curves = Curves {
         runs: runs.map(curve).collect(),
         names: names.iter().map(ToString::to_string).collect(),
@@ -205,10 +240,13 @@ fn page(
     rows: &[Row],
     numbers: &[Vec<Option<f64>>],
     drawn: &Drawn<'_>,
-    left_out: Option<usize>,
+    (left_out, now): (Option<usize>, Option<u64>),
     data: &str,
 ) -> Template {
-    let failed = || rows.iter().filter(|row| matches!(row.standing.state, State::Failed(_)));
+    let failed = || {
+        rows.iter()
+            .filter(|row| matches!(row.standing.state, State::Failed(_)))
+    };
     let outputs: Vec<Template> = record
         .outputs
         .iter()
@@ -235,6 +273,7 @@ fn page(
         script => SCRIPT,
         // Nothing in the data can end the script element.
         data => data.replace('<', "\\u003c"),
+        running => now.map(running),
         title => record.title.clone(),
         design => record.design.clone(),
         program => record.program.clone(),
@@ -274,7 +313,8 @@ fn unfinished(rows: &[Row]) -> Vec<String> {
     for row in rows.iter().filter(|row| !row.standing.state.is_final()) {
         *counts.entry(row.standing.state.word()).or_default() += 1;
     }
-    let line = |(word, n): (&str, usize)| format!("{n} run{} {word}", if n == 1 { "" } else { "s" });
+    let line =
+        |(word, n): (&str, usize)| format!("{n} run{} {word}", if n == 1 { "" } else { "s" });
     counts.into_iter().map(line).collect()
 }
 
@@ -286,15 +326,22 @@ fn output_context(
 ) -> Template {
     let known: Vec<f64> = numbers.iter().copied().flatten().collect();
     let least = known.iter().copied().reduce(f64::min);
-    let range = least.zip(known.iter().copied().reduce(f64::max)).map(|(least, most)| {
-        let mean = known.iter().sum::<f64>() / known.len() as f64;
-        let missing = numbers.len() - known.len();
-        let missing = match missing {
-            0 => String::new(),
-            n => format!("; {n} runs have none"),
-        };
-        format!("{} to {}, mean {}{missing}", display(least), display(most), display(mean))
-    });
+    let range = least
+        .zip(known.iter().copied().reduce(f64::max))
+        .map(|(least, most)| {
+            let mean = known.iter().sum::<f64>() / known.len() as f64;
+            let missing = numbers.len() - known.len();
+            let missing = match missing {
+                0 => String::new(),
+                n => format!("; {n} runs have none"),
+            };
+            format!(
+                "{} to {}, mean {}{missing}",
+                display(least),
+                display(most),
+                display(mean)
+            )
+        });
     let effects: Vec<Template> = counted
         .effects
         .iter()

@@ -4,6 +4,7 @@ use super::one::COORDINATOR;
 use super::{Plan, folder_of_run, is_wanted};
 use crate::{Error, supervision};
 use law::{Stop, Stopped};
+use results::report::Running;
 use results::study::{Row, Standing, State, standing, take_table};
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -56,13 +57,14 @@ pub enum Event {
 /// are rows with their reason.
 ///
 /// # Errors
-/// As [`Plan::prepare`]; another process carries out the study; stopped as asked.
+/// As [`Plan::check`] and [`Plan::prepare`]; another process carries out the study; stopped as asked.
 pub fn carry_out(
     plan: &Plan,
     jobs: &Jobs,
     stop: &Stop,
     watch: &mut dyn FnMut(&Event),
 ) -> Result<Vec<Row>, Error> {
+    let record = plan.check()?;
     let Some(_table) = take_table(&plan.folder)? else {
         let message = format!(
             "{}: another process carries out this study",
@@ -70,8 +72,8 @@ pub fn carry_out(
         );
         return Err(Error::usage(message));
     };
-    // Validation may take its time; from here on a request to stop is answered.
-    let (record, mut rows) = plan.prepare(jobs.anew)?;
+    let mut rows = plan.prepare(&record, jobs.anew)?;
+    // From here on a request to stop is answered.
     supervision::case_begun(1, &plan.folder);
     let wanted = rows
         .iter()
@@ -96,6 +98,7 @@ pub fn carry_out(
         }
         drop(sender);
         let mut last = Instant::now();
+        let mut report = Running::new(&plan.folder);
         let mut written = Ok(());
         loop {
             match receiver.recv_timeout(PAUSE) {
@@ -118,6 +121,8 @@ pub fn carry_out(
             }
             if last.elapsed() >= TABLE_EVERY && written.is_ok() {
                 written = record.write_table(&plan.folder, &rows);
+                // What cannot be shown now is said by the report at the end.
+                let _ = report.write_if_due();
                 last = Instant::now();
             }
         }

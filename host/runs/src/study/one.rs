@@ -92,12 +92,12 @@ pub fn run_one(
     let values = plan.values(index)?;
     let case = plan.case(values)?;
     if !is_worker() && !is_planned(plan, &case)? {
-        let table = wait_for_table(&plan.folder)?;
+        let record = plan.check()?;
+        let _table = wait_for_table(&plan.folder)?;
         // Whoever had it until now may have made the plan.
         if !is_planned(plan, &case)? {
-            plan.prepare(false)?;
+            plan.prepare(&record, false)?;
         }
-        drop(table);
     }
     let folder = plan.folder.join(folder_of_run(index));
     let Some(mut held) = Held::take(&folder)? else {
@@ -114,6 +114,7 @@ pub fn run_one(
     };
     supervision::case_begun(1, &folder);
     if before == State::Planned {
+        checkpoint::remove(&folder)?;
         held.begin("")?;
     }
     let outcome = (|| {
@@ -134,6 +135,7 @@ pub fn run_one(
             checkpoints: Some(once.checkpoints),
             // What is left of a run that is done is in its record.
             ends_without: true,
+            reports: plan.study.file.reports,
         };
         let mut reuse = Reuse::default();
         reuse.is_last_run = true;
@@ -145,16 +147,18 @@ pub fn run_one(
         return Ok(false);
     }
     let standing = standing_after(outcome.as_ref().err());
-    if plan.study.file.reports && folder.join("history.csv").is_file() {
-        let folders = [folder.clone()];
-        report::write(&folders, &report::default_path(&folders))?;
-    }
     held.end(&standing)?;
     if standing.state == State::Done {
         checkpoint::remove(&folder)?;
     }
     if !is_worker() {
         note(plan, index, &standing)?;
+    }
+    if plan.study.file.reports && folder.join("history.csv").is_file() {
+        let folders = [folder];
+        let reported = report::write(&folders, &report::default_path(&folders));
+        // What became of the run matters more than what became of its report.
+        return outcome.and_then(|done| reported.map(|_| done).map_err(Error::from));
     }
     outcome
 }
