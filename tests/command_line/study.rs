@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, Outcome, Place, edited};
+use crate::results::sliding;
 use crate::troubled;
 use std::collections::BTreeMap;
 use std::os::unix::process::CommandExt;
@@ -318,8 +319,8 @@ const MISTAKES: &[(&str, &str, &str, &str)] = &[
     ),
     (
         "two ways to a number",
-        "at = {",
-        "take = ^\"max\", at = {",
+        "probe = \"tau\", at = {",
+        "probe = \"tau\", take = ^\"max\", at = {",
         "a number is one of both",
     ),
     (
@@ -367,13 +368,14 @@ fn mistakes_are_named_with_their_place_before_anything_runs() {
     );
 }
 
-/// A layer pushed far beyond its strength in one step finds no equilibrium with three iterations.
+/// A block on a joint without dilatancy carries 40 of 100 kPa.
 #[test]
 fn runs_that_fail_are_rows_with_their_reason() {
     let list = "case = \"case.toml\"\nmethod = \"list\"\n\
-                [[parameter]]\nname = \"most\"\nkey = \"solver.max_iterations\"\nvalues = [20, 1, 20]\n";
+                [[parameter]]\nname = \"load\"\nkey = \"phase.push.pressure.1.value\"\n\
+                values = [20.0, 100.0, 30.0]\n";
     let place = Place::new();
-    place.write("case.toml", edited(&[("x = 1e-5", "x = 1e-3")]));
+    place.write("case.toml", sliding());
     place.write("study.toml", list);
     let outcome = study(&place, &[]);
     done(&outcome);

@@ -232,6 +232,7 @@ impl Study {
     /// [`text::Error::Input`] at the place that does not fit.
     pub fn of(source: Source) -> Result<Self, Error> {
         let file: StudyFile = text::parse(&source)?;
+        check_counts(&source, &file)?;
         let mut parameters: Vec<Parameter> = Vec::new();
         for input in &file.parameters {
             let parameter = parameter(&source, file.method, input)?;
@@ -255,7 +256,7 @@ impl Study {
             file,
             parameters,
         };
-        study.check()?;
+        study.check_list()?;
         Ok(study)
     }
 
@@ -277,54 +278,24 @@ impl Study {
         )
     }
 
-    /// What does not hang together.
-    fn check(&self) -> Result<(), Error> {
-        let Self { source, file, .. } = self;
-        let method = file.method.name();
-        if self.parameters.is_empty() {
-            let message = "a study needs a [[parameter]] that varies";
-            return Err(source.error(0..0, message).into());
-        }
-        match &file.runs {
-            Some(runs) if !file.method.is_sampled() => {
-                let message = format!("`runs`: the values say how many runs a {method} has");
-                return Err(source.error(runs.span(), message).into());
-            }
-            Some(runs) if !(1..=MOST_RUNS).contains(runs.get_ref()) => {
-                let message = format!("`runs`: {}, expected 1 to {MOST_RUNS}", runs.get_ref());
-                return Err(source.error(runs.span(), message).into());
-            }
-            None if file.method.is_sampled() => {
-                let message = format!("missing key `runs`: how many points `{method}` has");
-                return Err(source.error(0..0, message).into());
-            }
-            _ => {}
-        }
-        if let Some(seed) = &file.seed
-            && !file.method.is_sampled()
-        {
-            let message = format!("`seed`: nothing is random in a {method}");
-            return Err(source.error(seed.span(), message).into());
-        }
-        if file.method == Method::List {
-            let mut counts = self.parameters.iter().map(|p| (p, p.values.len()));
-            let first = counts.next();
-            if let Some((other, n)) =
-                counts.find(|(_, n)| first.as_ref().is_some_and(|f| f.1 != *n))
-                && let Some((first, m)) = first
-            {
-                let span = other
-                    .values
-                    .first()
-                    .map_or(other.key.clone(), |v| v.start..v.end);
+    /// Whether the numbers of values of a list are one.
+    fn check_list(&self) -> Result<(), Error> {
+        let mut counts = self.parameters.iter().map(|p| (p, p.values.len()));
+        let Some((first, n)) = counts.next().filter(|_| self.file.method == Method::List) else {
+            return Ok(());
+        };
+        match counts.find(|(_, count)| *count != n) {
+            None => Ok(()),
+            Some((other, count)) => {
+                let span = other.values.first().unwrap_or(&other.key).clone();
                 let message = format!(
-                    "`{}` has {n} values and `{}` {m}: a list takes the first of all, then the second of all",
+                    "`{}` has {count} values and `{}` {n}: a list takes the first of all, then the second of \
+                     all",
                     other.name, first.name
                 );
-                return Err(source.error(span, message).into());
+                Err(self.source.error(span, message).into())
             }
         }
-        Ok(())
     }
 
     /// Path of the case file or folder.
@@ -472,6 +443,38 @@ impl Parameter {
 /// A value as a setting has it: a text in quotes, a number with all its digits.
 fn written(value: &Value) -> String {
     value.to_string()
+}
+
+/// How many runs there are, and what chance has to do with it.
+fn check_counts(source: &Source, file: &StudyFile) -> Result<(), Error> {
+    let method = file.method.name();
+    let wrong = |span, message: String| Err(source.error(span, message).into());
+    if file.parameters.is_empty() {
+        let message = "a study needs a [[parameter]] that varies".to_owned();
+        return wrong(0..0, message);
+    }
+    match &file.runs {
+        Some(runs) if !file.method.is_sampled() => {
+            let message = format!("`runs`: the values say how many runs a {method} has");
+            return wrong(runs.span(), message);
+        }
+        Some(runs) if !(1..=MOST_RUNS).contains(runs.get_ref()) => {
+            let message = format!("`runs`: {}, expected 1 to {MOST_RUNS}", runs.get_ref());
+            return wrong(runs.span(), message);
+        }
+        None if file.method.is_sampled() => {
+            let message = format!("missing key `runs`: how many points `{method}` has");
+            return wrong(0..0, message);
+        }
+        _ => {}
+    }
+    match &file.seed {
+        Some(seed) if !file.method.is_sampled() => {
+            let message = format!("`seed`: nothing is random in a {method}");
+            wrong(seed.span(), message)
+        }
+        _ => Ok(()),
+    }
 }
 
 fn parameter(

@@ -5,7 +5,7 @@
 use crate::record::{entries, names, settings, settings_of_files, text};
 use crate::study::{self, History, State};
 use indexmap::{IndexMap, IndexSet};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
 use text::{Error, Source};
@@ -69,7 +69,9 @@ fn of_study(folder: &Path) -> Result<String, Error> {
         // Of an earlier study there may be more.
         let has_results = row.standing.state != State::Planned && place.join(SUMMARY).is_file();
         let summary = if has_results {
-            Run::read(&place)?.summary
+            // Of many runs only what the table has is kept.
+            let mut summary = Run::read_summary(&place)?;
+            json!({ "probes": summary["probes"].take(), "pile": summary["pile"].take() })
         } else {
             Value::Null
         };
@@ -150,6 +152,10 @@ fn find(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Error> {
 
 impl Run {
     fn read(folder: &Path) -> Result<Self, Error> {
+        Ok(Self::of(Self::read_summary(folder)?))
+    }
+
+    fn read_summary(folder: &Path) -> Result<Value, Error> {
         let path = folder.join(SUMMARY);
         let text = std::fs::read_to_string(&path).map_err(|why| unreadable(&path, why))?;
         let summary: Value = serde_json::from_str(&text).map_err(|error| {
@@ -165,7 +171,7 @@ impl Run {
             let message = format!("not written by a run: {} has no `status`", path.display());
             return Err(source.error(0..0, message).into());
         }
-        Ok(Self::of(summary))
+        Ok(summary)
     }
 
     fn of(summary: Value) -> Self {
@@ -273,7 +279,6 @@ fn shown(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn a_row_has_what_differs_and_what_came_out() {
