@@ -340,14 +340,13 @@ impl Study {
             }
             Some(name) => {
                 let is_wanted = |case: &&Case| case.variant.as_ref() == Some(name.get_ref());
-                match cases.iter().find(is_wanted) {
-                    Some(case) => Some(case.clone()),
-                    None => {
-                        let message = format!("there is no variant `{}`", name.get_ref());
-                        let error = self.source.error(name.span(), message);
-                        return Err(error.hint(suggestion(name.get_ref(), variants)).into());
-                    }
+                let found = cases.iter().find(is_wanted).cloned();
+                if found.is_none() {
+                    let message = format!("there is no variant `{}`", name.get_ref());
+                    let error = self.source.error(name.span(), message);
+                    return Err(error.hint(suggestion(name.get_ref(), variants)).into());
                 }
+                found
             }
         };
         let case = chosen.ok_or_else(|| Error::internal("a file without a case"))?;
@@ -477,43 +476,17 @@ fn check_counts(source: &Source, file: &StudyFile) -> Result<(), Error> {
     }
 }
 
-fn parameter(
-    source: &Source,
-    method: Method,
-    input: &Spanned<ParameterInput>,
-) -> Result<Parameter, Error> {
-    let span = input.span();
-    let input = input.get_ref();
+/// What says which values there are: its key, where it stands, the values.
+type Given = (&'static str, Range<usize>, Spread);
+
+/// All of them that are given.
+fn spreads(source: &Source, input: &ParameterInput) -> Result<Vec<Given>, Error> {
     let wrong = |span: Range<usize>, message: String| Err(source.error(span, message).into());
-    let key = input.key.span();
-    let keys = match input.key.get_ref() {
-        Keys::One(key) => vec![key.trim().to_owned()],
-        Keys::Several(keys) => keys.iter().map(|key| key.trim().to_owned()).collect(),
-    };
-    let Some(first) = keys
-        .first()
-        .filter(|_| keys.iter().all(|key| !key.is_empty()))
-    else {
-        return wrong(
-            key,
-            "`key`: expected the dotted path of a key of the case".to_owned(),
-        );
-    };
-    let name = input.name.as_ref().map_or(first, Spanned::get_ref).clone();
-    if name.is_empty() || COLUMNS.contains(&name.as_str()) {
-        let span = input.name.as_ref().map_or(key, Spanned::span);
-        let message = format!(
-            "`{name}` is no name for a parameter: the table of runs has a column of this name"
-        );
-        return wrong(span, message);
-    }
-    let mut spreads: Vec<(&str, Range<usize>, Spread)> = Vec::new();
-    let mut values = Vec::new();
+    let mut spreads: Vec<Given> = Vec::new();
     if let Some(listed) = &input.values {
         if listed.get_ref().is_empty() {
             return wrong(listed.span(), "`values`: there is none".to_owned());
         }
-        values = listed.get_ref().iter().map(Spanned::span).collect();
         let listed_values = listed.get_ref().iter().map(|value| value.get_ref().clone());
         spreads.push((
             "values",
@@ -546,6 +519,44 @@ fn parameter(
             return wrong(normal.span(), message.to_owned());
         }
         spreads.push(("normal", normal.span(), Spread::Normal(of)));
+    }
+    Ok(spreads)
+}
+
+fn parameter(
+    source: &Source,
+    method: Method,
+    input: &Spanned<ParameterInput>,
+) -> Result<Parameter, Error> {
+    let span = input.span();
+    let input = input.get_ref();
+    let wrong = |span: Range<usize>, message: String| Err(source.error(span, message).into());
+    let key = input.key.span();
+    let keys = match input.key.get_ref() {
+        Keys::One(key) => vec![key.trim().to_owned()],
+        Keys::Several(keys) => keys.iter().map(|key| key.trim().to_owned()).collect(),
+    };
+    let Some(first) = keys
+        .first()
+        .filter(|_| keys.iter().all(|key| !key.is_empty()))
+    else {
+        return wrong(
+            key,
+            "`key`: expected the dotted path of a key of the case".to_owned(),
+        );
+    };
+    let name = input.name.as_ref().map_or(first, Spanned::get_ref).clone();
+    if name.is_empty() || COLUMNS.contains(&name.as_str()) {
+        let span = input.name.as_ref().map_or(key, Spanned::span);
+        let message = format!(
+            "`{name}` is no name for a parameter: the table of runs has a column of this name"
+        );
+        return wrong(span, message);
+    }
+    let mut spreads = spreads(source, input)?;
+    let mut values: Vec<Range<usize>> = Vec::new();
+    if let Some(listed) = &input.values {
+        values = listed.get_ref().iter().map(Spanned::span).collect();
     }
     if spreads.len() > 1 {
         let names: Vec<String> = spreads

@@ -160,17 +160,16 @@ fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
 fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
     let values = || rows.iter().map(|row| row.values[number].as_str());
     let numbers: Option<Vec<f64>> = values().map(|value| value.parse().ok()).collect();
-    let (numbers, texts) = match numbers {
-        Some(numbers) => (numbers, None),
-        None => {
-            let texts: IndexSet<&str> = values().collect();
-            let number = |value| texts.get_index_of(value).unwrap_or(0) as f64;
-            let numbers = values().map(number).collect();
-            (
-                numbers,
-                Some(texts.iter().map(ToString::to_string).collect()),
-            )
-        }
+    let (numbers, texts) = if let Some(numbers) = numbers {
+        (numbers, None)
+    } else {
+        let texts: IndexSet<&str> = values().collect();
+        let number = |value| texts.get_index_of(value).unwrap_or(0) as f64;
+        let numbers = values().map(number).collect();
+        (
+            numbers,
+            Some(texts.iter().map(ToString::to_string).collect()),
+        )
     };
     Varied {
         name: parameter.name.clone(),

@@ -67,7 +67,9 @@ pub fn effects(parameters: &[Vec<f64>], numbers: &[Option<f64>], is_grid: bool) 
 /// Of runs in the order of the parameter's values.
 fn effect(parameter: usize, runs: &[(f64, f64)], is_grid: bool) -> Effect {
     let n = runs.len();
-    let by_value: Vec<&[(f64, f64)]> = runs.chunk_by(|a, b| a.0 == b.0).collect();
+    let by_value: Vec<&[(f64, f64)]> = runs
+        .chunk_by(|a, b| a.0.to_bits() == b.0.to_bits())
+        .collect();
     let groups = if by_value.len() <= FEW {
         by_value
     } else {
@@ -97,13 +99,13 @@ fn effect(parameter: usize, runs: &[(f64, f64)], is_grid: bool) -> Effect {
         .iter()
         .fold(0.0, |most: f64, run| most.max(run.1.abs()));
     let varies = whole > n as f64 * (1e-12 * scale).powi(2);
-    let share = match (varies, is_grid) {
-        (false, _) => None,
-        (true, true) => Some(1.0 - within / whole),
-        (true, false) if n > k => {
-            Some((1.0 - (n as f64 - 1.0) / (n - k) as f64 * within / whole).max(0.0))
-        }
-        (true, false) => None,
+    let share = if !varies {
+        None
+    } else if is_grid {
+        Some(1.0 - within / whole)
+    } else {
+        let by_chance = || (n as f64 - 1.0) / (n - k) as f64;
+        (n > k).then(|| (1.0 - by_chance() * within / whole).max(0.0))
     };
     Effect {
         parameter,

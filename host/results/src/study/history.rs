@@ -79,9 +79,9 @@ impl History {
             let points = rows.filter_map(|row| Some((other[row]?, values[row]?)));
             return at(points, *goal);
         }
-        let found = rows.filter_map(|row| values[row]);
+        let mut found = rows.filter_map(|row| values[row]);
         match output.take {
-            Take::Final => found.last(),
+            Take::Final => found.next_back(),
             Take::Max => found.reduce(f64::max),
             Take::Min => found.reduce(f64::min),
         }
@@ -92,7 +92,7 @@ impl History {
 fn at(points: impl Iterator<Item = (f64, f64)>, goal: f64) -> Option<f64> {
     let mut last: Option<(f64, f64)> = None;
     for (x, y) in points {
-        if x == goal {
+        if x.total_cmp(&goal).is_eq() {
             return Some(y);
         }
         if let Some((x0, y0)) = last

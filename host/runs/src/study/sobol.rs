@@ -129,9 +129,9 @@ mod tests {
                     let n = 1 << k;
                     let points = coordinate(dimension, n, shift);
                     let mut seen = vec![0; n];
-                    points
-                        .iter()
-                        .for_each(|x| seen[(x * n as f64) as usize] += 1);
+                    for x in points {
+                        seen[(x * n as f64) as usize] += 1;
+                    }
                     assert!(seen.iter().all(|&count| count == 1), "{dimension} {k}");
                 }
             }
