@@ -1,5 +1,4 @@
 //! The report of a run that is under way.
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{DONE, Place};
 use std::time::{Duration, Instant, SystemTime};
