@@ -83,7 +83,36 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
     },
-    /// Write the report of a run, or the comparison of several.
+    /// Carry out many runs of one case, as a study file plans them; one that was ended goes on.
+    Study {
+        /// A study file, or a folder with `study.toml`.
+        file: PathBuf,
+        /// Folder for the results [default: results/STUDY].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// So many runs at a time, each in a process of its own [default: one for each processor].
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        jobs: Option<u16>,
+        /// Check everything, write the table of runs and carry out none.
+        #[arg(long, conflicts_with_all = ["jobs", "run", "retry"])]
+        plan: bool,
+        /// Carry out this run alone, unless it is done: for programs that distribute work.
+        #[arg(long, value_name = "INDEX", conflicts_with_all = ["jobs", "retry"])]
+        run: Option<usize>,
+        /// Carry out runs that failed once more.
+        #[arg(long)]
+        retry: bool,
+        /// Forget what was done before.
+        #[arg(long)]
+        anew: bool,
+        /// Seconds between checkpoints, from which a run can be resumed; 0: after every increment.
+        #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
+        checkpoint: f64,
+        /// Threads of each run; the results do not depend on it [default: 1].
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        threads: Option<u16>,
+    },
+    /// Write the report of a run or of a study, or the comparison of several runs.
     Report {
         /// Results folders.
         #[arg(required = true)]
@@ -209,6 +238,8 @@ impl Command {
                     .is_some_and(|csv| csv.exists() && !csv.is_file());
                 Some(driver.is_file() && !goes_into_pipe)
             }
+            // One run goes on from its checkpoint.
+            Self::Study { run, .. } => Some(run.is_some()),
             Self::TradeOff { .. } | Self::Laws { .. } | Self::Lock { .. } => Some(false),
             _ => None,
         }
@@ -228,6 +259,8 @@ pub(crate) enum File {
     Case,
     /// Driver files, for `pilum point`.
     Point,
+    /// Study files, for `pilum study`.
+    Study,
 }
 
 /// A time in seconds.

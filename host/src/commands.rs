@@ -1,6 +1,7 @@
 //! What each command does: calls of the rooms, and what they say.
 
 mod cases;
+mod studies;
 
 use crate::arguments::{Arguments, Command, File};
 use crate::say::{print, printing, say};
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use studies::{How, What};
 use text::write::refuse_other;
 
 #[expect(clippy::too_many_lines, reason = "one arm for each command")]
@@ -36,6 +38,8 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             let options = Options {
                 resume,
                 checkpoints: Some(Duration::from_secs_f64(checkpoint)),
+                ends_without: false,
+                reports: true,
             };
             if dry_run {
                 return dry_run_cases(&opener, (&case, &set), variant.as_deref(), out.as_deref());
@@ -66,6 +70,31 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
                 let (umat, csv) = (umat.as_deref(), csv.as_deref());
                 run_point(opener, &driver, umat, which, csv, &stop)
             })
+        }
+        Command::Study {
+            file,
+            out,
+            jobs,
+            plan,
+            run,
+            retry,
+            anew,
+            checkpoint,
+            threads,
+        } => {
+            start_threads(Some(threads.unwrap_or(1)))?;
+            let what = match run {
+                _ if plan => What::Plan,
+                Some(index) => What::One(index),
+                None => What::All { jobs, retry },
+            };
+            let how = How {
+                anew,
+                checkpoint,
+                threads,
+            };
+            let stop = stop_on_signals()?;
+            studies::study(&opener, (&file, out.as_deref()), &what, &how, stop)
         }
         Command::Report { folders, out } => write_report(&folders, out),
         Command::Table { folders, out } => {
@@ -301,6 +330,7 @@ fn print_schema(file: File) -> Result<(), Error> {
     let text = serde_json::to_string_pretty(&schema::of(match file {
         File::Case => FileKind::Case,
         File::Point => FileKind::Point,
+        File::Study => FileKind::Study,
     }))
     .map_err(|error| Error::internal(error.to_string()))?;
     print(&format!("{text}\n"))

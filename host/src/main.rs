@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         runs::memory::reserve();
         law::child::ignore_file_limit();
     }
+    runs::study::follow();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -102,7 +103,14 @@ fn watched(again: bool) -> Watched {
     }
     // What the child could not write any more.
     let mend = |folder: &Path, error: &Error| {
+        let of_study = runs::study::mend(folder, error);
         let mended = results::end_summary(folder, &runs::ending(Some(error)));
+        match of_study {
+            // Its runs have no reports of their own, or write them the next time.
+            Ok(true) => return,
+            Ok(false) => {}
+            Err(why) => say::error(why),
+        }
         let reported = || {
             let folders = [folder.to_owned()];
             report::write(&folders, &report::default_path(&folders)).map(|_| ())

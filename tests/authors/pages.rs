@@ -369,6 +369,7 @@ how_to! {
     how_to_swap_a_law: "swap-a-law",
     how_to_make_a_mesh: "mesh",
     how_to_take_a_mesh_of_gmsh: "gmsh",
+    how_to_make_many_runs: "study",
     how_to_resume: "resume",
     how_to_compare_variants: "compare-variants",
     how_to_set_from_the_command_line: "set-from-the-command-line",

@@ -42,10 +42,12 @@ impl Schema {
             .filter(|(name, _)| !name.ends_with("Part"))
             .map(|(name, value)| (name.clone(), value.clone()))
             .collect();
-        let complete = definitions.remove("Complete").unwrap();
-        definitions.remove("Variant");
         let mut file = schema.clone();
-        file["required"] = complete["required"].clone();
+        // A study has neither base nor variants, and is complete as it is.
+        if let Some(complete) = definitions.remove("Complete") {
+            definitions.remove("Variant");
+            file["required"] = complete["required"].clone();
+        }
         definitions.insert(root.to_owned(), file);
         Self { definitions }
     }
@@ -134,6 +136,7 @@ impl Schema {
                 "by name: {}",
                 self.kind(&value["additionalProperties"], places)
             ),
+            None if value["type"].is_array() => "any value".to_owned(),
             other => panic!("{other:?} in {value}"),
         }
     }
@@ -257,11 +260,12 @@ fn places(file: &str, text: &str) -> BTreeMap<String, String> {
     places
 }
 
-/// Both schemas, with the page of each.
-fn schemas() -> [(Schema, &'static str); 2] {
+/// All schemas, with the page of each.
+fn schemas() -> [(Schema, &'static str); 3] {
     [
         (Schema::new("case", "CaseFile"), "case.md"),
         (Schema::new("point", "DriverFile"), "driver.md"),
+        (Schema::new("study", "StudyFile"), "study.md"),
     ]
 }
 
@@ -335,6 +339,7 @@ fn every_example_runs() {
     let runs = [
         (&["run"][..], "case.md"),
         (&["point", "--csv", "out.csv"], "driver.md"),
+        (&["study", "--anew"], "study.md"),
     ];
     for (command, name) in runs {
         let place = TempDir::new().unwrap();
@@ -361,12 +366,18 @@ fn every_example_runs() {
                 .and_then(|name| name.strip_suffix(".toml"));
             let (file, based) = match name_of {
                 Some(name) => (format!("{name}.toml"), ""),
-                None if block.text.contains("base = ") => (format!("{number}.toml"), ""),
+                None if name == "study.md" || block.text.contains("base = ") => {
+                    (format!("{number}.toml"), "")
+                }
                 None => (format!("{number}.toml"), "base = \"example.toml\"\n"),
             };
             fs::write(place.path().join(&file), based.to_owned() + &block.text).unwrap();
             // A library of this kind is not there; the keys are held against the schema.
             if block.text.contains("adapter = ") {
+                continue;
+            }
+            // What the studies are of.
+            if file == "case.toml" {
                 continue;
             }
             let outcome = pilum(place.path(), &[command, &[file.as_str()]].concat());

@@ -35,7 +35,7 @@ fn inputs(folder: &Path, found: &mut Vec<PathBuf>) {
 
 #[test]
 fn every_committed_file_follows_its_schema() {
-    let (case, point) = (validator("case"), validator("point"));
+    let (case, point, study) = (validator("case"), validator("point"), validator("study"));
     let mut files = Vec::new();
     inputs(&repository("cases"), &mut files);
     inputs(
@@ -46,7 +46,7 @@ fn every_committed_file_follows_its_schema() {
         &repository("host/workshop/src/new_law/continuum"),
         &mut files,
     );
-    let (mut cases, mut points) = (0, 0);
+    let (mut cases, mut points, mut studies) = (0, 0, 0);
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
         let value = value(&text);
@@ -57,7 +57,9 @@ fn every_committed_file_follows_its_schema() {
             self::value(&text)
         });
         let is_point = is_point(&value) || base.as_ref().is_some_and(is_point);
-        let (validator, count) = if is_point {
+        let (validator, count) = if value.get("method").is_some() {
+            (&study, &mut studies)
+        } else if is_point {
             (&point, &mut points)
         } else {
             (&case, &mut cases)
@@ -67,8 +69,8 @@ fn every_committed_file_follows_its_schema() {
         assert!(errors.is_empty(), "{}: {errors:#?}", path.display());
     }
     assert!(
-        cases >= 12 && points >= 8,
-        "{cases} cases, {points} drivers"
+        cases >= 12 && points >= 8 && studies >= 3,
+        "{cases} cases, {points} drivers, {studies} studies"
     );
 }
 
@@ -126,6 +128,27 @@ fn mistakes_do_not_follow_it() {
     }
 }
 
+/// Studies have no parts.
+#[test]
+fn mistakes_in_studies_do_not_follow_it() {
+    let study = validator("study");
+    let text = include_str!("../../cases/study_parallel/study.toml");
+    assert!(study.is_valid(&value(text)));
+    for (from, to) in [
+        ("title", "titel"),
+        ("latin_hypercube", "hypercube"),
+        ("case = \"chamber.toml\"\n", ""),
+        ("runs = 24", "runs = 0"),
+        ("deviation", "sigma"),
+        ("take = \"max\"", "take = \"most\""),
+    ] {
+        assert!(
+            !study.is_valid(&changed(text, from, to)),
+            "{from:?} to {to:?}"
+        );
+    }
+}
+
 /// With a base or variants a file may be a part, but not any part.
 #[test]
 fn parts_follow_it_too() {
@@ -163,7 +186,7 @@ fn every_key_has_a_description() {
         }
     }
     let place = TempDir::new().unwrap();
-    for kind in ["case", "point"] {
+    for kind in ["case", "point", "study"] {
         let text = pilum(place.path(), &["schema", kind]).stdout;
         let mut bare = Vec::new();
         look(&serde_json::from_str(&text).unwrap(), kind, &mut bare);

@@ -21,10 +21,13 @@ mod results;
 #[cfg(unix)]
 mod resume;
 mod run_table;
+mod running;
 mod settings;
 mod shear_zone;
 mod stopping;
 mod streams;
+mod study;
+mod study_cases;
 mod swapped;
 mod syntax;
 mod trade_off;

@@ -10,7 +10,7 @@ use tests::case::table;
 
 /// The upper half slides on the joint: without friction 10 kPa over 2 m resist, and a pressure
 /// acts on 0.5 m, so 40 of its 100 kPa can be carried.
-fn sliding() -> String {
+pub(crate) fn sliding() -> String {
     let slide: [Edit; 5] = [
         ("friction_angle = 30.0", "friction_angle = 0.0"),
         ("dilatancy_angle = 5.0", "dilatancy_angle = 0.0"),

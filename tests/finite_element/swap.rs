@@ -268,6 +268,7 @@ fn run_until(text: &str, folder: &Path, increments: usize) -> Result<(), Error> 
     let options = Options {
         resume: true,
         checkpoints: Some(Duration::ZERO),
+        ..Options::default()
     };
     let mut observer = Stopping {
         left: increments,

@@ -33,13 +33,35 @@ fn chromium() -> Option<PathBuf> {
 
 /// What the page says of itself; `None` without a browser.
 pub(crate) fn selftest(page: &Path) -> Option<Value> {
+    let document = document(page, "?selftest")?;
+    let (_, outcome) = document
+        .split_once("<pre id=\"selftest\">")
+        .unwrap_or_else(|| panic!("the page did not try itself out"));
+    let (outcome, _) = outcome.split_once("</pre>").unwrap();
+    let outcome = outcome
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&amp;", "&");
+    let outcome: Value = serde_json::from_str(&outcome).unwrap();
+    assert_eq!(outcome["errors"], serde_json::json!([]), "{outcome:#}");
+    assert_eq!(outcome["failed"], Value::Null, "{outcome:#}");
+    for drawn in outcome["canvases"].as_array().unwrap() {
+        assert_eq!(drawn, true, "{outcome:#}");
+    }
+    assert_eq!(outcome["chooser_changes"], true);
+    assert!(outcome["png_bytes"].as_u64().unwrap() > 2000);
+    Some(outcome)
+}
+
+/// The page as it is once its script has run, which says nothing on the console; `None` without a browser.
+fn document(page: &Path, query: &str) -> Option<String> {
     let program = chromium()?;
     let place = tempfile::tempdir().unwrap();
     let (document, messages) = (place.path().join("document"), place.path().join("messages"));
     let mut profile = OsStr::new("--user-data-dir=").to_owned();
     profile.push(place.path().join("profile"));
     let page = page.display().to_string();
-    let address = format!("file://{}?selftest", page.replace(' ', "%20"));
+    let address = format!("file://{}{query}", page.replace(' ', "%20"));
     let mut browser = Command::new(program)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"])
         .args(["--enable-logging=stderr", "--virtual-time-budget=20000"])
@@ -63,23 +85,7 @@ pub(crate) fn selftest(page: &Path) -> Option<Value> {
         .collect();
     assert!(console.is_empty(), "{console:#?}");
     let document = String::from_utf8_lossy(&std::fs::read(document).unwrap()).into_owned();
-    let (_, outcome) = document
-        .split_once("<pre id=\"selftest\">")
-        .unwrap_or_else(|| panic!("the page did not try itself out\n{messages}"));
-    let (outcome, _) = outcome.split_once("</pre>").unwrap();
-    let outcome = outcome
-        .replace("&lt;", "<")
-        .replace("&gt;", ">")
-        .replace("&amp;", "&");
-    let outcome: Value = serde_json::from_str(&outcome).unwrap();
-    assert_eq!(outcome["errors"], serde_json::json!([]), "{outcome:#}");
-    assert_eq!(outcome["failed"], Value::Null, "{outcome:#}");
-    for drawn in outcome["canvases"].as_array().unwrap() {
-        assert_eq!(drawn, true, "{outcome:#}");
-    }
-    assert_eq!(outcome["chooser_changes"], true);
-    assert!(outcome["png_bytes"].as_u64().unwrap() > 2000);
-    Some(outcome)
+    Some(document)
 }
 
 fn text(value: &Value) -> &str {
@@ -150,4 +156,28 @@ fn a_comparison_works() {
 fn a_missing_browser_is_named() {
     let what = format!("a browser ({})", NAMES.join(", "));
     tests::needs::assert_named("browser::a_comparison_works", &what);
+}
+
+/// The page of a study draws all of its pictures, from whatever its runs came to.
+#[test]
+fn a_study_is_drawn() {
+    let place = tempfile::tempdir().unwrap();
+    crate::folders::study(place.path());
+    let page = results::report::write(
+        &[place.path().to_owned()],
+        &place.path().join("report.html"),
+    );
+    let page = page.unwrap();
+    let Some(document) = document(&page, "") else {
+        return;
+    };
+    assert!(document.contains("data-drawn=\"yes\""), "{document}");
+    let count = |what: &str| document.matches(what).count();
+    // Two outputs by two parameters; a tornado each; the curves and their colours.
+    assert_eq!(count("<svg class=\"plot\""), 4 + 2 + 2, "{document}");
+    // Three runs have numbers, of four.
+    assert_eq!(count("<circle class=\"point\""), 3 * 4);
+    assert_eq!(count("<polyline class=\"run\""), 3);
+    assert!(document.contains("1 run could not come to the end"));
+    assert!(document.contains("no way &lt;b&gt; further"));
 }

@@ -161,3 +161,50 @@ pub(crate) fn folders() -> &'static Folders {
 pub(crate) fn page_of(folder: &Path) -> String {
     std::fs::read_to_string(folder.join("report.html")).unwrap()
 }
+
+/// A study of four runs in a folder, as its files are: one failed before it had results.
+pub(crate) fn study(folder: &std::path::Path) {
+    use results::study::{Output, ParameterRecord, Record, Row, Standing, State};
+    let parameter = |name: &str, key: &str| ParameterRecord {
+        name: name.to_owned(),
+        keys: vec![key.to_owned()],
+        spread: "two values".to_owned(),
+    };
+    let record = Record {
+        program: "pilum".to_owned(),
+        title: "A study of <b>".to_owned(),
+        design: "grid".to_owned(),
+        is_grid: true,
+        texts: String::new(),
+        identity: String::new(),
+        parameters: vec![
+            parameter("phi", "laws.a.phi"),
+            parameter("law", "laws.a.law"),
+        ],
+        outputs: vec![Output::last("q"), Output::last("w")],
+    };
+    let mut rows = Vec::new();
+    for (index, (phi, law)) in (1..).zip([(20, "a"), (20, "b<"), (30, "a"), (30, "b<")]) {
+        let place = folder.join(format!("{index:05}"));
+        std::fs::create_dir_all(&place).unwrap();
+        let (state, reason) = if index == 4 {
+            ("bad input", "no way <b> further")
+        } else {
+            let q = f64::from(phi) + f64::from(index);
+            let history =
+                format!("phase,increment,time,w,q,iterations\na,1,1,0,0,1\nb,1,2,1,{q},1\n");
+            std::fs::write(place.join("history.csv"), history).unwrap();
+            ("done", "")
+        };
+        let run = serde_json::json!({ "identity": "", "state": state, "reason": reason });
+        std::fs::write(place.join("run.json"), run.to_string()).unwrap();
+        rows.push(Row {
+            index: index as usize,
+            folder: format!("{index:05}"),
+            values: vec![phi.to_string(), law.to_owned()],
+            standing: Standing::plain(State::Planned),
+        });
+    }
+    record.write(folder).unwrap();
+    record.write_table(folder, &rows).unwrap();
+}

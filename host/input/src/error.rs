@@ -17,6 +17,15 @@ pub enum Error {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Law(law::Error),
+    /// The process was killed from outside.
+    #[error("{trouble}")]
+    #[diagnostic(help(
+        "it was killed by somebody, or by the system, which may have had no memory left"
+    ))]
+    Killed {
+        /// Where, in words.
+        trouble: String,
+    },
     /// A point did not come to the end of its path.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -165,9 +174,10 @@ impl Error {
                 add_hint(&mut hint, more);
                 Self::Simulation { error, hint }
             }
-            other @ (Self::CallFails { .. } | Self::Stopped(_) | Self::StoppedAtOnce { .. }) => {
-                other
-            }
+            other @ (Self::CallFails { .. }
+            | Self::Killed { .. }
+            | Self::Stopped(_)
+            | Self::StoppedAtOnce { .. }) => other,
         }
     }
 
@@ -181,7 +191,7 @@ impl Error {
                 cannot_follow: true,
                 ..
             } => Kind::NoEquilibrium,
-            Self::Law(_) | Self::CallFails { .. } => Kind::Library,
+            Self::Law(_) | Self::CallFails { .. } | Self::Killed { .. } => Kind::Library,
             Self::Stopped(_) | Self::StoppedAtOnce { .. } => Kind::Stopped,
             Self::Point(error) => match &**error {
                 point::Error::Misuse { .. } | point::Error::InitialState { .. } => Kind::Input,

@@ -17,10 +17,12 @@ pub mod mesh;
 pub mod pile;
 pub mod probes;
 pub mod schema;
+pub mod study;
 
 pub use case::Case;
 pub use driver::Driver;
 pub use error::{Error, Kind};
+pub use study::Study;
 
 use std::path::Path;
 use text::{Source, base};

@@ -1,4 +1,4 @@
-//! JSON Schemas of case files and driver files, for editors: derived from the types that read them.
+//! JSON Schemas of case, driver and study files, for editors: derived from the types that read them.
 //!
 //! `base` and `[[variant]]` are merged before anything is read, so a file with one of them may leave
 //! out what the other file says: the top level of a schema admits parts, and demands a complete file
@@ -6,6 +6,7 @@
 
 use crate::case::CaseFile;
 use crate::driver::DriverFile;
+use crate::study::StudyFile;
 use schemars::generate::SchemaSettings;
 use schemars::transform::{Transform, transform_subschemas};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -20,6 +21,8 @@ pub enum FileKind {
     Case,
     /// Driver files, for `pilum point`.
     Point,
+    /// Study files, for `pilum study`.
+    Study,
 }
 
 /// The JSON Schema (2020-12) of a kind of input file.
@@ -27,6 +30,11 @@ pub fn of(kind: FileKind) -> Value {
     match kind {
         FileKind::Case => with_bases(complete::<CaseFile>(), "Pilum case file"),
         FileKind::Point => with_bases(complete::<DriverFile>(), "Pilum driver file"),
+        FileKind::Study => {
+            let mut schema = complete::<StudyFile>().to_value();
+            set(&mut schema, "title", json!("Pilum study file"));
+            schema
+        }
     }
 }
 
@@ -228,6 +236,25 @@ impl JsonSchema for HypothesisName {
         json_schema!({
             "type": "string",
             "enum": abi::Hypothesis::ALL.map(abi::Hypothesis::name),
+        })
+    }
+}
+
+/// Any value that a file may have.
+pub(crate) struct AnyValue;
+
+impl JsonSchema for AnyValue {
+    fn schema_name() -> Cow<'static, str> {
+        "AnyValue".into()
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "type": ["number", "string", "boolean", "array", "object"],
         })
     }
 }

@@ -56,7 +56,7 @@ impl Opener {
 
     /// The trust that holds here. A child is where libraries are tried and called, so it does
     /// neither.
-    fn trust(&self) -> Trust {
+    pub fn trust(&self) -> Trust {
         if child::is_child() {
             return Trust::default();
         }

@@ -27,6 +27,20 @@ const HEAD: &[u8] = b"pilum checkpoint 8\n";
 /// Bytes that are summed and written at a time: they stay in the processor's cache.
 const PIECE: usize = 1 << 17;
 
+/// Removes the checkpoint of a folder, if there is one.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn remove(folder: &Path) -> Result<(), Error> {
+    let path = folder.join(FILE_NAME);
+    match std::fs::remove_file(&path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(Error::unwritable(&path, error))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// A run after a whole increment.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Checkpoint<'c> {

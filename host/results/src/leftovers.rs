@@ -7,7 +7,7 @@ use text::Error;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
 /// are begun anew by each.
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     law::capsule::FILE_NAME,
     crate::checkpoint::FILE_NAME,
     "path.csv",
@@ -16,6 +16,7 @@ const NAMES: [&str; 10] = [
     "points.csv",
     "fields.pvd",
     "report.html",
+    "report.html.part",
     "summary.json",
     "summary.json.part",
 ];

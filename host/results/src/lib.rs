@@ -17,6 +17,7 @@ mod record;
 mod recorder;
 pub mod report;
 pub mod run_table;
+pub mod study;
 mod summary;
 mod table;
 pub mod wanted;

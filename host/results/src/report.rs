@@ -17,11 +17,12 @@ mod pile;
 mod profile;
 mod results;
 mod short;
+mod study;
 mod table;
 
 pub use page::STYLE;
 use text::Error;
-use text::write::replace;
+use text::write::replace_whole;
 
 use crate::record;
 use crate::summary::About;
@@ -30,6 +31,7 @@ use budget::Budget;
 use mechanics::Simulation;
 use results::Run;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Name of a report's file.
 const FILE: &str = "report.html";
@@ -43,6 +45,54 @@ pub fn default_path(folders: &[PathBuf]) -> PathBuf {
         [first, ..] if first.file_name().is_none() => first.join("..").join(FILE),
         [first, ..] => first.parent().unwrap_or(first).join(FILE),
         [] => PathBuf::from(FILE),
+    }
+}
+
+/// The report of a run, or of a study, that is under way: written anew at most once a second, and so seldom
+/// that it takes about a hundredth of the time; marked, and reloading itself.
+#[derive(Debug)]
+pub struct Running {
+    folder: PathBuf,
+    next: Instant,
+}
+
+/// Least time between two of them, and what is under way for less has none.
+const EVERY: Duration = Duration::from_secs(1);
+/// So many times as long as writing one takes, none is written.
+const SELDOM: u32 = 100;
+
+impl Running {
+    /// In this folder.
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            next: Instant::now() + EVERY,
+        }
+    }
+
+    /// Writes the report as the folder is now, if it is time for that.
+    ///
+    /// # Errors
+    /// As [`write()`].
+    pub fn write_if_due(&mut self) -> Result<(), Error> {
+        let started = Instant::now();
+        if started < self.next {
+            return Ok(());
+        }
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        let now = Some(now.map_or(0, |since| since.as_secs()));
+        let text = if crate::study::is_study(&self.folder) {
+            study::render(&self.folder, now)?
+        } else {
+            page::render(
+                &read(std::slice::from_ref(&self.folder))?,
+                &self.folder,
+                now,
+            )?
+        };
+        replace_whole(&self.folder.join(FILE), text)?;
+        self.next = Instant::now() + EVERY.max(SELDOM * started.elapsed());
+        Ok(())
     }
 }
 
@@ -74,14 +124,36 @@ pub fn write_dry(
     }
     let run = Run::before(folder, about, wanted, simulation, warnings);
     std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
-    let text = page::render(&[run], folder)?;
+    let text = page::render(&[run], folder, None)?;
     let file = folder.join(FILE);
-    replace(&file, text)?;
+    replace_whole(&file, text)?;
     Ok(file)
 }
 
-/// Writes the report of a results folder, or the comparison of several, and returns the file's
-/// path. If `out` is a folder, the report goes into it.
+/// The folder of a study, if that is what is reported.
+fn study_among(folders: &[PathBuf]) -> Result<Option<&Path>, Error> {
+    match folders {
+        [folder] if crate::study::is_study(folder) => Ok(Some(folder)),
+        _ if folders.iter().any(|folder| crate::study::is_study(folder)) => Err(Error::Usage(
+            "one of these folders is that of a study, which has a report of its own: name it alone, or folders of \
+             its runs"
+                .to_owned(),
+        )),
+        _ => Ok(None),
+    }
+}
+
+/// The runs in these folders.
+fn read(folders: &[PathBuf]) -> Result<Vec<Run>, Error> {
+    let budget = Budget::of(folders.len());
+    let named = record::names(folders).into_iter().zip(folders);
+    named
+        .map(|(name, folder)| Run::read(&name, folder, &budget))
+        .collect()
+}
+
+/// Writes the report of a results folder, or the comparison of several, or the report of a study, and
+/// returns the file's path. If `out` is a folder, the report goes into it.
 ///
 /// # Errors
 /// [`Error::Usage`] without a folder, or if one has no results; [`Error::Unreadable`] if one has no `history.csv`,
@@ -90,7 +162,10 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
     if folders.is_empty() {
         return Err(Error::Usage("name at least one results folder".to_owned()));
     }
-    if let Some(folder) = folders.iter().find(|f| !has_results(f)) {
+    let study = study_among(folders)?;
+    if study.is_none()
+        && let Some(folder) = folders.iter().find(|f| !has_results(f))
+    {
         let why = if folder.is_dir() {
             "has no results of a run (`history.csv`)"
         } else {
@@ -101,11 +176,6 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
             folder.display()
         )));
     }
-    let budget = Budget::of(folders.len());
-    let named = record::names(folders).into_iter().zip(folders);
-    let runs = named
-        .map(|(name, folder)| Run::read(&name, folder, &budget))
-        .collect::<Result<Vec<_>, _>>()?;
     let is_ours = out.is_dir() || out == default_path(folders);
     let out = if out.is_dir() {
         out.join(FILE)
@@ -119,10 +189,13 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
     let absolute = std::path::absolute(&out).map_err(unwritable)?;
     let parent = absolute.parent().unwrap_or(&absolute);
     std::fs::create_dir_all(parent).map_err(unwritable)?;
-    let text = page::render(&runs, parent)?;
+    let text = match study {
+        Some(folder) => study::render(folder, None)?,
+        None => page::render(&read(folders)?, parent, None)?,
+    };
     // A name that was asked for is followed, as a shell does.
     if is_ours {
-        replace(&out, text)?;
+        replace_whole(&out, text)?;
     } else {
         std::fs::write(&out, text).map_err(unwritable)?;
     }

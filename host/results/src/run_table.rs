@@ -1,9 +1,11 @@
 //! A table of runs, one row each: how they ended, the settings in which they differ, and the last
-//! values of their probes.
+//! values of their probes. Of a study: its parameters, what counts of its results, and every run that it
+//! has.
 
 use crate::record::{entries, names, settings, settings_of_files, text};
+use crate::study::{self, History, State};
 use indexmap::{IndexMap, IndexSet};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
 use text::{Error, Source};
@@ -31,6 +33,13 @@ struct Run {
 /// [`Error::Unreadable`] if there is no run in a folder; [`Error::Input`] if its summary is not one
 /// that a run has written.
 pub fn of(folders: &[PathBuf]) -> Result<String, Error> {
+    if folders.iter().any(|folder| study::is_study(folder)) {
+        let [folder] = folders else {
+            let message = "one of these folders is that of a study, which has a table of its own: name it alone";
+            return Err(Error::Usage(message.to_owned()));
+        };
+        return of_study(folder);
+    }
     let mut found = Vec::new();
     for folder in folders {
         let before = found.len();
@@ -47,6 +56,71 @@ pub fn of(folders: &[PathBuf]) -> Result<String, Error> {
     let runs = runs.collect::<Result<Vec<Run>, _>>()?;
     written(&names(&found), &runs)
         .map_err(|error| Error::Internal(format!("the table of runs: {error}")))
+}
+
+/// The table of a study: all of its runs, whatever became of them, with their parameters, what counts of
+/// their results, and why one has none.
+fn of_study(folder: &Path) -> Result<String, Error> {
+    let record = study::Record::read(folder)?;
+    let rows = record.runs(folder)?;
+    let mut runs = Vec::new();
+    for row in &rows {
+        let place = folder.join(&row.folder);
+        // Of an earlier study there may be more.
+        let has_results = row.standing.state != State::Planned && place.join(SUMMARY).is_file();
+        let summary = if has_results {
+            // Of many runs only what the table has is kept.
+            let mut summary = Run::read_summary(&place)?;
+            json!({ "probes": summary["probes"].take(), "pile": summary["pile"].take() })
+        } else {
+            Value::Null
+        };
+        runs.push((row, summary, History::read_if(has_results, &place)));
+    }
+    let summaries = || runs.iter().map(|(_, summary, _)| summary);
+    let counted: IndexSet<&str> = record
+        .outputs
+        .iter()
+        .map(|output| output.name.as_str())
+        .collect();
+    let probes: IndexSet<&str> = summaries()
+        .flat_map(|summary| entries(&summary["probes"]).map(|(name, _)| name))
+        .filter(|name| !counted.contains(name))
+        .collect();
+    let has_pile = summaries().any(|summary| summary["pile"].is_object());
+    let resistances = if has_pile { &RESISTANCES[..] } else { &[] };
+    let parameters = record
+        .parameters
+        .iter()
+        .map(|parameter| parameter.name.as_str());
+    let of_pile = resistances.iter().map(|name| format!("pile.{name}"));
+    let mut header: Vec<String> = ["run", "status"].map(str::to_owned).to_vec();
+    header.extend(
+        parameters
+            .chain(counted)
+            .chain(probes.iter().copied())
+            .map(str::to_owned),
+    );
+    header.extend(of_pile.chain(["reason".to_owned()]));
+    let body = runs.iter().map(|(row, summary, history)| {
+        let mut cells = vec![row.folder.clone(), row.standing.state.word().to_owned()];
+        cells.extend(row.values.iter().cloned());
+        let outputs = record.outputs.iter().map(|output| history.output(output));
+        cells.extend(outputs.map(|value| value.map(|v| shown(&v.into())).unwrap_or_default()));
+        cells.extend(probes.iter().map(|probe| shown(&summary["probes"][probe])));
+        cells.extend(resistances.iter().map(|name| shown(&summary["pile"][name])));
+        cells.push(row.standing.reason.clone());
+        cells
+    });
+    let table = || -> Result<String, Box<dyn std::error::Error>> {
+        let mut table = csv::Writer::from_writer(Vec::new());
+        table.write_record(&header)?;
+        for row in body {
+            table.write_record(&row)?;
+        }
+        Ok(String::from_utf8(table.into_inner()?)?)
+    };
+    table().map_err(|error| Error::Internal(format!("the table of runs: {error}")))
 }
 
 fn unreadable(path: &Path, source: io::Error) -> Error {
@@ -78,6 +152,10 @@ fn find(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Error> {
 
 impl Run {
     fn read(folder: &Path) -> Result<Self, Error> {
+        Ok(Self::of(Self::read_summary(folder)?))
+    }
+
+    fn read_summary(folder: &Path) -> Result<Value, Error> {
         let path = folder.join(SUMMARY);
         let text = std::fs::read_to_string(&path).map_err(|why| unreadable(&path, why))?;
         let summary: Value = serde_json::from_str(&text).map_err(|error| {
@@ -93,7 +171,7 @@ impl Run {
             let message = format!("not written by a run: {} has no `status`", path.display());
             return Err(source.error(0..0, message).into());
         }
-        Ok(Self::of(summary))
+        Ok(summary)
     }
 
     fn of(summary: Value) -> Self {
@@ -201,7 +279,6 @@ fn shown(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn a_row_has_what_differs_and_what_came_out() {

@@ -9,6 +9,7 @@ pub fn ending(error: Option<&Error>) -> Ending {
         return Ending::done();
     };
     let status = match error.kind() {
+        _ if matches!(error, Error::Killed { .. }) => "killed",
         Kind::NoEquilibrium => "no equilibrium",
         Kind::Library => "plugin trouble",
         Kind::Stopped => "interrupted",

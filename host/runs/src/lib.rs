@@ -7,6 +7,7 @@ mod ending;
 pub mod memory;
 pub mod point;
 pub mod run;
+pub mod study;
 pub mod supervision;
 pub mod trade_off;
 pub mod variants;

@@ -11,7 +11,7 @@ use mechanics::equilibrium::{Iteration, Reason, Reuse};
 use mechanics::group::{Group, PointFailure};
 use mechanics::settings::Method;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
-use mechanics::{Place, Simulation, State, Watch};
+use mechanics::{Place, Problem, Simulation, State, Watch};
 use results::pile::Resistances;
 use results::wanted::Wanted;
 use results::{Checkpoint, Fault, Figures, Recorder, report};
@@ -51,6 +51,10 @@ pub struct Options {
     pub resume: bool,
     /// Time between checkpoints; `None`: there are none.
     pub checkpoints: Option<Duration>,
+    /// A run that has come to its end leaves no checkpoint that says so.
+    pub ends_without: bool,
+    /// A report is written while the run goes on, if that takes more than a second.
+    pub reports: bool,
 }
 
 /// A case's simulation before its first phase, with its laws.
@@ -162,7 +166,83 @@ pub fn run_reusing(
     reuse: &mut Reuse,
     options: Options,
 ) -> Result<Figures, Error> {
+    ready(case)?.run(folder, observer, reuse, options)
+}
+
+/// A case whose problem is posed, with its laws opened.
+#[derive(Debug)]
+pub struct Ready<'c> {
+    case: &'c Case,
+    posed: Posed,
+    identity: String,
+    started: Instant,
+}
+
+/// Poses the problem of a case.
+///
+/// # Errors
+/// Bad input, or trouble with a library.
+pub fn ready(case: &Case) -> Result<Ready<'_>, Error> {
     let started = Instant::now();
+    let posed = case.pose()?;
+    Ok(Ready {
+        identity: identity(case, &posed.laws, posed.mesh_file.as_ref()),
+        case,
+        posed,
+        started,
+    })
+}
+
+impl Ready<'_> {
+    /// What the results depend on: program, case with its settings, mesh, libraries.
+    pub fn identity(&self) -> &str {
+        &self.identity
+    }
+
+    /// The files that the case names, by what is in them: libraries with their sidecars, and the mesh.
+    pub fn libraries(&self) -> impl Iterator<Item = String> {
+        let libraries = self.posed.laws.values().map(|built| {
+            let library = built.law.library();
+            let sidecar = library.sidecar_sha256().unwrap_or_default();
+            format!("{} {sidecar}\n", library.sha256())
+        });
+        let mesh = self.posed.mesh_file.iter();
+        libraries.chain(mesh.map(|mesh| format!("{}\n", mesh.sha256)))
+    }
+
+    /// The problem alone.
+    pub fn into_problem(self) -> Problem {
+        self.posed.problem
+    }
+
+    /// Runs it, as [`run_reusing`].
+    ///
+    /// # Errors
+    /// As [`run_reusing`].
+    pub fn run(
+        self,
+        folder: &Path,
+        observer: &mut dyn Observer,
+        reuse: &mut Reuse,
+        options: Options,
+    ) -> Result<Figures, Error> {
+        carry_out(self, folder, observer, reuse, options)
+    }
+}
+
+fn carry_out(
+    ready: Ready<'_>,
+    folder: &Path,
+    observer: &mut dyn Observer,
+    reuse: &mut Reuse,
+    options: Options,
+) -> Result<Figures, Error> {
+    let Ready {
+        case,
+        posed,
+        identity,
+        started,
+    } = ready;
     #[cfg(unix)]
     {
         reuse.announces = Some(crate::memory::expect);
@@ -172,13 +252,12 @@ pub fn run_reusing(
         laws,
         mesh_file,
         notes,
-    } = case.pose()?;
+    } = posed;
     let mut simulation =
         Simulation::reusing(problem, std::mem::take(reuse)).map_err(|error| case.place(error))?;
     let wanted = case.wanted(&simulation)?;
     let about = case.about(&laws, mesh_file.as_ref());
-    let identity = identity(case, &laws, mesh_file.as_ref());
-    let keeper = Keeper::new(identity, folder, options.checkpoints);
+    let keeper = Keeper::new(identity, folder, options);
     let found = if options.resume {
         keeper.found()?
     } else {
@@ -219,6 +298,7 @@ pub fn run_reusing(
         results,
         keeper,
         warnings,
+        report: options.reports.then(|| report::Running::new(folder)),
         fault: None,
     };
     let outcome = simulation.run(&mut follower);
@@ -260,6 +340,8 @@ struct Follower<'a> {
     /// Warnings so far, for the summary.
     warnings: Vec<String>,
     stop: Stop,
+    /// The report of what there is so far.
+    report: Option<report::Running>,
     /// Why no more is wanted.
     fault: Option<Fault>,
 }
@@ -320,6 +402,12 @@ impl Watch for Follower<'_> {
             let place = &increment.place;
             self.observer
                 .increment(place, increment.of, increment.iterations);
+            if let Some(report) = &mut self.report
+                && report.write_if_due().is_err()
+            {
+                // A run does not end for its sake; the report at the end says what is wrong.
+                self.report = None;
+            }
         }
         self.kept(written)
     }
@@ -383,16 +471,19 @@ struct Keeper {
     identity: String,
     folder: PathBuf,
     every: Option<Duration>,
+    /// There is none at the end.
+    ends_without: bool,
     last: Instant,
 }
 
 impl Keeper {
-    /// Checkpoints in this folder, this long after one another; `None`: there are none.
-    fn new(identity: String, folder: &Path, every: Option<Duration>) -> Self {
+    /// Checkpoints in this folder.
+    fn new(identity: String, folder: &Path, options: Options) -> Self {
         Self {
             identity,
             folder: folder.to_owned(),
-            every,
+            every: options.checkpoints,
+            ends_without: options.ends_without,
             last: Instant::now(),
         }
     }
@@ -423,7 +514,7 @@ impl Keeper {
 
     /// The last checkpoint: there is nothing left to do.
     fn end(&self, results: &Recorder, warnings: &[String]) -> Result<(), text::Error> {
-        if self.every.is_some() {
+        if self.every.is_some() && !self.ends_without {
             let so_far = results.state()?;
             Checkpoint::new(&self.identity, so_far, warnings, None).write(&self.folder)?;
         }

@@ -257,6 +257,23 @@ impl InputError {
         &mut self.hint
     }
 
+    /// Of an error in a setting of the command line: that setting, and where in it.
+    pub fn setting(&self) -> Option<(&str, usize)> {
+        let is_setting = self.source_code.name() == SETTING;
+        is_setting.then(|| (self.source_code.inner().as_str(), self.span.offset()))
+    }
+
+    /// The same mistake, at the place of another text that the present one was made from.
+    #[must_use]
+    pub fn moved_to(self, source: &Source, span: Range<usize>) -> Self {
+        let moved = source.error(span, self.message);
+        Self {
+            hint: self.hint,
+            label: self.label,
+            ..moved
+        }
+    }
+
     /// Adds what the user could do.
     #[must_use]
     pub fn hint(self, hint: impl Into<String>) -> Self {

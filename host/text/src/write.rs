@@ -4,7 +4,7 @@
 use crate::Error;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Refuses to write where something else than a file is: a pipe that nobody reads would keep the
 /// program waiting for ever.
@@ -31,6 +31,25 @@ pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Error> {
     begin(path)
         .and_then(|mut file| file.write_all(content.as_ref()))
         .map_err(|error| Error::unwritable(path, error))
+}
+
+/// The same, whole or not at all: whoever reads meanwhile, or is left with it after a kill, has the earlier
+/// file or this one.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn replace_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Error> {
+    refuse_other(path)?;
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".part");
+    let partial = PathBuf::from(partial);
+    replace(&partial, content)
+        .and_then(|()| {
+            std::fs::rename(&partial, path).map_err(|error| Error::unwritable(path, error))
+        })
+        .inspect_err(|_| {
+            let _ = std::fs::remove_file(&partial);
+        })
 }
 
 /// Begins a file in place of what has its name, which other names of the same file keep.

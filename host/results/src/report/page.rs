@@ -33,6 +33,8 @@ const SCRIPT: [&str; 8] = [
     include_str!("script/convergence.js"),
     include_str!("script/selftest.js"),
 ];
+/// A page that reloads itself.
+const RUNNING: &str = include_str!("running.html");
 const UPLOT: &str = include_str!("vendor/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("vendor/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("vendor/LICENSE-uPlot");
@@ -70,12 +72,13 @@ struct Drawn<'a> {
     units: BTreeMap<&'a str, &'a str>,
 }
 
-/// The text of the page, for a file in `folder`.
-pub(super) fn render(runs: &[Run], folder: &Path) -> Result<String, Error> {
+/// The text of the page, for a file in `folder`; of a run that is under way with the present time, in
+/// seconds since 1970.
+pub(super) fn render(runs: &[Run], folder: &Path, now: Option<u64>) -> Result<String, Error> {
     let internal = |why: String| Error::Internal(format!("report: {why}"));
     let drawn: Vec<Drawn<'_>> = runs.iter().zip(figures(runs)).map(drawn).collect();
     let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
-    let page = page(runs, folder, &data).map_err(|error| internal(error.to_string()))?;
+    let page = page(runs, folder, now, &data).map_err(|error| internal(error.to_string()))?;
     let mut environment = Environment::new();
     environment
         .add_template("report.html", TEMPLATE)
@@ -84,7 +87,7 @@ pub(super) fn render(runs: &[Run], folder: &Path) -> Result<String, Error> {
         .map_err(|error| internal(format!("{error:#}")))
 }
 
-fn page(runs: &[Run], folder: &Path, data: &str) -> serde_json::Result<Template> {
+fn page(runs: &[Run], folder: &Path, now: Option<u64>, data: &str) -> serde_json::Result<Template> {
     let is_comparison = runs.len() > 1;
     let is_many = runs.len() > MANY;
     let title = if is_many {
@@ -105,11 +108,12 @@ fn page(runs: &[Run], folder: &Path, data: &str) -> serde_json::Result<Template>
     let safe = |json: &str| json.replace('<', "\\u003c");
     Ok(context! {
         title,
+        running => now.map(running),
         is_comparison,
         is_many,
         varied => safe(&varied),
         notes => if is_many { common_notes(runs) } else { Vec::new() },
-        runs => runs.iter().map(|run| run_context(run, folder)).collect::<Vec<_>>(),
+        runs => runs.iter().map(|run| run_context(run, folder, now.is_some())).collect::<Vec<_>>(),
         final_values => Template::from(Serde(final_values(runs))),
         n_differing => settings.iter().filter(|setting| setting.differs).count(),
         settings => Template::from(Serde(settings)),
@@ -124,6 +128,11 @@ fn page(runs: &[Run], folder: &Path, data: &str) -> serde_json::Result<Template>
         script => SCRIPT.concat(),
         data => safe(data),
     })
+}
+
+/// What a page of something that is under way has in addition.
+pub(super) fn running(now: u64) -> String {
+    RUNNING.replace("NOW", &now.to_string())
 }
 
 /// What is to be noted of many runs: every line once, with those that it is about.
@@ -194,9 +203,10 @@ fn drawn((run, figures): (&Run, Value)) -> Drawn<'_> {
     }
 }
 
-fn run_context(run: &Run, folder: &Path) -> Template {
+fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
     let summary = &run.summary;
     let (status, failed, reason) = match run.ending() {
+        Ending::Unfinished(_) if is_running => ("running".to_owned(), false, String::new()),
         Ending::Done => ("done".to_owned(), false, String::new()),
         Ending::NotRun => ("dry run: nothing computed".to_owned(), false, String::new()),
         Ending::Failed(status, reason) => (status, true, reason),

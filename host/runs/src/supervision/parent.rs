@@ -186,17 +186,16 @@ impl Watch {
         };
         let place = places(&calls);
         let is_apart = self.page.get(word::APART) != 0;
-        if is_apart {
+        if is_apart && ending != Ending::Signal(9) {
             let message = format!("the program {what}, and no law was in its process");
             return Err(self.mended(mend, Error::internal(message)));
         }
         let trouble = format!("{place}: the process {what}");
-        if !again || ending == Ending::Signal(9) {
-            let hint = if ending == Ending::Signal(9) {
-                "it was killed by somebody, or by the system, which may have had no memory left"
-            } else {
-                "with `--isolate` the law is called in a process of its own, and its point is named"
-            };
+        if ending == Ending::Signal(9) {
+            return Err(self.mended(mend, Error::Killed { trouble }));
+        }
+        if !again {
+            let hint = "with `--isolate` the law is called in a process of its own, and its point is named";
             let error = law::Error::Library {
                 message: trouble,
                 hint: Some(hint.to_owned()),

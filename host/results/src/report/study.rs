@@ -1,0 +1,378 @@
+//! The report of a study: what its parameters do to what counts, and every curve in the colour of a
+//! parameter.
+
+use super::budget::Budget;
+use super::page::{STYLE, running};
+use super::results::Run;
+use super::short::{Short, display, thinned};
+use crate::study::{Effect, History, Output, ParameterRecord, Record, Row, State, Take, effects};
+use indexmap::{IndexMap, IndexSet};
+use minijinja::{Environment, Value as Template, context};
+use serde::Serialize;
+use std::path::Path;
+use text::Error;
+
+const TEMPLATE: &str = include_str!("study.html");
+const SCRIPT: &str = include_str!("script/study.js");
+const OWN_STYLE: &str = include_str!("study.css");
+/// Numbers of histories that go into the page.
+const MOST_NUMBERS: usize = 400_000;
+/// Rows of the table of runs, and of those that failed, that the page shows.
+const MOST_ROWS: usize = 1000;
+const MOST_FAILED: usize = 200;
+
+/// What the script draws.
+#[derive(Serialize)]
+struct Drawn<'a> {
+    parameters: Vec<Varied>,
+    outputs: Vec<Counted<'a>>,
+    units: IndexMap<String, String>,
+    /// The column that the first output is looked up at, that output's, and its phase.
+    at: Option<&'a str>,
+    first: &'a str,
+    phase: Option<&'a str>,
+    history: Curves,
+}
+
+/// A parameter: its value in every run, of texts the number of the text.
+#[derive(Serialize)]
+struct Varied {
+    name: String,
+    numbers: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    texts: Option<Vec<String>>,
+}
+
+#[derive(Serialize)]
+struct Counted<'a> {
+    name: &'a str,
+    numbers: Vec<Short>,
+    effects: Vec<Effect>,
+}
+
+/// Histories of all runs, with the columns and phases that any of them has.
+#[derive(Default, Serialize)]
+struct Curves {
+    names: Vec<String>,
+    phases: Vec<String>,
+    runs: Vec<Curve>,
+}
+
+#[derive(Serialize)]
+struct Curve {
+    /// Number of the row.
+    run: usize,
+    phase: Vec<usize>,
+    values: Vec<Vec<Short>>,
+}
+
+/// The text of the page of the study in a folder; while it is carried out with the present time, in seconds
+/// since 1970.
+pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
+    let internal = |why: String| Error::Internal(format!("report: {why}"));
+    let record = Record::read(folder)?;
+    let rows = record.runs(folder)?;
+    let histories: Vec<History> = rows
+        .iter()
+        .map(|row| {
+            History::read_if(
+                row.standing.state != State::Planned,
+                &folder.join(&row.folder),
+            )
+        })
+        .collect();
+    let numbers: Vec<Vec<Option<f64>>> = record
+        .outputs
+        .iter()
+        .map(|output| {
+            histories
+                .iter()
+                .map(|history| history.output(output))
+                .collect()
+        })
+        .collect();
+    let parameters: Vec<Varied> = (0..)
+        .zip(&record.parameters)
+        .map(|(number, parameter)| varied(number, parameter, &rows))
+        .collect();
+    let columns: Vec<Vec<f64>> = parameters.iter().map(|p| p.numbers.clone()).collect();
+    let of_output = |(output, numbers): (&'_ Output, &Vec<Option<f64>>)| {
+        let found = effects(&columns, numbers, record.is_grid);
+        (output.name.clone(), found)
+    };
+    let found: IndexMap<String, Vec<Effect>> =
+        record.outputs.iter().zip(&numbers).map(of_output).collect();
+    let units = units(folder, &rows);
+    let (history, left_out) = curves(&histories);
+    let first = record.outputs.first();
+    let drawn = Drawn {
+        outputs: record
+            .outputs
+            .iter()
+            .zip(&numbers)
+            .map(|(output, numbers)| Counted {
+                name: &output.name,
+                numbers: numbers.iter().map(|number| Short(*number)).collect(),
+                effects: found[&output.name].clone(),
+            })
+            .collect(),
+        units: {
+            let of =
+                |output: &Output| Some((output.name.clone(), units.get(&output.probe)?.clone()));
+            let mut all = units.clone();
+            all.extend(record.outputs.iter().filter_map(of));
+            all
+        },
+        at: first.and_then(|output| Some(output.at.as_ref()?.0.as_str())),
+        first: first.map_or("", |output| &output.probe),
+        phase: first.and_then(|output| output.phase.as_deref()),
+        history,
+        parameters,
+    };
+    let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
+    let page = page(&record, &rows, &numbers, &drawn, (left_out, now), &data);
+    let mut environment = Environment::new();
+    environment
+        .add_template("report.html", TEMPLATE)
+        .and_then(|()| environment.get_template("report.html"))
+        .and_then(|template| template.render(page))
+        .map_err(|error| internal(format!("{error:#}")))
+}
+
+/// Units of the probes, as the first run that can be read has them.
+fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
+    let begun = rows
+        .iter()
+        .filter(|row| row.standing.state != State::Planned);
+    let mut runs = begun.filter_map(|row| {
+        let place = folder.join(&row.folder);
+        Run::read(&row.folder, &place, &Budget::of(rows.len().max(2))).ok()
+    });
+    let Some(run) = runs.next() else {
+        return IndexMap::new();
+    };
+    let units = run.units().into_iter();
+    units
+        .map(|(name, unit)| (name.to_owned(), unit.to_owned()))
+        .collect()
+}
+
+fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
+    let values = || rows.iter().map(|row| row.values[number].as_str());
+    let numbers: Option<Vec<f64>> = values().map(|value| value.parse().ok()).collect();
+    let (numbers, texts) = if let Some(numbers) = numbers {
+        (numbers, None)
+    } else {
+        let texts: IndexSet<&str> = values().collect();
+        let number = |value| texts.get_index_of(value).unwrap_or(0) as f64;
+        let numbers = values().map(number).collect();
+        (
+            numbers,
+            Some(texts.iter().map(ToString::to_string).collect()),
+        )
+    };
+    Varied {
+        name: parameter.name.clone(),
+        numbers,
+        texts,
+    }
+}
+
+/// The curves, and how many rows of the longest are shown if that is not all.
+fn curves(histories: &[History]) -> (Curves, Option<usize>) {
+    let names: IndexSet<&str> = histories
+        .iter()
+        .flat_map(|history| history.names.iter().map(String::as_str))
+        .filter(|name| *name != "iterations")
+        .collect();
+    let phases: IndexSet<&str> = histories
+        .iter()
+        .flat_map(|history| history.phases.iter().map(String::as_str))
+        .collect();
+    let n_runs = histories
+        .iter()
+        .filter(|history| !history.phases.is_empty())
+        .count();
+    let most = (MOST_NUMBERS / (n_runs * (names.len() + 1)).max(1)).max(8);
+    let longest = histories
+        .iter()
+        .map(|history| history.phases.len())
+        .max()
+        .unwrap_or(0);
+    let curve = |(run, history): (usize, &History)| {
+        let of = &history.phases;
+        // The last row of a phase is where it ends.
+        let is_end = |row: usize| of.get(row + 1) != of.get(row);
+        let shown = thinned(of.len(), most, is_end);
+        Curve {
+            run,
+            phase: shown
+                .iter()
+                .filter_map(|&row| phases.get_index_of(of[row].as_str()))
+                .collect(),
+            values: names
+                .iter()
+                .map(|name| {
+                    let column = history.column(name).unwrap_or_default();
+                    shown
+                        .iter()
+                        .map(|&row| Short(column.get(row).copied().flatten()))
+                        .collect()
+                })
+                .collect(),
+        }
+    };
+    let runs = histories
+        .iter()
+        .enumerate()
+        .filter(|(_, history)| !history.phases.is_empty());
+    let curves = Curves {
+        runs: runs.map(curve).collect(),
+        names: names.iter().map(ToString::to_string).collect(),
+        phases: phases.iter().map(ToString::to_string).collect(),
+    };
+    (curves, (longest > most).then_some(most))
+}
+
+fn page(
+    record: &Record,
+    rows: &[Row],
+    numbers: &[Vec<Option<f64>>],
+    drawn: &Drawn<'_>,
+    (left_out, now): (Option<usize>, Option<u64>),
+    data: &str,
+) -> Template {
+    let failed = || {
+        rows.iter()
+            .filter(|row| matches!(row.standing.state, State::Failed(_)))
+    };
+    let outputs: Vec<Template> = record
+        .outputs
+        .iter()
+        .zip(&drawn.outputs)
+        .zip(numbers)
+        .map(|((output, counted), numbers)| output_context(output, counted, numbers, drawn))
+        .collect();
+    let row = |(number, row): (usize, &Row)| {
+        let of_run: Vec<String> = numbers
+            .iter()
+            .map(|numbers| numbers[number].map(display).unwrap_or_default())
+            .collect();
+        context! { numbers => of_run, ..run_context(row) }
+    };
+    let parameters: Vec<Template> = record
+        .parameters
+        .iter()
+        .map(|p| context! { name => p.name.clone(), keys => p.keys.clone(), spread => p.spread.clone() })
+        .collect();
+    context! {
+        version => env!("CARGO_PKG_VERSION"),
+        style => STYLE,
+        own_style => OWN_STYLE,
+        script => SCRIPT,
+        // Nothing in the data can end the script element.
+        data => data.replace('<', "\\u003c"),
+        running => now.map(running),
+        title => record.title.clone(),
+        design => record.design.clone(),
+        program => record.program.clone(),
+        n_runs => rows.len(),
+        done => rows.iter().filter(|row| row.standing.state == State::Done).count(),
+        n_failed => failed().count(),
+        failed => failed().take(MOST_FAILED).map(run_context).collect::<Vec<_>>(),
+        unfinished => unfinished(rows),
+        parameters,
+        outputs,
+        levels => if record.is_grid {
+            "The share is η², which counts what a parameter does alone."
+        } else {
+            "The values of a parameter that has more than twelve are divided into levels of as many runs each; the \
+             share is Kelley's ε², which counts what a parameter does alone and takes off what the scatter of the \
+             runs makes up by chance."
+        },
+        thinned => left_out.map(|most| format!(
+            "About {most} rows of each history are shown, evenly spaced, with the last of each phase; history.csv has all."
+        )),
+        rows => rows.iter().enumerate().take(MOST_ROWS).map(row).collect::<Vec<_>>(),
+    }
+}
+
+fn run_context(row: &Row) -> Template {
+    context! {
+        folder => row.folder.clone(),
+        state => row.standing.state.word(),
+        values => row.values.clone(),
+        reason => row.standing.reason.clone(),
+    }
+}
+
+/// How many runs have not come to an end, by their state.
+fn unfinished(rows: &[Row]) -> Vec<String> {
+    let mut counts: IndexMap<&str, usize> = IndexMap::new();
+    for row in rows.iter().filter(|row| !row.standing.state.is_final()) {
+        *counts.entry(row.standing.state.word()).or_default() += 1;
+    }
+    let line =
+        |(word, n): (&str, usize)| format!("{n} run{} {word}", if n == 1 { "" } else { "s" });
+    counts.into_iter().map(line).collect()
+}
+
+fn output_context(
+    output: &Output,
+    counted: &Counted<'_>,
+    numbers: &[Option<f64>],
+    drawn: &Drawn<'_>,
+) -> Template {
+    let known: Vec<f64> = numbers.iter().copied().flatten().collect();
+    let least = known.iter().copied().reduce(f64::min);
+    let range = least
+        .zip(known.iter().copied().reduce(f64::max))
+        .map(|(least, most)| {
+            let mean = known.iter().sum::<f64>() / known.len() as f64;
+            let missing = numbers.len() - known.len();
+            let missing = match missing {
+                0 => String::new(),
+                n => format!("; {n} runs have none"),
+            };
+            format!(
+                "{} to {}, mean {}{missing}",
+                display(least),
+                display(most),
+                display(mean)
+            )
+        });
+    let effects: Vec<Template> = counted
+        .effects
+        .iter()
+        .map(|effect| {
+            let mean = |level: Option<&crate::study::Level>| level.map(|level| display(level.mean));
+            context! {
+                name => drawn.parameters[effect.parameter].name.clone(),
+                low => mean(effect.levels.first()),
+                high => mean(effect.levels.last()),
+                range => display(effect.range()),
+                share => effect.share.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share)),
+            }
+        })
+        .collect();
+    context! {
+        name => output.name.clone(),
+        unit => drawn.units.get(&output.probe).cloned(),
+        words => in_words(output),
+        range,
+        effects,
+    }
+}
+
+fn in_words(output: &Output) -> String {
+    let what = match (&output.at, output.take) {
+        (Some((other, value)), _) => format!("{} where {other} first is {value}", output.probe),
+        (None, Take::Final) => format!("last value of {}", output.probe),
+        (None, Take::Max) => format!("largest value of {}", output.probe),
+        (None, Take::Min) => format!("smallest value of {}", output.probe),
+    };
+    match &output.phase {
+        Some(phase) => format!("{what}, phase {phase}"),
+        None => what,
+    }
+}

@@ -1,0 +1,506 @@
+//! A study in a folder: `study.json`, what it is; `runs.csv`, its runs, a row each, made at the start;
+//! and in the folder of each run `run.json`, how far it has come. The folders know best: the table's
+//! column `state` follows them.
+
+mod effects;
+mod history;
+
+pub use effects::{Effect, Level, effects};
+pub use history::History;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+use text::Error;
+use text::write::replace_whole;
+
+/// What a study is, in its folder.
+pub const RECORD: &str = "study.json";
+/// Its runs.
+pub const TABLE: &str = "runs.csv";
+/// How far a run has come, in its folder.
+const RUN: &str = "run.json";
+/// Held by whoever carries the run out, or writes the table.
+const LOCK: &str = ".lock";
+/// Columns of the table before the parameters, and behind them.
+const FIRST: [&str; 2] = ["index", "folder"];
+const LAST: [&str; 2] = ["state", "reason"];
+
+/// What a study is.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Record {
+    /// The program.
+    pub program: String,
+    /// Title, or the name.
+    pub title: String,
+    /// How the values were chosen, in words.
+    pub design: String,
+    /// Whether its runs are all combinations of the parameters' values.
+    pub is_grid: bool,
+    /// Texts of study and case, and the program, as one number.
+    pub texts: String,
+    /// What all runs depend on: these texts and the libraries.
+    pub identity: String,
+    /// What varies.
+    pub parameters: Vec<ParameterRecord>,
+    /// What counts.
+    pub outputs: Vec<Output>,
+}
+
+/// What varies.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ParameterRecord {
+    /// Column of the table.
+    pub name: String,
+    /// Keys of the case that have its value.
+    pub keys: Vec<String>,
+    /// Its values in words.
+    pub spread: String,
+}
+
+/// Which value of a probe counts.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Take {
+    /// The last one.
+    #[default]
+    Final,
+    /// The largest.
+    Max,
+    /// The smallest.
+    Min,
+}
+
+/// A number of each run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Output {
+    /// Its name.
+    pub name: String,
+    /// Column of `history.csv`.
+    pub probe: String,
+    /// Which of its values.
+    pub take: Take,
+    /// Instead: where this column first comes to this value.
+    pub at: Option<(String, f64)>,
+    /// Only of this phase.
+    pub phase: Option<String>,
+}
+
+impl Output {
+    /// The last value of a column, called as that is.
+    pub fn last(column: &str) -> Self {
+        Self {
+            name: column.to_owned(),
+            probe: column.to_owned(),
+            take: Take::Final,
+            at: None,
+            phase: None,
+        }
+    }
+}
+
+/// How far a run has come.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nothing was done yet.
+    Planned,
+    /// It is being carried out.
+    Running,
+    /// The process that carried it out was ended; it goes on from its last checkpoint.
+    Lost,
+    /// It was stopped as asked, and goes on from its last checkpoint.
+    Interrupted,
+    /// It has come to its end.
+    Done,
+    /// It could not come to its end: how a run's summary calls that.
+    Failed(String),
+}
+
+impl State {
+    /// As tables have it.
+    pub fn word(&self) -> &str {
+        match self {
+            Self::Planned => "planned",
+            Self::Running => "running",
+            Self::Lost => "lost",
+            Self::Interrupted => "interrupted",
+            Self::Done => "done",
+            Self::Failed(status) => status,
+        }
+    }
+
+    fn of_word(word: &str) -> Self {
+        match word {
+            "planned" => Self::Planned,
+            "running" => Self::Running,
+            "lost" => Self::Lost,
+            "interrupted" => Self::Interrupted,
+            "done" => Self::Done,
+            status => Self::Failed(status.to_owned()),
+        }
+    }
+
+    /// Whether nothing is left to be done.
+    pub fn is_final(&self) -> bool {
+        matches!(self, Self::Done | Self::Failed(_))
+    }
+}
+
+/// A run's state, with the reason where there is one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Standing {
+    /// How far it has come.
+    pub state: State,
+    /// Why not further.
+    pub reason: String,
+}
+
+impl Standing {
+    /// A state that needs no reason.
+    pub fn plain(state: State) -> Self {
+        Self {
+            state,
+            reason: String::new(),
+        }
+    }
+}
+
+/// `run.json`.
+#[derive(Debug, Serialize, Deserialize)]
+struct RunRecord {
+    identity: String,
+    state: String,
+    reason: String,
+}
+
+/// The folder of a run, held by the process that carries it out.
+#[derive(Debug)]
+pub struct Held {
+    folder: PathBuf,
+    identity: String,
+    _lock: File,
+}
+
+impl Held {
+    /// Takes the folder of a run, and makes it if need be. `None`: another process has it.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn take(folder: &Path) -> Result<Option<Self>, Error> {
+        std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
+        Ok(lock(folder)?.map(|lock| Self {
+            folder: folder.to_owned(),
+            identity: String::new(),
+            _lock: lock,
+        }))
+    }
+
+    /// Says that the run is under way. `identity`: what its results depend on.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn begin(&mut self, identity: &str) -> Result<(), Error> {
+        identity.clone_into(&mut self.identity);
+        self.end(&Standing::plain(State::Running))
+    }
+
+    /// Says how far it has come.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn end(&self, standing: &Standing) -> Result<(), Error> {
+        write_run(
+            &self.folder,
+            &RunRecord {
+                identity: self.identity.clone(),
+                state: standing.state.word().to_owned(),
+                reason: standing.reason.clone(),
+            },
+        )
+    }
+}
+
+/// Takes the lock of a folder; `None`: another process has it. Some file systems know no locks: there
+/// nobody is kept out.
+fn lock(folder: &Path) -> Result<Option<File>, Error> {
+    let path = folder.join(LOCK);
+    let mut options = File::options();
+    let file = options.create(true).truncate(false).write(true).open(&path);
+    let file = file.map_err(|error| Error::unwritable(&path, error))?;
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Ok(None),
+        _ => Ok(Some(file)),
+    }
+}
+
+/// Takes the table of a study; `None`: another process has it.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn take_table(folder: &Path) -> Result<Option<File>, Error> {
+    std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
+    lock(folder)
+}
+
+fn write_run(folder: &Path, record: &RunRecord) -> Result<(), Error> {
+    let text = serde_json::to_string(record).map_err(|e| Error::Internal(e.to_string()))?;
+    replace_whole(&folder.join(RUN), text + "\n")
+}
+
+fn read_run(folder: &Path) -> Option<RunRecord> {
+    let text = std::fs::read_to_string(folder.join(RUN)).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// What the results in the folder of a run depend on; `None` if it was not begun.
+pub fn identity_of_run(folder: &Path) -> Option<String> {
+    read_run(folder).map(|record| record.identity)
+}
+
+/// Forgets how far a run has come; its results stay until it begins anew.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn forget_run(folder: &Path) -> Result<(), Error> {
+    let path = folder.join(RUN);
+    match std::fs::remove_file(&path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(Error::unwritable(&path, error))
+        }
+        _ => crate::checkpoint::remove(folder),
+    }
+}
+
+/// How far the run in this folder has come.
+pub fn standing(folder: &Path) -> Standing {
+    let Some(record) = read_run(folder) else {
+        return Standing::plain(State::Planned);
+    };
+    match State::of_word(&record.state) {
+        // Without a lock to be had, nobody is there any more.
+        State::Running if !is_held(folder) => Standing::plain(State::Lost),
+        state => Standing {
+            state,
+            reason: record.reason,
+        },
+    }
+}
+
+fn is_held(folder: &Path) -> bool {
+    let file = File::open(folder.join(LOCK));
+    file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
+/// Has the record of a run that could not write it any more say how it ended. Whether there is one.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn end_run(folder: &Path, standing: &Standing) -> Result<bool, Error> {
+    match read_run(folder) {
+        Some(mut record) if record.state == State::Running.word() => {
+            standing.state.word().clone_into(&mut record.state);
+            standing.reason.clone_into(&mut record.reason);
+            write_run(folder, &record)?;
+            Ok(true)
+        }
+        _ => Ok(false),
+    }
+}
+
+/// A row of the table of runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Its number, from 1.
+    pub index: usize,
+    /// Its folder inside that of the study.
+    pub folder: String,
+    /// Values of the parameters: texts without quotes, all else as the case file has it.
+    pub values: Vec<String>,
+    /// How far it has come.
+    pub standing: Standing,
+}
+
+/// Whether a folder is that of a study.
+pub fn is_study(folder: &Path) -> bool {
+    folder.join(RECORD).is_file() && folder.join(TABLE).is_file()
+}
+
+impl Record {
+    /// Reads the record of the study in a folder.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`]; [`Error::Usage`] if a study has not written it.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(RECORD);
+        let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+            path: path.clone(),
+            source,
+        })?;
+        serde_json::from_str(&text).map_err(|error| not_ours(&path, &error))
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn write(&self, folder: &Path) -> Result<(), Error> {
+        let text = serde_json::to_string_pretty(self);
+        let text = text.map_err(|error| Error::Internal(error.to_string()))?;
+        replace_whole(&folder.join(RECORD), text + "\n")
+    }
+
+    /// Writes the table of runs.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn write_table(&self, folder: &Path, rows: &[Row]) -> Result<(), Error> {
+        let path = folder.join(TABLE);
+        let table = self
+            .table(rows)
+            .map_err(|error| Error::unwritable(&path, io::Error::other(error)))?;
+        replace_whole(&path, table)
+    }
+
+    fn table(&self, rows: &[Row]) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
+        let mut table = csv::Writer::from_writer(Vec::new());
+        let names = self
+            .parameters
+            .iter()
+            .map(|parameter| parameter.name.as_str());
+        table.write_record(FIRST.into_iter().chain(names).chain(LAST))?;
+        for row in rows {
+            let index = row.index.to_string();
+            let first = [index.as_str(), &row.folder].into_iter();
+            let values = row.values.iter().map(String::as_str);
+            let last = [row.standing.state.word(), &row.standing.reason];
+            table.write_record(first.chain(values).chain(last))?;
+        }
+        Ok(table.into_inner()?)
+    }
+
+    /// Reads the table of runs, as it was written.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`]; [`Error::Usage`] if a study has not written it.
+    pub fn read_table(&self, folder: &Path) -> Result<Vec<Row>, Error> {
+        let path = folder.join(TABLE);
+        let text = std::fs::read(&path).map_err(|source| Error::Unreadable {
+            path: path.clone(),
+            source,
+        })?;
+        let mut rows = Vec::new();
+        let n = self.parameters.len();
+        for record in csv::Reader::from_reader(text.as_slice()).records() {
+            let record = record.map_err(|error| not_ours(&path, &error))?;
+            let cells: Vec<&str> = record.iter().collect();
+            let index = cells.first().and_then(|index| index.parse().ok());
+            let (Some(index), true) = (index, cells.len() == FIRST.len() + n + LAST.len()) else {
+                let why = format!("row {} is not one of this study", rows.len() + 1);
+                return Err(not_ours(&path, &why));
+            };
+            rows.push(Row {
+                index,
+                folder: cells[1].to_owned(),
+                values: cells[2..2 + n].iter().map(ToString::to_string).collect(),
+                standing: Standing {
+                    state: State::of_word(cells[2 + n]),
+                    reason: cells[3 + n].to_owned(),
+                },
+            });
+        }
+        Ok(rows)
+    }
+
+    /// The runs as their folders show them.
+    ///
+    /// # Errors
+    /// As [`Record::read_table`].
+    pub fn runs(&self, folder: &Path) -> Result<Vec<Row>, Error> {
+        let mut rows = self.read_table(folder)?;
+        for row in &mut rows {
+            row.standing = standing(&folder.join(&row.folder));
+        }
+        Ok(rows)
+    }
+}
+
+fn not_ours(path: &Path, why: &dyn std::fmt::Display) -> Error {
+    Error::Usage(format!("{}: not written by a study: {why}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record() -> Record {
+        Record {
+            program: "pilum".to_owned(),
+            title: "t".to_owned(),
+            design: "grid".to_owned(),
+            is_grid: true,
+            texts: String::new(),
+            identity: String::new(),
+            parameters: vec![ParameterRecord {
+                name: "phi".to_owned(),
+                keys: vec!["laws.a.parameters.phi".to_owned()],
+                spread: "20, 30".to_owned(),
+            }],
+            outputs: vec![Output::last("tau")],
+        }
+    }
+
+    #[test]
+    fn a_table_reads_back_as_it_was_written() {
+        let folder = std::env::temp_dir().join(format!("pilum_table_{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let row = |index, state, reason: &str| Row {
+            index,
+            folder: format!("{index:05}"),
+            values: vec!["a, \"b\"\nc".to_owned()],
+            standing: Standing {
+                state,
+                reason: reason.to_owned(),
+            },
+        };
+        let rows = [
+            row(1, State::Planned, ""),
+            row(
+                2,
+                State::Failed("no equilibrium".to_owned()),
+                "why,\nand \"how\"",
+            ),
+            row(3, State::Done, ""),
+        ];
+        record().write_table(&folder, &rows).unwrap();
+        assert_eq!(record().read_table(&folder).unwrap(), rows);
+        std::fs::write(folder.join(TABLE), "index,folder\n1,2\n").unwrap();
+        assert!(record().read_table(&folder).is_err());
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_run_that_nobody_holds_is_lost() {
+        let folder = std::env::temp_dir().join(format!("pilum_held_{}", std::process::id()));
+        assert_eq!(standing(&folder).state, State::Planned);
+        let mut held = Held::take(&folder).unwrap().unwrap();
+        held.begin("x").unwrap();
+        assert_eq!(standing(&folder).state, State::Running);
+        assert!(Held::take(&folder).unwrap().is_none());
+        drop(held);
+        assert_eq!(standing(&folder).state, State::Lost);
+        let failed = Standing {
+            state: State::Failed("plugin trouble".to_owned()),
+            reason: "crashed".to_owned(),
+        };
+        assert!(end_run(&folder, &failed).unwrap());
+        assert_eq!(standing(&folder), failed);
+        // What has an end keeps it.
+        assert!(!end_run(&folder, &Standing::plain(State::Lost)).unwrap());
+        assert_eq!(identity_of_run(&folder).as_deref(), Some("x"));
+        forget_run(&folder).unwrap();
+        assert_eq!(standing(&folder).state, State::Planned);
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

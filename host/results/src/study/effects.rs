@@ -1,0 +1,176 @@
+//! What each parameter does to a number: its means at several levels of the parameter, over all values
+//! of the others.
+//!
+//! The values of a parameter are its levels if there are few; else its runs, in the order of their
+//! values, are divided into levels of as many runs each. The main effect of a level is the mean of the
+//! number over its runs. The share of the variance that the levels explain is
+//!
+//! - in a grid, where the others have the same values at every level, the sum of squares between levels
+//!   over the whole one, η²;
+//! - else Kelley's ε² = 1 − (n−1)/(n−k) · within/whole, which takes off what the scatter of n runs in k
+//!   levels makes up by chance; at least 0.
+//!
+//! Source: Kelley, T. L. (1935), "An unbiased correlation ratio measure", PNAS 21.
+
+use serde::Serialize;
+
+/// So many different values of a parameter are levels.
+const FEW: usize = 12;
+
+/// What a parameter does to a number.
+#[derive(Clone, Debug, Serialize)]
+pub struct Effect {
+    /// Number of the parameter.
+    pub parameter: usize,
+    /// Its levels, from the lowest.
+    pub levels: Vec<Level>,
+    /// Share of the variance that the levels explain, 0 to 1; `None` where nothing varies.
+    pub share: Option<f64>,
+}
+
+/// A level of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Level {
+    /// Mean of the parameter's values; the number of the level, from 0, where they are no numbers.
+    pub value: f64,
+    /// Its runs.
+    pub runs: usize,
+    /// Mean of the number.
+    pub mean: f64,
+}
+
+impl Effect {
+    /// How far the means of the levels lie apart.
+    pub fn range(&self) -> f64 {
+        let means = || self.levels.iter().map(|level| level.mean);
+        means().fold(f64::MIN, f64::max) - means().fold(f64::MAX, f64::min)
+    }
+}
+
+/// What every parameter does to a number of the runs, those first that do most. `parameters`: values by
+/// parameter and run, texts as the number of the text; `numbers` by run, `None` where a run has none.
+pub fn effects(parameters: &[Vec<f64>], numbers: &[Option<f64>], is_grid: bool) -> Vec<Effect> {
+    let mut effects: Vec<Effect> = (0..)
+        .zip(parameters)
+        .filter_map(|(parameter, values)| {
+            let runs = values.iter().zip(numbers);
+            let runs = runs.filter_map(|(value, number)| Some((*value, (*number)?)));
+            let mut runs: Vec<(f64, f64)> = runs.collect();
+            runs.sort_by(|a, b| a.0.total_cmp(&b.0));
+            (!runs.is_empty()).then(|| effect(parameter, &runs, is_grid))
+        })
+        .collect();
+    effects.sort_by(|a, b| b.range().total_cmp(&a.range()));
+    effects
+}
+
+/// Of runs in the order of the parameter's values.
+fn effect(parameter: usize, runs: &[(f64, f64)], is_grid: bool) -> Effect {
+    let n = runs.len();
+    let by_value: Vec<&[(f64, f64)]> = runs
+        .chunk_by(|a, b| a.0.to_bits() == b.0.to_bits())
+        .collect();
+    let groups = if by_value.len() <= FEW {
+        by_value
+    } else {
+        let k = ((n as f64).sqrt().round() as usize).clamp(2, 10);
+        (0..k).map(|i| &runs[i * n / k..(i + 1) * n / k]).collect()
+    };
+    let mean = |runs: &[(f64, f64)], of: fn(&(f64, f64)) -> f64| {
+        runs.iter().map(of).sum::<f64>() / runs.len() as f64
+    };
+    let levels: Vec<Level> = groups
+        .iter()
+        .map(|runs| Level {
+            value: mean(runs, |run| run.0),
+            runs: runs.len(),
+            mean: mean(runs, |run| run.1),
+        })
+        .collect();
+    let whole_mean = mean(runs, |run| run.1);
+    let whole: f64 = runs.iter().map(|run| (run.1 - whole_mean).powi(2)).sum();
+    let with_levels = groups.iter().zip(&levels);
+    let within: f64 = with_levels
+        .flat_map(|(runs, level)| runs.iter().map(|run| (run.1 - level.mean).powi(2)))
+        .sum();
+    let k = levels.len();
+    // Round-off is no scatter.
+    let scale = runs
+        .iter()
+        .fold(0.0, |most: f64, run| most.max(run.1.abs()));
+    let varies = whole > n as f64 * (1e-12 * scale).powi(2);
+    let share = if !varies {
+        None
+    } else if is_grid {
+        Some(1.0 - within / whole)
+    } else {
+        let by_chance = || (n as f64 - 1.0) / (n - k) as f64;
+        (n > k).then(|| (1.0 - by_chance() * within / whole).max(0.0))
+    };
+    Effect {
+        parameter,
+        levels,
+        share,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// y = 3 a + 2 b² on a ∈ {0, 1, 2}, b ∈ {−1, 0, 1, 2}: means over the other parameter in closed form.
+    #[test]
+    fn main_effects_of_a_grid_are_those_of_the_closed_form() {
+        let (mut a, mut b, mut y) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..3 {
+            for j in -1..3 {
+                let (x, z) = (f64::from(i), f64::from(j));
+                a.push(x);
+                b.push(z);
+                y.push(Some(3.0 * x + 2.0 * z * z));
+            }
+        }
+        let found = effects(&[a, b], &y, true);
+        // Mean of 2b² is 2 · 6/4 = 3, that of 3a is 3.
+        let of = |parameter: usize| found.iter().find(|e| e.parameter == parameter).unwrap();
+        let means =
+            |effect: &Effect| -> Vec<f64> { effect.levels.iter().map(|l| l.mean).collect() };
+        assert_eq!(means(of(0)), [3.0, 6.0, 9.0]);
+        assert_eq!(means(of(1)), [5.0, 3.0, 5.0, 11.0]);
+        // b does more: its range is 8, that of a 6.
+        assert_eq!(found[0].parameter, 1);
+        assert_eq!((found[0].range(), found[1].range()), (8.0, 6.0));
+        // Variances: of 3a 9 · 2/3 = 6; of 2b² 4 · (18/4 − (6/4)²) = 9. They add up.
+        assert!((of(0).share.unwrap() - 6.0 / 15.0).abs() < 1e-12);
+        assert!((of(1).share.unwrap() - 9.0 / 15.0).abs() < 1e-12);
+    }
+
+    /// Runs that are no grid: a parameter that does nothing explains nothing, but for chance.
+    #[test]
+    fn scatter_is_no_effect() {
+        let n = 1000;
+        let fraction = |x: f64| x - x.floor();
+        let golden = |i: usize, by: f64| fraction(i as f64 * by);
+        let a: Vec<f64> = (0..n).map(|i| golden(i, 0.754_877_666_246_693)).collect();
+        let b: Vec<f64> = (0..n).map(|i| golden(i, 0.569_840_290_998_053)).collect();
+        let y: Vec<Option<f64>> = a.iter().map(|a| Some(5.0 * a)).collect();
+        let found = effects(&[a, b], &y, false);
+        assert_eq!(found[0].parameter, 0);
+        assert_eq!(found[0].levels.len(), 10);
+        // Ten levels of a straight line leave (1/10)² of its variance inside them.
+        assert!((found[0].share.unwrap() - 0.99).abs() < 2e-3, "{found:?}");
+        assert!(found[1].share.unwrap() < 0.01, "{found:?}");
+        // Means at the lowest and highest tenth: 5 · 0.05 and 5 · 0.95.
+        let levels = &found[0].levels;
+        assert!((levels[0].mean - 0.25).abs() < 0.02 && (levels[9].mean - 4.75).abs() < 0.02);
+    }
+
+    #[test]
+    fn runs_without_a_number_do_not_count_and_a_constant_has_no_share() {
+        let found = effects(&[vec![1.0, 2.0, 3.0]], &[Some(7.0), None, Some(7.0)], true);
+        let levels: Vec<(f64, usize)> = found[0].levels.iter().map(|l| (l.value, l.runs)).collect();
+        assert_eq!(levels, [(1.0, 1), (3.0, 1)]);
+        assert_eq!(found[0].share, None);
+        assert!(effects(&[vec![1.0]], &[None], true).is_empty());
+    }
+}

@@ -1,0 +1,304 @@
+//! Many runs of one case: `pilum study`.
+//!
+//! A [`Plan`] is the study with the values of all its runs. [`Plan::prepare`] checks it and writes the
+//! table of runs; [`carry_out`] starts a process for each run, so many at a time; [`run_one`] is what
+//! such a process does, or one that whatever else distributes work has started. What was done stands in
+//! the folders of the runs, so that any of these processes may be killed at any time.
+
+mod carry_out;
+mod design;
+mod one;
+mod sobol;
+
+pub use carry_out::{Event, Jobs, carry_out};
+pub use one::{Once, follow, mend, run_one, stop_of_worker};
+
+use crate::Error;
+use crate::run::ready;
+use input::study::{Method, Parameter, Spread};
+use input::{Case, Study};
+use law::{Opener, hexadecimal_sha256};
+use mechanics::Simulation;
+use results::study::{
+    ParameterRecord, Record, Row, State, forget_run, identity_of_run, is_study, standing,
+};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use toml::Value;
+
+/// A study with the values of its runs, and the folder of its results.
+#[derive(Debug)]
+pub struct Plan {
+    study: Study,
+    rows: Vec<Vec<Value>>,
+    folder: PathBuf,
+    opener: Opener,
+}
+
+impl Plan {
+    /// Of a study file; results go to `out`, or to `results/<study>`.
+    ///
+    /// # Errors
+    /// Bad input, at its place in the file.
+    pub fn of(file: &Path, out: Option<&Path>, opener: &Opener) -> Result<Self, Error> {
+        let study = Study::load(file)?;
+        let folder = match out {
+            Some(out) => out.to_owned(),
+            None => Path::new("results").join(study.name()),
+        };
+        Ok(Self {
+            rows: design::rows(&study)?,
+            study,
+            folder,
+            opener: opener.clone(),
+        })
+    }
+
+    /// How many runs there are.
+    pub fn n_runs(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Folder of the results.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What should be known of the plan before it is carried out.
+    pub fn warnings(&self) -> Vec<String> {
+        let n = self.rows.len();
+        let is_even = self.study.file.method != Method::Sobol || n.is_power_of_two();
+        let below = n.next_power_of_two() / 2;
+        let warning = (!is_even).then(|| {
+            format!(
+                "the points of Sobol' are even for 2, 4, 8, … runs: rather {below} or {} than {n}",
+                2 * below
+            )
+        });
+        warning.into_iter().collect()
+    }
+
+    /// The values of a run.
+    fn values(&self, index: usize) -> Result<&[Value], Error> {
+        let row = index.checked_sub(1).and_then(|row| self.rows.get(row));
+        row.map(Vec::as_slice).ok_or_else(|| {
+            let n = self.rows.len();
+            Error::usage(format!(
+                "there is no run {index}: the study has runs 1 to {n}"
+            ))
+        })
+    }
+
+    /// The case of a run, as it is carried out.
+    fn case(&self, values: &[Value]) -> Result<Case, Error> {
+        let mut case = self.study.case(&self.opener, values)?;
+        if !self.study.file.reports {
+            case.file.figures.clear();
+        }
+        Ok(case)
+    }
+
+    /// What the texts of study and case are, with the program.
+    fn texts(&self, case: &Case) -> String {
+        let parts = [
+            env!("CARGO_PKG_VERSION"),
+            self.study.source.text(),
+            case.source.text_of_files(),
+        ];
+        hexadecimal_sha256(parts.join("\n\0\n").as_bytes())
+    }
+
+    /// Checks the values of all parameters, as far as that can be done without running anything: every
+    /// value that is listed is read, and the smallest and the largest number of each parameter, and what is
+    /// no number, are tried in a case with the first run's values of the others. Returns the record of the
+    /// study.
+    ///
+    /// # Errors
+    /// Bad input, at its place in the study or case file; trouble with a library.
+    pub fn check(&self) -> Result<Record, Error> {
+        let first = self.values(1)?;
+        let case = self.case(first)?;
+        let placed = |error: Error| self.study.placed(error, first);
+        let of_first = ready(&case).map_err(placed)?;
+        let mut libraries: BTreeSet<String> = of_first.libraries().collect();
+        let problem = of_first.into_problem();
+        let phases: Vec<String> = problem
+            .phases
+            .iter()
+            .map(|phase| phase.name.clone())
+            .collect();
+        let simulation = Simulation::new(problem).map_err(|error| placed(case.place(error)))?;
+        let wanted = case.wanted(&simulation).map_err(placed)?;
+        let columns: Vec<&str> = wanted.columns().collect();
+        let phases: Vec<&str> = phases.iter().map(String::as_str).collect();
+        let outputs = self.study.outputs(&columns, &phases)?;
+        drop(simulation);
+        for (number, parameter) in self.study.parameters.iter().enumerate() {
+            let with = |value: &Value| {
+                let mut values = first.to_vec();
+                values[number] = value.clone();
+                values
+            };
+            if let Spread::Values(values) = &parameter.spread {
+                for value in values {
+                    self.case(&with(value))?;
+                }
+            }
+            for value in design::extremes(parameter) {
+                let values = with(&value);
+                let case = self.case(&values)?;
+                let checked = ready(&case).and_then(|ready| {
+                    libraries.extend(ready.libraries());
+                    let simulation = Simulation::new(ready.into_problem());
+                    let simulation = simulation.map_err(|error| case.place(error))?;
+                    case.wanted(&simulation).map(|_| ())
+                });
+                checked.map_err(|error| {
+                    let hint = format!("in a run with {} = {value}", parameter.name);
+                    self.study.placed(error, &values).with_hint(&hint)
+                })?;
+            }
+        }
+        let texts = self.texts(&case);
+        let mut identity = texts.clone();
+        identity.extend(libraries);
+        let title = match self.study.file.title.as_str() {
+            "" => self.study.name(),
+            title => title.to_owned(),
+        };
+        Ok(Record {
+            program: format!("pilum {}", env!("CARGO_PKG_VERSION")),
+            title,
+            design: self.design(),
+            is_grid: self.study.file.method == Method::Grid,
+            texts,
+            identity: hexadecimal_sha256(identity.as_bytes()),
+            parameters: self.study.parameters.iter().map(described).collect(),
+            outputs,
+        })
+    }
+
+    /// Method and seed in words.
+    fn design(&self) -> String {
+        let method = match self.study.file.method {
+            Method::Grid => "grid",
+            Method::List => "list",
+            Method::LatinHypercube => "Latin hypercube",
+            Method::Sobol => "points of Sobol'",
+        };
+        match &self.study.file.seed {
+            Some(seed) => format!("{method}, seed {}", seed.get_ref()),
+            None => method.to_owned(),
+        }
+    }
+
+    /// Writes the record of the study, which [`Plan::check`] returned, and the table of its runs; whoever
+    /// calls holds the table. What was done of them in earlier calls is kept, unless they are to be carried
+    /// out `anew`.
+    ///
+    /// # Errors
+    /// Runs of another study in the folder; files that cannot be written.
+    pub fn prepare(&self, record: &Record, anew: bool) -> Result<Vec<Row>, Error> {
+        let indices = 1..=self.rows.len();
+        if anew {
+            for index in indices.clone() {
+                forget_run(&self.folder.join(folder_of_run(index)))?;
+            }
+        } else {
+            let is_same = is_study(&self.folder)
+                && Record::read(&self.folder).is_ok_and(|old| old.identity == record.identity);
+            if !is_same {
+                indices
+                    .clone()
+                    .try_for_each(|index| self.check_run(index))?;
+            }
+        }
+        let rows: Vec<Row> = indices.map(|index| self.row(index)).collect();
+        record.write(&self.folder)?;
+        record.write_table(&self.folder, &rows)?;
+        Ok(rows)
+    }
+
+    /// The row of a run in the table, as its folder has it.
+    fn row(&self, index: usize) -> Row {
+        let folder = folder_of_run(index);
+        Row {
+            index,
+            values: self.rows[index - 1].iter().map(shown).collect(),
+            standing: standing(&self.folder.join(&folder)),
+            folder,
+        }
+    }
+
+    /// Refuses a folder that holds another run than this one.
+    fn check_run(&self, index: usize) -> Result<(), Error> {
+        let folder = self.folder.join(folder_of_run(index));
+        match identity_of_run(&folder) {
+            // It failed before it was known what it depends on.
+            Some(identity) if !identity.is_empty() => {
+                let case = self.case(self.values(index)?)?;
+                if ready(&case)?.identity() == identity {
+                    return Ok(());
+                }
+                Err(other_run(&folder))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What is said of a folder with another run.
+fn other_run(folder: &Path) -> Error {
+    Error::usage(format!(
+        "{}: it holds a run of another case, with other values, libraries or another version of the program: \
+         --out names another folder, --anew carries out all runs anew",
+        folder.display()
+    ))
+}
+
+/// The folder of a run inside that of the study.
+fn folder_of_run(index: usize) -> String {
+    format!("{index:05}")
+}
+
+/// A value in a table: a text without quotes.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn described(parameter: &Parameter) -> ParameterRecord {
+    let range = |what: &str, [from, to]: [f64; 2]| format!("{what} {from} … {to}");
+    let spread = match &parameter.spread {
+        Spread::Values(values) => {
+            let texts: Vec<String> = values.iter().take(8).map(shown).collect();
+            let more = if values.len() > 8 { ", …" } else { "" };
+            texts.join(", ") + more
+        }
+        Spread::Uniform(range_of) => range("uniform", *range_of),
+        Spread::LogUniform(range_of) => range("log-uniform", *range_of),
+        Spread::Normal(n) => {
+            let range = range("within", [n.min, n.max]);
+            format!(
+                "normal, mean {}, deviation {}, {range}",
+                n.mean, n.deviation
+            )
+        }
+    };
+    ParameterRecord {
+        name: parameter.name.clone(),
+        keys: parameter.keys.clone(),
+        spread,
+    }
+}
+
+/// Whether a run is to be carried out.
+fn is_wanted(state: &State, retry: bool) -> bool {
+    match state {
+        State::Planned | State::Lost | State::Interrupted => true,
+        State::Failed(_) => retry,
+        State::Done | State::Running => false,
+    }
+}

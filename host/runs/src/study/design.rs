@@ -1,0 +1,441 @@
+//! The points of a study: which values each run has.
+
+use super::sobol;
+use crate::Error;
+use input::Study;
+use input::study::{MOST_RUNS, Method, Parameter, Spread};
+use libm::erfc;
+use toml::Value;
+
+/// The values of the parameters, by run and parameter.
+///
+/// # Errors
+/// More runs than a study may have; more parameters than a sequence has dimensions.
+pub(super) fn rows(study: &Study) -> Result<Vec<Vec<Value>>, Error> {
+    let method = study.file.method;
+    let parameters = &study.parameters;
+    let runs = study.file.runs.as_ref().map_or(0, |runs| *runs.get_ref());
+    let seed = study.file.seed.as_ref().map(|seed| *seed.get_ref());
+    match method {
+        Method::Grid => grid(study),
+        Method::List => {
+            let columns: Vec<Vec<Value>> = parameters.iter().map(levels).collect();
+            let n = columns.first().map_or(0, Vec::len);
+            let row = |i: usize| columns.iter().map(|column| column[i].clone()).collect();
+            Ok((0..n).map(row).collect())
+        }
+        Method::Sobol if parameters.len() > sobol::MOST_DIMENSIONS => {
+            let message = format!(
+                "{} parameters: `sobol` has points for at most {}",
+                parameters.len(),
+                sobol::MOST_DIMENSIONS
+            );
+            Err(study.source.error(0..0, message).into())
+        }
+        Method::LatinHypercube | Method::Sobol => {
+            let columns: Vec<Vec<f64>> = (0..parameters.len())
+                .map(|dimension| {
+                    let mut random = Random::of(seed.unwrap_or(0), dimension);
+                    if method == Method::Sobol {
+                        let shift = seed.map_or(0, |_| (random.next() >> 32) as u32);
+                        sobol::coordinate(dimension, runs, shift)
+                    } else {
+                        stratified(runs, &mut random)
+                    }
+                })
+                .collect();
+            let with_columns = |i: usize| {
+                let with = parameters.iter().zip(&columns);
+                with.map(|(parameter, column)| value(parameter, column[i]))
+                    .collect()
+            };
+            Ok((0..runs).map(with_columns).collect())
+        }
+    }
+}
+
+/// All combinations; the last parameter varies fastest.
+fn grid(study: &Study) -> Result<Vec<Vec<Value>>, Error> {
+    let columns: Vec<Vec<Value>> = study.parameters.iter().map(levels).collect();
+    let n = columns.iter().try_fold(1_usize, |n, column| {
+        n.checked_mul(column.len()).filter(|&n| n <= MOST_RUNS)
+    });
+    let Some(n) = n else {
+        let counts: Vec<String> = columns
+            .iter()
+            .map(|column| column.len().to_string())
+            .collect();
+        let message = format!(
+            "the grid has {} runs, at most {MOST_RUNS} are possible",
+            counts.join(" × ")
+        );
+        return Err(study.source.error(0..0, message).into());
+    };
+    let row = |mut i: usize| {
+        let mut row: Vec<Value> = columns
+            .iter()
+            .rev()
+            .map(|column| {
+                let value = column[i % column.len()].clone();
+                i /= column.len();
+                value
+            })
+            .collect();
+        row.reverse();
+        row
+    };
+    Ok((0..n).map(row).collect())
+}
+
+/// The values that a parameter has in a grid or a list.
+fn levels(parameter: &Parameter) -> Vec<Value> {
+    if let Spread::Values(values) = &parameter.spread {
+        return values.clone();
+    }
+    let n = parameter.levels.unwrap_or(1);
+    // One level stands in the middle.
+    let share = |i: usize| {
+        if n == 1 {
+            0.5
+        } else {
+            i as f64 / (n - 1) as f64
+        }
+    };
+    let mut levels: Vec<Value> = (0..n)
+        .map(|i| {
+            number(
+                parameter,
+                quantile(&parameter.spread, share(i)).round_if(parameter.whole),
+            )
+        })
+        .collect();
+    levels.dedup();
+    levels
+}
+
+/// Values among which every value lies that a parameter may have: the smallest and largest number, and
+/// whatever is no number.
+pub(super) fn extremes(parameter: &Parameter) -> Vec<Value> {
+    let Spread::Values(values) = &parameter.spread else {
+        let ends = [0.0, 1.0].map(|share| quantile(&parameter.spread, share));
+        return ends
+            .into_iter()
+            .map(|end| number(parameter, end.round_if(parameter.whole)))
+            .collect();
+    };
+    let as_number = |value: &Value| match value {
+        Value::Float(number) => Some(*number),
+        Value::Integer(number) => Some(*number as f64),
+        _ => None,
+    };
+    let by_size = |a: &&Value, b: &&Value| {
+        as_number(a)
+            .unwrap_or(0.0)
+            .total_cmp(&as_number(b).unwrap_or(0.0))
+    };
+    let numbers = || values.iter().filter(|value| as_number(value).is_some());
+    let others = values.iter().filter(|value| as_number(value).is_none());
+    let ends = numbers()
+        .min_by(by_size)
+        .into_iter()
+        .chain(numbers().max_by(by_size));
+    let mut found: Vec<Value> = Vec::new();
+    for value in ends.chain(others) {
+        if !found.contains(value) {
+            found.push(value.clone());
+        }
+    }
+    found
+}
+
+/// The value at this share of the probability, 0 to 1 (1 excluded).
+fn value(parameter: &Parameter, share: f64) -> Value {
+    match &parameter.spread {
+        Spread::Values(values) => {
+            let number = (share * values.len() as f64) as usize;
+            values[number.min(values.len() - 1)].clone()
+        }
+        // Every whole number is as probable as the others, those at the ends, too.
+        Spread::Uniform([from, to]) if parameter.whole => {
+            let [from, to] = [from.ceil(), to.floor()];
+            let among = (from + share * (to - from + 1.0)).floor().min(to);
+            number(parameter, among)
+        }
+        spread => number(parameter, quantile(spread, share).round_if(parameter.whole)),
+    }
+}
+
+fn number(parameter: &Parameter, value: f64) -> Value {
+    if parameter.whole {
+        Value::Integer(value as i64)
+    } else {
+        Value::Float(value)
+    }
+}
+
+/// Rounding where whole numbers are wanted.
+trait Round {
+    fn round_if(self, whole: bool) -> Self;
+}
+
+impl Round for f64 {
+    fn round_if(self, whole: bool) -> Self {
+        if whole { self.round() } else { self }
+    }
+}
+
+/// The number below which this share of a distribution lies; both ends exactly.
+fn quantile(spread: &Spread, share: f64) -> f64 {
+    match spread {
+        Spread::Values(_) => f64::NAN,
+        Spread::Uniform([from, to]) => between(*from, *to, share),
+        Spread::LogUniform([from, to]) => {
+            let inside = (from.ln() + share * (to / from).ln()).exp();
+            match share {
+                0.0 => *from,
+                1.0 => *to,
+                _ => inside.clamp(*from, *to),
+            }
+        }
+        Spread::Normal(normal) => {
+            let standard = |x: f64| (x - normal.mean) / normal.deviation;
+            let (a, b) = (standard(normal.min), standard(normal.max));
+            match share {
+                0.0 => normal.min,
+                1.0 => normal.max,
+                _ => {
+                    let z = truncated_normal(a, b, share);
+                    (normal.mean + normal.deviation * z).clamp(normal.min, normal.max)
+                }
+            }
+        }
+    }
+}
+
+fn between(from: f64, to: f64, share: f64) -> f64 {
+    (from * (1.0 - share) + to * share).clamp(from, to)
+}
+
+/// Probability that a standard normal number lies between two.
+fn probability(a: f64, b: f64) -> f64 {
+    let root = std::f64::consts::SQRT_2;
+    // On the side where both tails are small, so that no digits cancel.
+    if a + b < 0.0 {
+        0.5 * (erfc(-b / root) - erfc(-a / root))
+    } else {
+        0.5 * (erfc(a / root) - erfc(b / root))
+    }
+}
+
+/// The number below which this share of a standard normal distribution between a and b lies, by bisection.
+fn truncated_normal(a: f64, b: f64, share: f64) -> f64 {
+    let whole = probability(a, b);
+    let (mut low, mut high) = (a, b);
+    if whole <= 0.0 {
+        // So far out that nothing of it is left in a double: evenly.
+        return between(a, b, share);
+    }
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return middle;
+        }
+        if probability(a, middle) < share * whole {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+}
+
+/// One number in each of n equal parts of 0 to 1, in random order.
+fn stratified(n: usize, random: &mut Random) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..n).collect();
+    for i in (1..n).rev() {
+        order.swap(i, random.below(i + 1));
+    }
+    let inside = |part: usize| {
+        let x = (part as f64 + random.fraction()) / n as f64;
+        // Rounding must not carry it into the next part.
+        x.min(((part + 1) as f64 / n as f64).next_down())
+    };
+    order.into_iter().map(inside).collect()
+}
+
+/// SplitMix64 (G. L. Steele, D. Lea & C. H. Flood, OOPSLA 2014): the same numbers everywhere and for ever.
+struct Random(u64);
+
+impl Random {
+    /// Numbers of their own for each dimension: one more parameter leaves those of the others alone.
+    fn of(seed: u64, dimension: usize) -> Self {
+        let mut seeds = Self(seed);
+        for _ in 0..dimension {
+            seeds.next();
+        }
+        Self(seeds.next())
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// At least 0 and below 1.
+    fn fraction(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / 2_f64.powi(53)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        ((u128::from(self.next()) * n as u128) >> 64) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use input::study::NormalInput;
+    use text::Source;
+
+    fn study(text: &str) -> Study {
+        Study::of(Source::new(
+            "study.toml",
+            format!("case = \"case.toml\"\n{text}"),
+        ))
+        .unwrap()
+    }
+
+    fn numbers(rows: &[Vec<Value>], parameter: usize) -> Vec<f64> {
+        let number = |row: &Vec<Value>| match &row[parameter] {
+            Value::Float(number) => *number,
+            Value::Integer(number) => *number as f64,
+            other => panic!("{other}"),
+        };
+        rows.iter().map(number).collect()
+    }
+
+    /// The first numbers of the reference implementation (S. Vigna) from the seed 1234567.
+    #[test]
+    fn random_numbers_are_the_published_ones() {
+        let mut random = Random(1_234_567);
+        let published = [
+            6_457_827_717_110_365_317,
+            3_203_168_211_198_807_973,
+            9_817_491_932_198_370_423,
+            4_593_380_528_125_082_431,
+            16_408_922_859_458_223_821,
+        ];
+        assert_eq!(std::array::from_fn(|_| random.next()), published);
+    }
+
+    #[test]
+    fn a_grid_has_all_combinations() {
+        let study = study(
+            "method = \"grid\"\n\
+             [[parameter]]\nkey = \"a\"\nvalues = [\"x\", \"y\"]\n\
+             [[parameter]]\nkey = \"b\"\nuniform = [0.0, 1.0]\nlevels = 3\n\
+             [[parameter]]\nkey = \"c\"\nlog_uniform = [1.0, 100.0]\nlevels = 3\nwhole = true\n",
+        );
+        let rows = rows(&study).unwrap();
+        assert_eq!(rows.len(), 18);
+        let texts: Vec<&str> = rows.iter().map(|row| row[0].as_str().unwrap()).collect();
+        assert_eq!(texts[..9], ["x"; 9]);
+        assert_eq!(numbers(&rows, 1)[..4], [0.0, 0.0, 0.0, 0.5]);
+        assert_eq!(numbers(&rows, 2)[..4], [1.0, 10.0, 100.0, 1.0]);
+    }
+
+    #[test]
+    fn a_hypercube_has_one_run_in_each_part_whatever_the_seed() {
+        for (n, seed) in [(1, 0), (7, 3), (100, 42), (1000, u64::MAX >> 1)] {
+            let text = format!(
+                "method = \"latin_hypercube\"\nruns = {n}\nseed = {seed}\n\
+                 [[parameter]]\nkey = \"a\"\nuniform = [2.0, 4.0]\n\
+                 [[parameter]]\nkey = \"b\"\nnormal = {{ mean = 1.0, deviation = 2.0, min = 0.0, max = 3.0 }}\n"
+            );
+            let study = study(&text);
+            let found = rows(&study).unwrap();
+            assert_eq!(found, rows(&study).unwrap());
+            for (parameter, share) in [
+                (0, (|x| (x - 2.0) / 2.0) as fn(f64) -> f64),
+                (1, |x| {
+                    probability(-0.5, (x - 1.0) / 2.0) / probability(-0.5, 1.0)
+                }),
+            ] {
+                let mut seen = vec![0; n];
+                for x in numbers(&found, parameter) {
+                    seen[(share(x) * n as f64).min(n as f64 - 1.0) as usize] += 1;
+                }
+                assert!(
+                    seen.iter().all(|&count| count == 1),
+                    "{n} {seed} {parameter}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn seeds_differ_and_parameters_keep_their_numbers() {
+        let with = |seed: &str, more: &str, method: &str| {
+            let text = format!(
+                "method = \"{method}\"\nruns = 16\n{seed}\n\
+                 [[parameter]]\nkey = \"a\"\nuniform = [0.0, 1.0]\n{more}"
+            );
+            numbers(&rows(&study(&text)).unwrap(), 0)
+        };
+        let more = "[[parameter]]\nkey = \"b\"\nuniform = [0.0, 1.0]\n";
+        for method in ["latin_hypercube", "sobol"] {
+            assert_eq!(with("seed = 1", "", method), with("seed = 1", more, method));
+            assert_ne!(with("seed = 1", "", method), with("seed = 2", "", method));
+        }
+        assert_eq!(with("", "", "sobol")[..4], [0.0, 0.5, 0.75, 0.25]);
+    }
+
+    #[test]
+    fn whole_numbers_are_equally_probable() {
+        let study = study(
+            "method = \"sobol\"\nruns = 256\n[[parameter]]\nkey = \"a\"\nuniform = [3, 6]\nwhole = true\n",
+        );
+        let found = numbers(&rows(&study).unwrap(), 0);
+        for whole in 3..=6 {
+            let count = found.iter().filter(|x| **x as i32 == whole).count();
+            assert_eq!(count, 64, "{whole}");
+        }
+    }
+
+    /// Φ⁻¹ from tables: 0.975 at 1.959963984540054, 0.9999 at 3.719016485455709; the tail beyond 5 has
+    /// its median where half of its 2.866515719e-7 lies.
+    #[test]
+    fn normal_quantiles_are_those_of_tables() {
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * b.abs(), "{a} {b}");
+        near(truncated_normal(-38.0, 38.0, 0.975), 1.959_963_984_540_054);
+        near(truncated_normal(-38.0, 38.0, 0.9999), 3.719_016_485_455_709);
+        near(truncated_normal(-38.0, 38.0, 0.025), -1.959_963_984_540_054);
+        let median = truncated_normal(5.0, 38.0, 0.5);
+        assert!((erfc(median / 2_f64.sqrt()) / erfc(5.0 / 2_f64.sqrt()) - 0.5).abs() < 1e-12);
+        let cut = NormalInput {
+            mean: 30.0,
+            deviation: 2.0,
+            min: 25.0,
+            max: 35.0,
+        };
+        let of = |share| quantile(&Spread::Normal(cut), share);
+        assert_eq!(
+            [of(0.0), of(1.0)].map(f64::to_bits),
+            [25.0_f64, 35.0].map(f64::to_bits)
+        );
+        assert!((of(0.5) - 30.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn extremes_hold_all_values() {
+        let study = study(
+            "method = \"list\"\n[[parameter]]\nkey = \"a\"\nvalues = [3, 1.5, 2, 3]\n\
+             [[parameter]]\nkey = \"b\"\nvalues = [\"x\", \"y\", \"x\", \"y\"]\n",
+        );
+        let of = |parameter: usize| extremes(&study.parameters[parameter]);
+        assert_eq!(of(0), [Value::Float(1.5), Value::Integer(3)]);
+        assert_eq!(of(1), [Value::from("x"), Value::from("y")]);
+    }
+}

@@ -1,0 +1,223 @@
+//! `pilum study`: many runs of one case, or one of them.
+
+use super::cases::write_report;
+use crate::say::{print, say};
+use indicatif::{ProgressBar, ProgressStyle};
+use input::Error;
+use law::{Opener, Stop};
+use mechanics::Place;
+use results::study::{Row, State};
+use runs::run::Observer;
+use runs::study::{Event, Jobs, Once, Plan, carry_out, run_one, stop_of_worker};
+use std::collections::BTreeMap;
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What of a study is asked for.
+pub(super) enum What {
+    /// The table of runs alone.
+    Plan,
+    /// One run.
+    One(usize),
+    /// All that are not done; those that failed, too.
+    All { jobs: Option<u16>, retry: bool },
+}
+
+/// How it is carried out.
+pub(super) struct How {
+    pub(super) anew: bool,
+    /// Seconds between checkpoints.
+    pub(super) checkpoint: f64,
+    pub(super) threads: Option<u16>,
+}
+
+pub(super) fn study(
+    opener: &Opener,
+    (file, out): (&Path, Option<&Path>),
+    what: &What,
+    how: &How,
+    stop: Stop,
+) -> Result<(), Error> {
+    let plan = Plan::of(file, out, opener)?;
+    match what {
+        What::Plan => {
+            say_warnings(&plan);
+            let record = plan.check()?;
+            let Some(_table) = results::study::take_table(plan.folder())? else {
+                let message = format!(
+                    "{}: another process carries out this study",
+                    plan.folder().display()
+                );
+                return Err(Error::usage(message));
+            };
+            plan.prepare(&record, how.anew)?;
+            let table = plan.folder().join(results::study::TABLE);
+            print(&format!(
+                "{} runs\ntable in {}\n",
+                plan.n_runs(),
+                table.display()
+            ))
+        }
+        What::One(index) => one(&plan, *index, how, stop),
+        What::All { jobs, retry } => {
+            say_warnings(&plan);
+            let jobs = Jobs {
+                at_a_time: jobs.map_or_else(processors, usize::from),
+                retry: *retry,
+                anew: how.anew,
+                arguments: arguments(opener, how),
+            };
+            all(&plan, &jobs, &stop)
+        }
+    }
+}
+
+fn say_warnings(plan: &Plan) {
+    for warning in plan.warnings() {
+        say!("warning: {warning}");
+    }
+}
+
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// What the process of each run is told.
+fn arguments(opener: &Opener, how: &How) -> Vec<std::ffi::OsString> {
+    let trust = opener.trust();
+    let mut arguments = vec![format!("--checkpoint={}", how.checkpoint)];
+    arguments.extend(how.threads.map(|n| format!("--threads={n}")));
+    if !trust.probe {
+        arguments.push("--no-probe".to_owned());
+    }
+    let isolate = trust.isolate.map(|limit| limit.as_secs_f64());
+    arguments.extend(isolate.map(|limit| format!("--isolate={limit}")));
+    arguments.into_iter().map(Into::into).collect()
+}
+
+/// Of one run among many only what should be known is said.
+struct Quiet(Stop);
+
+impl Observer for Quiet {
+    fn phase(&mut self, _name: &str, _increments: usize) {}
+
+    fn increment(&mut self, _place: &Place, _of: usize, _iterations: usize) {}
+
+    fn cut_back(&mut self, _place: &Place, _reason: &str) {}
+
+    fn warning(&mut self, message: &str) {
+        say!("warning: {message}");
+    }
+
+    fn stop(&self) -> Stop {
+        self.0.clone()
+    }
+}
+
+fn one(plan: &Plan, index: usize, how: &How, stop: Stop) -> Result<(), Error> {
+    let mut quiet = Quiet(stop_of_worker(stop));
+    let once = Once {
+        anew: how.anew,
+        checkpoints: Duration::from_secs_f64(how.checkpoint),
+    };
+    let run = run_one(plan, index, once, &mut quiet, &mut |_| {})?;
+    let what = if run { "done" } else { "done already" };
+    print(&format!("run {index}: {what}\n"))
+}
+
+fn all(plan: &Plan, jobs: &Jobs, stop: &Stop) -> Result<(), Error> {
+    let mut shown = Shown::default();
+    let rows = carry_out(plan, jobs, stop, &mut |event| shown.event(event));
+    shown.finish();
+    let rows = rows?;
+    print(&counts(&rows))?;
+    let folder = plan.folder();
+    print(&format!(
+        "table in {}\n",
+        folder.join(results::study::TABLE).display()
+    ))?;
+    write_report(&[PathBuf::from(folder)], None)?;
+    let unfinished = rows.iter().filter(|row| !row.standing.state.is_final());
+    match unfinished.count() {
+        0 => Ok(()),
+        n => Err(Error::usage(format!(
+            "{n} of {} runs have no outcome, see the reasons in the table; the same command goes on with them",
+            rows.len()
+        ))),
+    }
+}
+
+/// How many runs came to what.
+fn counts(rows: &[Row]) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for row in rows {
+        *counts.entry(row.standing.state.word()).or_default() += 1;
+    }
+    let done = counts.remove(State::Done.word()).unwrap_or(0);
+    let others = counts.iter().map(|(word, n)| format!(", {n} {word}"));
+    format!(
+        "{} runs: {done} done{}\n",
+        rows.len(),
+        others.collect::<String>()
+    )
+}
+
+/// A bar on a terminal, plain lines elsewhere.
+#[derive(Default)]
+struct Shown {
+    bar: Option<ProgressBar>,
+    of: usize,
+    ended: usize,
+}
+
+impl Shown {
+    fn event(&mut self, event: &Event) {
+        match event {
+            Event::Planned { of, left } => {
+                self.of = *of;
+                self.ended = of - left;
+                if self.ended > 0 {
+                    say!("{of} runs, {} of them done already", self.ended);
+                } else {
+                    say!("{of} runs");
+                }
+                if std::io::stderr().is_terminal() {
+                    let bar = ProgressBar::new(*of as u64).with_position(self.ended as u64);
+                    if let Ok(style) =
+                        ProgressStyle::with_template("{bar:32} {pos}/{len}  {msg}  {eta} left")
+                    {
+                        bar.set_style(style);
+                    }
+                    bar.reset_eta();
+                    bar.tick();
+                    self.bar = Some(bar);
+                }
+            }
+            Event::Ended { index, standing } => {
+                self.ended += 1;
+                let word = standing.state.word();
+                let why = standing.reason.lines().next().unwrap_or_default();
+                let line = match why {
+                    "" => format!("run {index}: {word}"),
+                    why => format!("run {index}: {word}: {why}"),
+                };
+                match &self.bar {
+                    Some(bar) => {
+                        bar.inc(1);
+                        if standing.state != State::Done {
+                            bar.println(line);
+                        }
+                    }
+                    None => say!("{line} ({} of {})", self.ended, self.of),
+                }
+            }
+        }
+    }
+
+    fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,626 @@
+//! `pilum study`: many runs of one case, whatever becomes of the processes that carry them out.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, Outcome, Place, edited};
+use crate::results::sliding;
+use crate::troubled;
+use std::collections::BTreeMap;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Three by two runs.
+const STUDY: &str = r#"title = "Strength of the layer"
+case = "case.toml"
+method = "grid"
+
+[[parameter]]
+name = "cohesion"
+key = "laws.joint.parameters.cohesion"
+values = [2.0, 5.0, 10.0]
+
+[[parameter]]
+name = "push"
+key = "phase.push.displacement.1.x"
+uniform = [1e-5, 2e-5]
+levels = 2
+
+[outputs]
+tau_max = { probe = "tau", take = "max" }
+tau_at = { probe = "tau", at = { probe = "settlement", value = 1.0 } }
+first = { probe = "tau", take = "min", phase = "push" }
+"#;
+
+fn place(study: &str) -> Place {
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    place.write("study.toml", study);
+    place
+}
+
+/// The table of a study, as `pilum table` writes it.
+fn table(place: &Place) -> String {
+    let outcome = place.run(&["table", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    outcome.stdout
+}
+
+/// A column of a table whose cells have no commas.
+fn column<'t>(table: &'t str, name: &str) -> Vec<&'t str> {
+    let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    let at = header.iter().position(|cell| *cell == name);
+    let at = at.unwrap_or_else(|| panic!("no {name} in {header:?}"));
+    rows.map(|row| row[at]).collect()
+}
+
+fn study(place: &Place, more: &[&str]) -> Outcome {
+    place.run(&[&["study", "study.toml", "--out", "out"], more].concat())
+}
+
+fn done(outcome: &Outcome) {
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
+    let place = place(STUDY);
+    let outcome = study(&place, &["--jobs", "2"]);
+    done(&outcome);
+    assert!(
+        outcome.stdout.contains("6 runs: 6 done\n"),
+        "{}",
+        outcome.stdout
+    );
+    let runs = std::fs::read_to_string(place.path("out/runs.csv")).unwrap();
+    let expected = "index,folder,cohesion,push,state,reason\n\
+                    1,00001,2.0,0.00001,done,\n2,00002,2.0,0.00002,done,\n\
+                    3,00003,5.0,0.00001,done,\n4,00004,5.0,0.00002,done,\n\
+                    5,00005,10.0,0.00001,done,\n6,00006,10.0,0.00002,done,\n";
+    assert_eq!(
+        runs.replace("1e-5", "0.00001").replace("2e-5", "0.00002"),
+        expected
+    );
+    // A run of the study is the run of the case with these settings.
+    let alone = [
+        "run",
+        "case.toml",
+        "--out",
+        "alone",
+        "--set",
+        "laws.joint.parameters.cohesion=5.0",
+    ];
+    done(&place.run(&[&alone[..], &["--set", "phase.push.displacement.1.x=2e-5"]].concat()));
+    let history = |folder: &str| std::fs::read(place.path(folder).join("history.csv")).unwrap();
+    assert_eq!(history("alone"), history("out/00004"));
+    let table = table(&place);
+    assert_eq!(column(&table, "status"), ["done"; 6]);
+    let text = String::from_utf8(history("out/00004")).unwrap();
+    let taus: Vec<f64> = column(&text, "tau")
+        .iter()
+        .map(|t| t.parse().unwrap())
+        .collect();
+    let is = |name: &str, value: f64| {
+        let number: f64 = column(&table, name)[3].parse().unwrap();
+        assert_eq!(number.to_bits(), value.to_bits(), "{name}");
+    };
+    is("tau_max", taus.iter().copied().fold(f64::MIN, f64::max));
+    is("first", taus[2].min(taus[3]));
+    is("tau", taus[3]);
+    // Nothing is done twice.
+    let written = || {
+        std::fs::metadata(place.path("out/00004/history.csv"))
+            .unwrap()
+            .modified()
+            .unwrap()
+    };
+    let before = written();
+    let again = study(&place, &[]);
+    done(&again);
+    assert!(
+        again.stderr.contains("6 of them done already"),
+        "{}",
+        again.stderr
+    );
+    let one = study(&place, &["--run", "4"]);
+    assert!(one.stdout.contains("run 4: done already"), "{}", one.stdout);
+    assert_eq!(written(), before);
+    done(&study(&place, &["--run", "4", "--anew"]));
+    assert_ne!(written(), before);
+    assert_eq!(self::table(&place), table);
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains("6 of 6 runs done") && !report.contains("id=\"running\""));
+}
+
+#[test]
+fn a_longer_study_keeps_the_runs_that_are_done() {
+    let list = "case = \"case.toml\"\nmethod = \"list\"\n\
+                [[parameter]]\nkey = \"laws.joint.parameters.cohesion\"\nvalues = [2.0, 5.0]\n";
+    let place = place(list);
+    done(&study(&place, &[]));
+    place.write("study.toml", list.replace("5.0]", "5.0, 7.0]"));
+    let longer = study(&place, &[]);
+    done(&longer);
+    assert!(
+        longer.stderr.contains("3 runs, 2 of them done already"),
+        "{}",
+        longer.stderr
+    );
+    // Other values, or another case, are another study.
+    place.write("study.toml", list.replace("2.0,", "3.0,"));
+    for more in [&[][..], &["--plan"], &["--run", "1"]] {
+        let other = study(&place, more);
+        assert_eq!(other.code, Some(BAD_INPUT));
+        assert!(
+            other.says("out/00001: it holds a run of another case"),
+            "{}",
+            other.stderr
+        );
+    }
+    done(&study(&place, &["--anew"]));
+    assert_eq!(
+        column(&table(&place), "laws.joint.parameters.cohesion"),
+        ["3.0", "5.0"]
+    );
+}
+
+#[test]
+fn the_table_does_not_depend_on_who_carries_it_out() {
+    let sampled = STUDY
+        .replace(
+            "method = \"grid\"",
+            "method = \"latin_hypercube\"\nruns = 7\nseed = 3",
+        )
+        .replace("levels = 2\n", "");
+    let alone = place(&sampled);
+    done(&study(&alone, &["--jobs", "1"]));
+    let expected = table(&alone);
+    let several = place(&sampled);
+    done(&study(&several, &["--jobs", "4", "--threads", "2"]));
+    assert_eq!(table(&several), expected);
+    // Processes that know nothing of each other, and no plan.
+    let scattered = place(&sampled);
+    let mut children: Vec<Child> = (1..=7)
+        .map(|run| {
+            scattered.start(&[
+                "study",
+                "study.toml",
+                "--out",
+                "out",
+                "--run",
+                &run.to_string(),
+            ])
+        })
+        .collect();
+    for child in &mut children {
+        assert!(child.wait().unwrap().success());
+    }
+    assert_eq!(table(&scattered), expected);
+    let runs = std::fs::read_to_string(scattered.path("out/runs.csv")).unwrap();
+    assert_eq!(column(&runs, "state"), ["done"; 7]);
+    done(&scattered.run(&["report", "out"]));
+    assert!(scattered.path("out/report.html").is_file());
+}
+
+/// What is wrong, the edit of the study that makes it so, and what the message says; `^` marks the place.
+const MISTAKES: &[(&str, &str, &str, &str)] = &[
+    ("an unknown key", "title", "^titel", "unknown key `titel`"),
+    (
+        "no case",
+        "\"case.toml\"",
+        "^\"cases.toml\"",
+        "`case`: cannot read",
+    ),
+    ("no method", "\"grid\"", "^\"gird\"", "did you mean `grid`?"),
+    (
+        "runs of a grid",
+        "method = \"grid\"",
+        "method = \"grid\"\nruns = ^5",
+        "`runs`",
+    ),
+    (
+        "a seed of a grid",
+        "method = \"grid\"",
+        "method = \"grid\"\nseed = ^5",
+        "nothing is random",
+    ),
+    (
+        "points without a number",
+        "\"grid\"",
+        "\"sobol\"",
+        "missing key `runs`",
+    ),
+    (
+        "no levels",
+        "uniform = [1e-5, 2e-5]\nlevels = 2",
+        "uniform = ^[1e-5, 2e-5]",
+        "a grid needs `levels`",
+    ),
+    (
+        "levels of values",
+        "10.0]",
+        "10.0]\nlevels = ^3",
+        "`levels` is for distributions",
+    ),
+    (
+        "the ends exchanged",
+        "[1e-5, 2e-5]",
+        "^[2e-5, 1e-5]",
+        "is not below",
+    ),
+    (
+        "two kinds of values",
+        "levels = 2",
+        "levels = 2\nvalues = [1.0]",
+        "a parameter has one of them",
+    ),
+    ("no values", "[2.0, 5.0, 10.0]", "^[]", "there is none"),
+    (
+        "a key that leads nowhere",
+        "key = \"phase.push.",
+        "key = ^\"phase.pusch.",
+        "did you mean `push`?",
+    ),
+    (
+        "an unknown parameter",
+        "parameters.cohesion\"",
+        "parameters.cohesian\"",
+        "did you mean `cohesion`?",
+    ),
+    (
+        "a text for a number",
+        "5.0, 10.0]",
+        "5.0, ^\"ten\"]",
+        "expected a number",
+    ),
+    (
+        "out of the law's range",
+        "5.0, 10.0]",
+        "5.0, ^-10.0]",
+        "-10",
+    ),
+    (
+        "an unknown key of the case",
+        "laws.joint.parameters.cohesion",
+        "title2",
+        "unknown key `title2`",
+    ),
+    (
+        "one key twice",
+        "phase.push.displacement.1.x",
+        "laws.joint.parameters.cohesion",
+        "key of two parameters",
+    ),
+    (
+        "one name twice",
+        "name = \"push\"",
+        "name = ^\"cohesion\"",
+        "two parameters are called",
+    ),
+    (
+        "a name of the table's",
+        "name = \"push\"",
+        "name = ^\"state\"",
+        "no name for a parameter",
+    ),
+    (
+        "an unknown probe",
+        "probe = \"tau\", take",
+        "probe = ^\"tao\", take",
+        "did you mean `tau`?",
+    ),
+    (
+        "an unknown phase",
+        "phase = \"push\"",
+        "phase = ^\"pull\"",
+        "did you mean `push`?",
+    ),
+    (
+        "two ways to a number",
+        "probe = \"tau\", at = {",
+        "probe = \"tau\", take = ^\"max\", at = {",
+        "a number is one of both",
+    ),
+    (
+        "a variant",
+        "method",
+        "variant = ^\"a\"\nmethod",
+        "there is no variant `a`",
+    ),
+];
+
+#[test]
+fn mistakes_are_named_with_their_place_before_anything_runs() {
+    let mut complaints = Vec::new();
+    for (what, from, to, says) in MISTAKES {
+        assert!(STUDY.contains(from), "{from}");
+        let marked = STUDY.replacen(from, to, 1);
+        let place = place(&marked.replacen('^', "", 1));
+        let outcome = study(&place, &[]);
+        if let Some(at) = marked.find('^') {
+            let before = &marked[..at];
+            let line = before.matches('\n').count() + 1;
+            let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+            if !outcome.says(&format!("study.toml:{line}:{column}")) {
+                complaints.push(format!(
+                    "{what}: not at {line}:{column}: {}",
+                    outcome.stderr
+                ));
+            }
+        }
+        if outcome.code != Some(BAD_INPUT) || !outcome.says(says) {
+            complaints.push(format!("{what}: {:?}: {}", outcome.code, outcome.stderr));
+        }
+        if place.path("out").exists() {
+            complaints.push(format!("{what}: something was written"));
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+    let place = place(STUDY);
+    let outcome = study(&place, &["--run", "7"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    assert!(
+        outcome.says("there is no run 7: the study has runs 1 to 6"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+/// A block on a joint without dilatancy carries 40 of 100 kPa.
+#[test]
+fn runs_that_fail_are_rows_with_their_reason() {
+    let list = "case = \"case.toml\"\nmethod = \"list\"\n\
+                [[parameter]]\nname = \"load\"\nkey = \"phase.push.pressure.1.value\"\n\
+                values = [20.0, 100.0, 30.0]\n";
+    let place = Place::new();
+    place.write("case.toml", sliding());
+    place.write("study.toml", list);
+    let outcome = study(&place, &[]);
+    done(&outcome);
+    assert!(
+        outcome.stdout.contains("3 runs: 2 done, 1 no equilibrium"),
+        "{}",
+        outcome.stdout
+    );
+    let table = table(&place);
+    assert_eq!(column(&table, "status"), ["done", "no equilibrium", "done"]);
+    let reason = table.lines().nth(2).unwrap();
+    assert!(
+        reason.contains("phase `") && reason.contains("increment"),
+        "{reason}"
+    );
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains("1 run could not come to the end"));
+    // It is left alone, unless it is asked for.
+    let left = |more: &[&str]| study(&place, more).stderr;
+    assert!(left(&[]).contains("3 of them done already"));
+    assert!(left(&["--retry"]).contains("2 of them done already"));
+    assert_eq!(study(&place, &["--run", "2"]).code, Some(NO_EQUILIBRIUM));
+}
+
+/// A law that crashes the process is a row like any other.
+#[test]
+fn a_law_that_crashes_is_a_row_and_the_others_go_on() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    place.write("case.toml", troubled::case("segfault"));
+    place.write(
+        "study.toml",
+        "case = \"case.toml\"\nmethod = \"list\"\n[[parameter]]\nname = \"limit\"\n\
+         key = \"laws.joint.parameters.limit\"\nvalues = [1.0, 1e-6, 1.0]\n",
+    );
+    let outcome = study(&place, &[]);
+    done(&outcome);
+    let table = table(&place);
+    assert_eq!(
+        column(&table, "status"),
+        ["done", "plugin trouble", "done"],
+        "{table}"
+    );
+}
+
+/// The runs of a study that takes some seconds.
+const SLOW: &str = r#"case = "case.toml"
+method = "latin_hypercube"
+runs = 12
+seed = 5
+
+[[parameter]]
+name = "cohesion"
+key = "laws.joint.parameters.cohesion"
+uniform = [2.0, 10.0]
+
+[[parameter]]
+name = "friction"
+key = "laws.joint.parameters.friction_angle"
+normal = { mean = 30.0, deviation = 3.0, min = 20.0, max = 40.0 }
+"#;
+
+fn slow() -> Place {
+    let place = Place::new();
+    let text = edited(&[
+        ("increments = 2", "increments = 60"),
+        ("increments = 2\ndis", "increments = 60\ndis"),
+        ("x = 1e-5", "x = 1e-3"),
+    ]);
+    place.write("case.toml", text);
+    place.write("study.toml", SLOW);
+    place
+}
+
+const ARGUMENTS: [&str; 8] = [
+    "study",
+    "study.toml",
+    "--out",
+    "out",
+    "--jobs",
+    "2",
+    "--checkpoint",
+    "0",
+];
+
+/// States of the runs by their folders.
+fn states(place: &Place) -> BTreeMap<String, usize> {
+    let mut states = BTreeMap::new();
+    if place.path("out/runs.csv").exists() {
+        for status in column(&table(place), "status") {
+            *states.entry(status.to_owned()).or_default() += 1;
+        }
+    }
+    states
+}
+
+/// Descendants of a process, itself the first.
+fn family(pid: u32) -> Vec<u32> {
+    let mut found = vec![pid];
+    let mut at = 0;
+    while let Some(pid) = found.get(at) {
+        if let Ok(tasks) = std::fs::read_dir(format!("/proc/{pid}/task")) {
+            for task in tasks.flatten() {
+                let children = std::fs::read_to_string(task.path().join("children"));
+                let children = children.unwrap_or_default();
+                found.extend(
+                    children
+                        .split_whitespace()
+                        .filter_map(|pid| pid.parse::<u32>().ok()),
+                );
+            }
+        }
+        at += 1;
+    }
+    found
+}
+
+/// Whoever of the processes is killed, and whenever: nothing is lost, and nothing computed twice to
+/// another end.
+#[test]
+fn kills_lose_nothing() {
+    let undisturbed = slow();
+    let started = Instant::now();
+    done(&undisturbed.run(&ARGUMENTS));
+    let length = started.elapsed().as_secs_f64();
+    let expected = table(&undisturbed);
+    assert_eq!(column(&expected, "status"), ["done"; 12]);
+
+    let place = slow();
+    let mut on_the_way = 0;
+    for kill in 0..24_u32 {
+        let share = f64::from(kill.wrapping_mul(2_654_435_769)) / f64::from(u32::MAX);
+        let mut child = place.start(&ARGUMENTS);
+        std::thread::sleep(Duration::from_secs_f64(0.5 * share * length));
+        // The first one of the family, or any other of it.
+        let family = family(child.id());
+        let victim = family[if kill % 3 == 0 {
+            0
+        } else {
+            kill as usize % family.len()
+        }];
+        let _ = Command::new("kill")
+            .args(["-9", &victim.to_string()])
+            .stderr(Stdio::null())
+            .status();
+        if victim == child.id() {
+            child.wait().unwrap();
+        } else {
+            // What is left of the family goes on; then that is ended, too.
+            std::thread::sleep(Duration::from_secs_f64(0.1 * length));
+            child.kill().unwrap();
+            child.wait().unwrap();
+        }
+        let states = states(&place);
+        assert!(
+            states.keys().all(|state| !state.contains("trouble")),
+            "{states:?}"
+        );
+        let n_done = states.get("done").copied().unwrap_or(0);
+        on_the_way += usize::from((1..12).contains(&n_done));
+        if n_done == 12 {
+            wait_for_locks(&place);
+            std::fs::remove_dir_all(place.path("out")).unwrap();
+        }
+    }
+    assert!(
+        on_the_way >= 6,
+        "only {on_the_way} kills hit the study on its way"
+    );
+    wait_for_locks(&place);
+    done(&place.run(&ARGUMENTS));
+    assert_eq!(table(&place), expected);
+}
+
+/// Processes whose ancestors were killed may take a moment to follow them.
+fn wait_for_locks(place: &Place) {
+    let since = Instant::now();
+    while states(place).contains_key("running") {
+        assert!(since.elapsed() < Duration::from_secs(10));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    if let Ok(lock) = std::fs::File::open(place.path("out/.lock")) {
+        lock.lock().unwrap();
+    }
+}
+
+#[test]
+fn ctrl_c_stops_a_study_and_the_same_command_goes_on() {
+    let undisturbed = slow();
+    done(&undisturbed.run(&ARGUMENTS));
+    let expected = table(&undisturbed);
+
+    let place = slow();
+    let said = std::fs::File::create(place.path("said")).unwrap();
+    let mut command = place.command(&ARGUMENTS);
+    let mut child = command
+        .process_group(0)
+        .stdout(Stdio::null())
+        .stderr(said)
+        .spawn()
+        .unwrap();
+    let since = Instant::now();
+    let text = || std::fs::read_to_string(place.path("said")).unwrap();
+    while !text().contains("run ") {
+        assert!(since.elapsed() < Duration::from_mins(1), "{}", text());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // As a terminal does: to the whole group.
+    let group = format!("-{}", child.id());
+    assert!(
+        Command::new("kill")
+            .args(["-INT", "--", &group])
+            .status()
+            .unwrap()
+            .success()
+    );
+    let code = child.wait().unwrap().code();
+    assert_eq!(code, Some(130), "{}", text());
+    assert!(text().contains("have come to an end"), "{}", text());
+    let states = states(&place);
+    assert!(
+        !states.contains_key("running") && !states.contains_key("lost"),
+        "{states:?}"
+    );
+    assert!(states.get("done").copied().unwrap_or(0) < 12, "{states:?}");
+    done(&place.run(&ARGUMENTS));
+    assert_eq!(table(&place), expected);
+}
+
+#[test]
+fn two_processes_do_not_carry_out_one_study() {
+    let place = slow();
+    let mut first = place.start(&ARGUMENTS);
+    let since = Instant::now();
+    while !place.path("out/runs.csv").exists() {
+        assert!(since.elapsed() < Duration::from_mins(1));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let second = place.run(&ARGUMENTS);
+    assert_eq!(second.code, Some(BAD_INPUT));
+    assert!(
+        second.says("another process carries out this study"),
+        "{}",
+        second.stderr
+    );
+    assert!(first.wait().unwrap().success());
+    assert_eq!(states(&place), BTreeMap::from([("done".to_owned(), 12)]));
+}
