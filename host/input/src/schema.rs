@@ -1,9 +1,10 @@
-//! JSON Schemas of case files and driver files, for editors: derived from the types that read them.
+//! JSON Schemas of case files, driver files and calibrations, for editors: derived from the types that read them.
 //!
 //! `base` and `[[variant]]` are merged before anything is read, so a file with one of them may leave
 //! out what the other file says: the top level of a schema admits parts, and demands a complete file
 //! only where there is neither.
 
+use crate::calibration::CalibrationFile;
 use crate::case::CaseFile;
 use crate::driver::DriverFile;
 use schemars::generate::SchemaSettings;
@@ -20,6 +21,8 @@ pub enum FileKind {
     Case,
     /// Driver files, for `pilum point`.
     Point,
+    /// Calibrations, for `pilum calibrate`.
+    Calibration,
 }
 
 /// The JSON Schema (2020-12) of a kind of input file.
@@ -27,6 +30,7 @@ pub fn of(kind: FileKind) -> Value {
     match kind {
         FileKind::Case => with_bases(complete::<CaseFile>(), "Pilum case file"),
         FileKind::Point => with_bases(complete::<DriverFile>(), "Pilum driver file"),
+        FileKind::Calibration => with_bases(complete::<CalibrationFile>(), "Pilum calibration"),
     }
 }
 

@@ -178,10 +178,10 @@ fn scaled(n: usize, factor: f64) -> usize {
 
 /// A folder that is gone when this is dropped.
 #[derive(Debug)]
-pub(super) struct Scratch {
+pub(crate) struct Scratch {
     folder: PathBuf,
     /// Who may want what is done there to stop.
-    pub(super) stop: Stop,
+    pub(crate) stop: Stop,
 }
 
 impl Scratch {
@@ -189,7 +189,7 @@ impl Scratch {
     ///
     /// # Errors
     /// [`text::Error::Unwritable`].
-    pub(super) fn new(within: &Path, stop: &Stop) -> Result<Self, Error> {
+    pub(crate) fn new(within: &Path, stop: &Stop) -> Result<Self, Error> {
         let folder = within.join(".trial");
         std::fs::create_dir_all(&folder).map_err(|source| text::Error::Unwritable {
             path: folder.clone(),
@@ -217,9 +217,9 @@ pub(super) const COUNTS: &[&str] = &["iterations", "factorisations", "law_calls"
 
 /// What came out of a trial.
 #[derive(Clone, Debug)]
-pub(super) struct Trial {
+pub(crate) struct Trial {
     /// Probes by phase and increment.
-    pub(super) rows: Sampled,
+    pub(crate) rows: Sampled,
     /// CPU time from the first phase on, s; the least of the repetitions.
     pub(super) seconds: f64,
     /// Counts, in the order of [`COUNTS`].
@@ -256,7 +256,7 @@ pub(super) fn trial(
 ///
 /// # Errors
 /// Those of the run.
-pub(super) fn measure(case: &mut Case, scratch: &Scratch, timed: bool) -> Result<Trial, Error> {
+pub(crate) fn measure(case: &mut Case, scratch: &Scratch, timed: bool) -> Result<Trial, Error> {
     case.file.figures.clear();
     let mut seconds = f64::INFINITY;
     let mut spent = 0.0;
