@@ -257,11 +257,15 @@ fn places(file: &str, text: &str) -> BTreeMap<String, String> {
     places
 }
 
-/// Both schemas, with the page of each.
-fn schemas() -> [(Schema, &'static str); 2] {
+/// All schemas, with the page of each.
+fn schemas() -> [(Schema, &'static str); 3] {
     [
         (Schema::new("case", "CaseFile"), "case.md"),
         (Schema::new("point", "DriverFile"), "driver.md"),
+        (
+            Schema::new("calibration", "CalibrationFile"),
+            "calibration.md",
+        ),
     ]
 }
 
@@ -335,6 +339,7 @@ fn every_example_runs() {
     let runs = [
         (&["run"][..], "case.md"),
         (&["point", "--csv", "out.csv"], "driver.md"),
+        (&["calibrate", "--out", "out"], "calibration.md"),
     ];
     for (command, name) in runs {
         let place = TempDir::new().unwrap();
@@ -367,6 +372,13 @@ fn every_example_runs() {
             fs::write(place.path().join(&file), based.to_owned() + &block.text).unwrap();
             // A library of this kind is not there; the keys are held against the schema.
             if block.text.contains("adapter = ") {
+                continue;
+            }
+            // What the tests of a calibration name.
+            let is_of_test = ["hypothesis = ", "analysis = "]
+                .iter()
+                .any(|key| block.text.contains(key));
+            if command[0] == "calibrate" && is_of_test {
                 continue;
             }
             let outcome = pilum(place.path(), &[command, &[file.as_str()]].concat());

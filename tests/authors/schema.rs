@@ -36,6 +36,7 @@ fn inputs(folder: &Path, found: &mut Vec<PathBuf>) {
 #[test]
 fn every_committed_file_follows_its_schema() {
     let (case, point) = (validator("case"), validator("point"));
+    let calibration = validator("calibration");
     let mut files = Vec::new();
     inputs(&repository("cases"), &mut files);
     inputs(
@@ -46,7 +47,7 @@ fn every_committed_file_follows_its_schema() {
         &repository("host/workshop/src/new_law/continuum"),
         &mut files,
     );
-    let (mut cases, mut points) = (0, 0);
+    let (mut cases, mut points, mut calibrations) = (0, 0, 0);
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
         let value = value(&text);
@@ -57,7 +58,9 @@ fn every_committed_file_follows_its_schema() {
             self::value(&text)
         });
         let is_point = is_point(&value) || base.as_ref().is_some_and(is_point);
-        let (validator, count) = if is_point {
+        let (validator, count) = if value.get("free").is_some() {
+            (&calibration, &mut calibrations)
+        } else if is_point {
             (&point, &mut points)
         } else {
             (&case, &mut cases)
@@ -67,8 +70,8 @@ fn every_committed_file_follows_its_schema() {
         assert!(errors.is_empty(), "{}: {errors:#?}", path.display());
     }
     assert!(
-        cases >= 12 && points >= 8,
-        "{cases} cases, {points} drivers"
+        cases >= 12 && points >= 8 && calibrations >= 4,
+        "{cases} cases, {points} drivers, {calibrations} calibrations"
     );
 }
 

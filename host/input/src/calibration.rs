@@ -116,7 +116,8 @@ pub struct FreeInput {
     /// Id of the law's parameter, if it is not the name.
     #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
-    /// Cases: the tables under `[laws]` that it belongs to. A driver has one law, which needs no name.
+    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone, which have
+    /// one law each.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
@@ -141,7 +142,7 @@ pub struct FixedInput {
     /// Id of the law's parameter, if it is not the name.
     #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
-    /// Cases: the tables under `[laws]` that it belongs to.
+    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,

@@ -6,6 +6,9 @@ use results::figure::Figures;
 use results::wanted::{Figure, Measured};
 use std::path::Path;
 
+/// Points of a drawn profile between two that were computed.
+const SMOOTH: usize = 8;
+
 /// The figures that were drawn: names of files without `.svg`, with a heading.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Drawn {
@@ -161,14 +164,27 @@ fn profile(outcome: &Outcome, parameter: usize, name: &str) -> Option<Figures> {
     };
     let mut figures = Figures::new(&outcome.title, &[figure], columns);
     let limit = stage.quantile.powi(2);
-    for (u, sum) in &profile.points {
-        let growth = (sum - stage.sum) / stage.variance;
-        let straight = stage
-            .error(place)
-            .map(|error| ((u - stage.best[place]) / error).powi(2));
-        let straight = straight.filter(|value| *value < 3.0 * limit);
-        let row = [Some(p.value(*u)), Some(growth), straight, Some(limit)];
-        figures.add(&row, |_| true);
+    let best = stage.best[place];
+    // The root of the growth, with a sign, is nearly straight between points.
+    let root = |(u, sum): &(f64, f64)| {
+        let root = ((sum - stage.sum) / stage.variance).max(0.0).sqrt();
+        (*u, if *u < best { -root } else { root })
+    };
+    let roots: Vec<(f64, f64)> = profile.points.iter().map(root).collect();
+    for pair in roots.windows(2) {
+        let [(u, a), (v, b)] = [pair[0], pair[1]];
+        for k in 0..=SMOOTH {
+            let part = k as f64 / SMOOTH as f64;
+            let (at, growth) = (u + part * (v - u), (a + part * (b - a)).powi(2));
+            let straight = stage
+                .error(place)
+                .map(|error| ((at - best) / error).powi(2));
+            let straight = straight.filter(|value| *value < 2.0 * limit);
+            figures.add(
+                &[Some(p.value(at)), Some(growth), straight, Some(limit)],
+                |_| true,
+            );
+        }
     }
     Some(figures)
 }

@@ -74,7 +74,7 @@ impl Outcome {
                 p.unit.clone(),
             ]
         });
-        let interval = format!("{} % interval", 100.0 * self.confidence);
+        let interval = format!("{} % interval", digits(100.0 * self.confidence));
         let head = [
             "parameter".to_owned(),
             "value".to_owned(),

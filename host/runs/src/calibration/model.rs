@@ -152,7 +152,7 @@ impl Model {
         let mut declared: Vec<&ParameterDescription> = Vec::new();
         let mut own: Option<f64> = None;
         for (test, known) in self.tests.iter_mut().zip(laws) {
-            for law in wanted.of(calibration, &test.name, known)? {
+            for law in wanted.of(calibration, known)? {
                 let Some(parameter) = law.parameter(wanted.id.get_ref()) else {
                     continue;
                 };
@@ -632,7 +632,6 @@ impl<'a> Wanted<'a> {
     fn of<'k>(
         self,
         calibration: &Calibration,
-        test: &str,
         known: &'k [Known],
     ) -> Result<Vec<&'k Known>, Error> {
         let has = |law: &&Known| law.parameter(self.id.get_ref()).is_some();
@@ -660,23 +659,6 @@ impl<'a> Wanted<'a> {
                 .hint(hint)
                 .into());
         }
-        let tables: Vec<&str> = known
-            .iter()
-            .filter(has)
-            .filter_map(|law| law.table.as_deref())
-            .collect();
-        if self.laws.is_empty() && !tables.is_empty() {
-            let message = format!(
-                "`{}` needs `laws`: the tables under [laws] of test `{test}` that it belongs to",
-                self.name.get_ref()
-            );
-            let hint = format!("these have such a parameter: {}", tables.join(", "));
-            return Err(calibration
-                .source
-                .error(self.name.span(), message)
-                .hint(hint)
-                .into());
-        }
         Ok(known.iter().filter(named).collect())
     }
 
@@ -695,6 +677,17 @@ impl<'a> Wanted<'a> {
             );
             let hint = suggestion(name.get_ref(), tables().collect::<Vec<_>>());
             return source.error(name.span(), message).hint(hint).into();
+        }
+        let has = |law: &&Known| law.parameter(self.id.get_ref()).is_some();
+        let of_cases = laws.iter().flatten().filter(has);
+        let of_cases: Vec<&str> = of_cases.filter_map(|law| law.table.as_deref()).collect();
+        if !of_cases.is_empty() {
+            let message = format!(
+                "`{}` needs `laws`: the tables under [laws] of the case that it belongs to",
+                self.name.get_ref()
+            );
+            let hint = format!("these have such a parameter: {}", of_cases.join(", "));
+            return source.error(self.name.span(), message).hint(hint).into();
         }
         let message = format!("no law of a test has a parameter `{}`", self.id.get_ref());
         let ids = laws
@@ -804,7 +797,7 @@ fn with_fixed(
     for (name, input) in fixed {
         let wanted = Wanted::of_fixed(name, input.get_ref());
         let value = input.get_ref().value.get_ref();
-        let laws = wanted.of(calibration, "", known)?;
+        let laws = wanted.of(calibration, known)?;
         used.push(!laws.is_empty());
         for law in laws {
             let set = (wanted.id.get_ref().clone(), value.clone());

@@ -34,7 +34,7 @@ pub(super) fn render(
         style => STYLE,
         title => outcome.title.clone(),
         variant => calibration.variant.clone(),
-        percent => 100.0 * outcome.confidence,
+        percent => digits(100.0 * outcome.confidence),
         is_estimated => outcome.variance == Variance::Estimated,
         parameters => parameters(outcome),
         notes => outcome.words.clone(),
