@@ -27,7 +27,7 @@ increments = 12
 control = {{ t = {{ jump = 1.0e-3 }}, n = {{ stiffness = 3e4 }} }}
 [[segment]]
 increments = 8
-control = {{ t = {{ traction = 60.0 }} }}
+control = {{ t = {{ traction = 20.0 }} }}
 [[segment]]
 increments = 6
 control = {{ t = {{ jump = 1.6e-3 }}, n = {{ traction = -90.0 }} }}

@@ -293,7 +293,7 @@ fn mistakes_are_told_with_file_line_and_key() {
             "{to:?}, line {line}: {}",
             outcome.stderr
         );
-        assert!(!place.path("out/calibration.json").exists(), "{to:?}");
+        assert!(!place.path("out").exists(), "{to:?}");
     }
     let stage = |text: &str| format!("noise = 0.1\n[[stage]]\nname = \"one\"\n{text}");
     for (text, says) in [
@@ -322,6 +322,29 @@ fn mistakes_are_told_with_file_line_and_key() {
         outcome.stderr
     );
     assert_eq!(outcome.code, Some(BAD_INPUT));
+}
+
+/// What was in the folder before.
+#[test]
+fn a_folder_with_earlier_results() {
+    let place = place();
+    let run = ["calibrate", "joint.toml", "--out", "out"];
+    assert_eq!(place.run(&run).code, Some(DONE));
+    assert!(place.path("out/profile_friction_angle.svg").is_file());
+    // Figures that this one does not draw are gone.
+    let outcome = place.run(&[&run[..], &["--set", "profiles=false"]].concat());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(!place.path("out/profile_friction_angle.svg").exists());
+    assert!(place.path("out/fit_traction_t_over_u_t.svg").is_file());
+    place.write("run/history.csv", "phase,increment\n");
+    let outcome = place.run(&["calibrate", "joint.toml", "--out", "run"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    assert!(
+        outcome.says("holds the results of a run"),
+        "{}",
+        outcome.stderr
+    );
+    assert!(!place.path("run/report.html").exists());
 }
 
 /// Points beyond the computed ones are left out, and that is said.

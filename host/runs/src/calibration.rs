@@ -177,7 +177,14 @@ pub fn run(
             say(&format!("variant {name}"));
         }
         let folder = options.folder(calibration);
-        let outcome = calibrate(calibration, &folder, options, say)?;
+        files::refuse_run(&folder)?;
+        let was_there = folder.exists();
+        let outcome = calibrate(calibration, &folder, options, say).inspect_err(|_| {
+            // Nothing was found: a folder that has nothing in it goes.
+            if !was_there {
+                let _ = std::fs::remove_dir(&folder);
+            }
+        })?;
         files::write(&outcome, calibration, &folder)?;
         show(&outcome.text());
         show(&format!("results in {}", folder.display()));
@@ -360,7 +367,6 @@ fn fitted(model: &mut Model, stages: &[Stage], counted: &[f64]) -> Result<Vec<Fi
         // The stage that has most to say of it.
         let stage = stages
             .iter()
-            .rev()
             .max_by_key(|stage| stage.group.parameters.len());
         let gradients = match stage {
             Some(stage) => model.gradients(number, counted, &stage.group.parameters)?,

@@ -21,8 +21,12 @@ pub(super) fn write(
     folder: &Path,
 ) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|why| text::Error::unwritable(folder, why))?;
+    remove_figures(folder);
     let drawn = figures::draw(outcome, folder)?;
-    let json = serde_json::to_string_pretty(&summary(outcome, calibration));
+    let mut all = summary(outcome, calibration);
+    let names = drawn.fits.iter().chain(&drawn.profiles);
+    all["figures"] = names.map(|(name, _)| name.clone()).collect();
+    let json = serde_json::to_string_pretty(&all);
     let json = json.map_err(|error| Error::internal(error.to_string()))?;
     let put = |name: &str, text: String| replace(&folder.join(name), text);
     put("calibration.json", json + "\n")?;
@@ -37,6 +41,34 @@ pub(super) fn write(
         page::render(outcome, calibration, &drawn, folder)?,
     )?;
     Ok(())
+}
+
+/// Refuses a folder that holds the results of a run, whose report would be replaced.
+///
+/// # Errors
+/// [`text::Error::Usage`].
+pub(super) fn refuse_run(folder: &Path) -> Result<(), Error> {
+    let of_runs = ["summary.json", "history.csv"];
+    if !of_runs.iter().any(|name| folder.join(name).is_file()) {
+        return Ok(());
+    }
+    Err(Error::usage(format!(
+        "{} holds the results of a run; `--out` names another folder",
+        folder.display()
+    )))
+}
+
+/// Removes the figures of an earlier calibration, which may have other names.
+fn remove_figures(folder: &Path) {
+    let earlier = std::fs::read_to_string(folder.join("calibration.json")).unwrap_or_default();
+    let earlier: Value = serde_json::from_str(&earlier).unwrap_or_default();
+    let names = earlier["figures"].as_array().into_iter().flatten();
+    for name in names.filter_map(Value::as_str) {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        if name.chars().all(is_plain) {
+            let _ = std::fs::remove_file(folder.join(format!("{name}.svg")));
+        }
+    }
 }
 
 impl Outcome {

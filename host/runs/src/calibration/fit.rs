@@ -265,6 +265,7 @@ pub(super) fn fit(
         reduction: 0.1 * model.exactness,
         step: (1e-2 * model.exactness.sqrt()).max(1e-9),
         gradient: model.exactness.sqrt().min(1e-3),
+        blind: blind(model),
         iterations: ITERATIONS,
     };
     let given: Vec<f64> = group.parameters.iter().map(|&p| values[p]).collect();
@@ -387,9 +388,15 @@ pub(super) fn fit(
     Ok(Some(stage))
 }
 
+/// What moves the residuals by less than their differences are known to is not seen.
+fn blind(model: &Model) -> f64 {
+    (model.exactness / model.difference).max(1e-6)
+}
+
 /// What residuals and derivatives say of the best place.
 fn known(model: &Model, group: &Group, best: &Minimum, bounds: &[[f64; 2]], wish: Wish) -> Stage {
-    let moving = free(&best.u, &best.jacobian, &best.residuals, bounds);
+    let blind = blind(model);
+    let moving = free(&best.u, &best.jacobian, &best.residuals, bounds, blind);
     let n = best.u.len();
     let on_bound = (0..n).map(|i| {
         let is_held = !moving.contains(&i);
@@ -402,8 +409,6 @@ fn known(model: &Model, group: &Group, best: &Minimum, bounds: &[[f64; 2]], wish
         Variance::Given => 1.0,
     };
     let counted = (wish.variance == Variance::Estimated).then_some(degrees);
-    // What moves the residuals by less than their differences are known to is not seen.
-    let blind = (model.exactness / model.difference).max(1e-6);
     Stage {
         group: group.clone(),
         best: best.u.clone(),

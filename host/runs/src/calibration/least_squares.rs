@@ -42,6 +42,9 @@ pub(super) struct Settings {
     pub(super) step: f64,
     /// Cosine of the angle between residuals and every column below which they count as orthogonal.
     pub(super) gradient: f64,
+    /// Norm of a column, over the largest, below which it is nothing but what derivatives are not known to:
+    /// its variable is left alone.
+    pub(super) blind: f64,
     /// Most iterations.
     pub(super) iterations: usize,
 }
@@ -53,6 +56,7 @@ impl Default for Settings {
             reduction: 1e-15,
             step: 1e-12,
             gradient: 1e-11,
+            blind: 0.0,
             iterations: 200,
         }
     }
@@ -130,7 +134,7 @@ pub(super) fn minimise<P: Problem>(
     let mut end = End::Exhausted;
     while iterations < settings.iterations {
         let sum = residuals.norm_squared();
-        let free = free(&u, &jacobian, &residuals, bounds);
+        let free = free(&u, &jacobian, &residuals, bounds, settings.blind);
         for (scale, column) in scale.iter_mut().zip(jacobian.column_iter()) {
             *scale = scale.max(column.norm());
         }
@@ -199,18 +203,23 @@ fn clamped(u: impl Iterator<Item = f64>, bounds: &[[f64; 2]]) -> Vec<f64> {
     u.zip(bounds).map(within).collect()
 }
 
-/// The variables that may move: not at a bound that the way down leads out of.
+/// The variables that may move: seen by the residuals, and not at a bound that the way down leads out of.
 pub(super) fn free(
     u: &[f64],
     jacobian: &DMatrix<f64>,
     residuals: &DVector<f64>,
     bounds: &[[f64; 2]],
+    blind: f64,
 ) -> Vec<usize> {
+    let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+    let largest = norms
+        .iter()
+        .fold(0.0_f64, |largest, norm| largest.max(*norm));
     let may_move = |&i: &usize| {
         let gradient = jacobian.column(i).dot(residuals);
         let [lower, upper] = bounds[i];
         let is_out = u[i] <= lower && gradient > 0.0 || u[i] >= upper && gradient < 0.0;
-        lower < upper && !is_out
+        lower < upper && !is_out && norms[i] > blind * largest
     };
     (0..u.len()).filter(may_move).collect()
 }
@@ -493,6 +502,7 @@ mod tests {
             &both.jacobian,
             &both.residuals,
             &[[0.0, 200.0], [0.0, 1.0]],
+            0.0,
         );
         assert_eq!(free, [1]);
     }

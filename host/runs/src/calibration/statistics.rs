@@ -23,6 +23,14 @@ impl Covariance {
     /// residuals then change by less than `blind` times the largest change is one that they do not see.
     pub fn new(jacobian: &DMatrix<f64>, variables: &[usize], blind: f64) -> Self {
         let n = variables.len();
+        if n == 0 || jacobian.nrows() == 0 {
+            let blind = |k: usize| (0..n).map(|i| f64::from(u8::from(i == k))).collect();
+            return Self {
+                variables: variables.to_vec(),
+                blind: (0..n).map(blind).collect(),
+                matrix: DMatrix::zeros(n, n),
+            };
+        }
         let norms: Vec<f64> = variables
             .iter()
             .map(|&i| jacobian.column(i).norm())
@@ -197,6 +205,8 @@ mod tests {
         // More variables than residuals.
         let covariance = Covariance::new(&jacobian.rows(1, 1).into_owned(), &[0, 1, 2], 1e-8);
         assert_eq!(covariance.blind.len(), 2);
+        // Nothing to determine.
+        assert!(Covariance::new(&jacobian, &[], 1e-8).blind.is_empty());
         // A column of nothing.
         let covariance = Covariance::new(&DMatrix::zeros(4, 1), &[0], 1e-8);
         assert!(!covariance.determines(0));
