@@ -160,6 +160,24 @@ pub(crate) enum Command {
         #[arg(long)]
         interface_stiffness: bool,
     },
+    /// Find parameters of laws from measured curves, and how well the tests determine them.
+    Calibrate {
+        /// A calibration: free parameters, and tests with what was measured in them.
+        file: PathBuf,
+        /// Carry out only this variant of it.
+        #[arg(long)]
+        variant: Option<String>,
+        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
+        /// in the file's syntax, such as `starts=20`; may be repeated.
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// Folder for the results [default: `results/calibrate_NAME`].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Threads of the runs of cases; the results do not depend on it [default: all processors].
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        threads: Option<u16>,
+    },
     /// Check whether a library keeps the contract; each check runs in a process of its own.
     Check(workshop::check::Arguments),
     /// List the laws found, or show all about one of them.
@@ -240,7 +258,10 @@ impl Command {
             }
             // One run goes on from its checkpoint.
             Self::Study { run, .. } => Some(run.is_some()),
-            Self::TradeOff { .. } | Self::Laws { .. } | Self::Lock { .. } => Some(false),
+            Self::TradeOff { .. }
+            | Self::Calibrate { .. }
+            | Self::Laws { .. }
+            | Self::Lock { .. } => Some(false),
             _ => None,
         }
     }
@@ -261,6 +282,8 @@ pub(crate) enum File {
     Point,
     /// Study files, for `pilum study`.
     Study,
+    /// Calibrations, for `pilum calibrate`.
+    Calibration,
 }
 
 /// A time in seconds.

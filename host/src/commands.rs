@@ -12,7 +12,7 @@ use input::{Case, Error};
 use law::adapter::Adapter;
 use law::{Opener, SearchPath, Stop, vetting};
 use runs::run::Options;
-use runs::{supervision, trade_off};
+use runs::{calibration, supervision, trade_off};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -136,6 +136,26 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
                 trade_off::run(&input, &options, &mut show, &mut |doing| {
                     say!("{doing}");
                 })
+            })
+        }
+        Command::Calibrate {
+            file,
+            variant,
+            set,
+            out,
+            threads,
+        } => {
+            start_threads(threads)?;
+            let options = calibration::Options {
+                variant,
+                settings: set,
+                out,
+                stop: stop_on_signals()?,
+                opener,
+            };
+            printing(|out| {
+                let mut show = |text: &str| out.line(text);
+                calibration::run(&file, &options, &mut show, &mut |doing| say!("{doing}"))
             })
         }
         Command::Check(arguments) => {
@@ -331,6 +351,7 @@ fn print_schema(file: File) -> Result<(), Error> {
         File::Case => FileKind::Case,
         File::Point => FileKind::Point,
         File::Study => FileKind::Study,
+        File::Calibration => FileKind::Calibration,
     }))
     .map_err(|error| Error::internal(error.to_string()))?;
     print(&format!("{text}\n"))

@@ -3,7 +3,7 @@
 //!
 //! - A block of `toml`, `python` or another language whose first line is a comment that is a file
 //!   name, `# case.toml`, is that file. `# case.toml, continued` goes on with it.
-//! - A `toml` block without a name is a part of a case or driver file, and follows its schema.
+//! - A `toml` block without a name is a part of a case, driver file or calibration, and follows its schema.
 //! - A `diff` block after a line `--- NAME` changes that file.
 //! - A `console` block: a line `$ …` is run, the lines below are what it prints, on either stream.
 //!   `…` alone stands for lines left out, in a line for anything. Numbers are compared to the digits
@@ -143,6 +143,7 @@ struct Session<'a> {
     folder: TempDir,
     case: Validator,
     point: Validator,
+    calibration: Validator,
     commands: usize,
 }
 
@@ -189,7 +190,8 @@ impl Session<'_> {
             .entry("base")
             .or_insert_with(|| Value::from("other.toml"));
         let (cases, points) = (self.case.errors(&value), self.point.errors(&value));
-        let follows = cases.is_empty() || points.is_empty();
+        let is_calibration = self.calibration.errors(&value).is_empty();
+        let follows = cases.is_empty() || points.is_empty() || is_calibration;
         assert!(
             follows,
             "{at}: as a case {cases:#?}, as a driver {points:#?}"
@@ -286,6 +288,7 @@ fn follow(name: &str) -> usize {
         folder: TempDir::new().unwrap(),
         case: validator("case"),
         point: validator("point"),
+        calibration: validator("calibration"),
         commands: 0,
     };
     for other in remarks(&text, "files of") {
@@ -451,6 +454,7 @@ fn mistakes_of_a_page_are_found() {
             folder: TempDir::new().unwrap(),
             case: validator("case"),
             point: validator("point"),
+            calibration: validator("calibration"),
             commands: 0,
         };
         for block in blocks(text) {

@@ -36,6 +36,7 @@ fn inputs(folder: &Path, found: &mut Vec<PathBuf>) {
 #[test]
 fn every_committed_file_follows_its_schema() {
     let (case, point, study) = (validator("case"), validator("point"), validator("study"));
+    let calibration = validator("calibration");
     let mut files = Vec::new();
     inputs(&repository("cases"), &mut files);
     inputs(
@@ -46,7 +47,7 @@ fn every_committed_file_follows_its_schema() {
         &repository("host/workshop/src/new_law/continuum"),
         &mut files,
     );
-    let (mut cases, mut points, mut studies) = (0, 0, 0);
+    let (mut cases, mut points, mut studies, mut calibrations) = (0, 0, 0, 0);
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
         let value = value(&text);
@@ -59,6 +60,8 @@ fn every_committed_file_follows_its_schema() {
         let is_point = is_point(&value) || base.as_ref().is_some_and(is_point);
         let (validator, count) = if value.get("method").is_some() {
             (&study, &mut studies)
+        } else if value.get("free").is_some() {
+            (&calibration, &mut calibrations)
         } else if is_point {
             (&point, &mut points)
         } else {
@@ -69,8 +72,8 @@ fn every_committed_file_follows_its_schema() {
         assert!(errors.is_empty(), "{}: {errors:#?}", path.display());
     }
     assert!(
-        cases >= 12 && points >= 8 && studies >= 3,
-        "{cases} cases, {points} drivers, {studies} studies"
+        cases >= 12 && points >= 8 && studies >= 3 && calibrations >= 4,
+        "{cases} cases, {points} drivers, {studies} studies, {calibrations} calibrations"
     );
 }
 

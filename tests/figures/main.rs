@@ -26,6 +26,33 @@ type Committed = (
 );
 
 const COMMITTED: &[Committed] = &[
+    (
+        "calibrate_mepi/calibration.toml",
+        "",
+        "*",
+        &[
+            "fit_traction_t_over_u_t",
+            "fit_u_n_over_u_t",
+            "prediction_u_n_over_u_t",
+            "profile_a",
+        ],
+    ),
+    (
+        "calibrate_stiffness/calibration.toml",
+        "",
+        "*",
+        &["fit_sigma_n_over_u_t", "prediction_traction_t_over_u_t"],
+    ),
+    (
+        "calibrate_pile/calibration.toml",
+        "",
+        "*",
+        &[
+            "fit_pile_head_load_over_pile_settlement",
+            "fit_gauge_2_over_pile_settlement",
+            "profile_shear_stiffness",
+        ],
+    ),
     ("bored_pile/case.toml", "", "*", &["loads", "axial_force"]),
     (
         "textbook_pile/case.toml",
@@ -193,6 +220,17 @@ fn pictures() -> BTreeSet<PathBuf> {
 fn draw(input: &str) -> TempDir {
     let place = TempDir::new().unwrap();
     let path = cases().join(input);
+    if input.starts_with("calibrate_") {
+        let options = runs::calibration::Options {
+            variant: None,
+            settings: Vec::new(),
+            out: Some(place.path().to_owned()),
+            stop: law::Stop::never(),
+            opener: law::Opener::default(),
+        };
+        runs::calibration::run(&path, &options, &mut |_| (), &mut |_| ()).unwrap();
+        return place;
+    }
     if ["shear_box/", "shear_zone/", "joint_laws/"]
         .iter()
         .any(|point| input.starts_with(point))

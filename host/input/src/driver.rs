@@ -11,7 +11,7 @@ use crate::material::{self, LawTables, ParameterTable, ParameterValue, Route, bu
 use crate::schema;
 use indexmap::IndexMap;
 use law::adapter::{Externals, Order, Scratch};
-use law::{BuiltLaw, Opener, Pins, SearchPath};
+use law::{BuiltLaw, LoadedLaw, Opener, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
 use results::point_figure::drawable;
@@ -257,28 +257,20 @@ impl Driver {
 
     fn build_all(opener: &Opener, source: Source, locked: bool) -> Result<Vec<Self>, Error> {
         let (source, files) = read_kind(source, &CASE)?;
-        let driver = |(variant, file)| Self::build(opener, &source, variant, file, locked);
+        let driver = |(variant, file)| {
+            let load = |file: &DriverFile| Self::load(opener, &source, file, locked);
+            Self::build(opener, &source, variant, file, load)
+        };
         files.into_iter().map(driver).collect()
     }
 
-    fn build(
+    /// The law of a driver file, without its parameters.
+    fn load(
         opener: &Opener,
         source: &Source,
-        variant: Option<String>,
-        file: DriverFile,
+        file: &DriverFile,
         locked: bool,
-    ) -> Result<Self, Error> {
-        let hypothesis = hypothesis(source, &file.hypothesis)?;
-        let segments = segments(source, &file, hypothesis)?;
-        let in_file = file
-            .initial
-            .as_ref()
-            .map_or_else(|| file.law.span(), Spanned::span);
-        let place_of_initial = source.setting_of("initial").unwrap_or(in_file);
-        let none = Initial::default();
-        let initial = file.initial.as_ref().map_or(&none, Spanned::get_ref);
-        let flux = initial_flux(source, initial, hypothesis)?;
-
+    ) -> Result<LoadedLaw, Error> {
         let folder = |written: &Spanned<PathBuf>| {
             let file = source.path_at(&written.span());
             file.parent()
@@ -286,7 +278,7 @@ impl Driver {
                 .join(written.get_ref())
         };
         let folders: Vec<PathBuf> = file.law_path.iter().map(folder).collect();
-        let entry = file.entry(initial);
+        let entry = file.entry(&Initial::default());
         let tables = LawTables {
             source,
             tables: &file.laws,
@@ -301,8 +293,33 @@ impl Driver {
             Pins::given(source, laws)?
         };
         let search = SearchPath::of(opener, &folders).pinned(pins);
-        let loaded = tables.loaded(&search, &entry)?;
+        tables.loaded(&search, &entry)
+    }
+
+    fn build(
+        opener: &Opener,
+        source: &Source,
+        variant: Option<String>,
+        file: DriverFile,
+        load: impl Fn(&DriverFile) -> Result<LoadedLaw, Error>,
+    ) -> Result<Self, Error> {
+        let hypothesis = hypothesis(source, &file.hypothesis)?;
+        let segments = segments(source, &file, hypothesis)?;
+        let in_file = file
+            .initial
+            .as_ref()
+            .map_or_else(|| file.law.span(), Spanned::span);
+        let place_of_initial = source.setting_of("initial").unwrap_or(in_file);
+        let none = Initial::default();
+        let initial = file.initial.as_ref().map_or(&none, Spanned::get_ref);
+        let flux = initial_flux(source, initial, hypothesis)?;
+        let entry = file.entry(initial);
+        let tables = LawTables {
+            source,
+            tables: &file.laws,
+        };
         let parameters = tables.parameters(&entry);
+        let loaded = load(&file)?;
         let built = build_law(source, &loaded, &file.law, hypothesis, &parameters)?;
         let place = (source, &place_of_initial);
         let mut point = started(built, &flux, segments).map_err(|error| located(place, error))?;
@@ -371,7 +388,12 @@ impl Driver {
         &self.figures
     }
 
-    /// The same path with other values of some parameters.
+    /// The parameters that the file gives.
+    pub fn parameters(&self) -> Option<&ParameterTable> {
+        self.file.as_ref().map(|file| &file.parameters)
+    }
+
+    /// The same path with other values of some parameters; the law's library stays open.
     ///
     /// # Errors
     /// The law does not take them; the driver was not read from a driver file.
@@ -382,7 +404,8 @@ impl Driver {
         };
         material::set_parameters(&mut file.parameters, values);
         let variant = self.point.variant().map(str::to_owned);
-        let mut driver = Self::build(&self.opener, &self.source, variant, file, true)?;
+        let load = |_: &DriverFile| Ok(self.point.law().loaded().clone());
+        let mut driver = Self::build(&self.opener, &self.source, variant, file, load)?;
         let point = driver.point_mut();
         point.set_increments(&self.point.segment_increments());
         point.stop_on(self.point.stop());

@@ -2,6 +2,7 @@
 //! and what is wrong with either is said at its place in the file.
 
 pub mod build;
+pub mod calibration;
 pub mod case;
 pub mod driver;
 mod error;

@@ -79,6 +79,7 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
     Ok(Measured {
         label: input.label.clone(),
         points,
+        of_curve: None,
     })
 }
 

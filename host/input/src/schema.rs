@@ -1,9 +1,10 @@
-//! JSON Schemas of case, driver and study files, for editors: derived from the types that read them.
+//! JSON Schemas of case, driver and study files and calibrations, for editors: derived from the types that read them.
 //!
 //! `base` and `[[variant]]` are merged before anything is read, so a file with one of them may leave
 //! out what the other file says: the top level of a schema admits parts, and demands a complete file
 //! only where there is neither.
 
+use crate::calibration::CalibrationFile;
 use crate::case::CaseFile;
 use crate::driver::DriverFile;
 use crate::study::StudyFile;
@@ -23,6 +24,8 @@ pub enum FileKind {
     Point,
     /// Study files, for `pilum study`.
     Study,
+    /// Calibrations, for `pilum calibrate`.
+    Calibration,
 }
 
 /// The JSON Schema (2020-12) of a kind of input file.
@@ -35,6 +38,7 @@ pub fn of(kind: FileKind) -> Value {
             set(&mut schema, "title", json!("Pilum study file"));
             schema
         }
+        FileKind::Calibration => with_bases(complete::<CalibrationFile>(), "Pilum calibration"),
     }
 }
 

@@ -287,9 +287,11 @@ fn draw(
         let drawn = curves.iter().flat_map(|curve| &curve.points);
         drawn.chain(measured.iter().flat_map(|measured| &measured.points))
     };
+    let has_entry = |measured: &&Measured| measured.of_curve.is_none();
     let names = || {
         let drawn = curves.iter().map(|curve| curve.name.as_str());
-        drawn.chain(measured.iter().map(|measured| measured.label.as_str()))
+        let measured = measured.iter().filter(has_entry);
+        drawn.chain(measured.map(|measured| measured.label.as_str()))
     };
     let entries = names().count();
     let x = range(points().map(|p| p.0), 0.0);
@@ -333,12 +335,16 @@ fn draw(
             name_beside(&curve.name, y)?;
         }
     }
-    let colours = colours().skip(curves.len());
-    for (number, (measured, colour)) in (curves.len()..).zip(measured.iter().zip(colours)) {
+    let mut number = curves.len();
+    for measured in measured {
+        let colour = COLOURS[measured.of_curve.unwrap_or(number) % COLOURS.len()];
         let style = colour.stroke_width(1);
         let markers = measured.points.iter();
-        chart
-            .draw_series(markers.map(|&point| Circle::new(point, MARKER, style)))?
+        let drawn = chart.draw_series(markers.map(|&point| Circle::new(point, MARKER, style)))?;
+        if measured.of_curve.is_some() {
+            continue;
+        }
+        drawn
             .label(&measured.label)
             .legend(move |(x, y)| Circle::new((x + 9, y), MARKER, style));
         if beside {
@@ -346,6 +352,7 @@ fn draw(
             right.draw(&Circle::new((9, y), MARKER, style))?;
             name_beside(&measured.label, y)?;
         }
+        number += 1;
     }
     if let Some(corner) = corner.filter(|_| entries > 1) {
         chart

@@ -22,8 +22,8 @@ pub fn drawable(driver: &Driver) -> Vec<String> {
     names
 }
 
-/// Adds a row to figures of what is [`drawable`].
-pub fn draw_row(driver: &Driver, figures: &mut Figures, row: &Row<'_>) {
+/// The values of a row, in the order of [`drawable`].
+pub fn drawn(driver: &Driver, row: &Row<'_>) -> Vec<Option<f64>> {
     let table = row.gradient.iter().chain(row.flux).chain(row.internal);
     let mut values: Vec<Option<f64>> = table.copied().map(Some).collect();
     match (driver.law().hypothesis(), row.gradient, row.flux) {
@@ -41,5 +41,10 @@ pub fn draw_row(driver: &Driver, figures: &mut Figures, row: &Row<'_>) {
     if driver.is_timed() {
         values.push(Some(row.time));
     }
-    figures.add(&values, |_| true);
+    values
+}
+
+/// Adds a row to figures of what is [`drawable`].
+pub fn draw_row(driver: &Driver, figures: &mut Figures, row: &Row<'_>) {
+    figures.add(&drawn(driver, row), |_| true);
 }

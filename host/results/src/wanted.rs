@@ -71,6 +71,9 @@ pub struct Measured {
     pub label: String,
     /// Points in the order of their file.
     pub points: Vec<(f64, f64)>,
+    /// The curve, from 0, that they are measured values of: they have its colour, and no entry in the
+    /// legend of their own.
+    pub of_curve: Option<usize>,
 }
 
 /// Integration points inside extents (ends excluded), at chosen increments.

@@ -1,6 +1,7 @@
 //! Runs: of a case, of a driver, of variants, of studies; with results in folders, checkpoints, and a
 //! watch over what laws do to the process.
 
+pub mod calibration;
 mod ending;
 #[expect(unsafe_code, reason = "the program's allocator")]
 #[cfg(unix)]

@@ -14,12 +14,12 @@ mod kept;
 mod pace;
 mod page;
 mod pareto;
-mod sampled;
+pub(crate) mod sampled;
 mod scheme;
 mod stiffness;
 mod study;
 mod table;
-mod trial;
+pub(crate) mod trial;
 
 pub use accuracy::{reach, reach_until};
 pub use sampled::Convergence;

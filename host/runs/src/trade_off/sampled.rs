@@ -2,11 +2,11 @@
 
 /// Values along a path.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Sampled {
+pub(crate) struct Sampled {
     /// Names of the values.
-    pub(super) names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// Values by stretch (segment or phase) and increment; NaN where there is none.
-    pub(super) stretches: Vec<Vec<Vec<f64>>>,
+    pub(crate) stretches: Vec<Vec<Vec<f64>>>,
 }
 
 impl Sampled {

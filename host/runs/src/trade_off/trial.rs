@@ -187,10 +187,10 @@ fn scaled(n: usize, factor: f64) -> usize {
 
 /// A folder that is gone when this is dropped.
 #[derive(Debug)]
-pub(super) struct Scratch {
+pub(crate) struct Scratch {
     folder: PathBuf,
     /// Who may want what is done there to stop.
-    pub(super) stop: Stop,
+    pub(crate) stop: Stop,
     /// Trials that are done.
     kept: Option<RefCell<Kept>>,
 }
@@ -200,7 +200,7 @@ impl Scratch {
     ///
     /// # Errors
     /// [`text::Error::Unwritable`].
-    pub(super) fn new(within: &Path, stop: &Stop) -> Result<Self, Error> {
+    pub(crate) fn new(within: &Path, stop: &Stop) -> Result<Self, Error> {
         let folder = within.join(".trial");
         std::fs::create_dir_all(&folder).map_err(|source| text::Error::Unwritable {
             path: folder.clone(),
@@ -285,9 +285,9 @@ pub(super) const COUNTS: &[&str] = &["iterations", "factorisations", "law_calls"
 
 /// What came out of a trial.
 #[derive(Clone, Debug)]
-pub(super) struct Trial {
+pub(crate) struct Trial {
     /// Probes by phase and increment.
-    pub(super) rows: Sampled,
+    pub(crate) rows: Sampled,
     /// CPU time from the first phase on, s; the least of the repetitions.
     pub(super) seconds: f64,
     /// Counts, in the order of [`COUNTS`].
@@ -307,7 +307,7 @@ pub(super) fn repetitions(seconds: f64) -> f64 {
 
 /// How often a case runs, and how long it may.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Timing {
+pub(crate) enum Timing {
     /// Until its CPU time is known.
     Repeated,
     /// Once.
@@ -353,7 +353,7 @@ pub(super) fn trial(
 ///
 /// # Errors
 /// Those of the run.
-pub(super) fn measure(
+pub(crate) fn measure(
     case: &mut Case,
     scratch: &Scratch,
     timing: Timing,

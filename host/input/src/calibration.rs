@@ -1,0 +1,452 @@
+//! The calibration file: which parameters of laws are looked for, and the tests that they are to follow.
+
+use crate::case::MeasuredInput;
+use crate::material::ParameterValue;
+use crate::{Error, measured};
+use results::wanted::Measured;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use text::base::{OtherKind, read_kind};
+use text::{Named, Source};
+use toml::Spanned;
+
+/// What other files look like among calibrations.
+const OTHER: OtherKind = OtherKind {
+    keys: &[
+        "hypothesis",
+        "segment",
+        "analysis",
+        "mesh",
+        "groups",
+        "phase",
+    ],
+    message: "this is a driver or case file; expected a calibration, whose tests name such files",
+    command: "pilum point` or `pilum run",
+};
+
+/// A calibration and its text.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    /// Text and path, for messages.
+    pub source: Source,
+    /// Contents.
+    pub file: CalibrationFile,
+    /// Name of the variant, if the file stands for several calibrations.
+    pub variant: Option<String>,
+}
+
+/// The keys of a calibration.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationFile {
+    /// What the calibration is.
+    #[serde(default)]
+    pub title: String,
+    /// The parameters that are looked for, by name.
+    #[schemars(with = "BTreeMap<String, FreeInput>")]
+    pub free: Named<FreeInput>,
+    /// Parameters that have another value than in the files of the tests, by name.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, FixedInput>")]
+    pub fixed: Named<FixedInput>,
+    /// The tests.
+    pub test: Vec<TestInput>,
+    /// Groups of parameters that are fitted one after the other; all at once if left out.
+    #[serde(default)]
+    pub stage: Vec<StageInput>,
+    /// How many places the search starts from: the given one, and others spread over the ranges; 8 if left
+    /// out, 2 if a test is a case.
+    #[schemars(with = "Option<usize>", range(min = 1))]
+    pub starts: Option<Spanned<usize>>,
+    /// Which places those are; the same number gives the same places.
+    #[serde(default)]
+    pub seed: u64,
+    /// Whether the `noise` of curves is known, or only its proportions.
+    #[serde(default)]
+    pub variance: Variance,
+    /// Probability with which an interval holds the true value.
+    #[serde(default = "confidence")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub confidence: Spanned<f64>,
+    /// Follow the profile of each parameter: the best sum of squares for values beside the best one.
+    #[serde(default = "yes")]
+    pub profiles: bool,
+    /// Step of differences, relative to a parameter's range or, on a logarithmic scale, to itself; 1e-4
+    /// if left out, with cases the root of the loosest force tolerance.
+    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.1))]
+    pub difference: Option<Spanned<f64>>,
+}
+
+fn confidence() -> Spanned<f64> {
+    Spanned::new(0..0, 0.95)
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// What is known of the scatter of measured values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Variance {
+    /// The noise of curves says their proportions; its size is estimated from the residuals.
+    #[default]
+    Estimated,
+    /// The noise of curves is their standard deviation.
+    Given,
+}
+
+/// How a parameter is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// As it is.
+    Linear,
+    /// By its logarithm.
+    Log,
+}
+
+/// A parameter that is looked for.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FreeInput {
+    /// Id of the law's parameter, if it is not the name.
+    #[schemars(with = "Option<String>")]
+    pub parameter: Option<Spanned<String>>,
+    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone, which have
+    /// one law each.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub laws: Vec<Spanned<String>>,
+    /// Where the search starts; the value in the file of the first test that has it, if left out.
+    #[schemars(with = "Option<f64>")]
+    pub start: Option<Spanned<f64>>,
+    /// Least value; the law's own bound if left out.
+    #[schemars(with = "Option<f64>")]
+    pub min: Option<Spanned<f64>>,
+    /// Greatest value; the law's own bound if left out.
+    #[schemars(with = "Option<f64>")]
+    pub max: Option<Spanned<f64>>,
+    /// How it is counted; `log` if left out and the law takes only values above 0.
+    #[schemars(with = "Option<Scale>")]
+    pub scale: Option<Spanned<Scale>>,
+}
+
+/// A parameter that has another value than in the files of the tests.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixedInput {
+    /// Id of the law's parameter, if it is not the name.
+    #[schemars(with = "Option<String>")]
+    pub parameter: Option<Spanned<String>>,
+    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub laws: Vec<Spanned<String>>,
+    /// Its value.
+    #[schemars(with = "ParameterValue")]
+    pub value: Spanned<ParameterValue>,
+}
+
+/// A test: what leads a law or a model, and what was measured.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TestInput {
+    /// Name.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// A driver file, relative to this one.
+    #[schemars(with = "Option<PathBuf>")]
+    pub driver: Option<Spanned<PathBuf>>,
+    /// A case file or its folder, relative to this one, instead of a driver.
+    #[schemars(with = "Option<PathBuf>")]
+    pub case: Option<Spanned<PathBuf>>,
+    /// The variant of that file.
+    #[schemars(with = "Option<String>")]
+    pub variant: Option<Spanned<String>>,
+    /// The test is predicted with what the others give, not fitted.
+    #[serde(default)]
+    pub predict: bool,
+    /// How often its squared residuals count.
+    #[serde(default = "weight")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
+    pub weight: Spanned<f64>,
+    /// Curves that were measured in it.
+    pub curve: Vec<CurveInput>,
+}
+
+fn weight() -> Spanned<f64> {
+    Spanned::new(0..0, 1.0)
+}
+
+/// A measured curve, and the computed one beside it.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CurveInput {
+    /// Computed column along the horizontal axis, which only grows or only falls: what the test imposes.
+    #[schemars(with = "String")]
+    pub x: Spanned<String>,
+    /// Computed column along the vertical axis, whose differences to the measured values are squared.
+    #[schemars(with = "String")]
+    pub y: Spanned<String>,
+    /// Text of the horizontal axis.
+    pub x_label: Option<String>,
+    /// Text of the vertical axis.
+    pub y_label: Option<String>,
+    /// Drivers: only this segment, from 1.
+    #[schemars(with = "Option<usize>", range(min = 1))]
+    pub segment: Option<Spanned<usize>>,
+    /// Cases: the phase; the last one if left out.
+    #[schemars(with = "Option<String>")]
+    pub phase: Option<Spanned<String>>,
+    /// The measured points, in the unit of the computed columns after their scale.
+    #[schemars(with = "MeasuredInput")]
+    pub measured: Spanned<MeasuredInput>,
+    /// Standard deviation of measured values, in the unit of `y`; 1 % of the largest if neither this nor
+    /// `relative_noise` is given.
+    #[schemars(with = "Option<f64>", range(min = 0))]
+    pub noise: Option<Spanned<f64>>,
+    /// A part of it that grows with the value measured.
+    #[schemars(with = "Option<f64>", range(min = 0))]
+    pub relative_noise: Option<Spanned<f64>>,
+    /// How often its squared residuals count.
+    #[serde(default = "weight")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
+    pub weight: Spanned<f64>,
+}
+
+/// Parameters that are fitted together; those of earlier stages keep what was found, those of later ones
+/// their start.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StageInput {
+    /// Name.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// The parameters.
+    #[schemars(with = "Vec<String>")]
+    pub free: Vec<Spanned<String>>,
+    /// The tests that they are fitted to; all that are not predicted, if left out.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub tests: Vec<Spanned<String>>,
+}
+
+impl Calibration {
+    /// Reads a calibration: one, or one for each `[[variant]]`, with settings over what the file says,
+    /// `KEY=VALUE`, in every variant.
+    ///
+    /// # Errors
+    /// [`text::Error::Unreadable`]; [`text::Error::Input`] at the place that does not fit.
+    pub fn load_with(path: &Path, settings: &[String]) -> Result<Vec<Self>, Error> {
+        let source = Source::read(path)?.with_settings(settings);
+        let (source, files) = read_kind(source, &OTHER)?;
+        let one = |(variant, file)| {
+            let calibration = Self {
+                source: source.clone(),
+                file,
+                variant,
+            };
+            calibration.check()?;
+            Ok(calibration)
+        };
+        files.into_iter().map(one).collect()
+    }
+
+    /// Name: the file's stem.
+    pub fn name(&self) -> String {
+        let stem = self.source.path().file_stem().unwrap_or_default();
+        stem.to_string_lossy().into_owned()
+    }
+
+    /// Where a file is that a key names.
+    pub fn path_of(&self, written: &Spanned<PathBuf>) -> PathBuf {
+        let file = self.source.path_at(&written.span());
+        file.parent()
+            .unwrap_or(Path::new(""))
+            .join(written.get_ref())
+    }
+
+    /// The points of a curve.
+    ///
+    /// # Errors
+    /// [`text::Error::Input`] at the key that does not fit.
+    pub fn measured(&self, curve: &CurveInput) -> Result<Measured, Error> {
+        measured::read(&self.source, curve.measured.get_ref())
+    }
+
+    /// An error at a place of the file.
+    pub fn error(&self, at: Range<usize>, message: impl Into<String>) -> Error {
+        self.source.error(at, message).into()
+    }
+
+    /// What can be said of the file without any other.
+    fn check(&self) -> Result<(), Error> {
+        let file = &self.file;
+        let above = |value: &Spanned<f64>, key: &str, most: f64| {
+            let number = *value.get_ref();
+            if number > 0.0 && number < most {
+                return Ok(());
+            }
+            let end = if most.is_finite() {
+                format!(" and below {most}")
+            } else {
+                String::new()
+            };
+            let message = format!("`{key}` is {number}, expected a number above 0{end}");
+            Err(self.error(value.span(), message))
+        };
+        above(&file.confidence, "confidence", 1.0)?;
+        if let Some(step) = &file.difference
+            && !(*step.get_ref() > 0.0 && *step.get_ref() <= 0.1)
+        {
+            let message = format!(
+                "`difference` is {}, expected above 0, at most 0.1",
+                step.get_ref()
+            );
+            return Err(self.error(step.span(), message));
+        }
+        if let Some(starts) = file
+            .starts
+            .as_ref()
+            .filter(|starts| !(1..=1000).contains(starts.get_ref()))
+        {
+            let message = format!("`starts` is {}, expected 1 to 1000", starts.get_ref());
+            return Err(self.error(starts.span(), message));
+        }
+        if file.free.is_empty() {
+            let message = "there is no free parameter: [free] names those that are looked for";
+            return Err(self.error(0..0, message));
+        }
+        self.check_names("test", file.test.iter().map(|test| &test.name))?;
+        self.check_names("stage", file.stage.iter().map(|stage| &stage.name))?;
+        let fitted = file.test.iter().filter(|test| !test.predict).count();
+        if fitted == 0 {
+            let message = "there is no test to fit: each has `predict = true`, or there is none";
+            return Err(self.error(0..0, message));
+        }
+        for test in &file.test {
+            match (&test.driver, &test.case) {
+                (Some(_), None) | (None, Some(_)) => {}
+                (Some(_), Some(case)) => {
+                    let message = "a test has a `driver` or a `case`, not both";
+                    return Err(self.error(case.span(), message));
+                }
+                (None, None) => {
+                    let message = format!(
+                        "test `{}` needs a `driver` or a `case`",
+                        test.name.get_ref()
+                    );
+                    return Err(self.error(test.name.span(), message));
+                }
+            }
+            above(&test.weight, "weight", f64::INFINITY)?;
+            if test.curve.is_empty() {
+                let message = format!("test `{}` needs a [[test.curve]]", test.name.get_ref());
+                return Err(self.error(test.name.span(), message));
+            }
+            for curve in &test.curve {
+                above(&curve.weight, "weight", f64::INFINITY)?;
+                self.check_curve(test, curve)?;
+            }
+        }
+        self.check_stages()
+    }
+
+    fn check_names<'s>(
+        &self,
+        kind: &str,
+        names: impl Iterator<Item = &'s Spanned<String>>,
+    ) -> Result<(), Error> {
+        let mut seen: Vec<&str> = Vec::new();
+        for name in names {
+            if name.get_ref().trim().is_empty() {
+                return Err(self.error(name.span(), format!("a {kind} needs a name")));
+            }
+            if seen.contains(&name.get_ref().as_str()) {
+                let message = format!("two {kind}s are called `{}`", name.get_ref());
+                return Err(self.error(name.span(), message));
+            }
+            seen.push(name.get_ref());
+        }
+        Ok(())
+    }
+
+    fn check_curve(&self, test: &TestInput, curve: &CurveInput) -> Result<(), Error> {
+        for (key, noise) in [
+            ("noise", &curve.noise),
+            ("relative_noise", &curve.relative_noise),
+        ] {
+            if let Some(noise) = noise.as_ref().filter(|noise| *noise.get_ref() < 0.0) {
+                let message = format!("`{key}` is {}, expected 0 or more", noise.get_ref());
+                return Err(self.error(noise.span(), message));
+            }
+        }
+        if let (Some(phase), Some(_)) = (&curve.phase, &test.driver) {
+            let message = "a driver has no phases; `segment` chooses a part of its path";
+            return Err(self.error(phase.span(), message));
+        }
+        if let (Some(segment), Some(_)) = (&curve.segment, &test.case) {
+            let message = "a case has no segments; `phase` chooses a part of it";
+            return Err(self.error(segment.span(), message));
+        }
+        Ok(())
+    }
+
+    fn check_stages(&self) -> Result<(), Error> {
+        let file = &self.file;
+        let free: Vec<&str> = file.free.keys().map(|key| key.get_ref().as_str()).collect();
+        let tests: Vec<&str> = file
+            .test
+            .iter()
+            .map(|test| test.name.get_ref().as_str())
+            .collect();
+        let unknown = |kind: &str, name: &Spanned<String>, known: &[&str]| {
+            let message = format!("there is no {kind} `{}`", name.get_ref());
+            let hint = text::suggestion(name.get_ref(), known.to_vec());
+            Error::from(self.source.error(name.span(), message).hint(hint))
+        };
+        for stage in &file.stage {
+            if stage.free.is_empty() {
+                let message = format!("stage `{}` has no free parameter", stage.name.get_ref());
+                return Err(self.error(stage.name.span(), message));
+            }
+            for name in &stage.free {
+                if !free.contains(&name.get_ref().as_str()) {
+                    return Err(unknown("free parameter", name, &free));
+                }
+            }
+            for name in &stage.tests {
+                let test = file
+                    .test
+                    .iter()
+                    .find(|test| test.name.get_ref() == name.get_ref());
+                match test {
+                    None => return Err(unknown("test", name, &tests)),
+                    Some(test) if test.predict => {
+                        let message = format!("test `{}` is predicted, not fitted", name.get_ref());
+                        return Err(self.error(name.span(), message));
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+        if file.stage.is_empty() {
+            return Ok(());
+        }
+        let is_fitted = |name: &Spanned<String>| {
+            let mut all = file.stage.iter().flat_map(|stage| &stage.free);
+            all.any(|other| other.get_ref() == name.get_ref())
+        };
+        match file.free.keys().find(|name| !is_fitted(name)) {
+            None => Ok(()),
+            Some(name) => {
+                let message = format!("`{}` is in no stage", name.get_ref());
+                Err(self.error(name.span(), message))
+            }
+        }
+    }
+}

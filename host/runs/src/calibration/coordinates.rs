@@ -1,0 +1,151 @@
+//! Parameters as the search counts them: by their logarithm or in widths of their range, so that units do
+//! not matter.
+
+use input::calibration::Scale;
+
+/// A parameter that is looked for.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Name in the calibration.
+    pub name: String,
+    /// Id of the law's parameter.
+    pub id: String,
+    /// Tables of laws of cases that it belongs to.
+    pub laws: Vec<String>,
+    /// Its unit.
+    pub unit: String,
+    /// What it is.
+    pub doc: String,
+    /// Where the search starts.
+    pub start: f64,
+    /// Least and greatest value.
+    pub bounds: [f64; 2],
+    /// Range that other starts are spread over.
+    pub range: [f64; 2],
+    /// How it is counted.
+    pub scale: Scale,
+}
+
+impl Parameter {
+    fn width(&self) -> f64 {
+        self.range[1] - self.range[0]
+    }
+
+    /// As the search counts a value.
+    pub fn counted(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => value / self.width(),
+            Scale::Log => value.ln(),
+        }
+    }
+
+    /// The value that is counted so, within the bounds.
+    pub fn value(&self, counted: f64) -> f64 {
+        let value = match self.scale {
+            Scale::Linear => counted * self.width(),
+            Scale::Log => counted.exp(),
+        };
+        value.clamp(self.bounds[0], self.bounds[1])
+    }
+
+    /// The bounds as the search counts.
+    pub fn counted_bounds(&self) -> [f64; 2] {
+        self.bounds.map(|bound| self.counted(bound))
+    }
+
+    /// The range as the search counts.
+    pub fn counted_range(&self) -> [f64; 2] {
+        self.range.map(|end| self.counted(end))
+    }
+
+    /// Derivative of the value by how it is counted.
+    pub fn slope(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => self.width(),
+            Scale::Log => value,
+        }
+    }
+}
+
+/// Places spread over a box by a Latin hypercube: in every direction one of them in each of `n` slices.
+/// The same seed gives the same places.
+pub(super) fn spread(ranges: &[[f64; 2]], n: usize, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = Random(seed);
+    let mut places = vec![vec![0.0; ranges.len()]; n];
+    for (direction, [low, high]) in ranges.iter().enumerate() {
+        let mut slices: Vec<usize> = (0..n).collect();
+        for last in (1..n).rev() {
+            slices.swap(last, (random.unit() * (last + 1) as f64) as usize);
+        }
+        for (place, slice) in places.iter_mut().zip(slices) {
+            let part = (slice as f64 + random.unit()) / n as f64;
+            place[direction] = low + part * (high - low);
+        }
+    }
+    places
+}
+
+/// Random numbers by SplitMix64 (Steele, Lea & Flood 2014).
+#[derive(Clone, Debug)]
+struct Random(u64);
+
+impl Random {
+    /// The next number in [0, 1).
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^= z >> 31;
+        (z >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameter(scale: Scale) -> Parameter {
+        Parameter {
+            name: "k".to_owned(),
+            id: "k".to_owned(),
+            laws: Vec::new(),
+            unit: "kPa".to_owned(),
+            doc: String::new(),
+            start: 10.0,
+            bounds: [1e-3, 1e6],
+            range: [1.0, 101.0],
+            scale,
+        }
+    }
+
+    #[test]
+    fn counting_goes_to_and_fro_within_the_bounds() {
+        for scale in [Scale::Linear, Scale::Log] {
+            let k = parameter(scale);
+            for value in [1e-3, 0.5, 42.0, 1e6] {
+                let back = k.value(k.counted(value));
+                assert!((back / value - 1.0).abs() < 1e-12, "{back}");
+            }
+            assert!(k.value(k.counted(1e6) + 10.0) <= 1e6);
+            let step = 1e-6;
+            let difference = (k.value(k.counted(42.0) + step) - 42.0) / step;
+            assert!((k.slope(42.0) / difference - 1.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn places_are_one_in_each_slice_and_the_same_for_a_seed() {
+        let ranges = [[0.0, 1.0], [-5.0, 5.0]];
+        let places = spread(&ranges, 10, 7);
+        assert_eq!(places, spread(&ranges, 10, 7));
+        assert_ne!(places, spread(&ranges, 10, 8));
+        for direction in 0..2 {
+            let [low, high] = ranges[direction];
+            let slice = |p: &Vec<f64>| ((p[direction] - low) / (high - low) * 10.0) as usize;
+            let mut slices: Vec<usize> = places.iter().map(slice).collect();
+            slices.sort_unstable();
+            assert_eq!(slices, (0..10).collect::<Vec<_>>());
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! What residuals and their derivatives say of parameters: covariance, quantiles, correlation along a
+//! curve.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal, StudentsT};
+
+/// Covariance of some variables for residuals of unit variance, (JᵀJ)⁻¹, as far as J determines them.
+#[derive(Clone, Debug)]
+pub struct Covariance {
+    /// The variables, by number.
+    pub variables: Vec<usize>,
+    /// Directions that the residuals do not see, in the scale of unit columns: one entry for each of
+    /// `variables`.
+    pub blind: Vec<Vec<f64>>,
+    matrix: DMatrix<f64>,
+}
+
+/// A variable belongs to a blind direction if it has at least this part of it.
+const PART: f64 = 0.1;
+
+impl Covariance {
+    /// From derivatives of residuals. Columns are brought to unit length; a direction along which the
+    /// residuals then change by less than `blind` times the largest change is one that they do not see.
+    pub fn new(jacobian: &DMatrix<f64>, variables: &[usize], blind: f64) -> Self {
+        let n = variables.len();
+        if n == 0 || jacobian.nrows() == 0 {
+            let blind = |k: usize| (0..n).map(|i| f64::from(u8::from(i == k))).collect();
+            return Self {
+                variables: variables.to_vec(),
+                blind: (0..n).map(blind).collect(),
+                matrix: DMatrix::zeros(n, n),
+            };
+        }
+        let norms: Vec<f64> = variables
+            .iter()
+            .map(|&i| jacobian.column(i).norm())
+            .collect();
+        let norms: Vec<f64> = norms
+            .iter()
+            .map(|&c| if c > 0.0 { c } else { 1.0 })
+            .collect();
+        let unit = DMatrix::from_fn(jacobian.nrows(), n, |row, k| {
+            jacobian[(row, variables[k])] / norms[k]
+        });
+        let svd = unit.svd(false, true);
+        let mut matrix = DMatrix::zeros(n, n);
+        let mut directions = Vec::new();
+        let largest = svd.singular_values.iter().fold(0.0_f64, |a, b| a.max(*b));
+        let v_t = svd.v_t.unwrap_or_else(|| DMatrix::identity(0, n));
+        let mut seen = DMatrix::zeros(n, n);
+        for (number, &value) in svd.singular_values.iter().enumerate() {
+            let v = v_t.row(number).transpose();
+            seen += &v * v.transpose();
+            if value > blind * largest {
+                matrix += &v * v.transpose() / (value * value);
+            } else {
+                directions.push(v.iter().copied().collect::<Vec<_>>());
+            }
+        }
+        // With fewer residuals than variables some directions have no singular value.
+        for k in 0..n.saturating_sub(svd.singular_values.len()) {
+            let rest = DMatrix::identity(n, n) - &seen;
+            let Some(widest) = (0..n).max_by(|&a, &b| rest[(a, a)].total_cmp(&rest[(b, b)])) else {
+                break;
+            };
+            let direction: DVector<f64> = rest.column(widest).into_owned();
+            let norm = direction.norm();
+            if norm < 1e-9 {
+                break;
+            }
+            let direction = direction / norm;
+            seen += &direction * direction.transpose();
+            directions.push(direction.iter().copied().collect());
+            debug_assert!(k < n, "a direction for each that is missing");
+        }
+        let matrix = DMatrix::from_fn(n, n, |a, b| matrix[(a, b)] / (norms[a] * norms[b]));
+        Self {
+            variables: variables.to_vec(),
+            blind: directions,
+            matrix,
+        }
+    }
+
+    fn position(&self, variable: usize) -> Option<usize> {
+        self.variables.iter().position(|&v| v == variable)
+    }
+
+    /// Whether the residuals determine a variable.
+    pub fn determines(&self, variable: usize) -> bool {
+        let place = self.position(variable);
+        place.is_some_and(|k| self.blind.iter().all(|v| v[k].abs() < PART))
+    }
+
+    /// Variance of a variable; `None` if it is not determined.
+    pub fn variance(&self, variable: usize) -> Option<f64> {
+        let k = self.position(variable)?;
+        self.determines(variable).then(|| self.matrix[(k, k)])
+    }
+
+    /// Correlation of two variables; `None` if one is not determined.
+    pub fn correlation(&self, a: usize, b: usize) -> Option<f64> {
+        let product = self.variance(a)? * self.variance(b)?;
+        let [i, j] = [self.position(a)?, self.position(b)?];
+        Some(self.matrix[(i, j)] / product.sqrt())
+    }
+
+    /// Variance of what changes with the variables by `gradient` (one entry for each variable of the
+    /// fit, those that are not among [`Self::variables`] included).
+    pub fn variance_along(&self, gradient: &[f64]) -> f64 {
+        let of = |k: usize| gradient.get(self.variables[k]).copied().unwrap_or(0.0);
+        let n = self.variables.len();
+        let terms = (0..n).flat_map(|a| (0..n).map(move |b| (a, b)));
+        let terms = terms.map(|(a, b)| of(a) * self.matrix[(a, b)] * of(b));
+        terms.sum::<f64>().max(0.0)
+    }
+}
+
+/// The value that a variable of Student's distribution stays below with probability (1 + `level`)/2;
+/// of the normal distribution without degrees of freedom.
+pub(super) fn two_sided(level: f64, degrees: Option<usize>) -> f64 {
+    let p = 0.5 * (1.0 + level);
+    let student = degrees.and_then(|n| StudentsT::new(0.0, 1.0, n as f64).ok());
+    match (student, degrees) {
+        (Some(student), _) => student.inverse_cdf(p),
+        (None, Some(_)) => f64::INFINITY,
+        (None, None) => Normal::standard().inverse_cdf(p),
+    }
+}
+
+/// How much larger than the least a sum of squares may be for all of `n` parameters together to lie in
+/// their region of this level, relative to the variance: n F(n, ν), of known variance χ²(n).
+pub(super) fn joint(level: f64, n: usize, degrees: Option<usize>) -> f64 {
+    // F with so many degrees of freedom is χ²/n.
+    let degrees = degrees.map_or(1e7, |degrees| degrees as f64);
+    let distribution = FisherSnedecor::new(n as f64, degrees);
+    distribution.map_or(f64::INFINITY, |f| n as f64 * f.inverse_cdf(level))
+}
+
+/// Correlation of neighbours along a curve; 0 of fewer than four values, or of equal ones.
+pub(super) fn of_neighbours(values: &[f64]) -> f64 {
+    let n = values.len();
+    let squares: f64 = values.iter().map(|v| v * v).sum();
+    if n < 4 || squares <= 0.0 {
+        return 0.0;
+    }
+    values.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / squares
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Tables of Student's t and of F at 95 %, to their digits.
+    #[test]
+    fn quantiles_are_those_of_tables() {
+        for (degrees, t) in [(1, 12.706), (2, 4.303), (10, 2.228), (30, 2.042)] {
+            assert_relative_eq!(two_sided(0.95, Some(degrees)), t, epsilon = 5e-4);
+        }
+        assert_relative_eq!(two_sided(0.95, None), 1.959_964, epsilon = 5e-7);
+        assert_relative_eq!(two_sided(0.99, Some(10)), 3.169, epsilon = 5e-4);
+        assert_relative_eq!(joint(0.95, 3, Some(10)), 3.0 * 3.708, epsilon = 2e-3);
+        assert_relative_eq!(joint(0.95, 2, None), 5.991, epsilon = 1e-3);
+        assert_relative_eq!(
+            two_sided(0.95, Some(20)).powi(2),
+            joint(0.95, 1, Some(20)),
+            epsilon = 1e-6
+        );
+    }
+
+    #[test]
+    fn a_straight_line_has_its_textbook_covariance() {
+        // y = a + b x at x = 0, 1, 2, 3: var b = 1/Σ(x − x̄)² = 1/5, var a = Σx²/(4·5) = 14/20.
+        let x = [0.0, 1.0, 2.0, 3.0];
+        let jacobian = DMatrix::from_fn(4, 2, |i, k| if k == 0 { 1.0 } else { x[i] });
+        let covariance = Covariance::new(&jacobian, &[0, 1], 1e-12);
+        assert_relative_eq!(covariance.variance(1).unwrap(), 0.2, epsilon = 1e-12);
+        assert_relative_eq!(covariance.variance(0).unwrap(), 0.7, epsilon = 1e-12);
+        // cov(a, b) = −x̄/5.
+        let expected = -0.3 / (0.7_f64 * 0.2).sqrt();
+        assert_relative_eq!(
+            covariance.correlation(0, 1).unwrap(),
+            expected,
+            epsilon = 1e-12
+        );
+        // Of the mean of y at x = 2: 1/4 + (2 − 1.5)²/5.
+        assert_relative_eq!(covariance.variance_along(&[1.0, 2.0]), 0.3, epsilon = 1e-12);
+        let alone = Covariance::new(&jacobian, &[1], 1e-12);
+        assert_relative_eq!(alone.variance(1).unwrap(), 1.0 / 14.0, epsilon = 1e-12);
+        assert_eq!(alone.variance(0), None);
+    }
+
+    #[test]
+    fn directions_that_nothing_sees_are_named() {
+        // Two equal columns in other units, and one of its own.
+        let jacobian = DMatrix::from_fn(5, 3, |i, k| match k {
+            0 => i as f64,
+            1 => 1e6 * i as f64,
+            _ => (i as f64 - 2.0).powi(2),
+        });
+        let covariance = Covariance::new(&jacobian, &[0, 1, 2], 1e-8);
+        assert_eq!(covariance.blind.len(), 1);
+        assert!(!covariance.determines(0) && !covariance.determines(1));
+        assert!(covariance.determines(2));
+        // More variables than residuals.
+        let covariance = Covariance::new(&jacobian.rows(1, 1).into_owned(), &[0, 1, 2], 1e-8);
+        assert_eq!(covariance.blind.len(), 2);
+        // Nothing to determine.
+        assert!(Covariance::new(&jacobian, &[], 1e-8).blind.is_empty());
+        // A column of nothing.
+        let covariance = Covariance::new(&DMatrix::zeros(4, 1), &[0], 1e-8);
+        assert!(!covariance.determines(0));
+    }
+
+    #[test]
+    fn neighbours_of_a_wave_are_correlated_and_of_signs_opposed() {
+        let wave: Vec<f64> = (0..100).map(|i| (f64::from(i) / 10.0).sin()).collect();
+        assert!(of_neighbours(&wave) > 0.9);
+        let signs: Vec<f64> = (0..100)
+            .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        assert!(of_neighbours(&signs) < -0.9);
+        assert_relative_eq!(of_neighbours(&[1.0, 2.0]), 0.0);
+    }
+}

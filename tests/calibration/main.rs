@@ -1,0 +1,83 @@
+//! `pilum calibrate`: what it finds of parameters that are known.
+//!
+//! Goal        values and intervals from tests whose truth is known; words where tests do not tell
+//! Set-up      drivers of interface laws with synthetic scatter; the calibrations in `cases/`
+//! Asserts     true values inside the intervals at the nominal rate; derivatives by a law's rates
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod cases;
+mod coverage;
+mod rates;
+mod stages;
+mod words;
+
+use input::calibration::Calibration;
+use input::{Driver, Error};
+use runs::calibration::{Options, Outcome, calibrate};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use text::Source;
+
+/// Carries out a calibration file in memory.
+fn run(file: &Path, settings: &[&str]) -> Result<Outcome, Error> {
+    let settings: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
+    let calibration = Calibration::load_with(file, &settings)?.remove(0);
+    let folder = TempDir::new().unwrap();
+    let options = Options {
+        variant: None,
+        settings,
+        out: None,
+        stop: law::Stop::never(),
+        opener: law::Opener::default(),
+    };
+    calibrate(&calibration, folder.path(), &options, &mut |_| ())
+}
+
+/// Two columns that a driver computes, at places along the first.
+fn computed(driver: &str, columns: [&str; 2], at: &[f64]) -> Vec<f64> {
+    let driver = Driver::from_source(&Source::new("driver.toml", driver)).unwrap();
+    let names = results::point_figure::drawable(driver.point());
+    let [x, y] = columns.map(|name| names.iter().position(|other| other == name).unwrap());
+    let mut line = Vec::new();
+    driver
+        .run(|row| {
+            let values = results::point_figure::drawn(driver.point(), row);
+            line.push((values[x].unwrap(), values[y].unwrap()));
+        })
+        .unwrap();
+    let value = |x: &f64| {
+        let pair = line
+            .windows(2)
+            .find(|pair| (pair[0].0..=pair[1].0).contains(x))
+            .unwrap();
+        let [(a, f), (b, g)] = [pair[0], pair[1]];
+        f + (g - f) * (x - a) / (b - a)
+    };
+    at.iter().map(value).collect()
+}
+
+/// Writes measured points.
+fn write_points(folder: &Path, name: &str, points: &[(f64, f64)]) {
+    let mut text = "x,y\n".to_owned();
+    for (x, y) in points {
+        writeln!(text, "{x:e},{y:e}").unwrap();
+    }
+    fs::write(folder.join(name), text).unwrap();
+}
+
+/// The number of a parameter.
+fn number(outcome: &Outcome, name: &str) -> usize {
+    outcome
+        .parameters
+        .iter()
+        .position(|p| p.name == name)
+        .unwrap()
+}
+
+/// Whether the interval of a parameter holds a value.
+fn holds(outcome: &Outcome, name: &str, value: f64) -> bool {
+    let interval = outcome.interval(number(outcome, name)).unwrap();
+    interval.ends[0].unwrap() <= value && value <= interval.ends[1].unwrap()
+}

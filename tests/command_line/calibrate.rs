@@ -1,0 +1,411 @@
+//! `pilum calibrate`: what it shows and writes, and mistakes in its file.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
+use serde_json::Value;
+
+/// Shear stress of a joint of 5e4 kPa/m and tan φ = 0.6 at 100 kPa, with an error of a tenth.
+const POINTS: &str = "slip,tau,empty\n0.2,10.1,\n0.4,19.9,\n0.6,30.1,\n0.8,39.9,\n1.0,50.1,\n1.4,59.9,\n1.6,60.1,\n1.8,59.9,\n";
+
+const DRIVER: &str = r#"law = "coulomb_joint"
+hypothesis = "interface_2d"
+[parameters]
+normal_stiffness = 1e6
+shear_stiffness = 1e5
+cohesion = 0.0
+friction_angle = 20.0
+dilatancy_angle = 0.0
+[initial]
+traction = { n = -100.0 }
+[[segment]]
+increments = 20
+control = { t = { jump = 2e-3 } }
+[[segment]]
+increments = 5
+control = { t = { traction = 0.0 } }
+"#;
+
+const FILE: &str = r#"title = "A joint"
+starts = 2
+
+[free]
+shear_stiffness = { min = 1e3, max = 1e7 }
+friction_angle = {}
+
+[[test]]
+name = "box"
+driver = "driver.toml"
+
+[[test.curve]]
+x = "u_t"
+y = "traction_t"
+segment = 1
+measured = { file = "box.csv", x = "slip", y = "tau" }
+noise = 0.1
+"#;
+
+fn place() -> Place {
+    let place = Place::new();
+    place.write("driver.toml", DRIVER);
+    place.write("box.csv", POINTS);
+    place.write("joint.toml", FILE);
+    place
+}
+
+/// The file after an edit.
+fn edited(place: &Place, from: &str, to: &str, more: &[&str]) -> Outcome {
+    assert!(FILE.contains(from), "{from:?}");
+    place.write("joint.toml", FILE.replacen(from, to, 1));
+    place.run(&[&["calibrate", "joint.toml", "--out", "out"], more].concat())
+}
+
+#[test]
+fn finds_what_the_points_were_made_with_and_leaves_it_in_files() {
+    let place = place();
+    let outcome = place.run(&["calibrate", "joint.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for part in [
+        "shear_stiffness",
+        "95 % interval",
+        "[parameters]",
+        "results in results/calibrate_joint",
+    ] {
+        assert!(outcome.stdout.contains(part), "{part}: {}", outcome.stdout);
+    }
+    let folder = place.path("results/calibrate_joint");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let json: Value = serde_json::from_str(&read("calibration.json")).unwrap();
+    let parameters = json["parameters"].as_array().unwrap();
+    for (parameter, truth) in parameters.iter().zip([5e4, 0.6_f64.atan().to_degrees()]) {
+        let [low, high] = [0, 1].map(|end| parameter["interval"][end].as_f64().unwrap());
+        assert!(low < truth && truth < high, "{parameter}");
+        assert!((high / low - 1.0).abs() < 0.05, "{parameter}");
+    }
+    // Eight points, two parameters.
+    assert_eq!(json["stages"][0]["degrees_of_freedom"], 6);
+    for (name, lines) in [
+        ("parameters.csv", 3),
+        ("fit.csv", 9),
+        ("correlations.csv", 2),
+        ("starts.csv", 5),
+    ] {
+        assert_eq!(read(name).lines().count(), lines, "{name}");
+    }
+    assert!(read("profiles.csv").lines().count() > 8);
+    let report = read("report.html");
+    for part in ["<svg", "to paste", "Profiles", "correlations"] {
+        assert!(report.contains(part), "{part}");
+    }
+    assert!(folder.join("fit_traction_t_over_u_t.svg").is_file());
+    assert!(folder.join("profile_friction_angle.svg").is_file());
+    assert!(!folder.join(".trial").exists());
+    // The set is one that the driver takes.
+    let block = read("parameters.toml");
+    let (head, rest) = DRIVER.split_once("[parameters]").unwrap();
+    let (_, tail) = rest.split_once("[initial]").unwrap();
+    place.write("best.toml", format!("{head}{block}[initial]{tail}"));
+    assert_eq!(place.run(&["point", "best.toml"]).code, Some(DONE));
+}
+
+#[test]
+fn variants_and_settings() {
+    let place = place();
+    let variants =
+        format!("{FILE}\n[[variant]]\nname = \"a\"\n[[variant]]\nname = \"b\"\nconfidence = 0.5\n");
+    place.write("joint.toml", variants);
+    let outcome = place.run(&[
+        "calibrate",
+        "joint.toml",
+        "--out",
+        "out",
+        "--set",
+        "starts=1",
+    ]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(
+        outcome.stderr.contains("start 1 of 1"),
+        "{}",
+        outcome.stderr
+    );
+    let width = |variant: &str| {
+        let text =
+            std::fs::read_to_string(place.path("out").join(variant).join("calibration.json"));
+        let json: Value = serde_json::from_str(&text.unwrap()).unwrap();
+        let interval = &json["parameters"][0]["linear_interval"];
+        interval[1].as_f64().unwrap() - interval[0].as_f64().unwrap()
+    };
+    // t(6) is 2.447 at 95 % and 0.718 at 50 %.
+    let ratio = width("a") / width("b");
+    assert!((ratio / (2.447 / 0.718) - 1.0).abs() < 0.02, "{ratio}");
+    let outcome = place.run(&["calibrate", "joint.toml", "--variant", "c"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    assert!(
+        outcome.says("there is no variant `c`"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn mistakes_are_told_with_file_line_and_key() {
+    let place = place();
+    for (from, to, line, says) in [
+        ("starts = 2", "stars = 2", 2, "unknown key `stars`"),
+        ("starts = 2", "starts = 0", 2, "`starts` is 0"),
+        ("starts = 2", "confidence = 1.0", 2, "`confidence` is 1"),
+        ("starts = 2", "difference = 0.5", 2, "`difference` is 0.5"),
+        (
+            "friction_angle = {}",
+            "friction_angel = {}",
+            6,
+            "no law of a test has a parameter `friction_angel`",
+        ),
+        (
+            "friction_angle = {}",
+            "friction_angle = { parameter = \"phi\" }",
+            6,
+            "a parameter `phi`",
+        ),
+        (
+            "friction_angle = {}",
+            "friction_angle = { start = 95.0 }",
+            6,
+            "`start` is 95",
+        ),
+        (
+            "friction_angle = {}",
+            "friction_angle = { max = 120.0 }",
+            6,
+            "`max` is 120",
+        ),
+        (
+            "friction_angle = {}",
+            "friction_angle = { min = 25.0 }",
+            6,
+            "`start` is 20",
+        ),
+        (
+            "min = 1e3, max = 1e7",
+            "min = 1e7, max = 1e3",
+            5,
+            "not below `max`",
+        ),
+        (
+            "min = 1e3",
+            "scale = \"decades\"",
+            5,
+            "there is no `decades`",
+        ),
+        (
+            "friction_angle = {}",
+            "cohesion = { scale = \"log\" }",
+            6,
+            "has no logarithm",
+        ),
+        (
+            "[[test]]\nname",
+            "[fixed]\nstiffness = { value = 1.0 }\n[[test]]\nname",
+            9,
+            "a parameter `stiffness`",
+        ),
+        (
+            "driver = \"driver.toml\"",
+            "",
+            9,
+            "needs a `driver` or a `case`",
+        ),
+        (
+            "driver = \"driver.toml\"",
+            "driver = \"driver.toml\"\ncase = \"c\"",
+            11,
+            "not both",
+        ),
+        (
+            "driver = \"driver.toml\"",
+            "driver = \"other.toml\"",
+            10,
+            "there is no file other.toml",
+        ),
+        (
+            "driver = \"driver.toml\"",
+            "driver = \"driver.toml\"\nvariant = \"v\"",
+            11,
+            "there is no variant `v`",
+        ),
+        (
+            "driver = \"driver.toml\"",
+            "driver = \"driver.toml\"\npredict = true",
+            1,
+            "there is no test to fit",
+        ),
+        (
+            "driver = \"driver.toml\"",
+            "driver = \"driver.toml\"\nweight = 0.0",
+            11,
+            "`weight` is 0",
+        ),
+        ("x = \"u_t\"", "x = \"u\"", 13, "there is no column `u`"),
+        (
+            "y = \"traction_t\"",
+            "y = \"traction\"",
+            14,
+            "there is no column `traction`",
+        ),
+        (
+            "segment = 1\n",
+            "segment = 3\n",
+            15,
+            "there is no segment 3: the driver has 2",
+        ),
+        (
+            "segment = 1\n",
+            "phase = \"push\"\n",
+            15,
+            "a driver has no phases",
+        ),
+        (
+            "segment = 1\n",
+            "",
+            13,
+            "`u_t` does not only grow or only fall",
+        ),
+        (
+            "y = \"tau\" }",
+            "y = \"sigma\" }",
+            16,
+            "has no column `sigma`",
+        ),
+        ("y = \"tau\" }", "y = \"empty\" }", 16, "has no row with"),
+        (
+            "y = \"tau\" }",
+            "y = \"tau\", x_scale = 1e3 }",
+            16,
+            "no measured point lies where `u_t` is computed",
+        ),
+        ("noise = 0.1", "noise = -0.1", 17, "`noise` is -0.1"),
+        ("noise = 0.1", "noise = 0.0", 17, "has no noise"),
+    ] {
+        let outcome = edited(&place, from, to, &[]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{to:?}: {}", outcome.stderr);
+        assert!(outcome.says(says), "{to:?}: {}", outcome.stderr);
+        assert!(
+            outcome.says(&format!("joint.toml:{line}:")),
+            "{to:?}, line {line}: {}",
+            outcome.stderr
+        );
+        assert!(!place.path("out").exists(), "{to:?}");
+    }
+    let stage = |text: &str| format!("noise = 0.1\n[[stage]]\nname = \"one\"\n{text}");
+    for (text, says) in [
+        (
+            "free = [\"stiffness\"]",
+            "there is no free parameter `stiffness`",
+        ),
+        (
+            "free = [\"friction_angle\"]",
+            "`shear_stiffness` is in no stage",
+        ),
+        (
+            "free = [\"friction_angle\"]\ntests = [\"bx\"]",
+            "there is no test `bx`",
+        ),
+        ("free = []", "has no free parameter"),
+    ] {
+        let outcome = edited(&place, "noise = 0.1\n", &stage(text), &[]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{text}");
+        assert!(outcome.says(says), "{text}: {}", outcome.stderr);
+    }
+    let outcome = place.run(&["calibrate", "driver.toml"]);
+    assert!(
+        outcome.says("this is a driver or case file"),
+        "{}",
+        outcome.stderr
+    );
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+}
+
+/// What was in the folder before.
+#[test]
+fn a_folder_with_earlier_results() {
+    let place = place();
+    let run = ["calibrate", "joint.toml", "--out", "out"];
+    assert_eq!(place.run(&run).code, Some(DONE));
+    assert!(place.path("out/profile_friction_angle.svg").is_file());
+    // Figures that this one does not draw are gone.
+    let outcome = place.run(&[&run[..], &["--set", "profiles=false"]].concat());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(!place.path("out/profile_friction_angle.svg").exists());
+    assert!(place.path("out/fit_traction_t_over_u_t.svg").is_file());
+    place.write("run/history.csv", "phase,increment\n");
+    let outcome = place.run(&["calibrate", "joint.toml", "--out", "run"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    assert!(
+        outcome.says("holds the results of a run"),
+        "{}",
+        outcome.stderr
+    );
+    assert!(!place.path("run/report.html").exists());
+}
+
+/// Points beyond the computed ones are left out, and that is said.
+#[test]
+fn points_that_are_not_computed_are_left_out() {
+    let place = place();
+    place.write("box.csv", format!("{POINTS}2.5,60.0,\n3.0,60.0,\n"));
+    let outcome = place.run(&["calibrate", "joint.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(
+        outcome
+            .stdout
+            .contains("2 of 10 measured points are left out"),
+        "{}",
+        outcome.stdout
+    );
+}
+
+/// A law of a case is named by its table.
+#[test]
+fn parameters_of_cases_need_their_law() {
+    let place = place();
+    place.write("case.toml", CASE);
+    let file = r#"starts = 1
+profiles = false
+[free]
+FREE
+[[test]]
+name = "push"
+case = "case.toml"
+[[test.curve]]
+x = "settlement"
+y = "tau"
+phase = "weight"
+measured = { file = "push.csv", x = "w", y = "tau" }
+noise = 0.1
+"#;
+    place.write("push.csv", "w,tau\n0.5,1.0\n");
+    for (free, says) in [
+        ("shear_stiffness = {}", "`shear_stiffness` needs `laws`"),
+        (
+            "shear_stiffness = { laws = [\"soil\"] }",
+            "law `elastic` has no parameter `shear_stiffness`",
+        ),
+        (
+            "shear_stiffness = { laws = [\"skin\"] }",
+            "no case of a test has a law `skin`",
+        ),
+    ] {
+        place.write("push.toml", file.replace("FREE", free));
+        let outcome = place.run(&["calibrate", "push.toml"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{free}");
+        assert!(outcome.says(says), "{free}: {}", outcome.stderr);
+        assert!(outcome.says("push.toml:4:"), "{free}: {}", outcome.stderr);
+    }
+    let wrong = file.replace("FREE", "young_modulus = { laws = [\"soil\"] }");
+    place.write("push.toml", wrong.replace("\"weight\"", "\"wait\""));
+    let outcome = place.run(&["calibrate", "push.toml"]);
+    assert!(
+        outcome.says("there is no phase `wait`"),
+        "{}",
+        outcome.stderr
+    );
+}
