@@ -20,7 +20,7 @@ mod study;
 mod table;
 mod trial;
 
-pub use accuracy::{reach, reach_until};
+pub use accuracy::{reach, reach_until, run_accurately};
 pub use sampled::Convergence;
 pub use study::{Measurement, Reference, Row, Study};
 
