@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import pilum
-from conftest import TABLE_4
+from conftest import compiled
 
 CHAMBER = pilum.cases() / "chamber_mesh1"
 JOINT = dict(normal_stiffness=1e7, shear_stiffness=1e6, cohesion=0.0, friction_angle=30.0, dilatancy_angle=0.0)
@@ -36,7 +36,6 @@ def slice_mesh(x: list[float] | None = None) -> pilum.Mesh:
 
 def slice_case() -> dict:
     """A slice of a pile in elastic ground behind a thin layer of Coulomb's friction, pushed down by 2 mm."""
-    stress = [-100.0, -100.0, -100.0, 0.0]
     stress = {"11": -100.0, "22": 0.0, "33": -100.0, "12": 0.0}
     return dict(
         analysis="axisymmetric",
@@ -63,8 +62,8 @@ def slice_case() -> dict:
 SHAFT = 100.0 * math.tan(math.radians(30.0)) * 2.0 * math.pi * 0.105 * 0.2
 
 
-def pushed(simulation: pilum.Simulation) -> list[float]:
-    return [-simulation.reaction("head")[1] for _ in simulation]
+def pushed(simulation: pilum.Simulation, head: str = "head") -> list[float]:
+    return [-simulation.reaction(head)[1] for _ in simulation]
 
 
 def test_a_slice_of_a_pile_from_arrays() -> None:
@@ -83,7 +82,9 @@ def test_a_slice_of_a_pile_from_arrays() -> None:
     np.testing.assert_allclose(-simulation.reactions[head, 1].sum(), curve[-1], rtol=1e-12)
     shaft = simulation.group("shaft")
     ratio = np.abs(shaft["traction"][:, 1] / shaft["traction"][:, 0])
-    np.testing.assert_allclose(ratio, math.tan(math.radians(30.0)), rtol=1e-6)
+    # Two thirds of the points slide; those that the layer's own elasticity still helps are below.
+    assert ratio.max() == pytest.approx(math.tan(math.radians(30.0)), rel=1e-9)
+    assert np.sum(np.isclose(ratio, ratio.max(), rtol=1e-9)) >= 6
     assert set(shaft) >= {"element", "point", "position", "jump", "traction", "plastic_slip"}
     ground = simulation.group("ground")
     assert ground["stress"].shape == ground["strain"].shape == (len(ground["element"]), 4)
@@ -166,7 +167,7 @@ def test_steps_are_those_of_a_run(here: Path) -> None:
     short = {"phase.loading.increments": 10}
     results = pilum.run(CHAMBER, set=short, results="run")
     simulation = pilum.Problem(CHAMBER, set=short).start()
-    loads = pushed(simulation)
+    loads = pushed(simulation, "pile_head")
     np.testing.assert_allclose(loads, results.history["q_t"], rtol=1e-9, atol=1e-9)
     assert not (here / "results").exists()
 
@@ -185,7 +186,10 @@ def test_copies_go_their_own_ways() -> None:
     simulation.go_to(state)
     assert simulation.time == pytest.approx(0.4) and pushed(simulation) == rest
     assert fresh.time == 0.0 and pushed(fresh)[4:] == rest
-    assert fresh.state() is not None and pilum.Problem(slice_case(), slice_mesh()).start().state() is None
+    # At the end there is a state too, and a copy of the end is at the end.
+    assert fresh.step() is None and fresh.state() is not None
+    assert fresh.copy().step() is None and fresh.copy().time == fresh.time == pytest.approx(1.0)
+    assert pilum.Problem(slice_case(), slice_mesh()).start().state() is None
 
 
 def test_another_problem_takes_no_state() -> None:
@@ -257,13 +261,15 @@ def test_what_the_mesh_lacks_is_said() -> None:
         simulation.group("sand")
 
 
-def test_a_law_that_fails_says_where(here: Path) -> None:
-    """A thin layer whose law cannot follow any increment."""
+def test_a_law_that_crashes_says_where(tmp_path: Path) -> None:
+    """A library that aborts, called in a process of its own."""
+    library = compiled("bad_abort.c", tmp_path, f"-I{pilum.include()}")
     case = slice_case()
-    case["laws"]["friction"] = pilum.Law("mepi", **TABLE_4)
-    case["phase"][0]["displacement"] = [dict(line="head", r=0.05)]
-    case["supports"] = case["supports"][:1]
-    simulation = pilum.Problem(case, slice_mesh()).start()
-    with pytest.raises(pilum.Error) as caught:
-        simulation.run()
-    assert caught.value.phase == "push" and caught.value.increment >= 1 and caught.value.cause
+    case["law_path"] = [library.parent]
+    case["laws"]["friction"] = {"law": "fixture", "parameters": {"normal_stiffness": 1e7, "shear_stiffness": 1e6}}
+    with pytest.raises(pilum.LawError) as caught:
+        pilum.Problem(case, slice_mesh(), isolate=5.0).start().run()
+    error = caught.value
+    assert (error.group, error.law) == ("shaft", "fixture")
+    assert error.element == 1 and error.point is not None and error.position is not None
+    assert "signal 6" in str(error.cause) or "crashed" in str(error.cause), error.cause

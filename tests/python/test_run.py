@@ -179,9 +179,7 @@ def test_drivers_have_variants_too(here: Path) -> None:
     # The peak friction of Table I is approached.
     ratio = -tables["100_kPa"]["traction_t"][-1] / tables["100_kPa"]["traction_n"][-1]
     assert 0.7 < ratio < 0.78
-    one = pilum.point(
-        pilum.cases() / "shear_box/fontainebleau.toml", variant="50_kPa", set={"segment": [{"increments": 5}]}
-    ) if False else pilum.point(pilum.cases() / "shear_box/fontainebleau.toml", variant="50_kPa")
+    one = pilum.point(pilum.cases() / "shear_box/fontainebleau.toml", variant="50_kPa")
     assert one["traction_t"].tolist() == tables["50_kPa"]["traction_t"].tolist()
 
 
@@ -269,7 +267,7 @@ def test_values_of_no_file_are_refused() -> None:
 
 
 def test_no_equilibrium_says_where(here: Path) -> None:
-    """A block on a slope of friction that is pulled harder than it holds."""
+    """A block on a joint with friction, which is pulled harder than it holds."""
     results = here / "slides"
     case = {
         **COLUMN,
@@ -299,8 +297,8 @@ def test_no_equilibrium_says_where(here: Path) -> None:
     with pytest.raises(pilum.NoEquilibriumError) as caught:
         pilum.run(case, results=results)
     error = caught.value
-    # It holds 100 tan 30° = 57.7 kN/m of 80: the eighth of ten increments is beyond.
-    assert error.phase == "pull" and error.increment in (7, 8) and error.cause
+    # It topples, at the latest where friction holds no more: 100 tan 30° = 57.7 kN/m of 80, in the eighth of ten.
+    assert error.phase == "pull" and 1 <= error.increment <= 8 and error.cause
     assert "pull" in str(error.place) and error.reached is not None and error.reached < 8
     found = pilum.Results(results)
     assert found.status == "no equilibrium" and found.history["increment"][-1] == error.increment - 1

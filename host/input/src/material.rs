@@ -484,8 +484,8 @@ impl ForeignKeys<'_> {
 }
 
 /// A law that a table describes by itself: the keys of one of a case's [`laws`](crate::case::CaseFile).
-/// `hypothesis` may be left out where the law offers one alone, `folders` are looked in for its library
-/// first. Returns the law, and initial internal variables that override its own, by their numbers.
+/// `hypothesis` may be left out where the law offers one alone (beside interfaces in space), `folders` are looked
+/// in for its library first. Returns the law, and initial internal variables that override its own, by their numbers.
 ///
 /// # Errors
 /// [`text::Error::Input`] at the key that does not fit; [`law::Error::Library`].
@@ -527,11 +527,12 @@ pub fn law_alone(
     Ok((built, initial))
 }
 
-/// The one hypothesis that a law is made for.
+/// The one hypothesis that a law is made for, interfaces in space aside: those are asked for.
 fn only_hypothesis(law: &LoadedLaw) -> Result<Hypothesis, String> {
     let description = law.description();
     let offered = Hypothesis::ALL.into_iter();
-    let mut offered = offered.filter(|one| description.formulation(*one).is_some());
+    let mut offered = offered
+        .filter(|one| *one != Hypothesis::Interface3d && description.formulation(*one).is_some());
     match (offered.next(), offered.next()) {
         (Some(only), None) => Ok(only),
         _ => Err(format!(

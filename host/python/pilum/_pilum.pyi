@@ -35,7 +35,7 @@ class Law:
     @property
     def variables(self) -> list[str]: ...
     @property
-    def parameters(self) -> dict[str, float]: ...
+    def parameters(self) -> dict[str, float | str]: ...
     @property
     def library(self) -> Path: ...
     @property
@@ -55,6 +55,7 @@ class Law:
         dt: float = 1.0,
         tangent: Literal["consistent", "elastic"] | None = "consistent",
         out: State | None = None,
+        copy: bool = True,
         positions: ArrayLike | None = None,
     ) -> tuple[NDArray[np.float64], Any, State]: ...
 

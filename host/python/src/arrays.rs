@@ -72,6 +72,12 @@ impl<'py> Rows<'py> {
         )))
     }
 
+    /// The array itself, if its values stand row by row.
+    pub(crate) fn array(&self) -> Option<Bound<'py, PyArray2<f64>>> {
+        let array: &Bound<'py, PyArray2<f64>> = &self.array;
+        array.is_c_contiguous().then(|| array.clone())
+    }
+
     /// Number of points.
     pub(crate) fn n_rows(&self) -> usize {
         self.array.shape()[0]

@@ -4,7 +4,7 @@ use abi::status::Outcome;
 use input::{Error, Kind};
 use law::BatchFailure;
 use mechanics::group::PointFailure;
-use miette::{Diagnostic, MietteSpanContents, SourceCode, SpanContents};
+use miette::{Diagnostic, SourceCode};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -111,38 +111,35 @@ fn place_in_file(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -
     let (Some(source), Some(label)) = (error.source_code(), label) else {
         return Ok(());
     };
-    let Ok(found) = line_of(source, label.inner()) else {
+    let Some((name, line, column, text)) = line_of(source, label.inner()) else {
         return Ok(());
     };
-    let text = String::from_utf8_lossy(found.data());
-    let text = text.lines().next().unwrap_or_default().trim();
     to.set_item("text", text)?;
     if let Some(label) = label.label() {
         to.set_item("cause", label)?;
     }
     // Lines of a text that was made of a dictionary tell its user nothing.
-    if let Some(name) = found.name().filter(|name| Some(*name) != written) {
+    if Some(name.as_str()) != written {
         to.set_item("file", name)?;
-        to.set_item("line", found.line() + 1)?;
-        to.set_item("column", found.column() + 1)?;
+        to.set_item("line", line)?;
+        to.set_item("column", column)?;
     }
     Ok(())
 }
 
-/// The line at which a span starts.
-fn line_of<'s>(
-    source: &'s dyn SourceCode,
+/// Name of the text, line and column at which a span starts (from 1), and that line.
+fn line_of(
+    source: &dyn SourceCode,
     span: &miette::SourceSpan,
-) -> Result<MietteSpanContents<'s>, miette::MietteError> {
-    let at = source.read_span(span, 0, 0)?;
-    let (line, column) = (at.line(), at.column());
-    let start = span.offset() - column.min(span.offset());
-    let whole = source.read_span(&(start, column + span.len()).into(), 0, 0)?;
+) -> Option<(String, usize, usize, String)> {
+    let at = source.read_span(span, 0, 0).ok()?;
+    // With a line on each side all of its own is there.
+    let around = source.read_span(span, 1, 1).ok()?;
+    let text = String::from_utf8_lossy(around.data());
+    let line = text.lines().nth(at.line() - around.line());
     let name = at.name().unwrap_or_default().to_owned();
-    let (data, span) = (whole.data(), *whole.span());
-    Ok(MietteSpanContents::new_named(
-        name, data, span, line, column, 1,
-    ))
+    let line = line.unwrap_or_default().trim().to_owned();
+    Some((name, at.line() + 1, at.column() + 1, line))
 }
 
 fn of_simulation(to: &Bound<'_, PyDict>, error: &mechanics::Error) -> PyResult<()> {

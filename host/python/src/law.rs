@@ -141,13 +141,13 @@ impl Law {
             .readwrite()
             .as_slice_mut()?
             .copy_from_slice(&internal);
-        copy(
+        copied(
             carried,
             state.flux.bind(py).readwrite().as_slice_mut()?,
             law.n_components(),
         );
         if let Some(gradient) = gradient {
-            copy(
+            copied(
                 gradient.view()?,
                 state.gradient.bind(py).readwrite().as_slice_mut()?,
                 law.n_components(),
@@ -158,7 +158,7 @@ impl Law {
 }
 
 /// Copies values point by point.
-fn copy((from, place): (&[f64], Strided), to: &mut [f64], n: usize) {
+fn copied((from, place): (&[f64], Strided), to: &mut [f64], n: usize) {
     if (place.offset, place.point, place.component) == (0, n, 1) {
         to.copy_from_slice(&from[..to.len()]);
         return;
@@ -256,11 +256,11 @@ impl Law {
             };
             if rows.n_rows() == n_points {
                 let mut values = vec![0.0; n_points * n];
-                copy(rows.view()?, &mut values, n);
+                copied(rows.view()?, &mut values, n);
                 Ok(values)
             } else if rows.n_rows() == 1 {
                 let mut one = vec![0.0; n];
-                copy(rows.view()?, &mut one, n);
+                copied(rows.view()?, &mut one, n);
                 Ok(one.repeat(n_points))
             } else {
                 let message = format!("{name}: found {} rows, expected {n_points}", rows.n_rows());
@@ -286,13 +286,14 @@ impl Law {
     ///
     /// The law reads and writes the arrays themselves, without the interpreter's lock. `out` is a state that is
     /// not needed any more: its memory, and that of what was returned with it, is used again.
+    /// With `copy=False` the state keeps the array of gradients itself, which nobody may write in any more.
     /// `positions`, shape (n, 2), is where the points lie, for routines that ask.
     ///
     /// Raises LawError, with `point` (from 0) and `outcome`, if a point cannot be carried; `outcome` is
     /// "cut_step" where a smaller increment may help.
     #[pyo3(
-        signature = (gradient, state=None, *, dt=1.0, tangent=Some("consistent"), out=None, positions=None),
-        text_signature = "($self, gradient, state=None, *, dt=1.0, tangent='consistent', out=None, positions=None)"
+        signature = (gradient, state=None, *, dt=1.0, tangent=Some("consistent"), out=None, copy=true, positions=None),
+        text_signature = "($self, gradient, state=None, *, dt=1.0, tangent='consistent', out=None, copy=True, positions=None)"
     )]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
     fn integrate<'py>(
@@ -303,6 +304,7 @@ impl Law {
         dt: f64,
         tangent: Option<&str>,
         out: Option<&Bound<'py, State>>,
+        copy: bool,
         positions: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let law = self.law();
@@ -341,6 +343,10 @@ impl Law {
         if end.operator.bind(py).len()? != n_points * n_operator {
             end.operator = numpy::PyArray1::zeros(py, n_points * n_operator, false).unbind();
         }
+        if let Some(array) = gradient.array().filter(|_| !copy) {
+            end.gradient = array.unbind();
+            end.is_lent = true;
+        }
         end.time = from.time + dt;
         end.increment = from.increment + 1;
         let sites = self.sites(py, n_points, positions)?;
@@ -348,7 +354,8 @@ impl Law {
             let [start_gradient, start_flux, start_internal] =
                 [&from.gradient, &from.flux, &from.internal].map(|array| array.bind(py).readonly());
             let busy = |_| PyValueError::new_err("out: its memory is in use");
-            let mut end_gradient = end.gradient.bind(py).try_readwrite().map_err(busy)?;
+            let own = (!end.is_lent).then(|| end.gradient.bind(py).try_readwrite());
+            let mut own = own.transpose().map_err(busy)?;
             let mut end_flux = end.flux.bind(py).try_readwrite().map_err(busy)?;
             let mut end_internal = end.internal.bind(py).try_readwrite().map_err(busy)?;
             let mut operator: PyReadwriteArray1<'_, f64> =
@@ -376,11 +383,13 @@ impl Law {
                 state: end_internal.as_slice_mut()?,
                 operator: operator.as_slice_mut()?,
             };
-            let reached = end_gradient.as_slice_mut()?;
+            let reached = own.as_mut().map(|own| own.as_slice_mut()).transpose()?;
             let outcome = self.calling(py, |law| {
                 let outcome = law.integrate(&start, wanted, results)?;
                 // The caller may use its array for the next increment.
-                copy(start.gradient_end, reached, n);
+                if let Some(reached) = reached {
+                    copied(start.gradient_end, reached, n);
+                }
                 Ok::<_, BatchFailure>(outcome)
             })?;
             let success = outcome.map_err(|failure| of_batch(py, law, &failure))?;
@@ -424,12 +433,18 @@ impl Law {
         self.variables.clone()
     }
 
-    /// Values of all parameters, those left out included; NaN where there is none.
+    /// Values of all parameters with those that were left out, as a law can be made of them again: numbers, of choices
+    /// their names.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
-        for parameter in &self.built.parameters {
-            all.set_item(&parameter.id, parameter.value)?;
+        let declared = &self.law().description().parameters;
+        let with_value = self.built.parameters.iter().zip(declared);
+        for (parameter, declared) in with_value.filter(|(p, _)| !p.value.is_nan()) {
+            match declared.choices.get(parameter.value as usize) {
+                Some(choice) => all.set_item(&parameter.id, choice)?,
+                None => all.set_item(&parameter.id, parameter.value)?,
+            }
         }
         Ok(all)
     }
@@ -472,7 +487,7 @@ impl Law {
         let positions = positions.map(|at| Rows::exactly(at, "positions", [n_points, 2]));
         let mut at = vec![0.0; 2 * n_points];
         if let Some(positions) = positions.transpose()? {
-            copy(positions.view()?, &mut at, 2);
+            copied(positions.view()?, &mut at, 2);
         }
         let site = |(number, at): (usize, &[f64])| Site {
             position: [at[0], at[1]],

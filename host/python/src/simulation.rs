@@ -27,6 +27,9 @@ pub(crate) struct Simulation {
 
 struct Inner {
     simulation: mechanics::Simulation,
+    /// The last increment of the last phase is done. The simulation is not led beyond it: a state could not be taken
+    /// of it any more.
+    is_done: bool,
     case: Case,
     written: Option<String>,
 }
@@ -35,8 +38,10 @@ struct Inner {
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct SimulationState {
     state: State<'static>,
+    /// Number of the phase, from 0.
     #[pyo3(get)]
     phase: usize,
+    /// Whole increments of it that are done.
     #[pyo3(get)]
     increment: usize,
 }
@@ -76,6 +81,21 @@ impl Simulation {
         }
     }
 
+    /// Goes on by one increment, unless all is done.
+    fn advance(&self, py: Python<'_>) -> PyResult<Option<Increment>> {
+        if self.inner()?.is_done {
+            return Ok(None);
+        }
+        let done = self.working(py, mechanics::Simulation::step_watched)?;
+        let mut inner = self.inner()?;
+        inner.is_done = done.as_ref().is_none_or(|done| {
+            let last = inner.simulation.problem().phases.last();
+            done.place.increment == done.of
+                && last.is_some_and(|last| last.name == done.place.phase)
+        });
+        Ok(done)
+    }
+
     /// Does something that may take long.
     fn working<T: Send>(
         &self,
@@ -88,6 +108,7 @@ impl Simulation {
             simulation,
             case,
             written,
+            ..
         } = &mut *inner;
         let outcome = carry_out(
             py,
@@ -156,6 +177,7 @@ impl Simulation {
         Ok(Self {
             inner: Mutex::new(Inner {
                 simulation,
+                is_done: false,
                 case,
                 written,
             }),
@@ -168,13 +190,17 @@ impl Simulation {
     /// law calls a result inaccurate, or None); None after the last. After an exception the state is the last one
     /// in equilibrium; `go_to` leads back to another.
     fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let done = self.working(py, mechanics::Simulation::step_watched)?;
+        let done = self.advance(py)?;
         done.map(|increment| told(py, &increment)).transpose()
     }
 
     /// Goes on to the end of the last phase.
     fn run(&self, py: Python<'_>) -> PyResult<()> {
-        self.working(py, mechanics::Simulation::run)
+        // Many increments take less time than signals are looked for within one.
+        while self.advance(py)?.is_some() {
+            py.check_signals()?;
+        }
+        Ok(())
     }
 
     /// The time that is reached.
@@ -315,8 +341,13 @@ impl Simulation {
 
     /// Goes back, or on, to a state of a simulation of the same problem.
     fn go_to(&self, py: Python<'_>, state: &SimulationState) -> PyResult<()> {
-        let state = state.state.clone();
-        self.working(py, |simulation, _| simulation.go_to(state))
+        let to = state.state.clone();
+        self.working(py, |simulation, _| simulation.go_to(to))?;
+        let mut inner = self.inner()?;
+        let phases = &inner.simulation.problem().phases;
+        let (number, phase) = (state.phase + 1, &phases[state.phase]);
+        inner.is_done = number == phases.len() && state.increment == phase.increments;
+        Ok(())
     }
 
     /// A simulation of its own that stands where this one does.
@@ -324,6 +355,7 @@ impl Simulation {
         let mut inner = self.inner()?;
         let Inner {
             simulation,
+            is_done,
             case,
             written,
         } = &mut *inner;
@@ -343,6 +375,7 @@ impl Simulation {
         Ok(Self {
             inner: Mutex::new(Inner {
                 simulation: copy,
+                is_done: *is_done,
                 case: case.clone(),
                 written: written.clone(),
             }),
@@ -370,7 +403,7 @@ impl Simulation {
         let inner = self.inner()?;
         let problem = inner.simulation.problem();
         Ok(format!(
-            "<pilum.Simulation: {} nodes, {} groups, {} phases, time {}>",
+            "<pilum.Simulation: {} nodes, {} groups, {} phases, time {:?}>",
             problem.mesh.nodes.len(),
             problem.groups.len(),
             problem.phases.len(),

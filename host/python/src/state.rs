@@ -11,6 +11,8 @@ use pyo3::prelude::*;
 pub(crate) struct State {
     /// Jumps or strains, a row a point.
     pub(crate) gradient: Py<PyArray2<f64>>,
+    /// That array is the user's, and is not to be written in.
+    pub(crate) is_lent: bool,
     /// Tractions or stresses, a row a point.
     pub(crate) flux: Py<PyArray2<f64>>,
     /// Internal variables, a row a point.
@@ -79,7 +81,7 @@ impl State {
 
     fn __repr__(&self, py: Python<'_>) -> String {
         format!(
-            "<pilum.State: {} points, increment {}, time {}>",
+            "<pilum.State: {} points, increment {}, time {:?}>",
             self.n_points(py),
             self.increment,
             self.time
@@ -104,6 +106,7 @@ impl State {
         let zeros = |columns: usize| PyArray2::zeros(py, [n_points, columns], false).unbind();
         Self {
             gradient: zeros(n_components),
+            is_lent: false,
             flux: zeros(n_components),
             internal: zeros(names.len()),
             operator: PyArray1::zeros(py, n_points * n_operator, false).unbind(),
@@ -120,8 +123,15 @@ impl State {
         let fits = same(&self.gradient, &like.gradient)
             && same(&self.flux, &like.flux)
             && same(&self.internal, &like.internal);
-        fits.then(|| Self {
-            gradient: self.gradient.clone_ref(py),
+        let gradient = if self.is_lent {
+            let shape = self.gradient.bind(py).shape();
+            PyArray2::zeros(py, [shape[0], shape[1]], false).unbind()
+        } else {
+            self.gradient.clone_ref(py)
+        };
+        fits.then_some(Self {
+            gradient,
+            is_lent: false,
             flux: self.flux.clone_ref(py),
             internal: self.internal.clone_ref(py),
             operator: self.operator.clone_ref(py),
