@@ -33,8 +33,15 @@ def bless() -> bool:
     return bool(os.environ.get("PILUM_BLESS"))
 
 
+def is_native(kind: Any) -> bool:
+    """Whether a class is written in Rust."""
+    return isinstance(kind, type) and getattr(pilum._pilum, kind.__name__, None) is kind
+
+
 def signature(name: str, thing: Any) -> str:
     """A call as its caller writes it, without types."""
+    if is_native(thing) and "__new__" not in vars(thing):
+        return name
     try:
         parameters = list(inspect.signature(thing).parameters.values())
     except ValueError:
@@ -75,8 +82,11 @@ def attributes(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def members(kind: type) -> Iterator[tuple[str, str]]:
-    """Public methods and properties of a class."""
-    for name, value in vars(kind).items():
+    """Public methods and properties of a class; those of one in Rust have no order of their own."""
+    all_of_it = list(vars(kind).items())
+    if is_native(kind):
+        all_of_it.sort(key=lambda item: (not callable(item[1]), item[0]))
+    for name, value in all_of_it:
         if name.startswith("_") or isinstance(value, (str, type(None), int)):
             continue
         if isinstance(value, (classmethod, staticmethod)):

@@ -27,6 +27,7 @@ def slice_mesh(x: list[float] | None = None) -> pilum.Mesh:
         return "pile" if r < 0.1 else "shaft" if r < 0.11 else "ground"
 
     mesh = pilum.Mesh.grid([0.0, 0.1, 0.11, 0.2, 0.5, 1.0], [0.0, 0.2], group)
+    mesh.name_line("axis", lambda r, z: r == 0.0)
     mesh.name_line("outside", lambda r, z: r == 1.0)
     mesh.name_line("bottom", lambda r, z: z == 0.0)
     mesh.name_line("top", lambda r, z: z == 0.2)
@@ -50,6 +51,7 @@ def slice_case() -> dict:
             ground=dict(formulation="solid", law="sand", initial_stress=stress),
         ),
         supports=[
+            dict(line="axis", fixed=["r"]),
             dict(line="outside", fixed=["r", "z"]),
             dict(line="bottom", fixed=["r"]),
             dict(line="top", fixed=["r"]),
