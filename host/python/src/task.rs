@@ -1,6 +1,7 @@
 //! Work in a thread of its own, while the thread that asked for it, without the interpreter's lock, listens:
 //! for Ctrl-C, and for what is to be said on the way.
 
+use crate::error::exception;
 use law::Stop;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -113,11 +114,9 @@ pub(crate) fn carry_out<E: Send, T: Send>(
     if let Some(error) = raised {
         return Err(error);
     }
-    match done {
-        Some(Ok(outcome)) => Ok(outcome),
-        _ => {
-            let message = "Pilum panicked; please report it";
-            Err(PyRuntimeError::new_err(message))
-        }
-    }
+    let Some(Ok(outcome)) = done else {
+        let defect = input::Error::internal("the program panicked; please report it");
+        return Err(exception(py, &defect, None));
+    };
+    Ok(outcome)
 }
