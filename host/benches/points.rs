@@ -55,8 +55,10 @@ fn operator_named(name: &str) -> Operator {
 fn table(batch: usize, names: &[&str]) {
     let names = if names.is_empty() { NAMES } else { names };
     for name in names {
-        let mut scenario = Scenario::new(name, N_POINTS);
-        let n_points = N_POINTS as f64;
+        // A batch as large as is asked for.
+        let n_points = N_POINTS.max(batch);
+        let mut scenario = Scenario::new(name, n_points);
+        let n_points = n_points as f64;
         for operator in ["none", "consistent"] {
             let wanted = operator_named(operator);
             let [median, least] = cpu_seconds(|| scenario.step(batch, wanted));

@@ -96,6 +96,10 @@ impl Observer for Progress {
         self.say(&format!("warning: {message}"));
     }
 
+    fn note(&mut self, message: &str) {
+        self.say(message);
+    }
+
     fn at_rest(&mut self, phase: &str, share: f64) {
         self.say(&format!(
             "phase {phase}: at rest within {share:.1e} of its weight"

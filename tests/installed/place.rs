@@ -71,7 +71,14 @@ pub(crate) fn archive() -> &'static (PathBuf, String) {
             program: built_program(),
             laws: deps(),
         };
-        dist::lay_out(&repository(), &metadata, &built, &laid_out).unwrap();
+        dist::lay_out(
+            &repository(),
+            &metadata,
+            &built,
+            dist::Kind::Archive,
+            &laid_out,
+        )
+        .unwrap();
         let archive = folder.join(metadata.name() + ".tar.gz");
         dist::pack(&laid_out, &archive).unwrap();
         (archive, metadata.name())

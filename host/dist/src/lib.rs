@@ -71,6 +71,22 @@ const FILES: [(&str, &str); 16] = [
     ("models/README.md", "share/doc/pilum/models"),
 ];
 
+/// What is laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// What a system has beside its other programs.
+    Archive,
+    /// What a Python package has in it, beside its extension module.
+    Wheel,
+}
+
+impl Kind {
+    /// The package whose library is there too.
+    fn library(self) -> Option<&'static str> {
+        (self == Self::Wheel).then_some("pilum-python")
+    }
+}
+
 /// What the program prints, and the file that it goes to.
 const PRINTED: [(&[&str], &str); 4] = [
     (&["man"], "share/man/man1/pilum.1"),
@@ -99,7 +115,8 @@ const WRITTEN: [(&str, &str); 4] = [
     (include_str!("README.md.txt"), "share/doc/pilum/README.md"),
 ];
 
-/// Lays all files out below a folder, which is made; files of an earlier version are replaced.
+/// Lays all files out below a folder, which is made; files of an earlier version are replaced. A wheel has neither
+/// manual page nor completions, which no shell would find in it.
 ///
 /// # Errors
 /// [`Error::File`] if a file cannot be read or written, [`Error::Command`] if the program does not run,
@@ -108,6 +125,7 @@ pub fn lay_out(
     repository: &Path,
     metadata: &Metadata,
     built: &Built,
+    kind: Kind,
     into: &Path,
 ) -> Result<(), Error> {
     let program = into.join(format!("bin/pilum{EXE_SUFFIX}"));
@@ -130,7 +148,12 @@ pub fn lay_out(
             copy(&from, &to.join(name))?;
         }
     }
-    for (arguments, to) in PRINTED {
+    let printed = if kind == Kind::Archive {
+        &PRINTED[..]
+    } else {
+        &[]
+    };
+    for &(arguments, to) in printed {
         let printed = output(Command::new(&program).args(arguments))?;
         write(&into.join(to), &printed)?;
     }
@@ -138,7 +161,8 @@ pub fn lay_out(
         let text = text.replace("@VERSION@", &metadata.version);
         write(&into.join(to), text.as_bytes())?;
     }
-    licences::write(repository, metadata, &into.join("share/doc/pilum"))
+    let pages = into.join("share/doc/pilum");
+    licences::write(repository, metadata, kind.library(), &pages)
 }
 
 /// Packs a folder as `tar.gz`, with its name as the first part of every path. The same files give the same
@@ -188,7 +212,10 @@ fn below(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 fn copy_folder(from: &Path, to: &Path) -> Result<(), Error> {
     for path in below(from)? {
         let ending = path.extension().and_then(|ending| ending.to_str());
-        if matches!(ending, Some("md" | "toml" | "csv" | "svg" | "msh" | "geo")) {
+        if matches!(
+            ending,
+            Some("md" | "ipynb" | "toml" | "csv" | "svg" | "msh" | "geo")
+        ) {
             copy(&path, &to.join(path.strip_prefix(from).unwrap_or(&path)))?;
         }
     }

@@ -18,10 +18,16 @@ const NAMES: [&str; 6] = [
     "UNLICENSE",
 ];
 
-/// Writes `licences.txt` into a folder: every package with its licence, then the texts, each once. Beside it
-/// comes what Rust says of its own library, where the toolchain has it.
-pub(crate) fn write(repository: &Path, metadata: &Metadata, folder: &Path) -> Result<(), Error> {
-    let linked = metadata.linked();
+/// Writes `licences.txt` into a folder: every package of the program, of the laws and of a library beside them with
+/// its licence, then the texts, each once. Beside it comes what Rust says of its own library, where the toolchain
+/// has it.
+pub(crate) fn write(
+    repository: &Path,
+    metadata: &Metadata,
+    library: Option<&str>,
+    folder: &Path,
+) -> Result<(), Error> {
+    let linked = metadata.linked(library);
     let mut list = format!(
         "Pilum {} is free software under the MIT licence or the Apache licence 2.0, at your choice: \
          LICENSE-MIT and\nLICENSE-APACHE beside this file. Program and laws contain the standard library of \

@@ -1,21 +1,25 @@
 //! `cargo run --release -p pilum-dist` builds program and laws, and makes the archive of them in `target/dist`.
-//! With a folder, `cargo run --release -p pilum-dist -- ~/.local`, it installs into that folder instead.
+//! With a folder, `cargo run --release -p pilum-dist -- ~/.local`, it installs into that folder instead;
+//! `--wheel FOLDER` lays out there what a Python package has in it (`host/python/wheel.sh`).
 #![expect(
     clippy::print_stdout,
     clippy::print_stderr,
     reason = "a program for the command line"
 )]
 
-use dist::{Built, Error, Metadata};
+use dist::{Built, Error, Kind, Metadata};
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-const USAGE: &str = "cargo run --release -p pilum-dist [-- PREFIX]\n\
-    makes target/dist/pilum-VERSION-PLATFORM.tar.gz, or installs into the folder PREFIX";
+const USAGE: &str = "cargo run --release -p pilum-dist [-- [--wheel] PREFIX]\n\
+    makes target/dist/pilum-VERSION-PLATFORM.tar.gz, or installs into the folder PREFIX; with --wheel what is in a \
+    Python package";
 
 fn main() -> ExitCode {
-    let mut arguments = env::args_os().skip(1);
+    let mut arguments = env::args_os().skip(1).peekable();
+    let is_wheel = arguments.next_if(|first| first == "--wheel").is_some();
+    let kind = if is_wheel { Kind::Wheel } else { Kind::Archive };
     let prefix = arguments.next();
     let asks = |name: &str| prefix.as_ref().is_some_and(|prefix| prefix == name);
     if asks("--help") || asks("-h") {
@@ -25,11 +29,11 @@ fn main() -> ExitCode {
     let is_option = prefix
         .as_ref()
         .is_some_and(|prefix| prefix.to_string_lossy().starts_with('-'));
-    if is_option || arguments.next().is_some() {
+    if is_option || arguments.next().is_some() || (is_wheel && prefix.is_none()) {
         eprintln!("{USAGE}");
         return ExitCode::from(1);
     }
-    match run(prefix.map(PathBuf::from).as_deref()) {
+    match run(kind, prefix.map(PathBuf::from).as_deref()) {
         Ok(said) => {
             println!("{said}");
             ExitCode::SUCCESS
@@ -41,14 +45,14 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(prefix: Option<&Path>) -> Result<String, Error> {
+fn run(kind: Kind, prefix: Option<&Path>) -> Result<String, Error> {
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     build(&repository)?;
     let metadata = Metadata::of(&repository)?;
     let target = &metadata.target;
     let built = Built::of(&target.join("release"));
     if let Some(prefix) = prefix {
-        dist::lay_out(&repository, &metadata, &built, prefix)?;
+        dist::lay_out(&repository, &metadata, &built, kind, prefix)?;
         let program = prefix.join("bin/pilum");
         return Ok(format!("{} is installed", program.display()));
     }
@@ -63,7 +67,7 @@ fn run(prefix: Option<&Path>) -> Result<String, Error> {
         }
         _ => {}
     }
-    dist::lay_out(&repository, &metadata, &built, &folder)?;
+    dist::lay_out(&repository, &metadata, &built, kind, &folder)?;
     let archive = target.join("dist").join(metadata.name() + ".tar.gz");
     dist::pack(&folder, &archive)?;
     let shown = archive.canonicalize().unwrap_or(archive);

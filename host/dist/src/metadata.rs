@@ -87,9 +87,12 @@ impl Metadata {
             .collect()
     }
 
-    /// All packages that are in the program or in a law, by name and version.
-    pub(crate) fn linked(&self) -> Vec<&Package> {
-        let is_ours = |package: &Package| package.name == PROGRAM || package.law.is_some();
+    /// All packages that are in the program, in a law, or in the library with this name, by name and version.
+    pub(crate) fn linked(&self, library: Option<&str>) -> Vec<&Package> {
+        let is_ours = |package: &Package| {
+            let name = package.name.as_str();
+            name == PROGRAM || package.law.is_some() || Some(name) == library
+        };
         let ours = self.packages.iter().filter(|(_, package)| is_ours(package));
         let mut open: Vec<&String> = ours.map(|(id, _)| id).collect();
         let mut seen = BTreeSet::new();

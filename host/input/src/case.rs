@@ -16,6 +16,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use text::{Named, Source, base};
 use toml::Spanned;
 
@@ -270,6 +271,9 @@ pub struct MeshInput {
     /// How often each element of the file is divided into four.
     #[serde(skip)]
     pub divisions: u32,
+    /// What the file holds, where it is not read: a mesh that was made in memory.
+    #[serde(skip)]
+    pub content: Option<Arc<[u8]>>,
 }
 
 /// Some columns or rows, following the previous ones.

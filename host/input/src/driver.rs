@@ -252,7 +252,19 @@ impl Driver {
     /// # Errors
     /// As [`Driver::read`].
     pub fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
-        Self::build_all(&Opener::default(), source, locked)
+        Self::variants_with(&Opener::default(), source, locked)
+    }
+
+    /// The same; the law's library is opened with this.
+    ///
+    /// # Errors
+    /// As [`Driver::read`].
+    pub fn variants_with(
+        opener: &Opener,
+        source: Source,
+        locked: bool,
+    ) -> Result<Vec<Self>, Error> {
+        Self::build_all(opener, source, locked)
     }
 
     fn build_all(opener: &Opener, source: Source, locked: bool) -> Result<Vec<Self>, Error> {

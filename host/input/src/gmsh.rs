@@ -14,6 +14,7 @@ use indexmap::IndexMap;
 use law::hexadecimal_sha256;
 use mechanics::mesh::Mesh;
 use mechanics::problem::{Analysis, Formulation};
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -66,7 +67,10 @@ pub(crate) fn mesh(
     let folder = source.path_at(&written.span()).parent();
     let path = folder.unwrap_or(Path::new(".")).join(written.get_ref());
     let unreadable = |why: io::Error| Error::from(unreadable(&path, why));
-    let bytes = file::read_mesh(&path).map_err(unreadable)?;
+    let bytes = match &input.content {
+        Some(content) => Cow::Borrowed(&content[..]),
+        None => Cow::Owned(file::read_mesh(&path).map_err(unreadable)?),
+    };
     let wrong = |fault: String| unreadable(io::Error::new(io::ErrorKind::InvalidData, fault));
     let contents = Contents::read(&bytes).map_err(wrong)?;
     let wanted = wanted(source, file, scale, &contents, &path)?;

@@ -5,7 +5,9 @@ use crate::case::LawInput;
 use crate::ground::Over;
 use abi::Hypothesis;
 use law::adapter::{Adapter, Externals, Foreign, Order, Scratch};
-use law::{BuildCause, BuildFailure, BuiltLaw, LoadedLaw, SearchPath, ShearZone, Value};
+use law::{
+    BuildCause, BuildFailure, BuiltLaw, LoadedLaw, Opener, Pins, SearchPath, ShearZone, Value,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::ops::Range;
@@ -478,5 +480,65 @@ impl ForeignKeys<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// A law that a table describes by itself: the keys of one of a case's [`laws`](crate::case::CaseFile).
+/// `hypothesis` may be left out where the law offers one alone (beside interfaces in space), `folders` are looked
+/// in for its library first. Returns the law, and initial internal variables that override its own, by their numbers.
+///
+/// # Errors
+/// [`text::Error::Input`] at the key that does not fit; [`law::Error::Library`].
+pub fn law_alone(
+    opener: &Opener,
+    source: &Source,
+    hypothesis: Option<Hypothesis>,
+    folders: &[PathBuf],
+) -> Result<(BuiltLaw, Vec<(usize, f64)>), Error> {
+    let entry: LawInput = text::parse(source)?;
+    let pins = Pins::given(source, [(&entry.law, entry.sha256.as_ref())].into_iter())?;
+    let search = SearchPath::of(opener, folders).pinned(pins);
+    let none = Named::new();
+    let tables = LawTables {
+        source,
+        tables: &none,
+    };
+    let loaded = tables.loaded(&search, &entry)?;
+    let hypothesis = match hypothesis {
+        Some(hypothesis) => hypothesis,
+        None => only_hypothesis(&loaded).map_err(|why| source.error(entry.law.span(), why))?,
+    };
+    let built = build_law(source, &loaded, &entry.law, hypothesis, &entry.parameters)?;
+    let variables = &built.law.formulation().internal_variables;
+    let mut initial = Vec::new();
+    for (key, value) in &entry.initial {
+        let id = key.get_ref();
+        let Some(number) = variables.iter().position(|variable| variable.id == *id) else {
+            let names: Vec<&str> = variables.iter().map(|v| v.id.as_str()).collect();
+            let message = format!(
+                "law `{}` has no internal variable `{id}`",
+                entry.law.get_ref()
+            );
+            let error = source.error(key.span(), message);
+            return Err(error.hint(suggestion(id, names)).into());
+        };
+        initial.push((number, *value.get_ref()));
+    }
+    Ok((built, initial))
+}
+
+/// The one hypothesis that a law is made for, interfaces in space aside: those are asked for.
+fn only_hypothesis(law: &LoadedLaw) -> Result<Hypothesis, String> {
+    let description = law.description();
+    let offered = Hypothesis::ALL.into_iter();
+    let mut offered = offered
+        .filter(|one| *one != Hypothesis::Interface3d && description.formulation(*one).is_some());
+    match (offered.next(), offered.next()) {
+        (Some(only), None) => Ok(only),
+        _ => Err(format!(
+            "law `{}` is made for several hypotheses, say which one: {}",
+            description.id,
+            description.hypotheses()
+        )),
     }
 }

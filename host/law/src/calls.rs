@@ -151,6 +151,13 @@ pub fn remember_process() {
     });
 }
 
+/// A copy of the process that its user has made, and no law, is a process of its own.
+pub fn goes_on_as_copy() {
+    if let Some(Some(word)) = ORIGINAL.get() {
+        word.write(0, std::iter::once(1));
+    }
+}
+
 /// Whether this process is a copy that a law has made.
 pub fn is_copy() -> bool {
     let original = ORIGINAL.get().and_then(Option::as_ref);

@@ -1,10 +1,11 @@
 //! Work that may crash, hang or eat all memory runs in a child process: this program again, with a
-//! hidden command. The child's death is an outcome like any other.
+//! hidden command, or the program that stands for it. The child's death is an outcome like any other.
 
 use std::ffi::OsString;
 use std::io::{self, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -82,13 +83,34 @@ fn signal_name(number: i32) -> Option<&'static str> {
     })
 }
 
+// Of the whole process: where its program lies never changes.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// Has this program be started where a child is needed, and its folders be those of the program's own
+/// laws: for a process that is not the program, such as an interpreter that has loaded its rooms. The
+/// first one that is named counts.
+pub fn stands_for(program: PathBuf) {
+    let _ = PROGRAM.set(program);
+}
+
+/// The program that children are.
+///
+/// # Errors
+/// The system does not say where this process's program lies.
+pub(crate) fn program() -> io::Result<PathBuf> {
+    PROGRAM
+        .get()
+        .cloned()
+        .map_or_else(std::env::current_exe, Ok)
+}
+
 /// Runs this program once more and waits for its end. It has no input, and is gone with all
 /// processes of its group when this function returns.
 ///
 /// # Errors
 /// The child cannot be started or waited for.
 pub fn run(work: &Work) -> io::Result<Outcome> {
-    let mut command = Command::new(std::env::current_exe()?);
+    let mut command = Command::new(program()?);
     command
         .args(&work.arguments)
         .env_remove(MEMORY)

@@ -4,6 +4,7 @@ use super::adapter::Foreign;
 use super::{Library, LoadedLaw, Opener};
 use crate::Error;
 use crate::Pins;
+use crate::child;
 use crate::inspect;
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
@@ -64,7 +65,7 @@ pub struct SearchPath {
 
 /// The program's own folders, by where it is: a link to the program is followed.
 pub(crate) fn of_program() -> Vec<Place> {
-    let program = std::env::current_exe().ok();
+    let program = child::program().ok();
     let program = program.map(|program| program.canonicalize().unwrap_or(program));
     let Some(folder) = program.as_deref().and_then(Path::parent) else {
         return Vec::new();

@@ -30,6 +30,8 @@ pub trait Observer {
     fn cut_back(&mut self, place: &Place, reason: &str);
     /// Something the user should know.
     fn warning(&mut self, message: &str);
+    /// What is being done before the first phase.
+    fn note(&mut self, _message: &str) {}
     /// The ground was found at rest in this phase but for a share of its weight, which the phase
     /// carries to equilibrium.
     fn at_rest(&mut self, _phase: &str, _share: f64) {}

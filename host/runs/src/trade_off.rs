@@ -21,7 +21,7 @@ mod study;
 mod table;
 pub(crate) mod trial;
 
-pub use accuracy::{reach, reach_until};
+pub use accuracy::{reach, reach_until, run_accurately};
 pub use sampled::Convergence;
 pub use study::{Measurement, Reference, Row, Study};
 

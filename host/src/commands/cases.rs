@@ -7,8 +7,9 @@ use input::{Case, Error};
 use law::{Opener, Stop};
 use mechanics::equilibrium::Reuse;
 use results::{Figures, remove_comparison, report};
-use runs::run::{Observer as _, Options, check, dry_run, run_reusing};
-use runs::{supervision, trade_off, variants};
+use runs::run::{Options, check, dry_run};
+use runs::trade_off::run_accurately;
+use runs::{supervision, variants};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -135,49 +136,6 @@ fn folder_of(case: &Case, variant: Option<&str>, out: Option<&Path>) -> PathBuf 
         (Some(out), Some(name)) if variant.is_none() => out.join(name),
         (Some(out), _) => out.to_owned(),
     }
-}
-
-/// Runs a case; where it asks for an accuracy, with settings that reach it.
-fn run_accurately(
-    case: &Case,
-    folder: &Path,
-    progress: &mut Progress,
-    reuse: &mut Reuse,
-    options: Options,
-) -> Result<Figures, Error> {
-    let studied = trade_off::reach_until(
-        case,
-        (folder, options.resume),
-        &progress.stop,
-        &mut |doing| {
-            say!("{doing}");
-        },
-    )?;
-    let case = studied.as_ref().unwrap_or(case);
-    if let Some(chosen) = &case.file.chosen {
-        let increments: Vec<String> = chosen
-            .increments
-            .iter()
-            .map(|(phase, n)| format!("{phase} {n}"))
-            .collect();
-        let settings = format!(
-            "error {:.1e} estimated, {:.1e} asked for; increments {}, force tolerance {:e} {}",
-            chosen.reached,
-            chosen.asked,
-            increments.join(", "),
-            chosen.force_tolerance,
-            chosen.parameters.join(" ")
-        );
-        if chosen.is_reached {
-            progress.say(&format!("accuracy: {}", settings.trim_end()));
-        } else {
-            progress.warning(&format!(
-                "the accuracy is not reached: {}",
-                settings.trim_end()
-            ));
-        }
-    }
-    run_reusing(case, folder, progress, reuse, options)
 }
 
 /// Keeps the last failure for the caller to report, and reports the one before it.

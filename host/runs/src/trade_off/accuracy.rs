@@ -13,11 +13,13 @@ use super::sampled::Sampled;
 use super::scheme::Scheme;
 use super::trial::{Scratch, Settings, Timing, Trial};
 use crate::Error;
-use crate::run::identity_of;
+use crate::run::{Observer, Options, identity_of, run_reusing};
 use input::case::Chosen;
 use input::material::ParameterValue;
 use input::{Case, Kind};
 use law::Stop;
+use mechanics::equilibrium::Reuse;
+use results::Figures;
 use std::path::{Path, PathBuf};
 use text::write::replace;
 
@@ -46,6 +48,51 @@ const ORDERS: [f64; 2] = [0.3, 1.0];
 /// Bad input before anything is written; no equilibrium with any settings; [`text::Error::Unwritable`].
 pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
     reach_until(case, (folder, false), &Stop::never(), &mut |_| ())
+}
+
+/// Runs a case; where it asks for an accuracy, with settings that reach it.
+///
+/// # Errors
+/// As [`reach_until`] and [`run_reusing`].
+pub fn run_accurately(
+    case: &Case,
+    folder: &Path,
+    observer: &mut dyn Observer,
+    reuse: &mut Reuse,
+    options: Options,
+) -> Result<Figures, Error> {
+    let stop = observer.stop();
+    let studied = reach_until(case, (folder, options.resume), &stop, &mut |doing| {
+        observer.note(doing);
+    })?;
+    let case = studied.as_ref().unwrap_or(case);
+    if let Some(chosen) = &case.file.chosen {
+        let settings = words(chosen);
+        if chosen.is_reached {
+            observer.note(&format!("accuracy: {settings}"));
+        } else {
+            observer.warning(&format!("the accuracy is not reached: {settings}"));
+        }
+    }
+    run_reusing(case, folder, observer, reuse, options)
+}
+
+/// What was chosen, and the error that it has.
+fn words(chosen: &Chosen) -> String {
+    let increments: Vec<String> = chosen
+        .increments
+        .iter()
+        .map(|(phase, n)| format!("{phase} {n}"))
+        .collect();
+    let settings = format!(
+        "error {:.1e} estimated, {:.1e} asked for; increments {}, force tolerance {:e} {}",
+        chosen.reached,
+        chosen.asked,
+        increments.join(", "),
+        chosen.force_tolerance,
+        chosen.parameters.join(" ")
+    );
+    settings.trim_end().to_owned()
 }
 
 /// As [`reach`], to be stopped on its way, and to go on (`resume`) with what is kept of an earlier study

@@ -1,0 +1,104 @@
+"""What can go wrong, as exceptions that say as data where and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+__all__ = [
+    "Error",
+    "InputError",
+    "InternalError",
+    "LawError",
+    "NoEquilibriumError",
+    "PilumWarning",
+]
+
+
+class PilumWarning(UserWarning):
+    """Something that the user should know: a value outside its usual range, say."""
+
+
+class Error(Exception):
+    """Anything that Pilum cannot do. What an attribute does not apply to has None."""
+
+    message: str
+    """What is wrong."""
+    hint: str | None = None
+    """What could be done about it."""
+    place: str | None = None
+    """Where in the course of a run or of a driver, in words."""
+    phase: str | None = None
+    """Name of the phase."""
+    segment: int | None = None
+    """Number of the segment of a driver, from 1."""
+    increment: int | None = None
+    """Number of the increment in its phase or segment, from 1."""
+    reached: float | None = None
+    """How far it came: in increments of the phase; of a driver in a fraction of the increment."""
+    law: str | None = None
+    """Id of the law."""
+    group: str | None = None
+    """Name of the group of elements."""
+    element: int | None = None
+    """Number of the element in its group, from 1."""
+    point: int | None = None
+    """Number of the integration point in its element, from 1; of a batch of `Law.integrate` its row, from 0."""
+    position: Sequence[float] | None = None
+    """Coordinates of the point, m."""
+    outcome: str | None = None
+    """What the law answered: "cut_step", "domain", "numeric", "internal" and so on."""
+    factor: float | None = None
+    """With "cut_step": by how much a smaller increment should be shorter."""
+    cause: str | None = None
+    """Why, in the words of the law, or of the iterations."""
+    file: str | None = None
+    """The file that is wrong; None where it was a dictionary."""
+    line: int | None = None
+    """The line of it, from 1."""
+    column: int | None = None
+    """The column of it, from 1."""
+    text: str | None = None
+    """What stands there."""
+
+    def __init__(self, message: str = "", **attributes: Any) -> None:
+        super().__init__(message)
+        self.message = message
+        for name, value in attributes.items():
+            setattr(self, name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_again, (type(self), self.message, dict(self.__dict__)))
+
+    def __str__(self) -> str:
+        lines = [self.message]
+        if self.file is not None:
+            lines[0] = f"{self.file}:{self.line}:{self.column}: {self.message}"
+        if self.text:
+            lines.append(f"  at: {self.text}")
+        if self.hint:
+            lines.append(f"  help: {self.hint}")
+        return "\n".join(lines)
+
+
+def _again(kind: type[Error], message: str, attributes: dict[str, Any]) -> Error:
+    """What another process has raised."""
+    error = kind(message)
+    error.__dict__.update(attributes)
+    return error
+
+
+class InputError(Error, ValueError):
+    """A file, a dictionary or what was asked for is wrong: whoever wrote it has to act."""
+
+
+class NoEquilibriumError(Error):
+    """There is no equilibrium, or none was found. What was found until then is there."""
+
+
+class LawError(Error):
+    """A law fails, or its library cannot be used: its author has to act, or the increment was too large."""
+
+
+class InternalError(Error):
+    """A defect of Pilum. Please report it."""

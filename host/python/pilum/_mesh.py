@@ -1,0 +1,195 @@
+"""Meshes from arrays, and from meshio."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._errors import InputError
+
+__all__ = ["Mesh"]
+
+# Nodes of a cell, and Gmsh's number of its kind.
+_SOLIDS = {8: 16, 6: 9}
+_LINES = {3: 8, 1: 15}
+_EDGES = {
+    8: np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
+    6: np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]]),
+}
+_MESHIO = {"quad8": 8, "triangle6": 6, "line3": 3, "vertex": 1}
+_LINEAR = {"line", "triangle", "quad", "quad9"}
+
+
+class Mesh:
+    """A mesh in the plane: nodes, groups of cells, named lines and points.
+
+    `nodes` has coordinates, shape (n, 2), m. `groups` gives by name the nodes of cells, counted from 0: shape
+    (m, 8) of quads or (m, 6) of triangles, corners in a round, then the mid-sides that follow them; or a list of
+    both. `lines` gives by name edges, shape (m, 3): two ends and the middle; or points, shape (m, 1). Interfaces
+    without thickness are no part of it: they are inserted along lines.
+    """
+
+    def __init__(
+        self,
+        nodes: ArrayLike,
+        groups: Mapping[str, Any],
+        lines: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.nodes: NDArray[np.float64] = np.asarray(nodes, dtype=np.float64)
+        if self.nodes.ndim != 2 or self.nodes.shape[1] not in (2, 3):
+            raise InputError(f"nodes: found shape {self.nodes.shape}, expected (n, 2)")
+        self.groups = {name: self._cells(name, cells, _SOLIDS) for name, cells in groups.items()}
+        self.lines = {name: self._cells(name, cells, _LINES) for name, cells in (lines or {}).items()}
+
+    def _cells(self, name: str, cells: Any, kinds: Mapping[int, int]) -> list[NDArray[np.int64]]:
+        if '"' in name or "\n" in name:
+            raise InputError(f"`{name}`: a name has neither quotes nor ends of lines")
+        parts = list(cells) if isinstance(cells, (list, tuple)) else [cells]
+        if parts and np.ndim(parts[0]) < 2:
+            parts = [cells]
+        found = []
+        for part in parts:
+            array = np.asarray(part)
+            if array.ndim == 1 and 1 in kinds:
+                array = array.reshape(-1, 1)
+            if array.ndim != 2 or array.shape[1] not in kinds or array.dtype.kind not in "iu":
+                wanted = " or ".join(f"(m, {n})" for n in kinds)
+                raise InputError(
+                    f"`{name}`: found {array.dtype} of shape {array.shape}, expected whole numbers of "
+                    f"shape {wanted}"
+                )
+            if array.size and not (0 <= array.min() and array.max() < len(self.nodes)):
+                raise InputError(
+                    f"`{name}`: node {array.max()} is none of 0 to {len(self.nodes) - 1}"
+                )
+            found.append(array.astype(np.int64))
+        return found
+
+    @classmethod
+    def grid(
+        cls,
+        x: ArrayLike,
+        y: ArrayLike,
+        group: str | Callable[[Any, Any], Any] = "ground",
+    ) -> Mesh:
+        """8-node quads between the lines of a grid at `x` and `y`, which rise, m.
+
+        `group` is the name of all cells, or gives it by the coordinates of a cell's middle.
+        """
+        across, up = (np.asarray(values, dtype=np.float64) for values in (x, y))
+        for values in (across, up):
+            if values.ndim != 1 or len(values) < 2 or not np.all(np.diff(values) > 0):
+                raise InputError("a grid needs two values that rise in x, and two in y")
+        fine = [np.insert(v, range(1, len(v)), (v[1:] + v[:-1]) / 2) for v in (across, up)]
+        n, m = len(fine[0]), len(fine[1])
+        number = -np.ones((m, n), dtype=np.int64)
+        kept = np.add.outer(np.arange(m) % 2, np.arange(n) % 2) < 2
+        number[kept] = np.arange(kept.sum())
+        nodes = np.stack(np.meshgrid(*fine), axis=-1)[kept]
+        at = [(0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0)]
+        cells = np.stack(
+            [number[j : m - 2 + j : 2, i : n - 2 + i : 2].ravel() for j, i in at], axis=1
+        )
+        if not callable(group):
+            return cls(nodes, {group: cells})
+        middles = nodes[cells[:, :4]].mean(axis=1)
+        names = [group(*middle) for middle in middles]
+        chosen = {name: np.array([other == name for other in names]) for name in names}
+        return cls(nodes, {name: cells[mask] for name, mask in chosen.items()})
+
+    @classmethod
+    def from_meshio(cls, mesh: Any) -> Mesh:
+        """A mesh of meshio, of second order: groups and lines by `cell_sets`, or by Gmsh's physical names."""
+        groups: dict[str, list[Any]] = {}
+        lines: dict[str, list[Any]] = {}
+        names = {(int(dim), int(tag)): name for name, (tag, dim) in mesh.field_data.items()}
+        tags = mesh.cell_data.get("gmsh:physical")
+        for number, block in enumerate(mesh.cells):
+            if block.type in _LINEAR:
+                raise InputError(
+                    f"the mesh has cells `{block.type}`, expected {', '.join(_MESHIO)}",
+                    hint="in Gmsh `Mesh.ElementOrder = 2` and `Mesh.SecondOrderIncomplete = 1`",
+                )
+            n = _MESHIO.get(block.type)
+            if n is None:
+                raise InputError(f"the mesh has cells `{block.type}`, which Pilum has not")
+            to, dim = (groups, 2) if n in _SOLIDS else (lines, 1 if n == 3 else 0)
+            sets = {
+                name: chosen[number]
+                for name, chosen in mesh.cell_sets.items()
+                if not name.startswith("gmsh:") and chosen[number] is not None
+            }
+            if tags is not None:
+                of_block = np.asarray(tags[number])
+                for tag in np.unique(of_block):
+                    name = names.get((dim, int(tag)), str(tag))
+                    sets.setdefault(name, np.flatnonzero(of_block == tag))
+            for name, chosen in sets.items():
+                if len(chosen):
+                    to.setdefault(name, []).append(np.asarray(block.data)[chosen])
+        if not groups:
+            raise InputError("the mesh has no named groups of cells: `cell_sets`, or physical names")
+        return cls(mesh.points, groups, lines)
+
+    def name_line(self, name: str, where: Callable[[Any, Any], Any]) -> None:
+        """Names a line after the edges all of whose three nodes fulfil a condition on their coordinates.
+
+        `mesh.name_line("top", lambda x, y: y == 1.0)`; `where` takes arrays.
+        """
+        found = [
+            part[:, _EDGES[part.shape[1]]].reshape(-1, 3)
+            for parts in self.groups.values()
+            for part in parts
+        ]
+        edges = np.concatenate(found) if found else np.empty((0, 3), dtype=np.int64)
+        at = self.nodes[edges]
+        chosen = edges[np.all(where(at[..., 0], at[..., 1]), axis=1)]
+        if not len(chosen):
+            raise InputError(f"line `{name}`: there is no such edge")
+        _, first = np.unique(chosen[:, 2], return_index=True)
+        self.lines[name] = [chosen[np.sort(first)]]
+
+    def _content(self) -> bytes:
+        """The mesh as a file of Gmsh, format 2.2 in bytes: what reads files reads it."""
+        blocks: list[tuple[int, int, NDArray[np.int64]]] = []
+        named: list[tuple[int, int, str]] = []
+        for kinds, parts_of in ((_SOLIDS, self.groups), (_LINES, self.lines)):
+            for name, parts in parts_of.items():
+                tag = len(named) + 1
+                for dim in sorted({_dimension(part.shape[1]) for part in parts}):
+                    named.append((dim, tag, name))
+                blocks += [(kinds[part.shape[1]], tag, part) for part in parts if len(part)]
+        text = [b"$MeshFormat\n2.2 1 8\n", np.int32(1).tobytes(), b"\n$EndMeshFormat\n"]
+        names = "".join(f'{dim} {tag} "{name}"\n' for dim, tag, name in named)
+        text.append(f"$PhysicalNames\n{len(named)}\n{names}$EndPhysicalNames\n".encode())
+        nodes = np.zeros(len(self.nodes), dtype=[("number", "<i4"), ("at", "<f8", 3)])
+        nodes["number"] = np.arange(1, len(nodes) + 1)
+        nodes["at"][:, : self.nodes.shape[1]] = self.nodes
+        text += [f"$Nodes\n{len(nodes)}\n".encode(), nodes.tobytes(), b"\n$EndNodes\n"]
+        total = sum(len(part) for _, _, part in blocks)
+        text.append(f"$Elements\n{total}\n".encode())
+        done = 0
+        for kind, tag, part in blocks:
+            rows = np.empty((len(part), 3 + part.shape[1]), dtype="<i4")
+            rows[:, 0] = np.arange(done + 1, done + len(part) + 1)
+            rows[:, 1:3] = tag
+            rows[:, 3:] = part + 1
+            text += [np.array([kind, len(part), 2], dtype="<i4").tobytes(), rows.tobytes()]
+            done += len(part)
+        return b"".join([*text, b"\n$EndElements\n"])
+
+    def __repr__(self) -> str:
+        groups = ", ".join(f"{name} ({_count(parts)})" for name, parts in self.groups.items())
+        lines = ", ".join(f"{name} ({_count(parts)})" for name, parts in self.lines.items())
+        return f"<pilum.Mesh: {len(self.nodes)} nodes; groups {groups}; lines {lines}>"
+
+
+def _dimension(n_nodes: int) -> int:
+    return {8: 2, 6: 2, 3: 1, 1: 0}[n_nodes]
+
+
+def _count(parts: Sequence[NDArray[np.int64]]) -> int:
+    return sum(len(part) for part in parts)

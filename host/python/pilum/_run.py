@@ -1,0 +1,163 @@
+"""Runs of cases and drivers, from files or dictionaries."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Union
+
+from . import _pilum
+from ._errors import InputError
+from ._mesh import Mesh
+from ._results import Results
+from ._table import Table
+
+__all__ = ["Problem", "Progress", "point", "run"]
+
+Case = Union[str, "os.PathLike[str]", Mapping[str, Any]]
+
+
+class Progress(NamedTuple):
+    """An increment that has reached equilibrium, as `watch` is told of it."""
+
+    phase: str
+    """Name of the phase."""
+    increment: int
+    """Number of the increment in it, from 1."""
+    of: int
+    """Increments of the phase."""
+    iterations: int
+    """Iterations of the increment, failed attempts included."""
+    cut_backs: int
+    """Steps of the phase so far that were repeated with a smaller size."""
+
+
+class Problem:
+    """What is to be computed: a case, as a file or as a dictionary with the same keys, perhaps on a mesh of arrays.
+
+    `case` is a case file, a folder with `case.toml`, or a dictionary with the keys of a case file; its `laws` may
+    be `pilum.Law`s. `mesh` is a `pilum.Mesh` or a mesh of meshio; then the dictionary needs no key `mesh`. `set`
+    gives settings over the case, `{"phase.push.increments": 80}`; `variant` names one of several; `isolate` calls
+    laws in processes of their own, which may take so many seconds for a call. Paths in a dictionary are relative
+    to the working folder.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        mesh: Any = None,
+        *,
+        name: str = "problem",
+        set: Mapping[str, Any] | None = None,
+        variant: str | None = None,
+        isolate: float | None = None,
+    ) -> None:
+        self.name = name
+        """What it is called, and its folder of results, where it comes from no file."""
+        self._mesh: bytes | None = None
+        if mesh is not None:
+            if not isinstance(case, Mapping):
+                raise InputError("a mesh of arrays goes with a case that is a dictionary")
+            if not isinstance(mesh, Mesh):
+                mesh = Mesh.from_meshio(mesh)
+            self._mesh = mesh._content()
+            case = {**case, "mesh": {"file": "mesh of arrays", **case.get("mesh", {})}}
+        self._case: Any = dict(case) if isinstance(case, Mapping) else os.fspath(case)
+        self._set = None if set is None else dict(set)
+        self._variant = variant
+        self._isolate = isolate
+
+    def start(self) -> _pilum.Simulation:
+        """A simulation before its first phase, checked. Each one goes its own way."""
+        return _pilum.Simulation(
+            self._case,
+            name=self.name,
+            mesh=self._mesh,
+            set=self._set,
+            variant=self._variant,
+            isolate=self._isolate,
+        )
+
+    def run(
+        self,
+        results: str | os.PathLike[str] | None = None,
+        *,
+        watch: Callable[[Progress], object] | None = None,
+        resume: bool = False,
+        checkpoints: float | None = 1.0,
+    ) -> Any:
+        """Runs it as the command does, with results in a folder: see `pilum.run`."""
+        done = _pilum.run(
+            self._case,
+            self.name,
+            self._mesh,
+            self._set,
+            self._variant,
+            None if results is None else os.fspath(results),
+            resume,
+            checkpoints,
+            self._isolate,
+            watch,
+        )
+        if [variant for variant, _ in done if variant is not None] and self._variant is None:
+            return {variant: Results(folder) for variant, folder in done}
+        return Results(done[0][1])
+
+    def __repr__(self) -> str:
+        what = "a dictionary" if isinstance(self._case, dict) else self._case
+        return f"<pilum.Problem {self.name}: {what}>"
+
+
+def run(
+    case: Case | Problem,
+    *,
+    set: Mapping[str, Any] | None = None,
+    watch: Callable[[Progress], object] | None = None,
+    results: str | os.PathLike[str] | None = None,
+    variant: str | None = None,
+    resume: bool = False,
+    checkpoints: float | None = 1.0,
+    isolate: float | None = None,
+) -> Any:
+    """Runs a case and returns its `Results`; of a case with variants a dictionary of them by their names.
+
+    `case` is a file, a folder with `case.toml`, a dictionary with the keys of a case file, or a `Problem`. `set`
+    gives settings over it: `{"phase.push.increments": 80, "laws.mepi.parameters.k_n": 2e5}`. `watch` is called
+    with a `Progress` after every increment, by the thread that called; what it raises stops the run and is raised
+    here. Ctrl-C stops the run; everything up to then is in its folder, and `resume=True` goes on from there.
+
+    Results go into `results`, or where the command puts them: `results/<case>`. `checkpoints` are written so many
+    seconds after one another. With `isolate` laws are called in processes of their own, for at most so many
+    seconds a call: a law that crashes raises LawError.
+
+    Raises InputError, NoEquilibriumError or LawError, with their places as attributes. Warnings are PilumWarning.
+    """
+    if isinstance(case, Problem):
+        if set is not None or variant is not None or isolate is not None:
+            raise InputError("set, variant and isolate are said to the Problem")
+        problem = case
+    else:
+        problem = Problem(case, set=set, variant=variant, isolate=isolate)
+    return problem.run(results, watch=watch, resume=resume, checkpoints=checkpoints)
+
+
+def point(
+    driver: Case,
+    *,
+    set: Mapping[str, Any] | None = None,
+    variant: str | None = None,
+    isolate: float | None = None,
+) -> Any:
+    """Leads a law along a path at one point and returns the `Table` of its increments.
+
+    `driver` is a driver file, or a dictionary with the keys of one; of a driver with variants a dictionary of
+    tables by their names is returned. Columns are `increment`, jumps and tractions (or strains and stresses) by
+    component, internal variables by their ids, `iterations`; row 0 is the initial state. Units are m and kPa;
+    tension and opening are positive.
+    """
+    source = dict(driver) if isinstance(driver, Mapping) else os.fspath(driver)
+    led = _pilum.point(source, None if set is None else dict(set), variant, isolate)
+    tables = {name: Table.of_text(rows) for name, rows, *_ in led}
+    if variant is None and any(name is not None for name in tables):
+        return tables
+    return next(iter(tables.values()))

@@ -1,0 +1,148 @@
+"""Tables: columns of arrays by name, as CSV files of results have them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _pilum
+
+__all__ = ["Table"]
+
+_WHOLE = {"increment", "iterations", "element", "point"}
+_SHOWN = 10
+
+
+class Table(Mapping[str, NDArray[Any]]):
+    """Columns of arrays by name, all of one length; what is missing is NaN.
+
+    A mapping of names to one-dimensional arrays: float64, int64 of numbers that count, texts of names. pandas and
+    polars take it as it is: `pandas.DataFrame(table)`, `polars.DataFrame(table)`; by the Arrow C stream
+    interface so do pyarrow, DuckDB and others.
+    """
+
+    def __init__(self, columns: Mapping[str, Any]) -> None:
+        self._columns = {name: np.asarray(values) for name, values in columns.items()}
+        for name, values in self._columns.items():
+            if values.shape != (len(self),):
+                message = f"column `{name}` has shape {values.shape}, expected ({len(self)},)"
+                raise ValueError(message)
+
+    @classmethod
+    def read(cls, path: str | Path) -> Table:
+        """Reads a CSV file of results."""
+        with open(path, encoding="utf-8", newline="") as file:
+            return cls._of_rows(csv.reader(file))
+
+    @classmethod
+    def of_text(cls, text: str) -> Table:
+        """Takes the text of a CSV file of results."""
+        return cls._of_rows(csv.reader(io.StringIO(text)))
+
+    @classmethod
+    def _of_rows(cls, rows: Iterator[list[str]]) -> Table:
+        names = next(rows, [])
+        # The row that a run is writing may not be whole yet.
+        columns = list(zip(*(row for row in rows if len(row) == len(names))))
+        if not columns:
+            columns = [()] * len(names)
+        return cls({name: _array(name, values) for name, values in zip(names, columns)})
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns, in order."""
+        return list(self._columns)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        try:
+            return self._columns[name]
+        except KeyError:
+            raise KeyError(f"there is no column `{name}`: {', '.join(self.names)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        for values in self._columns.values():
+            return int(values.shape[0])
+        return 0
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def keys(self) -> Any:
+        """Names of the columns."""
+        return self._columns.keys()
+
+    def values(self) -> Any:
+        """The columns."""
+        return self._columns.values()
+
+    def items(self) -> Any:
+        """Names and columns."""
+        return self._columns.items()
+
+    def where(self, **equal: Any) -> Table:
+        """The rows in which columns have these values: `profile.where(phase="push", increment=10)`."""
+        chosen = np.ones(len(self), dtype=bool)
+        for name, value in equal.items():
+            chosen &= self[name] == value
+        return Table({name: values[chosen] for name, values in self._columns.items()})
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """The columns as a stream of Arrow, copied; float64, int64 and texts."""
+        columns: list[tuple[str, Any]] = []
+        for name, values in self._columns.items():
+            if values.dtype.kind == "f":
+                columns.append((name, np.ascontiguousarray(values, dtype=np.float64)))
+            elif values.dtype.kind in "iub":
+                columns.append((name, np.ascontiguousarray(values, dtype=np.int64)))
+            else:
+                columns.append((name, [str(value) for value in values]))
+        return _pilum.stream(columns)
+
+    def __repr__(self) -> str:
+        return f"<pilum.Table: {len(self)} rows of {', '.join(self.names)}>"
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{escape(name)}</th>" for name in self.names)
+        if len(self) > 2 * _SHOWN:
+            rows = [*range(_SHOWN), -1, *range(len(self) - _SHOWN, len(self))]
+        else:
+            rows = list(range(len(self)))
+        body = "".join(
+            "<tr>"
+            + "".join(
+                "<td>…</td>" if row < 0 else f"<td>{escape(_short(values[row]))}</td>"
+                for values in self._columns.values()
+            )
+            + "</tr>"
+            for row in rows
+        )
+        return (
+            f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+            f"<p>{len(self)} rows</p>"
+        )
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, (float, np.floating)) else str(value)
+
+
+def _array(name: str, values: tuple[str, ...]) -> NDArray[Any]:
+    """Numbers where all are numbers or nothing, else texts."""
+    try:
+        numbers = np.array([value if value else "nan" for value in values], dtype=np.float64)
+    except ValueError:
+        return np.array(values)
+    if name in _WHOLE and np.all(numbers == np.floor(numbers)):
+        return numbers.astype(np.int64)
+    return numbers

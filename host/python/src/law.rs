@@ -1,0 +1,529 @@
+//! A law with its parameters, called for arrays of points.
+
+use crate::arrays::{Rows, looked_at, of_rows};
+use crate::error::{exception, of_batch};
+use crate::state::State;
+use crate::{task, value};
+use abi::Hypothesis;
+use input::material::law_alone;
+use law::{
+    BatchFailure, BuiltLaw, End, Moment, Opener, Operator, SearchPath, Site, Start, Strided,
+};
+use numpy::{PyArrayMethods, PyReadwriteArray1};
+use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use std::ffi::CString;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+use text::Source;
+
+/// Opens libraries as the program does: what is not known is tried in another process first.
+pub(crate) fn opener(isolate: Option<f64>) -> PyResult<Opener> {
+    let isolate = isolate.map(Duration::try_from_secs_f64).transpose();
+    let isolate = isolate
+        .map_err(|_| PyValueError::new_err("isolate: expected the seconds that a call may take"))?;
+    Ok(Opener::new(law::Trust {
+        probe: true,
+        isolate,
+    }))
+}
+
+/// Says something that the user should know.
+///
+/// # Errors
+/// Where warnings are errors, the warning.
+pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
+    let class = py.import("pilum._errors")?.getattr("PilumWarning");
+    let class = class.unwrap_or_else(|_| py.get_type::<PyUserWarning>().into_any());
+    let message = CString::new(message.replace('\0', " "))?;
+    PyErr::warn(py, &class, &message, 2)
+}
+
+/// A constitutive law with its parameters fixed, for any number of points.
+///
+/// Parameters are given by name, in the units of `pilum.describe(id)`: kPa, m, degrees. What is left out takes
+/// its default. Keys that are no parameters are those of a table of laws in a case file: `adapter`
+/// ("umat", "mfront", "udsm", "shear_zone"), `library`, `sidecar`, `thickness`, `initial` and so on; a parameter
+/// of such a name goes into `parameters`.
+#[pyclass(frozen, module = "pilum")]
+pub(crate) struct Law {
+    built: Arc<BuiltLaw>,
+    initial: Vec<(usize, f64)>,
+    table: toml::Table,
+    variables: Vec<String>,
+    /// Its library is called in processes of their own.
+    is_apart: bool,
+}
+
+/// Keys of a table of laws that are no parameters.
+const KEYS: [&str; 12] = [
+    "adapter",
+    "library",
+    "sidecar",
+    "in_process",
+    "record",
+    "externals",
+    "scratch",
+    "tangent_order",
+    "thickness",
+    "lateral_ratio",
+    "sha256",
+    "initial",
+];
+
+fn hypothesis_named(name: &str) -> PyResult<Hypothesis> {
+    let mut all = Hypothesis::ALL.into_iter();
+    all.find(|one| one.name() == name).ok_or_else(|| {
+        let names = Hypothesis::ALL.map(Hypothesis::name);
+        let hint = text::suggestion(name, names.to_vec());
+        PyValueError::new_err(format!("there is no hypothesis `{name}`: {hint}"))
+    })
+}
+
+fn operator_named(name: Option<&str>) -> PyResult<Operator> {
+    match name {
+        None => Ok(Operator::None),
+        Some("consistent") => Ok(Operator::Consistent),
+        Some("elastic") => Ok(Operator::Elastic),
+        Some(other) => Err(PyValueError::new_err(format!(
+            "tangent: `{other}` is none of \"consistent\", \"elastic\" and None"
+        ))),
+    }
+}
+
+impl Law {
+    /// What a file would say of it.
+    pub(crate) fn table(&self) -> &toml::Table {
+        &self.table
+    }
+
+    fn law(&self) -> &law::Law {
+        &self.built.law
+    }
+
+    /// Calls the library without the interpreter's lock. Processes of its own live as long as the thread that has
+    /// started them, which may be less than the law.
+    fn calling<T: Send>(
+        &self,
+        py: Python<'_>,
+        call: impl FnOnce(&law::Law) -> T + Send,
+    ) -> PyResult<T> {
+        let threads = self.is_apart.then(task::threads).transpose()?;
+        let law = self.law();
+        Ok(py.detach(|| match threads {
+            None => call(law),
+            Some(threads) => threads.install(|| call(law)),
+        }))
+    }
+
+    /// Points that carry these fluxes before anything has happened.
+    fn start(
+        &self,
+        py: Python<'_>,
+        flux: &Rows<'_>,
+        gradient: Option<&Rows<'_>>,
+    ) -> PyResult<State> {
+        let (law, n) = (self.law(), flux.n_rows());
+        let state = State::zeros(py, n, law.n_components(), 0, &self.variables);
+        let carried = flux.view()?;
+        let started = self.calling(py, |law| law.initial_state(n, carried))?;
+        let mut internal = started.map_err(|failure| of_batch(py, law, &failure))?;
+        for values in internal.chunks_exact_mut(self.variables.len().max(1)) {
+            for (number, value) in &self.initial {
+                values[*number] = *value;
+            }
+        }
+        state
+            .internal
+            .bind(py)
+            .readwrite()
+            .as_slice_mut()?
+            .copy_from_slice(&internal);
+        copied(
+            carried,
+            state.flux.bind(py).readwrite().as_slice_mut()?,
+            law.n_components(),
+        );
+        if let Some(gradient) = gradient {
+            copied(
+                gradient.view()?,
+                state.gradient.bind(py).readwrite().as_slice_mut()?,
+                law.n_components(),
+            );
+        }
+        Ok(state)
+    }
+}
+
+/// Copies values point by point.
+fn copied((from, place): (&[f64], Strided), to: &mut [f64], n: usize) {
+    if (place.offset, place.point, place.component) == (0, n, 1) {
+        to.copy_from_slice(&from[..to.len()]);
+        return;
+    }
+    for (point, values) in to.chunks_exact_mut(n.max(1)).enumerate() {
+        for (c, value) in values.iter_mut().enumerate() {
+            *value = from[place.offset + point * place.point + c * place.component];
+        }
+    }
+}
+
+#[pymethods]
+impl Law {
+    #[new]
+    #[pyo3(signature = (id, /, *, hypothesis=None, parameters=None, law_path=None, isolate=None, **values))]
+    fn new(
+        py: Python<'_>,
+        id: &str,
+        hypothesis: Option<&str>,
+        parameters: Option<&Bound<'_, PyAny>>,
+        law_path: Option<Vec<PathBuf>>,
+        isolate: Option<f64>,
+        values: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut table = toml::Table::new();
+        table.insert("law".to_owned(), id.into());
+        let mut named = parameters
+            .map(value::table)
+            .transpose()?
+            .unwrap_or_default();
+        let values = values
+            .map(|values| value::table(values.as_any()))
+            .transpose()?;
+        for (key, value) in values.into_iter().flatten() {
+            if KEYS.contains(&key.as_str()) {
+                table.insert(key, value);
+            } else {
+                named.insert(key, value);
+            }
+        }
+        table.insert("parameters".to_owned(), named.into());
+        let name = format!("Law(\"{id}\")");
+        let source = Source::new(&name, value::text_of(&table)?);
+        let hypothesis = hypothesis.map(hypothesis_named).transpose()?;
+        let opener = opener(isolate)?;
+        let folders = law_path.unwrap_or_default();
+        let threads = task::threads()?;
+        let built =
+            py.detach(|| threads.install(|| law_alone(&opener, &source, hypothesis, &folders)));
+        let (built, initial) = built.map_err(|error| exception(py, &error, Some(&name)))?;
+        for warning in &built.warnings {
+            warn(py, warning)?;
+        }
+        let variables = built.law.formulation().internal_variables.iter();
+        let variables = variables.map(|variable| variable.id.clone()).collect();
+        let library = built.law.library();
+        let is_apart = library.foreign().is_some() || isolate.is_some();
+        Ok(Self {
+            built: Arc::new(built),
+            initial,
+            table,
+            variables,
+            is_apart,
+        })
+    }
+
+    /// Points that carry these fluxes before anything has happened, with the internal variables that the law gives
+    /// them.
+    ///
+    /// `points` is their number, `flux` their tractions or stresses (kPa, tension positive; zero if left out),
+    /// shape (n, components) or (components,) for all; `gradient` jumps or strains that they have already,
+    /// likewise.
+    #[pyo3(signature = (points=None, *, flux=None, gradient=None))]
+    fn initial(
+        &self,
+        py: Python<'_>,
+        points: Option<usize>,
+        flux: Option<&Bound<'_, PyAny>>,
+        gradient: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<State> {
+        let n = self.law().n_components();
+        let flux = flux.map(|flux| Rows::of(flux, "flux", n)).transpose()?;
+        let gradient = gradient
+            .map(|gradient| Rows::of(gradient, "gradient", n))
+            .transpose()?;
+        let most = [&flux, &gradient]
+            .into_iter()
+            .flatten()
+            .map(Rows::n_rows)
+            .max();
+        let n_points = points.or(most).unwrap_or(1);
+        let full = |rows: Option<Rows<'_>>, name: &str| -> PyResult<Vec<f64>> {
+            let Some(rows) = rows else {
+                return Ok(vec![0.0; n_points * n]);
+            };
+            if rows.n_rows() == n_points {
+                let mut values = vec![0.0; n_points * n];
+                copied(rows.view()?, &mut values, n);
+                Ok(values)
+            } else if rows.n_rows() == 1 {
+                let mut one = vec![0.0; n];
+                copied(rows.view()?, &mut one, n);
+                Ok(one.repeat(n_points))
+            } else {
+                let message = format!("{name}: found {} rows, expected {n_points}", rows.n_rows());
+                Err(PyValueError::new_err(message))
+            }
+        };
+        let flux = of_rows(py, &full(flux, "flux")?, n)?;
+        let gradient = of_rows(py, &full(gradient, "gradient")?, n)?;
+        let flux = Rows::of(flux.as_any(), "flux", n)?;
+        self.start(
+            py,
+            &flux,
+            Some(&Rows::of(gradient.as_any(), "gradient", n)?),
+        )
+    }
+
+    /// Carries points over an increment: `(flux, tangents, state)`.
+    ///
+    /// `gradient` has the jumps (m) or strains (shear strains γ = 2ε) at its end, as totals, shape (n, components);
+    /// `state` is what they start from (points without a history if left out). Returns tractions or stresses
+    /// (kPa, tension positive), shape (n, components); tangents ∂flux/∂gradient, shape (n, components,
+    /// components), None if `tangent` is None; and the state at the end. `dt` is how long the increment takes.
+    ///
+    /// The law reads and writes the arrays themselves, without the interpreter's lock. `out` is a state that is
+    /// not needed any more: its memory, and that of what was returned with it, is used again.
+    /// With `copy=False` the state keeps the array of gradients itself, which nobody may write in any more.
+    /// `positions`, shape (n, 2), is where the points lie, for routines that ask.
+    ///
+    /// Raises LawError, with `point` (from 0) and `outcome`, if a point cannot be carried; `outcome` is
+    /// "cut_step" where a smaller increment may help.
+    #[pyo3(
+        signature = (gradient, state=None, *, dt=1.0, tangent=Some("consistent"), out=None, copy=true, positions=None),
+        text_signature = "($self, gradient, state=None, *, dt=1.0, tangent='consistent', out=None, copy=True, positions=None)"
+    )]
+    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    fn integrate<'py>(
+        &self,
+        py: Python<'py>,
+        gradient: &Bound<'py, PyAny>,
+        state: Option<&Bound<'py, State>>,
+        dt: f64,
+        tangent: Option<&str>,
+        out: Option<&Bound<'py, State>>,
+        copy: bool,
+        positions: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let law = self.law();
+        let n = law.n_components();
+        if !(dt >= 0.0 && dt.is_finite()) {
+            return Err(PyValueError::new_err(format!("dt: {dt} is no time")));
+        }
+        let wanted = operator_named(tangent)?;
+        let n_operator = if wanted == Operator::None { 0 } else { n * n };
+        let fresh;
+        let from = if let Some(state) = state {
+            state.get()
+        } else {
+            let points = Rows::of(gradient, "gradient", n)?.n_rows();
+            fresh = self.initial(py, Some(points), None, None)?;
+            &fresh
+        };
+        let n_points = from.n_points(py);
+        let gradient = Rows::exactly(gradient, "gradient", [n_points, n])?;
+        if from.names != self.variables {
+            return Err(PyValueError::new_err("state: it is one of another law"));
+        }
+        if let (Some(state), Some(out)) = (state, out)
+            && state.is(out)
+        {
+            let message =
+                "out: the increment starts from this state; give one that is not needed any more";
+            return Err(PyValueError::new_err(message));
+        }
+        let mut end = match out {
+            None => State::zeros(py, n_points, n, n_operator, &self.variables),
+            Some(out) => out.get().reused(py, from).ok_or_else(|| {
+                PyValueError::new_err("out: a state of other points, or of another law")
+            })?,
+        };
+        if end.operator.bind(py).len()? != n_points * n_operator {
+            end.operator = numpy::PyArray1::zeros(py, n_points * n_operator, false).unbind();
+        }
+        if let Some(array) = gradient.array().filter(|_| !copy) {
+            end.gradient = array.unbind();
+            end.is_lent = true;
+        }
+        end.time = from.time + dt;
+        end.increment = from.increment + 1;
+        let sites = self.sites(py, n_points, positions)?;
+        {
+            let [start_gradient, start_flux, start_internal] =
+                [&from.gradient, &from.flux, &from.internal].map(|array| array.bind(py).readonly());
+            let busy = |_| PyValueError::new_err("out: its memory is in use");
+            let own = (!end.is_lent).then(|| end.gradient.bind(py).try_readwrite());
+            let mut own = own.transpose().map_err(busy)?;
+            let mut end_flux = end.flux.bind(py).try_readwrite().map_err(busy)?;
+            let mut end_internal = end.internal.bind(py).try_readwrite().map_err(busy)?;
+            let mut operator: PyReadwriteArray1<'_, f64> =
+                end.operator.bind(py).try_readwrite().map_err(busy)?;
+            let rows = Strided::rows(n);
+            let start = Start {
+                n_points,
+                gradient: (start_gradient.as_slice()?, rows),
+                gradient_end: gradient.view()?,
+                flux: (start_flux.as_slice()?, rows),
+                state: start_internal.as_slice()?,
+                time: from.time,
+                time_increment: dt,
+                moment: Moment {
+                    step: 1,
+                    increment: end.increment,
+                    step_start: 0.0,
+                    step_length: end.time,
+                    is_undrained: false,
+                },
+                sites: &sites,
+            };
+            let results = End {
+                flux: (end_flux.as_slice_mut()?, rows),
+                state: end_internal.as_slice_mut()?,
+                operator: operator.as_slice_mut()?,
+            };
+            let reached = own.as_mut().map(|own| own.as_slice_mut()).transpose()?;
+            let outcome = self.calling(py, |law| {
+                let outcome = law.integrate(&start, wanted, results)?;
+                // The caller may use its array for the next increment.
+                if let Some(reached) = reached {
+                    copied(start.gradient_end, reached, n);
+                }
+                Ok::<_, BatchFailure>(outcome)
+            })?;
+            let success = outcome.map_err(|failure| of_batch(py, law, &failure))?;
+            if let Some((point, why)) = success.unreliable {
+                let id = &law.description().id;
+                warn(py, &format!("law `{id}`, point {point}: inaccurate: {why}"))?;
+            }
+        }
+        let tangents = if n_operator == 0 {
+            py.None().into_bound(py)
+        } else {
+            let all = end.operator.bind(py).as_any();
+            looked_at(&all.call_method1("reshape", ((n_points, n, n),))?)?
+        };
+        let flux = looked_at(end.flux.bind(py).as_any())?;
+        let end = Bound::new(py, end)?.into_any();
+        PyTuple::new(py, [flux, tangents, end])
+    }
+
+    /// Id of the law.
+    #[getter]
+    fn id(&self) -> &str {
+        &self.law().description().id
+    }
+
+    /// Name of the hypothesis that it is built for.
+    #[getter]
+    fn hypothesis(&self) -> &'static str {
+        self.law().hypothesis().name()
+    }
+
+    /// Components of jumps and tractions, or strains and stresses, in the order of the arrays' columns.
+    #[getter]
+    fn components(&self) -> Vec<&'static str> {
+        self.law().hypothesis().components().to_vec()
+    }
+
+    /// Ids of the internal variables, in the order of the columns of `State.internal`.
+    #[getter]
+    fn variables(&self) -> Vec<String> {
+        self.variables.clone()
+    }
+
+    /// Values of all parameters with those that were left out, as a law can be made of them again: numbers, of choices
+    /// their names.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        let declared = &self.law().description().parameters;
+        let with_value = self.built.parameters.iter().zip(declared);
+        for (parameter, declared) in with_value.filter(|(p, _)| !p.value.is_nan()) {
+            match declared.choices.get(parameter.value as usize) {
+                Some(choice) => all.set_item(&parameter.id, choice)?,
+                None => all.set_item(&parameter.id, parameter.value)?,
+            }
+        }
+        Ok(all)
+    }
+
+    /// Its library.
+    #[getter]
+    fn library(&self) -> PathBuf {
+        self.law().library().path().to_owned()
+    }
+
+    /// SHA-256 of its library, in hexadecimal digits.
+    #[getter]
+    fn sha256(&self) -> &str {
+        self.law().library().sha256()
+    }
+
+    fn __repr__(&self) -> String {
+        let given = self.built.parameters.iter().filter(|p| !p.by_default);
+        let given: Vec<String> = given.map(|p| format!(", {}={}", p.id, p.value)).collect();
+        format!(
+            "pilum.Law(\"{}\", hypothesis=\"{}\"{})",
+            self.id(),
+            self.hypothesis(),
+            given.join("")
+        )
+    }
+}
+
+impl Law {
+    /// Where points lie, if the law asks.
+    fn sites(
+        &self,
+        _py: Python<'_>,
+        n_points: usize,
+        positions: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<Site>> {
+        if !self.law().asks_for_sites() {
+            return Ok(Vec::new());
+        }
+        let positions = positions.map(|at| Rows::exactly(at, "positions", [n_points, 2]));
+        let mut at = vec![0.0; 2 * n_points];
+        if let Some(positions) = positions.transpose()? {
+            copied(positions.view()?, &mut at, 2);
+        }
+        let site = |(number, at): (usize, &[f64])| Site {
+            position: [at[0], at[1]],
+            element: number as u32 + 1,
+            ..Site::default()
+        };
+        Ok(at.chunks_exact(2).enumerate().map(site).collect())
+    }
+}
+
+/// What a law says of itself: name, version, parameters with units, bounds and meaning, hypotheses, internal
+/// variables.
+#[pyfunction]
+#[pyo3(signature = (id, /, *, law_path=None))]
+pub(crate) fn describe(
+    py: Python<'_>,
+    id: &str,
+    law_path: Option<Vec<PathBuf>>,
+) -> PyResult<Py<PyAny>> {
+    let opener = opener(None)?;
+    let folders = law_path.unwrap_or_default();
+    let found = py.detach(|| SearchPath::of(&opener, &folders).law(id));
+    let found = found.map_err(|error| exception(py, &error.into(), None))?;
+    let text = serde_json::to_string(found.description());
+    let text = text.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok(py.import("json")?.call_method1("loads", (text,))?.unbind())
+}
+
+/// Ids of all laws that are found, with their libraries. Nothing of them is executed.
+#[pyfunction]
+#[pyo3(signature = (*, law_path=None))]
+pub(crate) fn laws(py: Python<'_>, law_path: Option<Vec<PathBuf>>) -> PyResult<Bound<'_, PyDict>> {
+    let found = SearchPath::new(&law_path.unwrap_or_default()).installed();
+    let all = PyDict::new(py);
+    for (id, library) in found {
+        all.set_item(id, library)?;
+    }
+    Ok(all)
+}

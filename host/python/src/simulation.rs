@@ -1,0 +1,424 @@
+//! Simulations that are led from Python, increment by increment.
+
+use crate::arrays::of_rows;
+use crate::error::exception;
+use crate::law::warn;
+use crate::posed::Posed;
+use crate::task::{Caller, carry_out};
+use input::{Case, Error};
+use law::Stop;
+use mechanics::group::Group;
+use mechanics::simulation::{Increment, Warning};
+use mechanics::{State, Watch};
+use numpy::PyArray1;
+use pyo3::exceptions::{PyKeyError, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::{Mutex, MutexGuard, TryLockError};
+
+/// A problem on its way through its phases, in memory: nothing is written.
+///
+/// `source` is a case file, a folder with `case.toml`, or a dictionary with the keys of a case file; where it has
+/// variants, `variant` names one. `pilum.Problem.start` makes one too.
+#[pyclass(frozen, module = "pilum")]
+pub(crate) struct Simulation {
+    inner: Mutex<Inner>,
+}
+
+struct Inner {
+    simulation: mechanics::Simulation,
+    /// The last increment of the last phase is done. The simulation is not led beyond it: a state could not be taken
+    /// of it any more.
+    is_done: bool,
+    case: Case,
+    written: Option<String>,
+}
+
+/// A state of a simulation after a whole increment, for `Simulation.go_to`.
+#[pyclass(frozen, module = "pilum")]
+pub(crate) struct SimulationState {
+    state: State<'static>,
+    /// Number of the phase, from 0.
+    #[pyo3(get)]
+    phase: usize,
+    /// Whole increments of it that are done.
+    #[pyo3(get)]
+    increment: usize,
+}
+
+#[pymethods]
+impl SimulationState {
+    fn __repr__(&self) -> String {
+        let Self {
+            phase, increment, ..
+        } = self;
+        format!("<pilum.SimulationState: phase {phase} (from 0), increment {increment}>")
+    }
+}
+
+/// Hands on requests to stop and warnings.
+struct Follower<'c>(&'c Caller<String>);
+
+impl Watch for Follower<'_> {
+    fn warning(&mut self, warning: &Warning) {
+        self.0.tell(warning.to_string());
+    }
+
+    fn stop(&self) -> Stop {
+        self.0.stop()
+    }
+}
+
+impl Simulation {
+    fn inner(&self) -> PyResult<MutexGuard<'_, Inner>> {
+        match self.inner.try_lock() {
+            Ok(inner) => Ok(inner),
+            Err(TryLockError::Poisoned(inner)) => Ok(inner.into_inner()),
+            Err(TryLockError::WouldBlock) => {
+                let message = "the simulation is at work in another thread";
+                Err(PyRuntimeError::new_err(message))
+            }
+        }
+    }
+
+    /// Goes on by one increment, unless all is done.
+    fn advance(&self, py: Python<'_>) -> PyResult<Option<Increment>> {
+        if self.inner()?.is_done {
+            return Ok(None);
+        }
+        let done = self.working(py, mechanics::Simulation::step_watched)?;
+        let mut inner = self.inner()?;
+        inner.is_done = done.as_ref().is_none_or(|done| {
+            let last = inner.simulation.problem().phases.last();
+            done.place.increment == done.of
+                && last.is_some_and(|last| last.name == done.place.phase)
+        });
+        Ok(done)
+    }
+
+    /// Does something that may take long.
+    fn working<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut mechanics::Simulation, &mut dyn Watch) -> Result<T, mechanics::Error>
+        + Send,
+    ) -> PyResult<T> {
+        let mut inner = self.inner()?;
+        let Inner {
+            simulation,
+            case,
+            written,
+            ..
+        } = &mut *inner;
+        let outcome = carry_out(
+            py,
+            |caller| work(simulation, &mut Follower(caller)),
+            |py, warning: String| warn(py, &warning),
+        )?;
+        outcome.map_err(|error| exception(py, &case.place(error), written.as_deref()))
+    }
+}
+
+impl Inner {
+    fn group(&self, name: &str) -> PyResult<&Group> {
+        let mut groups = self.simulation.groups().iter();
+        groups.find(|group| group.name == name).ok_or_else(|| {
+            let groups = self.simulation.groups().iter();
+            let known: Vec<&str> = groups.map(|group| group.name.as_str()).collect();
+            let hint = text::suggestion(name, known);
+            PyKeyError::new_err(format!("there is no group `{name}`: {hint}"))
+        })
+    }
+
+    fn no_line(&self, name: &str) -> PyErr {
+        let lines = self.simulation.problem().mesh.lines.keys();
+        let hint = text::suggestion(name, lines.map(String::as_str).collect::<Vec<_>>());
+        PyKeyError::new_err(format!("there is no line `{name}`: {hint}"))
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(
+        signature = (source, *, name="problem".to_owned(), mesh=None, set=None, variant=None, isolate=None),
+        text_signature = "(source, *, name='problem', mesh=None, set=None, variant=None, isolate=None)"
+    )]
+    fn new(
+        py: Python<'_>,
+        source: &Bound<'_, PyAny>,
+        name: String,
+        mesh: Option<Vec<u8>>,
+        set: Option<&Bound<'_, PyDict>>,
+        variant: Option<String>,
+        isolate: Option<f64>,
+    ) -> PyResult<Self> {
+        let posed = Posed::of(source, name, mesh, set, variant, isolate)?;
+        let made = carry_out(
+            py,
+            |caller: &Caller<String>| -> Result<_, Error> {
+                let mut cases = posed.cases()?;
+                let (Some(case), true) = (cases.pop(), cases.is_empty()) else {
+                    let message = "the case has several variants: name one with `variant`";
+                    return Err(Error::usage(message));
+                };
+                let posed = case.pose()?;
+                let simulation = mechanics::Simulation::new(posed.problem);
+                let simulation = simulation.map_err(|error| case.place(error))?;
+                let of_laws = posed.laws.values().flat_map(|law| law.warnings.iter());
+                let all = of_laws.chain(simulation.warnings()).chain(&posed.notes);
+                all.for_each(|warning| caller.tell(warning.clone()));
+                Ok((simulation, case))
+            },
+            |py, warning| warn(py, &warning),
+        )?;
+        let written = posed.written().map(str::to_owned);
+        let (simulation, case) = made.map_err(|error| exception(py, &error, written.as_deref()))?;
+        Ok(Self {
+            inner: Mutex::new(Inner {
+                simulation,
+                is_done: false,
+                case,
+                written,
+            }),
+        })
+    }
+
+    /// Goes on by one increment, into the next phase where one is over.
+    ///
+    /// Returns a dictionary with `phase`, `increment` (from 1), `of`, `time`, `iterations` and `unreliable` (why a
+    /// law calls a result inaccurate, or None); None after the last. After an exception the state is the last one
+    /// in equilibrium; `go_to` leads back to another.
+    fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let done = self.advance(py)?;
+        done.map(|increment| told(py, &increment)).transpose()
+    }
+
+    /// Goes on to the end of the last phase.
+    fn run(&self, py: Python<'_>) -> PyResult<()> {
+        // Many increments take less time than signals are looked for within one.
+        while self.advance(py)?.is_some() {
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// The time that is reached.
+    #[getter]
+    fn time(&self) -> PyResult<f64> {
+        Ok(self.inner()?.simulation.time())
+    }
+
+    /// Names of the groups.
+    #[getter]
+    fn groups(&self) -> PyResult<Vec<String>> {
+        let inner = self.inner()?;
+        let groups = inner.simulation.groups().iter();
+        Ok(groups.map(|group| group.name.clone()).collect())
+    }
+
+    /// Names of the lines.
+    #[getter]
+    fn lines(&self) -> PyResult<Vec<String>> {
+        let inner = self.inner()?;
+        Ok(inner
+            .simulation
+            .problem()
+            .mesh
+            .lines
+            .keys()
+            .cloned()
+            .collect())
+    }
+
+    /// Coordinates of the nodes, m, shape (n, 2).
+    #[getter]
+    fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let inner = self.inner()?;
+        let nodes = inner.simulation.problem().mesh.nodes.as_flattened();
+        Ok(of_rows(py, nodes, 2)?.into_any())
+    }
+
+    /// Displacements of the nodes, m, shape (n, 2), counted since the last reset.
+    #[getter]
+    fn displacements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let inner = self.inner()?;
+        Ok(of_rows(py, inner.simulation.snapshot().displacement, 2)?.into_any())
+    }
+
+    /// Internal less external forces at the nodes, shape (n, 2): reactions where displacements are prescribed. kN of
+    /// the whole turn, or kN/m.
+    #[getter]
+    fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let inner = self.inner()?;
+        Ok(of_rows(py, inner.simulation.snapshot().reaction, 2)?.into_any())
+    }
+
+    /// Sum of the reactions at the nodes of a line, x and y: kN of the whole turn, or kN/m.
+    fn reaction(&self, line: &str) -> PyResult<[f64; 2]> {
+        let inner = self.inner()?;
+        let found = inner.simulation.reaction_of(line);
+        found.ok_or_else(|| inner.no_line(line))
+    }
+
+    /// Mean displacement of the nodes of a line, x and y, m.
+    fn displacement(&self, line: &str) -> PyResult<[f64; 2]> {
+        let inner = self.inner()?;
+        let found = inner.simulation.displacement_of(line);
+        found.ok_or_else(|| inner.no_line(line))
+    }
+
+    /// Integration points of a group: a dictionary of arrays with a row a point.
+    ///
+    /// `element` and `point` count from 1, as in the tables; `position` (n, 2), m. Solids and layers have
+    /// `stress` (11 22 33 12, kPa, tension positive, global axes) and `strain`; interfaces and layers `jump`
+    /// (normal, tangential, m) and `traction` (kPa); and all the internal variables of their law, by their ids.
+    fn group<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+        let inner = self.inner()?;
+        let group = inner.group(name)?;
+        let points = 0..group.kinematics.n_points();
+        let all = PyDict::new(py);
+        let places = points.clone().map(|point| group.kinematics.place_of(point));
+        let (elements, numbers): (Vec<i64>, Vec<i64>) = places
+            .map(|(element, point)| (element as i64 + 1, point as i64 + 1))
+            .unzip();
+        all.set_item("element", PyArray1::from_vec(py, elements))?;
+        all.set_item("point", PyArray1::from_vec(py, numbers))?;
+        let position = points.clone().flat_map(|p| group.kinematics.position(p));
+        let position: Vec<f64> = position.collect();
+        all.set_item("position", of_rows(py, &position, 2)?)?;
+        let rows = |of: &dyn Fn(usize) -> Option<Vec<f64>>| -> Option<Vec<f64>> {
+            let rows: Option<Vec<Vec<f64>>> = points.clone().map(of).collect();
+            rows.map(|rows| rows.concat())
+        };
+        let solid = [
+            (
+                "stress",
+                rows(&|p| group.global_stress(p).map(|s| s.to_vec())),
+            ),
+            (
+                "strain",
+                rows(&|p| group.global_strain(p).map(|s| s.to_vec())),
+            ),
+        ];
+        let interface = [
+            (
+                "jump",
+                rows(&|p| group.jump_and_traction(p).map(|(j, _)| j.to_vec())),
+            ),
+            (
+                "traction",
+                rows(&|p| group.jump_and_traction(p).map(|(_, t)| t.to_vec())),
+            ),
+        ];
+        for (values, n) in solid
+            .into_iter()
+            .zip([4, 4])
+            .chain(interface.into_iter().zip([2, 2]))
+        {
+            if let (name, Some(values)) = values {
+                all.set_item(name, of_rows(py, &values, n)?)?;
+            }
+        }
+        for variable in &group.law.built.law.formulation().internal_variables {
+            let values = rows(&|p| group.internal_variable(p, &variable.id).map(|v| vec![v]));
+            if let Some(values) = values {
+                all.set_item(&variable.id, PyArray1::from_vec(py, values))?;
+            }
+        }
+        Ok(all)
+    }
+
+    /// The state after the last whole increment, to go back to; None before the first one.
+    fn state(&self) -> PyResult<Option<SimulationState>> {
+        let state = self.inner()?.simulation.state();
+        Ok(state.map(|state| SimulationState {
+            phase: state.phase,
+            increment: state.increment(),
+            state,
+        }))
+    }
+
+    /// Goes back, or on, to a state of a simulation of the same problem.
+    fn go_to(&self, py: Python<'_>, state: &SimulationState) -> PyResult<()> {
+        let to = state.state.clone();
+        self.working(py, |simulation, _| simulation.go_to(to))?;
+        let mut inner = self.inner()?;
+        let phases = &inner.simulation.problem().phases;
+        let (number, phase) = (state.phase + 1, &phases[state.phase]);
+        inner.is_done = number == phases.len() && state.increment == phase.increments;
+        Ok(())
+    }
+
+    /// A simulation of its own that stands where this one does.
+    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
+        let mut inner = self.inner()?;
+        let Inner {
+            simulation,
+            is_done,
+            case,
+            written,
+        } = &mut *inner;
+        let copied = carry_out(
+            py,
+            |_: &Caller<()>| {
+                let state = simulation.state();
+                let mut copy = mechanics::Simulation::new(simulation.problem().clone())?;
+                if let Some(state) = state {
+                    copy.go_to(state)?;
+                }
+                Ok(copy)
+            },
+            |_, ()| Ok(()),
+        )?;
+        let copy = copied.map_err(|error| exception(py, &case.place(error), written.as_deref()))?;
+        Ok(Self {
+            inner: Mutex::new(Inner {
+                simulation: copy,
+                is_done: *is_done,
+                case: case.clone(),
+                written: written.clone(),
+            }),
+        })
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
+        self.copy(py)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> PyResult<Self> {
+        self.copy(py)
+    }
+
+    fn __iter__(this: Bound<'_, Self>) -> Bound<'_, Self> {
+        this
+    }
+
+    /// The next increment, as `step` does it.
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        self.step(py)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let inner = self.inner()?;
+        let problem = inner.simulation.problem();
+        Ok(format!(
+            "<pilum.Simulation: {} nodes, {} groups, {} phases, time {:?}>",
+            problem.mesh.nodes.len(),
+            problem.groups.len(),
+            problem.phases.len(),
+            inner.simulation.time()
+        ))
+    }
+}
+
+fn told<'py>(py: Python<'py>, done: &Increment) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("phase", &done.place.phase)?;
+    all.set_item("increment", done.place.increment)?;
+    all.set_item("of", done.of)?;
+    all.set_item("time", done.time)?;
+    all.set_item("iterations", done.iterations)?;
+    all.set_item("unreliable", &done.unreliable)?;
+    Ok(all)
+}

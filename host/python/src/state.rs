@@ -1,0 +1,143 @@
+//! Points on their way: what a law needs to carry them over an increment.
+
+use crate::arrays::looked_at;
+use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+/// Points of a law: the gradients and fluxes that they have reached, their internal variables, and the time.
+///
+/// `Law.initial` makes one, `Law.integrate` the one after an increment. Its arrays are not to be written in.
+#[pyclass(frozen, module = "pilum")]
+pub(crate) struct State {
+    /// Jumps or strains, a row a point.
+    pub(crate) gradient: Py<PyArray2<f64>>,
+    /// That array is the user's, and is not to be written in.
+    pub(crate) is_lent: bool,
+    /// Tractions or stresses, a row a point.
+    pub(crate) flux: Py<PyArray2<f64>>,
+    /// Internal variables, a row a point.
+    pub(crate) internal: Py<PyArray2<f64>>,
+    /// Operators, row-major, point by point; memory that is used again.
+    pub(crate) operator: Py<PyArray1<f64>>,
+    pub(crate) time: f64,
+    /// Increments so far.
+    pub(crate) increment: u32,
+    /// Ids of the internal variables.
+    pub(crate) names: Vec<String>,
+}
+
+#[pymethods]
+impl State {
+    /// Jumps (m) or strains (shear strains γ = 2ε) that the points have reached, shape (n, components).
+    #[getter]
+    fn gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        looked_at(self.gradient.bind(py).as_any())
+    }
+
+    /// Tractions or stresses (kPa, tension positive), shape (n, components).
+    #[getter]
+    fn flux<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        looked_at(self.flux.bind(py).as_any())
+    }
+
+    /// Internal variables, shape (n, variables), in the order of `Law.variables`.
+    #[getter]
+    fn internal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        looked_at(self.internal.bind(py).as_any())
+    }
+
+    /// The time that they have reached.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Increments that have led here.
+    #[getter]
+    fn increment(&self) -> u32 {
+        self.increment
+    }
+
+    /// One internal variable of all points, shape (n,).
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let Some(column) = self.names.iter().position(|known| known == name) else {
+            return Err(pyo3::exceptions::PyKeyError::new_err(format!(
+                "there is no internal variable `{name}`: {}",
+                text::suggestion(
+                    name,
+                    self.names.iter().map(String::as_str).collect::<Vec<_>>()
+                )
+            )));
+        };
+        let all = self.internal(py)?;
+        let every = pyo3::types::PySlice::full(py);
+        all.get_item((every, column))
+    }
+
+    /// Number of points.
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.n_points(py)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!(
+            "<pilum.State: {} points, increment {}, time {:?}>",
+            self.n_points(py),
+            self.increment,
+            self.time
+        )
+    }
+}
+
+impl State {
+    /// Number of points.
+    pub(crate) fn n_points(&self, py: Python<'_>) -> usize {
+        self.flux.bind(py).shape()[0]
+    }
+
+    /// A state of zeros, with room for operators if they are wanted.
+    pub(crate) fn zeros(
+        py: Python<'_>,
+        n_points: usize,
+        n_components: usize,
+        n_operator: usize,
+        names: &[String],
+    ) -> Self {
+        let zeros = |columns: usize| PyArray2::zeros(py, [n_points, columns], false).unbind();
+        Self {
+            gradient: zeros(n_components),
+            is_lent: false,
+            flux: zeros(n_components),
+            internal: zeros(names.len()),
+            operator: PyArray1::zeros(py, n_points * n_operator, false).unbind(),
+            time: 0.0,
+            increment: 0,
+            names: names.to_vec(),
+        }
+    }
+
+    /// The memory of this one once more, if it is of this size and nobody looks at it in this moment.
+    pub(crate) fn reused(&self, py: Python<'_>, like: &Self) -> Option<Self> {
+        let same =
+            |a: &Py<PyArray2<f64>>, b: &Py<PyArray2<f64>>| a.bind(py).shape() == b.bind(py).shape();
+        let fits = same(&self.gradient, &like.gradient)
+            && same(&self.flux, &like.flux)
+            && same(&self.internal, &like.internal);
+        let gradient = if self.is_lent {
+            let shape = self.gradient.bind(py).shape();
+            PyArray2::zeros(py, [shape[0], shape[1]], false).unbind()
+        } else {
+            self.gradient.clone_ref(py)
+        };
+        fits.then_some(Self {
+            gradient,
+            is_lent: false,
+            flux: self.flux.clone_ref(py),
+            internal: self.internal.clone_ref(py),
+            operator: self.operator.clone_ref(py),
+            time: like.time,
+            increment: like.increment,
+            names: like.names.clone(),
+        })
+    }
+}

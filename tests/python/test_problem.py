@@ -1,0 +1,277 @@
+"""Problems from arrays, stepped: against closed forms and runs of the program."""
+
+from __future__ import annotations
+
+import copy
+import math
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pilum
+from conftest import compiled
+
+CHAMBER = pilum.cases() / "chamber_mesh1"
+JOINT = dict(normal_stiffness=1e7, shear_stiffness=1e6, cohesion=0.0, friction_angle=30.0, dilatancy_angle=0.0)
+
+
+def slice_mesh(x: list[float] | None = None) -> pilum.Mesh:
+    """Columns: pile, layer, ground; 0.2 m high."""
+
+    def group(r: float, _z: float) -> str:
+        return "pile" if r < 0.1 else "shaft" if r < 0.11 else "ground"
+
+    mesh = pilum.Mesh.grid([0.0, 0.1, 0.11, 0.2, 0.5, 1.0], [0.0, 0.2], group)
+    mesh.name_line("axis", lambda r, z: r == 0.0)
+    mesh.name_line("outside", lambda r, z: r == 1.0)
+    mesh.name_line("bottom", lambda r, z: z == 0.0)
+    mesh.name_line("top", lambda r, z: z == 0.2)
+    mesh.name_line("head", lambda r, z: (z == 0.2) & (r <= 0.1))
+    return mesh
+
+
+def slice_case() -> dict:
+    """A slice of a pile in elastic ground behind a thin layer of Coulomb's friction, pushed down by 2 mm."""
+    stress = {"11": -100.0, "22": 0.0, "33": -100.0, "12": 0.0}
+    return dict(
+        analysis="axisymmetric",
+        laws=dict(
+            steel=dict(law="elastic", parameters=dict(young_modulus=2e8, poisson_ratio=0.3)),
+            sand=dict(law="elastic", parameters=dict(young_modulus=5e4, poisson_ratio=0.3)),
+            friction=pilum.Law("coulomb_joint", **JOINT),
+        ),
+        groups=dict(
+            pile=dict(formulation="solid", law="steel", initial_stress=stress),
+            shaft=dict(formulation="thin_layer", law="friction", initial_stress=stress),
+            ground=dict(formulation="solid", law="sand", initial_stress=stress),
+        ),
+        supports=[
+            dict(line="axis", fixed=["r"]),
+            dict(line="outside", fixed=["r", "z"]),
+            dict(line="bottom", fixed=["r"]),
+            dict(line="top", fixed=["r"]),
+        ],
+        phase=[dict(name="push", increments=10, displacement=[dict(line="head", z=-2e-3)])],
+    )
+
+
+# What the shaft carries where it yields: σ tan φ over its middle surface.
+SHAFT = 100.0 * math.tan(math.radians(30.0)) * 2.0 * math.pi * 0.105 * 0.2
+
+
+def pushed(simulation: pilum.Simulation, head: str = "head") -> list[float]:
+    return [-simulation.reaction(head)[1] for _ in simulation]
+
+
+def test_a_slice_of_a_pile_from_arrays() -> None:
+    simulation = pilum.Problem(slice_case(), slice_mesh()).start()
+    assert simulation.groups == ["pile", "shaft", "ground"] and "head" in simulation.lines
+    told = simulation.step()
+    assert told is not None
+    assert {"phase": "push", "increment": 1, "of": 10, "time": 0.1}.items() <= told.items()
+    curve = pushed(simulation)
+    assert len(curve) == 9 and simulation.step() is None
+    assert abs(curve[-1] / SHAFT - 1.0) < 0.05, (curve, SHAFT)
+    assert simulation.displacement("head")[1] == pytest.approx(-2e-3, rel=1e-12)
+    top = simulation.nodes[:, 1] == 0.2
+    head = top & (simulation.nodes[:, 0] <= 0.1)
+    np.testing.assert_allclose(simulation.displacements[head, 1], -2e-3, rtol=1e-12)
+    np.testing.assert_allclose(-simulation.reactions[head, 1].sum(), curve[-1], rtol=1e-12)
+    shaft = simulation.group("shaft")
+    ratio = np.abs(shaft["traction"][:, 1] / shaft["traction"][:, 0])
+    # Two thirds of the points slide; those that the layer's own elasticity still helps are below.
+    assert ratio.max() == pytest.approx(math.tan(math.radians(30.0)), rel=1e-9)
+    assert np.sum(np.isclose(ratio, ratio.max(), rtol=1e-9)) >= 6
+    assert set(shaft) >= {"element", "point", "position", "jump", "traction", "plastic_slip"}
+    ground = simulation.group("ground")
+    assert ground["stress"].shape == ground["strain"].shape == (len(ground["element"]), 4)
+
+
+def test_meshio_comes_to_the_same_bits(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    mesh = slice_mesh()
+    cells, sets = [], {}
+    for kind, parts in (("quad8", mesh.groups), ("line3", mesh.lines)):
+        for name, blocks in parts.items():
+            sets[name] = len(cells)
+            cells.append((kind, np.concatenate(blocks)))
+    by_sets = meshio.Mesh(
+        mesh.nodes,
+        cells,
+        cell_sets={
+            name: [np.arange(len(c)) if i == number else np.array([], dtype=int) for i, (_, c) in enumerate(cells)]
+            for name, number in sets.items()
+        },
+    )
+    tags = [np.full(len(c), number + 1) for number, (_, c) in enumerate(cells)]
+    dims = {"quad8": 2, "line3": 1}
+    by_tags = meshio.Mesh(
+        np.column_stack([mesh.nodes, np.zeros(len(mesh.nodes))]),
+        cells,
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data={n: np.array([i + 1, dims[cells[i][0]]]) for n, i in sets.items()},
+    )
+    expected = pushed(pilum.Problem(slice_case(), mesh).start())
+    for other in (by_sets, by_tags):
+        assert pushed(pilum.Problem(slice_case(), other).start()) == expected
+    # And by way of a file, which the program reads as it is.
+    meshio.write(tmp_path / "slice.msh", by_tags, file_format="gmsh22", binary=False)
+    from_file = {**slice_case(), "mesh": {"file": tmp_path / "slice.msh"}}
+    np.testing.assert_allclose(pushed(pilum.Problem(from_file).start()), expected, rtol=1e-9)
+    linear = meshio.Mesh(mesh.nodes, [("quad", mesh.groups["pile"][0][:, :4])], cell_sets={"pile": [[0]]})
+    with pytest.raises(pilum.InputError, match="cells `quad`") as caught:
+        pilum.Problem(slice_case(), linear)
+    assert "ElementOrder" in str(caught.value.hint)
+
+
+def test_triangles_and_an_interface_without_thickness() -> None:
+    """A block of triangles on another, pressed and sheared: the joint carries σ tan φ."""
+    mesh = pilum.Mesh.grid([0.0, 1.0], [0.0, 0.5, 1.0])
+    quads = np.concatenate(mesh.groups["ground"])
+    nodes, extra = mesh.nodes, []
+    for quad in quads:
+        extra.append(nodes[quad[[0, 2]]].mean(axis=0))
+    middle = len(nodes) + np.arange(len(quads))
+    nodes = np.vstack([nodes, extra])
+    lower = np.column_stack([quads[:, [0, 1, 2, 4, 5]], middle])
+    upper = np.column_stack([quads[:, [0, 2, 3]], middle, quads[:, [6, 7]]])
+    mesh = pilum.Mesh(nodes, {"blocks": np.concatenate([lower, upper])})
+    for name, y in (("bottom", 0.0), ("joint", 0.5), ("top", 1.0)):
+        mesh.name_line(name, lambda _x, at, y=y: at == y)
+    case = dict(
+        analysis="plane_strain",
+        laws=dict(
+            block=dict(law="elastic", parameters=dict(young_modulus=1e7, poisson_ratio=0.2)),
+            joint=pilum.Law("coulomb_joint", **{**JOINT, "normal_stiffness": 1e6, "shear_stiffness": 5e5}),
+        ),
+        groups=dict(
+            blocks=dict(formulation="solid", law="block"),
+            joint=dict(formulation="zero_thickness", line="joint", law="joint"),
+        ),
+        supports=[dict(line="bottom", fixed=["x", "y"])],
+        phase=[
+            dict(name="press", increments=1, pressure=[dict(line="top", value=100.0)], displacement=[dict(line="top", x=0.0)]),
+            dict(name="push", increments=10, displacement=[dict(line="top", x=1e-3)]),
+        ],
+    )
+    simulation = pilum.Problem(case, mesh).start()
+    simulation.run()
+    assert abs(simulation.reaction("top")[0]) == pytest.approx(100.0 * math.tan(math.radians(30.0)), rel=1e-6)
+
+
+def test_steps_are_those_of_a_run(here: Path) -> None:
+    """The chamber, stepped in memory and run into a folder."""
+    short = {"phase.loading.increments": 10}
+    results = pilum.run(CHAMBER, set=short, results="run")
+    simulation = pilum.Problem(CHAMBER, set=short).start()
+    loads = pushed(simulation, "pile_head")
+    np.testing.assert_allclose(loads, results.history["q_t"], rtol=1e-9, atol=1e-9)
+    assert not (here / "results").exists()
+
+
+def test_copies_go_their_own_ways() -> None:
+    simulation = pilum.Problem(slice_case(), slice_mesh()).start()
+    fresh = copy.copy(simulation)
+    for _ in range(4):
+        simulation.step()
+    state = simulation.state()
+    assert state is not None and (state.phase, state.increment) == (0, 4)
+    other = copy.deepcopy(simulation)
+    assert other.time == simulation.time == pytest.approx(0.4)
+    rest = pushed(simulation)
+    assert pushed(other) == rest
+    simulation.go_to(state)
+    assert simulation.time == pytest.approx(0.4) and pushed(simulation) == rest
+    assert fresh.time == 0.0 and pushed(fresh)[4:] == rest
+    # At the end there is a state too, and a copy of the end is at the end.
+    assert fresh.step() is None and fresh.state() is not None
+    assert fresh.copy().step() is None and fresh.copy().time == fresh.time == pytest.approx(1.0)
+    assert pilum.Problem(slice_case(), slice_mesh()).start().state() is None
+
+
+def test_another_problem_takes_no_state() -> None:
+    simulation = pilum.Problem(slice_case(), slice_mesh()).start()
+    simulation.step()
+    state = simulation.state()
+    assert state is not None
+    with pytest.raises(pilum.InputError, match="not that of this mesh"):
+        pilum.Problem(CHAMBER).start().go_to(state)
+
+
+def test_two_threads_do_not_share_one_simulation() -> None:
+    simulation = pilum.Problem(CHAMBER, set={"phase.loading.increments": 200}).start()
+    refused: list[str] = []
+    worker = threading.Thread(target=simulation.run)
+    worker.start()
+    while worker.is_alive() and not refused:
+        try:
+            simulation.time  # noqa: B018
+        except RuntimeError as error:
+            refused.append(str(error))
+    worker.join()
+    assert refused and "another thread" in refused[0]
+    assert simulation.step() is None
+
+
+def test_ctrl_c_leaves_a_simulation_that_goes_on() -> None:
+    simulation = pilum.Problem(CHAMBER, set={"phase.loading.increments": 100_000}).start()
+
+    def interrupt() -> None:
+        time.sleep(0.4)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        simulation.run()
+    reached = simulation.time
+    assert reached > 0.0
+    assert simulation.step() is not None and simulation.time > reached
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: pilum.Mesh([[0.0]], {}), "nodes: found shape"),
+        (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0, 1, 2, 3, 4, 5]]}), "node 5 is none of 0 to 0"),
+        (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0, 0, 0, 0]]}), r"expected whole numbers of shape \(m, 8\)"),
+        (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0.0] * 6]}), "expected whole numbers"),
+        (lambda: pilum.Mesh([[0.0, 0.0]], {'a"': [[0] * 6]}), "neither quotes"),
+        (lambda: pilum.Mesh.grid([0.0], [0.0, 1.0]), "two values that rise"),
+        (lambda: slice_mesh().name_line("none", lambda x, y: x > 9.0), "no such edge"),
+        (lambda: pilum.Problem(CHAMBER, slice_mesh()), "goes with a case that is a dictionary"),
+    ],
+)
+def test_meshes_are_checked(make, says: str) -> None:
+    with pytest.raises(pilum.InputError, match=says):
+        make()
+
+
+def test_what_the_mesh_lacks_is_said() -> None:
+    case = slice_case()
+    case["groups"]["rock"] = dict(formulation="solid", law="sand")
+    with pytest.raises(pilum.InputError, match="has no physical surface `rock`"):
+        pilum.Problem(case, slice_mesh()).start()
+    simulation = pilum.Problem(slice_case(), slice_mesh()).start()
+    with pytest.raises(KeyError, match="there is no line `heads`.*head"):
+        simulation.reaction("heads")
+    with pytest.raises(KeyError, match="there is no group `sand`"):
+        simulation.group("sand")
+
+
+def test_a_law_that_crashes_says_where(tmp_path: Path) -> None:
+    """A library that aborts, called in a process of its own."""
+    library = compiled("bad_abort.c", tmp_path, f"-I{pilum.include()}")
+    case = slice_case()
+    case["law_path"] = [library.parent]
+    case["laws"]["friction"] = {"law": "fixture", "parameters": {"normal_stiffness": 1e7, "shear_stiffness": 1e6}}
+    with pytest.raises(pilum.LawError) as caught:
+        pilum.Problem(case, slice_mesh(), isolate=5.0).start().run()
+    error = caught.value
+    assert (error.group, error.law) == ("shaft", "fixture")
+    assert error.element == 1 and error.point is not None and error.position is not None
+    assert "signal 6" in str(error.cause) or "crashed" in str(error.cause), error.cause

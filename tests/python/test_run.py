@@ -1,0 +1,329 @@
+"""Runs of cases: against the command, and as the tools of notebooks take them."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import sysconfig
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pilum
+from conftest import compiled, missing
+
+CHAMBER = pilum.cases() / "chamber_mesh1"
+SHORT = {"phase.loading.increments": 10}
+SOIL = dict(law="elastic", parameters=dict(young_modulus=1e4, poisson_ratio=0.3))
+
+# A column of soil on its base, loaded from above.
+COLUMN = dict(
+    analysis="plane_strain",
+    mesh=dict(
+        columns=[dict(n=1, to=1.0)],
+        rows=[dict(n=2, to=2.0)],
+        lines=dict(base=dict(y=0.0), top=dict(y=2.0), sides=dict(x=0.0), other=dict(x=1.0)),
+        region=[dict(group="soil")],
+    ),
+    laws=dict(soil=SOIL),
+    groups=dict(soil=dict(formulation="solid", law="soil")),
+    supports=[
+        dict(line="base", fixed=["x", "y"]),
+        dict(line="sides", fixed=["x"]),
+        dict(line="other", fixed=["x"]),
+    ],
+    phase=[dict(name="load", increments=4, pressure=[dict(line="top", value=100.0)])],
+    probes=dict(w=dict(line="top", quantity="displacement_y", scale=-1.0)),
+)
+
+
+def command() -> str:
+    """The command that came with the package."""
+    return str(Path(sysconfig.get_path("scripts")) / "pilum")
+
+
+def test_the_command_is_there_and_comes_to_the_same_bits(chamber: pilum.Results, here: Path) -> None:
+    version = subprocess.run([command(), "--version"], capture_output=True, text=True, check=True)
+    assert version.stdout.split() == ["pilum", pilum.__version__]
+    arguments = ["run", str(CHAMBER), "--set", "phase.loading.increments=10", "--out", "theirs"]
+    subprocess.run([command(), *arguments], check=True, capture_output=True)
+    for table in ("history.csv", "profile.csv"):
+        theirs = (here / "theirs" / table).read_text()
+        assert (chamber.folder / table).read_text() == theirs
+    as_module = subprocess.run([sys.executable, "-m", "pilum", "laws"], capture_output=True, text=True)
+    assert "mepi" in as_module.stdout
+
+
+def test_tables_are_arrays(chamber: pilum.Results) -> None:
+    with open(chamber.folder / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    history = chamber.history
+    assert list(history) == list(rows[0]) and len(history) == len(rows) == 16
+    assert history["tau_shaft"].tolist() == [float(row["tau_shaft"]) for row in rows]
+    assert history["increment"].dtype == np.int64 and history["phase"][-1] == "loading"
+    last = chamber.profile.where(phase="loading", increment=10)
+    assert 0 < len(last) < len(chamber.profile)
+    # Friction is below its peak of 0.7 everywhere.
+    assert np.all(np.abs(last["traction_t"]) <= 0.7 * np.abs(last["traction_n"]) * (1 + 1e-9))
+    assert chamber.status == "done" and chamber.warnings == chamber.summary["warnings"]
+    with pytest.raises(KeyError, match="there is no column `tau`: phase, increment"):
+        history["tau"]
+    with pytest.raises(pilum.InputError, match="no `pile.csv`") as caught:
+        chamber.pile
+    assert "[pile]" in str(caught.value.hint)
+    with pytest.raises(pilum.InputError, match="not the folder of a run"):
+        pilum.Results(chamber.folder.parent)
+
+
+def test_fields_are_arrays(chamber: pilum.Results) -> None:
+    fields = chamber.fields
+    assert len(fields) == 3 and fields.times.tolist() == sorted(fields.times)
+    last = fields[-1]
+    assert last["displacement"].shape == last.nodes.shape
+    head = last.nodes[:, 1] == last.nodes[:, 1].max()
+    pile = head & (last.nodes[:, 0] <= 0.010)
+    np.testing.assert_allclose(last["displacement"][pile, 1], -0.005, rtol=1e-12)
+    assert last["stress_22"].shape == (len(last.cells),) == fields["stress_22"].shape
+    assert {len(cell) for cell in last.cells} == {8}
+    table = last.table
+    assert len(table) == len(last.cells) and table["y"].min() > -0.03
+    with pytest.raises(KeyError, match="there is no field"):
+        last["stress"]
+
+
+def test_pandas_and_polars_take_tables(chamber: pilum.Results) -> None:
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    frame = pandas.DataFrame(dict(chamber.history))
+    assert frame["q_t"].tolist() == chamber.history["q_t"].tolist()
+    arrow = polars.DataFrame(chamber.history)
+    assert arrow.columns == chamber.history.names and len(arrow) == 16
+    for name in arrow.columns:
+        assert arrow[name].to_list() == chamber.history[name].tolist()
+    assert arrow.schema["phase"] == polars.String and arrow.schema["increment"] == polars.Int64
+    # Nobody has to take a stream that was asked for.
+    for _ in range(100):
+        chamber.profile.__arrow_c_stream__()
+    read = pandas.DataFrame.from_arrow(chamber.history) if hasattr(pandas.DataFrame, "from_arrow") else frame
+    assert read["tau_shaft"].tolist() == chamber.history["tau_shaft"].tolist()
+
+
+def test_notebooks_show_the_report(chamber: pilum.Results, tmp_path: Path) -> None:
+    page = chamber._repr_html_()
+    assert page.startswith("<iframe srcdoc=") and "&lt;!doctype html" in page.lower()
+    assert chamber.report.is_file()
+    assert chamber.history._repr_html_().count("<tr>") == 17
+    assert "done" in repr(chamber) and "16 rows" in repr(chamber.history)
+
+
+def test_a_figure_in_three_lines(chamber: pilum.Results, here: Path) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    push = chamber.history.where(phase="loading")
+    plt.plot(push["w_t"], push["tau_shaft"])
+    plt.savefig("friction.png")
+    assert (here / "friction.png").stat().st_size > 5000
+
+
+def test_pyvista_opens_fields(chamber: pilum.Results) -> None:
+    try:
+        import pyvista
+    except ImportError:
+        missing("pyvista")
+    field = chamber.fields[-1]
+    grid = field.to_pyvista()
+    assert grid.n_cells == len(field.cells) and grid.n_points == len(field.nodes)
+    assert np.array_equal(grid.cell_data["stress_22"], field["stress_22"])
+    assert np.array_equal(grid.point_data["displacement"][:, :2], field["displacement"])
+    reader = pyvista.get_reader(chamber.fields.path)
+    assert list(reader.time_values) == chamber.fields.times.tolist()
+
+
+def test_a_case_is_a_dictionary(here: Path) -> None:
+    """Uniaxial compression: w = q h (1 + ν)(1 − 2ν)/(E (1 − ν))."""
+    results = pilum.run(COLUMN, results="column")
+    expected = 100.0 * 2.0 * 1.3 * 0.4 / (1e4 * 0.7)
+    np.testing.assert_allclose(results.history["w"][-1], expected, rtol=1e-9)
+    law = pilum.Law("elastic", hypothesis="plane_strain", young_modulus=1e4, poisson_ratio=0.3)
+    same = pilum.run(pilum.Problem({**COLUMN, "laws": {"soil": law}}, name="column2"))
+    assert same.folder == Path("results/column2")
+    assert same.history["w"].tolist() == results.history["w"].tolist()
+    stiffer = pilum.run(COLUMN, set={"laws.soil.parameters.young_modulus": 2e4}, results="stiffer")
+    np.testing.assert_allclose(stiffer.history["w"], results.history["w"] / 2, rtol=1e-9)
+
+
+def test_variants_are_a_dictionary(here: Path) -> None:
+    stiff = dict(name="stiff", laws=dict(soil=dict(parameters=dict(young_modulus=2e4))))
+    case = {**COLUMN, "variant": [dict(name="soft"), stiff]}
+    runs = pilum.run(case, results="both")
+    assert list(runs) == ["soft", "stiff"]
+    np.testing.assert_allclose(runs["soft"].history["w"], 2 * runs["stiff"].history["w"], rtol=1e-9)
+    assert (here / "both/report.html").is_file()
+    one = pilum.run(case, variant="stiff", results="one")
+    assert one.history["w"].tolist() == runs["stiff"].history["w"].tolist()
+    with pytest.raises(pilum.InputError, match="no variant `hard`"):
+        pilum.run(case, variant="hard", results="none")
+
+
+def test_drivers_have_variants_too(here: Path) -> None:
+    tables = pilum.point(pilum.cases() / "shear_box/fontainebleau.toml")
+    assert list(tables) == ["50_kPa", "100_kPa", "200_kPa"]
+    # The peak friction of Table I is approached.
+    ratio = -tables["100_kPa"]["traction_t"][-1] / tables["100_kPa"]["traction_n"][-1]
+    assert 0.7 < ratio < 0.78
+    one = pilum.point(pilum.cases() / "shear_box/fontainebleau.toml", variant="50_kPa")
+    assert one["traction_t"].tolist() == tables["50_kPa"]["traction_t"].tolist()
+
+
+def test_who_watches_is_told(here: Path) -> None:
+    seen: list[pilum.Progress] = []
+    main = threading.get_ident()
+
+    def watch(progress: pilum.Progress) -> None:
+        assert threading.get_ident() == main
+        seen.append(progress)
+
+    pilum.run(COLUMN, results="watched", watch=watch)
+    assert [p.increment for p in seen] == [1, 2, 3, 4]
+    assert seen[0].phase == "load" and seen[0].of == 4 and seen[0].iterations >= 0
+
+
+def test_who_watches_may_stop_and_go_on(here: Path) -> None:
+    class Enough(Exception):
+        pass
+
+    def watch(progress: pilum.Progress) -> None:
+        if progress.increment == 2:
+            raise Enough
+
+    with pytest.raises(Enough):
+        pilum.run(COLUMN, results="stopped", watch=watch, checkpoints=0.0)
+    stopped = pilum.Results("stopped")
+    assert stopped.status == "interrupted" and len(stopped.history) == 2
+    seen = []
+    whole = pilum.run(COLUMN, results="stopped", resume=True, watch=lambda p: seen.append(p.increment))
+    assert seen == [3, 4]
+    assert whole.history["w"].tolist() == pilum.run(COLUMN, results="straight").history["w"].tolist()
+
+
+def test_ctrl_c_stops_a_run(here: Path) -> None:
+    def interrupt() -> None:
+        time.sleep(0.5)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        pilum.run(CHAMBER, set={"phase.loading.increments": 100_000}, results="long")
+    # The increment under way and a second of grace, on a machine that has other work.
+    assert time.monotonic() - begin < 20.0
+    assert pilum.Results("long").status == "interrupted"
+
+
+def test_mistakes_in_files_have_their_place(here: Path) -> None:
+    shutil.copytree(CHAMBER, here / "case")
+    text = (here / "case/case.toml").read_text().replace("young_modulus = 34e3", "youngs_modulus = 34e3")
+    (here / "case/case.toml").write_text(text)
+    with pytest.raises(pilum.InputError) as caught:
+        pilum.run(here / "case", results="none")
+    error = caught.value
+    line = next(i for i, row in enumerate(text.splitlines(), 1) if "youngs_modulus" in row)
+    assert (error.file, error.line) == (str(here / "case/case.toml"), line)
+    assert "young_modulus" in str(error.hint) and f"case.toml:{line}:" in str(error)
+    with pytest.raises(pilum.InputError, match="cannot read") as unreadable:
+        pilum.run("nowhere.toml")
+    assert "No such file" in str(unreadable.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (dict(groups=dict(soil=dict(formulation="solid", law="sand"))), "there is no law `sand`|sand"),
+        (dict(phase=[dict(name="load", increments=0)]), "increments"),
+        (dict(supports=[dict(line="bottom", fixed=["x"])]), "there is no line `bottom`"),
+        (dict(solver=dict(metod="auto")), "unknown"),
+    ],
+)
+def test_mistakes_in_dictionaries_show_what_was_written(here: Path, change: dict, says: str) -> None:
+    with pytest.raises(pilum.InputError, match=says) as caught:
+        pilum.run({**COLUMN, **change}, results="none")
+    assert caught.value.file is None and caught.value.text
+    assert not (here / "none").exists()
+
+
+def test_values_of_no_file_are_refused() -> None:
+    with pytest.raises(TypeError, match="analysis: a file has no values of the type `object`"):
+        pilum.run({**COLUMN, "analysis": object()})
+    with pytest.raises(pilum.InputError, match="said to the Problem"):
+        pilum.run(pilum.Problem(COLUMN), variant="a")
+
+
+def test_no_equilibrium_says_where(here: Path) -> None:
+    """A block on a joint with friction, which is pulled harder than it holds."""
+    results = here / "slides"
+    case = {
+        **COLUMN,
+        "mesh": {**COLUMN["mesh"], "lines": {**COLUMN["mesh"]["lines"], "joint": dict(y=1.0)}},
+        "laws": dict(
+            soil=SOIL,
+            joint=pilum.Law(
+                "coulomb_joint",
+                normal_stiffness=1e6,
+                shear_stiffness=1e6,
+                cohesion=0.0,
+                friction_angle=30.0,
+                dilatancy_angle=0.0,
+            ),
+        ),
+        "groups": dict(
+            soil=dict(formulation="solid", law="soil"),
+            joint=dict(formulation="zero_thickness", line="joint", law="joint"),
+        ),
+        "supports": [dict(line="base", fixed=["x", "y"])],
+        "phase": [
+            dict(name="press", increments=1, pressure=[dict(line="top", value=100.0)]),
+            dict(name="pull", increments=10, force=[dict(line="top", x=80.0)]),
+        ],
+        "probes": {},
+    }
+    with pytest.raises(pilum.NoEquilibriumError) as caught:
+        pilum.run(case, results=results)
+    error = caught.value
+    # It topples, at the latest where friction holds no more: 100 tan 30° = 57.7 kN/m of 80, in the eighth of ten.
+    assert error.phase == "pull" and 1 <= error.increment <= 8 and error.cause
+    assert "pull" in str(error.place) and error.reached is not None and error.reached < 8
+    found = pilum.Results(results)
+    assert found.status == "no equilibrium" and found.history["increment"][-1] == error.increment - 1
+
+
+def test_errors_travel_between_processes() -> None:
+    import pickle
+
+    error = pilum.LawError("it fails", law="mepi", point=3, hint="less")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.law, again.point) == (str(error), "mepi", 3)
+
+
+def test_a_law_is_built_with_the_headers(here: Path) -> None:
+    """The fixture of a correct law, with the headers in the package alone."""
+    (here / "good.c").write_text('#include "law.h"\n')
+    fixtures = Path(__file__).resolve().parents[1] / "fixtures"
+    library = compiled(str(here / "good.c"), here, f"-I{pilum.include()}", f"-I{fixtures}")
+    found = pilum.laws(law_path=[library.parent])
+    assert found["fixture"] == library
+    assert (pilum.include().parents[1] / "share/pilum/pilum_law.f90").is_file()
+
+
+def test_licences_of_what_is_inside_are_there() -> None:
+    pages = pilum.include().parents[1] / "share/doc/pilum"
+    text = (pages / "licences.txt").read_text()
+    for crate in ("faer", "pyo3", "numpy", "arrow-array"):
+        assert f"\n{crate} " in text, crate
