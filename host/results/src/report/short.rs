@@ -27,8 +27,20 @@ impl Serialize for Short {
 }
 
 /// A number with so many digits.
-fn rounded(value: f64, digits: usize) -> f64 {
-    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+fn rounded(value: f64, digits: i32) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let places = digits - 1 - value.abs().log10().floor() as i32;
+    let power = 10_f64.powi(places.abs());
+    // Powers of ten up to 10²² are exact: quotient and product are what the digits read as.
+    match places {
+        0..=22 => (value * power).round() / power,
+        -22..0 => (value / power).round() * power,
+        _ => format!("{value:.*e}", digits as usize - 1)
+            .parse()
+            .unwrap_or(value),
+    }
 }
 
 /// A number in a table: six digits.
@@ -87,6 +99,25 @@ mod tests {
         assert_eq!(json(f64::NAN), "null");
         assert_eq!(json(f64::NEG_INFINITY), "null");
         assert_eq!(serde_json::to_string(&Short(None)).unwrap(), "null");
+    }
+
+    #[test]
+    fn digits_are_those_of_the_decimal_number() {
+        for exponent in -40..40 {
+            for digits in [
+                1.0,
+                1.234_567_4,
+                9.999_999_7,
+                6.022_140_76,
+                3.141_592_653_589_793,
+            ] {
+                for value in [digits, -digits].map(|value| value * 10_f64.powi(exponent)) {
+                    let written: f64 = format!("{value:.6e}").parse().unwrap();
+                    assert_eq!(rounded(value, 7).to_bits(), written.to_bits(), "{value:e}");
+                }
+            }
+        }
+        assert_eq!(rounded(f64::MIN_POSITIVE, 7), 2.225_074e-308);
     }
 
     #[test]
