@@ -14,13 +14,9 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Whether the message contains a text, however its lines are broken and framed.
+    /// Whether the message contains a text, however its lines are broken.
     pub(crate) fn says(&self, text: &str) -> bool {
-        let squeezed = |text: &str| -> String {
-            text.chars()
-                .filter(|c| !c.is_whitespace() && *c != '│')
-                .collect()
-        };
+        let squeezed = |text: &str| -> String { text.split_whitespace().collect() };
         squeezed(&self.stderr).contains(&squeezed(text))
     }
 }

@@ -106,7 +106,7 @@ fn what_cannot_be_drawn_is_refused_at_its_key() {
         let column = "measured = ".len() + measured.find('^').unwrap() + 1;
         let outcome = run(&place, &measured.replacen('^', "", 1));
         assert_eq!(outcome.code, Some(BAD_INPUT), "{measured}");
-        for text in [at, says, &format!(":{column}]")] {
+        for text in [at, says, &format!(":{column}|")] {
             assert!(
                 outcome.says(text),
                 "{measured}: {text:?}\n{}",

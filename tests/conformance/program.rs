@@ -118,10 +118,9 @@ pub(crate) fn check(library: &Path, more: &[&str]) -> Report {
     }
 }
 
-/// A message in one line, without its frame.
+/// A message in one line.
 pub(crate) fn words(message: &str) -> String {
     let words = message.split_whitespace();
-    let words = words.filter(|word| !["│", "×", "╰─▶"].contains(word));
     words.collect::<Vec<_>>().join(" ")
 }
 

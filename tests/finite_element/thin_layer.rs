@@ -79,15 +79,7 @@ fn place<'a>(error: &Error, text: &'a str) -> &'a str {
         panic!("not an input error: {error}")
     };
     assert_eq!(error.exit_code(), 1);
-    // `SourceSpan` prints its offset and length.
-    let debug = format!("{input:?}");
-    let number = |after: &str| -> usize {
-        let rest = debug.split(after).nth(1).expect("a span");
-        let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
-        digits.parse().expect("a number")
-    };
-    let (offset, length) = (number("SourceOffset("), number("length: "));
-    &text[offset..offset + length]
+    &text[input.span()]
 }
 
 #[test]

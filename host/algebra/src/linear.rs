@@ -6,7 +6,7 @@ use crate::multifrontal::{Kind, Multifrontal};
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{ColMut, MatMut, Par};
+use faer::{ColMut, MatMut};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -210,8 +210,6 @@ impl LinearSolver {
 
     /// Factorises with full row exchanges.
     fn fall_back(&mut self) -> Result<(), Singular> {
-        // faer's sparse factorisations are slower with threads than without.
-        faer::set_global_parallelism(Par::Seq);
         self.factorised = false;
         self.fallbacks += 1;
         let (pattern, values) = self.with_block_entries();

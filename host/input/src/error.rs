@@ -1,34 +1,27 @@
 //! What can go wrong from a file to a result, by who has to act; the program's exit code follows.
 
 use law::Stopped;
-use miette::Diagnostic;
 use text::{InputError, add_hint};
 use thiserror::Error;
 
 /// Any error of the host.
-#[derive(Debug, Error, Diagnostic)]
+#[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file, or what was asked for, is wrong.
     #[error(transparent)]
-    #[diagnostic(transparent)]
     Text(#[from] text::Error),
     /// A library cannot be used, or broke the contract.
     #[error(transparent)]
-    #[diagnostic(transparent)]
     Law(law::Error),
     /// The process was killed from outside.
     #[error("{trouble}")]
-    #[diagnostic(help(
-        "it was killed by somebody, or by the system, which may have had no memory left"
-    ))]
     Killed {
         /// Where, in words.
         trouble: String,
     },
     /// A point did not come to the end of its path.
     #[error(transparent)]
-    #[diagnostic(transparent)]
     Point(Box<point::Error>),
     /// A simulation did not come to its end.
     #[error("{error}")]
@@ -36,7 +29,6 @@ pub enum Error {
         /// Why.
         error: Box<mechanics::Error>,
         /// What the user could do.
-        #[help]
         hint: Option<String>,
     },
     /// A call that was repeated fails.
@@ -54,9 +46,6 @@ pub enum Error {
     Stopped(#[from] Stopped),
     /// The user ended the program at once, during these calls of laws if there were any.
     #[error("{}stopped at once, as asked", during.as_ref().map(|calls| format!("{calls}: ")).unwrap_or_default())]
-    #[diagnostic(help(
-        "a run has all its rows and goes on with --resume; a driver lacks those of the last 0.2 s"
-    ))]
     StoppedAtOnce {
         /// The calls, in words.
         during: Option<String>,
@@ -161,6 +150,38 @@ impl Error {
     /// Trouble with a library, without a hint.
     pub fn library(message: impl Into<String>) -> Self {
         law::Error::library(message).into()
+    }
+
+    /// What the user could do, if something is known.
+    pub fn help(&self) -> Option<String> {
+        let help = match self {
+            Self::Text(error) => error.help(),
+            Self::Law(error) => error.help(),
+            Self::Point(error) => return error.hint(),
+            Self::Simulation { hint, .. } => hint.as_deref(),
+            Self::StoppedAtOnce { .. } => Some(
+                "a run has all its rows and goes on with --resume; a driver lacks those of the \
+                 last 0.2 s",
+            ),
+            Self::Killed { .. } => Some(
+                "it was killed by somebody, or by the system, which may have had no memory left",
+            ),
+            Self::CallFails { .. } | Self::Stopped(_) => None,
+        };
+        help.map(str::to_owned)
+    }
+
+    /// The place in a file that it is about.
+    pub fn place(&self) -> Option<&InputError> {
+        match self {
+            Self::Text(error) | Self::Law(law::Error::Text(error)) => error.place(),
+            _ => None,
+        }
+    }
+
+    /// What is said of it on a terminal, which may have colours, or elsewhere.
+    pub fn shown(&self, coloured: bool) -> String {
+        text::shown(self, self.place(), self.help().as_deref(), coloured)
     }
 
     /// Adds what the user could do.

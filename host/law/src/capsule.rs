@@ -218,6 +218,7 @@ impl Capsule {
     ///
     /// # Errors
     /// [`text::Error::Unreadable`]; [`text::Error::Input`] at the place that does not fit.
+    #[inline]
     pub fn read(path: &Path) -> Result<Self, Error> {
         Self::of_source(Source::read(path)?)
     }
@@ -226,6 +227,9 @@ impl Capsule {
     ///
     /// # Errors
     /// At the place that does not fit.
+    // Compiled where it is used, in rooms that are not optimised: reading this and locks takes a seventh
+    // of what this crate takes to compile.
+    #[inline]
     pub fn of_source(source: Source) -> Result<Self, Error> {
         let mut capsule: Self =
             toml::from_str(source.text()).map_err(|why| toml_error(&source, &why))?;

@@ -1,16 +1,14 @@
 //! What can go wrong with libraries and laws.
 
 use crate::Stopped;
-use miette::Diagnostic;
 use text::{InputError, add_hint};
 use thiserror::Error;
 
 /// A library cannot be used, or a file about it is wrong.
-#[derive(Debug, Error, Diagnostic)]
+#[derive(Debug, Error)]
 pub enum Error {
     /// A file.
     #[error(transparent)]
-    #[diagnostic(transparent)]
     Text(#[from] text::Error),
     /// A library cannot be used, or broke the contract.
     #[error("{message}")]
@@ -18,7 +16,6 @@ pub enum Error {
         /// Library, law and reason.
         message: String,
         /// What the user could do.
-        #[help]
         hint: Option<String>,
     },
     /// The user stopped the work in the middle.
@@ -44,6 +41,15 @@ impl Error {
     /// A defect of the program.
     pub fn internal(message: impl Into<String>) -> Self {
         text::Error::Internal(message.into()).into()
+    }
+
+    /// What the user could do, if something is known.
+    pub fn help(&self) -> Option<&str> {
+        match self {
+            Self::Text(error) => error.help(),
+            Self::Library { hint, .. } => hint.as_deref(),
+            Self::Stopped(_) => None,
+        }
     }
 
     /// Adds what the user could do.

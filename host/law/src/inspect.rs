@@ -517,6 +517,7 @@ fn pe_needs<Pe: ImageNtHeaders>(
 ///
 /// # Errors
 /// [`text::Error::Internal`].
+#[inline]
 pub fn json(inspection: &Inspection) -> Result<String, Error> {
     let mut text =
         serde_json::to_string_pretty(inspection).map_err(|why| Error::internal(why.to_string()))?;

@@ -290,6 +290,7 @@ impl Law {
     /// # Errors
     /// A point asks for a smaller step, or fails; also if it claims success with a result that
     /// is not finite, or if its outcome contradicts that of the batch.
+    #[inline]
     pub fn integrate(
         &self,
         start: &Start<'_>,
@@ -318,6 +319,7 @@ impl Law {
             })
     }
 
+    #[inline]
     fn integrate_with(
         &self,
         outcomes: &mut Outcomes,
@@ -454,7 +456,9 @@ fn judge(
 /// What is said of a success that is none.
 const NOT_FINITE: &str = "the law claims success with a result that is not finite";
 
-/// Distrusts success: every output must be finite.
+/// Distrusts success: every output must be finite. Compiled where batches are called, with what
+/// computes: this crate is optimised little.
+#[inline]
 fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), BatchFailure> {
     let whole = |(values, place, n): &(&[f64], Strided, usize)| {
         let packed = place.component == 1 && place.point == *n;
@@ -483,6 +487,7 @@ fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), B
 
 /// Whether all values are finite: 0 times a finite number is 0. Eight sums at a time and no branch,
 /// so that it costs little more than reading the values.
+#[inline]
 fn all_finite(values: &[f64]) -> bool {
     let (chunks, rest) = values.as_chunks::<8>();
     let mut sums = [0.0; 8];

@@ -51,6 +51,7 @@ impl Pins {
     ///
     /// # Errors
     /// [`text::Error::Input`] for what is no SHA-256, or a lock that cannot be read.
+    #[inline]
     pub fn of<'a>(
         source: &Source,
         laws: impl Iterator<Item = (&'a Spanned<String>, Option<&'a Spanned<String>>)>,
@@ -85,6 +86,7 @@ impl Pins {
         Ok(pins)
     }
 
+    #[inline]
     fn add_lock(&mut self, path: &Path) -> Result<(), Error> {
         self.take_lock(&Source::read(path)?)?;
         self.lock = Some(path.to_owned());
@@ -95,12 +97,14 @@ impl Pins {
     ///
     /// # Errors
     /// [`text::Error::Input`] at the place that does not fit.
+    #[inline]
     pub fn of_lock(source: &Source) -> Result<usize, Error> {
         let mut pins = Self::default();
         pins.take_lock(source)?;
         Ok(pins.locked.len())
     }
 
+    #[inline]
     fn take_lock(&mut self, source: &Source) -> Result<(), Error> {
         let lock: LockFile = text::parse(source)?;
         if *lock.version.get_ref() != 1 {

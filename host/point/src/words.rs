@@ -6,7 +6,6 @@ use crate::error::{
 use crate::path::{LONGEST, MAX_INCREMENTS};
 use abi::status::Outcome;
 use law::words;
-use miette::Diagnostic;
 use std::fmt::{self, Display, Formatter};
 
 impl Display for Place {
@@ -80,12 +79,6 @@ impl Display for Error {
             }
             Self::Failure(failure) => failure.fmt(f),
         }
-    }
-}
-
-impl Diagnostic for Error {
-    fn help<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
-        Some(Box::new(self.hint()?))
     }
 }
 

@@ -4,7 +4,6 @@ use abi::status::Outcome;
 use input::{Error, Kind};
 use law::BatchFailure;
 use mechanics::group::PointFailure;
-use miette::{Diagnostic, SourceCode};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -95,7 +94,7 @@ fn message(error: &Error) -> String {
 
 fn fill(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResult<()> {
     if let Some(hint) = error.help() {
-        to.set_item("hint", hint.to_string())?;
+        to.set_item("hint", hint)?;
     }
     place_in_file(to, error, written)?;
     match error {
@@ -107,39 +106,26 @@ fn fill(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResul
 
 /// File, line, column and the line itself.
 fn place_in_file(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResult<()> {
-    let label = error.labels().and_then(|mut labels| labels.next());
-    let (Some(source), Some(label)) = (error.source_code(), label) else {
+    let Some(place) = error.place() else {
         return Ok(());
     };
-    let Some((name, line, column, text)) = line_of(source, label.inner()) else {
-        return Ok(());
-    };
-    to.set_item("text", text)?;
-    if let Some(label) = label.label() {
+    let text::Line {
+        file,
+        at: (line, column),
+        text,
+        label,
+    } = place.line();
+    to.set_item("text", text.trim())?;
+    if let Some(label) = label {
         to.set_item("cause", label)?;
     }
     // Lines of a text that was made of a dictionary tell its user nothing.
-    if Some(name.as_str()) != written {
-        to.set_item("file", name)?;
+    if Some(file) != written {
+        to.set_item("file", file)?;
         to.set_item("line", line)?;
         to.set_item("column", column)?;
     }
     Ok(())
-}
-
-/// Name of the text, line and column at which a span starts (from 1), and that line.
-fn line_of(
-    source: &dyn SourceCode,
-    span: &miette::SourceSpan,
-) -> Option<(String, usize, usize, String)> {
-    let at = source.read_span(span, 0, 0).ok()?;
-    // With a line on each side all of its own is there.
-    let around = source.read_span(span, 1, 1).ok()?;
-    let text = String::from_utf8_lossy(around.data());
-    let line = text.lines().nth(at.line() - around.line());
-    let name = at.name().unwrap_or_default().to_owned();
-    let line = line.unwrap_or_default().trim().to_owned();
-    Some((name, at.line() + 1, at.column() + 1, line))
 }
 
 fn of_simulation(to: &Bound<'_, PyDict>, error: &mechanics::Error) -> PyResult<()> {

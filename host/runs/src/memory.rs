@@ -134,7 +134,7 @@ fn end(size: usize) {
     }
     let message = shortage(size as u64);
     let text = format!(
-        "Error:   × {message}\n  help: raise the limit of memory, or take a coarser mesh; rows that were written are whole\n"
+        "error: {message}\n  |\n  = help: raise the limit of memory, or take a coarser mesh; rows that were written are whole\n"
     );
     // Another thread may hold the lock of the error stream, and wait for memory.
     let mut rest = text.as_bytes();

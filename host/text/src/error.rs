@@ -1,16 +1,14 @@
 //! What can go wrong with files.
 
 use crate::InputError;
-use miette::Diagnostic;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// A file, or what somebody asked for, is wrong.
-#[derive(Debug, Error, Diagnostic)]
+#[derive(Debug, Error)]
 pub enum Error {
     /// An input file is wrong.
     #[error(transparent)]
-    #[diagnostic(transparent)]
     Input(#[from] Box<InputError>),
     /// An input file cannot be read.
     #[error("cannot read {}", path.display())]
@@ -22,7 +20,6 @@ pub enum Error {
     },
     /// Results cannot be written.
     #[error("cannot write {}", path.display())]
-    #[diagnostic(help("name another place for the results on the command line"))]
     Unwritable {
         /// The file or folder.
         path: PathBuf,
@@ -49,6 +46,25 @@ impl Error {
         Self::Unwritable {
             path: path.to_owned(),
             source,
+        }
+    }
+
+    /// What the user could do, if something is known.
+    pub fn help(&self) -> Option<&str> {
+        match self {
+            Self::Input(input) => input.help(),
+            Self::Unwritable { .. } => {
+                Some("name another place for the results on the command line")
+            }
+            Self::Unreadable { .. } | Self::Usage(_) | Self::Internal(_) => None,
+        }
+    }
+
+    /// The place in a file that it is about.
+    pub fn place(&self) -> Option<&InputError> {
+        match self {
+            Self::Input(input) => Some(input),
+            _ => None,
         }
     }
 

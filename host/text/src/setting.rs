@@ -325,8 +325,10 @@ mod tests {
         match base::read::<Table>(source) {
             Ok((_, files)) => Ok(files.into_iter().map(|(_, table)| table).collect()),
             Err(crate::Error::Input(error)) => {
-                let hint = miette::Diagnostic::help(error.as_ref());
-                let hint = hint.map(|hint| format!("; {hint}")).unwrap_or_default();
+                let hint = error
+                    .help()
+                    .map(|hint| format!("; {hint}"))
+                    .unwrap_or_default();
                 Err(format!("{error}{hint}"))
             }
             Err(error) => Err(error.to_string()),

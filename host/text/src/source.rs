@@ -1,8 +1,6 @@
 //! A text that a user wrote, and errors with their place in it.
 
 use crate::{Error, file};
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode, SourceSpan};
-use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::string::FromUtf8Error;
@@ -174,11 +172,9 @@ impl Source {
         label: impl Into<String>,
     ) -> InputError {
         let (path, start, text) = self.file(span.start);
-        let is_same_part = error.source_code.name() == path.display().to_string()
-            && error.source_code.inner() == text;
-        if is_same_part {
+        if error.path == path.display().to_string() && *error.text == *text {
             let span = span.start - start..span.end.saturating_sub(start).min(text.len());
-            error.second = Some((span.into(), label.into()));
+            error.second = Some((span, label.into()));
         }
         error
     }
@@ -191,10 +187,10 @@ impl Source {
             message: message.into(),
             label: None,
             hint: None,
-            span: span.into(),
+            span,
             second: None,
-            source_code: NamedSource::new(path.display().to_string(), text.to_owned())
-                .with_language("TOML"),
+            path: path.display().to_string(),
+            text: text.into(),
         }
     }
 }
@@ -223,44 +219,65 @@ fn not_utf_8(error: &FromUtf8Error) -> std::io::Error {
 #[error("{message}")]
 pub struct InputError {
     message: String,
-    label: Option<String>,
+    pub(crate) label: Option<String>,
     hint: Option<String>,
-    span: SourceSpan,
+    /// Its place, in bytes of the file's text.
+    pub(crate) span: Range<usize>,
     /// Another place that it is about.
-    second: Option<(SourceSpan, String)>,
-    source_code: NamedSource<String>,
+    pub(crate) second: Option<(Range<usize>, String)>,
+    pub(crate) path: String,
+    pub(crate) text: Arc<str>,
 }
 
-impl Diagnostic for InputError {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        let hint = self.hint.as_ref()?;
-        Some(Box::new(hint))
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        Some(&self.source_code)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let label = LabeledSpan::new_with_span(self.label.clone(), self.span);
-        let second = self
-            .second
-            .iter()
-            .map(|(span, label)| LabeledSpan::new_with_span(Some(label.clone()), *span));
-        Some(Box::new(std::iter::once(label).chain(second)))
-    }
+/// The line of a file that an error is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Line<'e> {
+    /// Name of the file.
+    pub file: &'e str,
+    /// Line and column at which the place starts, from 1.
+    pub at: (usize, usize),
+    /// The line itself.
+    pub text: &'e str,
+    /// What is said beside the place.
+    pub label: Option<&'e str>,
 }
 
 impl InputError {
+    /// The line that it is about, for those who do not show it as [`crate::shown`] does.
+    pub fn line(&self) -> Line<'_> {
+        let start = self.span.start.min(self.text.len());
+        let before = &self.text[..start];
+        let first = before.rfind('\n').map_or(0, |end| end + 1);
+        let text = self.text[first..].lines().next().unwrap_or_default();
+        Line {
+            file: &self.path,
+            at: (
+                before.matches('\n').count() + 1,
+                before[first..].chars().count() + 1,
+            ),
+            text,
+            label: self.label.as_deref(),
+        }
+    }
+
+    /// The place that it is about, in bytes of the file's text.
+    pub fn span(&self) -> Range<usize> {
+        self.span.clone()
+    }
+
     /// What the user could do, if something is known.
+    pub fn help(&self) -> Option<&str> {
+        self.hint.as_deref()
+    }
+
+    /// As [`Self::help`], to be added to.
     pub fn hint_mut(&mut self) -> &mut Option<String> {
         &mut self.hint
     }
 
     /// Of an error in a setting of the command line: that setting, and where in it.
     pub fn setting(&self) -> Option<(&str, usize)> {
-        let is_setting = self.source_code.name() == SETTING;
-        is_setting.then(|| (self.source_code.inner().as_str(), self.span.offset()))
+        (self.path == SETTING).then(|| (&*self.text, self.span.start))
     }
 
     /// The same mistake, at the place of another text that the present one was made from.

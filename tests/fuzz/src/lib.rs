@@ -62,8 +62,7 @@ fn shown<T>(outcome: Result<T, Error>) -> Option<T> {
         Ok(value) => Some(value),
         Err(error) => {
             assert!(error.kind() != Kind::Internal, "an internal error: {error}");
-            let message = format!("{:?}", miette::Report::new(error));
-            assert!(!message.is_empty(), "an error without a message");
+            assert!(!error.shown(true).is_empty(), "an error without a message");
             None
         }
     }
