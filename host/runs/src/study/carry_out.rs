@@ -1,6 +1,6 @@
 //! All runs of a study, so many at a time, each in a process of its own.
 
-use super::one::COORDINATOR;
+use super::one::{COORDINATOR, one_line};
 use super::{Plan, folder_of_run, is_wanted};
 use crate::{Error, supervision};
 use law::{Stop, Stopped};
@@ -245,6 +245,6 @@ impl Pool<'_> {
         let from = (from..=said.len())
             .find(|&at| said.is_char_boundary(at))
             .unwrap_or(0);
-        Ok((status.to_string(), said[from..].to_owned()))
+        Ok((status.to_string(), one_line(&said[from..])))
     }
 }

@@ -177,9 +177,14 @@ fn standing_after(error: Option<&Error>) -> Standing {
     };
     let reason = match state {
         State::Interrupted => String::new(),
-        _ => error.to_string(),
+        _ => one_line(&error.to_string()),
     };
     Standing { state, reason }
+}
+
+/// A text on one line: a row of the table is a line, whoever counts them.
+pub(super) fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Has the record of the run in this folder say how it ended, where its process could not. Whether there
