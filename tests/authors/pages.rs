@@ -383,6 +383,7 @@ how_to! {
     how_to_choose_an_integration: "which-integration",
     how_to_converge: "why-does-it-not-converge",
     how_to_read_results: "read-results",
+    how_to_calibrate: "calibrate",
     how_to_choose_an_accuracy: "choose-accuracy",
     how_to_get_forces: "forces",
     how_to_get_a_pile: "pile",

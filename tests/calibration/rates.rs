@@ -107,7 +107,8 @@ fn rates_follow_through_segments_of_led_flux() {
     let place = TempDir::new().unwrap();
     fs::write(place.path().join("driver.toml"), driver(VALUES)).unwrap();
     let mut text = "starts = 1\nprofiles = false\n[free]\n".to_owned();
-    for (name, value) in FREE.iter().zip(VALUES).take(3) {
+    // Not the exponent, which at one pressure counts with the stiffness only.
+    for (name, value) in FREE.iter().zip(VALUES).step_by(2) {
         text += &format!(
             "{name} = {{ start = {:?}, scale = \"log\" }}\n",
             1.2 * value
@@ -134,7 +135,11 @@ fn rates_follow_through_segments_of_led_flux() {
     // Exact points of the law itself: its own derivatives lead back to the truth.
     let outcome = run(&file, &[]).unwrap();
     assert!(outcome.tests[0].is_by_law);
-    for (found, (name, truth)) in outcome.values.iter().zip(FREE.iter().zip(VALUES)) {
+    for (found, (name, truth)) in outcome
+        .values
+        .iter()
+        .zip(FREE.iter().zip(VALUES).step_by(2))
+    {
         assert!(
             (found / truth - 1.0).abs() < 1e-4,
             "{name}: {found}, {:?}",

@@ -53,9 +53,9 @@ impl Default for Settings {
     /// For residuals that are known to round-off.
     fn default() -> Self {
         Self {
-            reduction: 1e-15,
+            reduction: 1e-22,
             step: 1e-12,
-            gradient: 1e-11,
+            gradient: 1e-12,
             blind: 0.0,
             iterations: 200,
         }
@@ -164,11 +164,15 @@ pub(super) fn minimise<P: Problem>(
             jacobian = derivatives;
             damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
             growth = 2.0;
-            is_barred = false;
             if is_least || is_small {
-                end = End::Converged;
+                end = if is_barred {
+                    End::Barred
+                } else {
+                    End::Converged
+                };
                 break;
             }
+            is_barred = false;
         } else {
             // What is foretold is below what the residuals are known to: there is no better place.
             if foretold <= settings.reduction * sum || is_small {
@@ -405,7 +409,9 @@ mod tests {
 
     const WIDE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-    /// Eleven digits are certified; ten of them are asked for, of standard deviations seven.
+    /// Eleven digits are certified. A sum of n squares is known to n ε/2, which tells a parameter to
+    /// √((n − p) n ε/2) standard deviations at best, 4e-7 here; 1e-7 are asked for, and eight digits; of
+    /// standard deviations seven.
     #[track_caller]
     fn hold(curve: &mut Curve, start: &[f64], certified: &[(f64, f64)], sum: f64) {
         let bounds = vec![WIDE; start.len()];
@@ -417,8 +423,9 @@ mod tests {
         let variance = found.sum() / degrees as f64;
         assert!((found.sum() / sum - 1.0).abs() < 1e-10, "{}", found.sum());
         for (i, (value, deviation)) in certified.iter().enumerate() {
-            let error = (found.u[i] / value - 1.0).abs();
-            assert!(error < 1e-9, "b{}: {} {:?}", i + 1, found.u[i], found.end);
+            let error = (found.u[i] - value).abs();
+            let is_exact = error < 1e-7 * deviation && error < 1e-8 * value;
+            assert!(is_exact, "b{}: {} {:?}", i + 1, found.u[i], found.end);
             let own = (covariance.variance(i).unwrap() * variance).sqrt();
             assert!((own / deviation - 1.0).abs() < 1e-7, "s{}: {own}", i + 1);
         }
@@ -509,19 +516,18 @@ mod tests {
 
     #[test]
     fn places_without_an_answer_shorten_the_step() {
-        // The first full step from here goes far above b1 = 300.
+        // Newton's step from 2 goes to 2 − 5 arctan 2 = −3.5.
         let mut curve = Curve {
-            fails: |b| b[0] > 300.0,
-            ..misra()
+            points: &[(0.0, 0.0)],
+            f: |_, b| b[0].atan(),
+            derivatives: |_, b| vec![1.0 / (1.0 + b[0] * b[0])],
+            fails: |b| b[0] < -3.0,
         };
-        let start = [100.0, 1e-5];
-        let found = minimise(&mut curve, &start, &[WIDE; 2], Settings::default());
+        let found = minimise(&mut curve, &[2.0], &[WIDE], Settings::default());
         let found = found.unwrap().unwrap();
         assert!(found.failures > 0);
-        assert!(
-            (found.u[0] / 2.389_421_291_8e2 - 1.0).abs() < 1e-8,
-            "{found:?}"
-        );
+        assert!(found.u[0].abs() < 1e-6, "{found:?}");
+        let start = [100.0, 1e-5];
         // A minimum behind a wall is none.
         let mut walled = Curve {
             fails: |b| b[0] > 150.0,

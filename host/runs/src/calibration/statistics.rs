@@ -2,7 +2,7 @@
 //! curve.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
 /// Covariance of some variables for residuals of unit variance, (JᵀJ)⁻¹, as far as J determines them.
 #[derive(Clone, Debug)]
@@ -130,10 +130,14 @@ pub(super) fn two_sided(level: f64, degrees: Option<usize>) -> f64 {
 /// How much larger than the least a sum of squares may be for all of `n` parameters together to lie in
 /// their region of this level, relative to the variance: n F(n, ν), of known variance χ²(n).
 pub(super) fn joint(level: f64, n: usize, degrees: Option<usize>) -> f64 {
-    // F with so many degrees of freedom is χ²/n.
-    let degrees = degrees.map_or(1e7, |degrees| degrees as f64);
-    let distribution = FisherSnedecor::new(n as f64, degrees);
-    distribution.map_or(f64::INFINITY, |f| n as f64 * f.inverse_cdf(level))
+    let n = n as f64;
+    match degrees {
+        None => ChiSquared::new(n).map_or(f64::INFINITY, |chi| chi.inverse_cdf(level)),
+        Some(degrees) => {
+            let distribution = FisherSnedecor::new(n, degrees as f64);
+            distribution.map_or(f64::INFINITY, |f| n * f.inverse_cdf(level))
+        }
+    }
 }
 
 /// Correlation of neighbours along a curve; 0 of fewer than four values, or of equal ones.
