@@ -129,7 +129,7 @@ fn memory_that_runs_out_is_said() {
     let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/bonded_pile");
     // In KiB of address space: too little for threads, for files, for the equations. The program itself
     // and the C library take 27 to 28 MB, by how it is optimised; with less it cannot be loaded.
-    for limit in [30_000, 40_000, 60_000, 140_000, 200_000] {
+    for limit in [30_000, 40_000, 60_000, 90_000] {
         let place = Place::new();
         let arguments = ["run", case, "--variant", "m2k", "--out", "out"];
         let outcome = place.run_limited(&format!("ulimit -v {limit}"), &arguments);
