@@ -116,7 +116,7 @@ fn watched(again: bool) -> Watched {
             report::write(&folders, &report::default_path(&folders)).map(|_| ())
         };
         if let Err(why) = mended.and_then(|is_there| if is_there { reported() } else { Ok(()) }) {
-            say::error(why.into());
+            say::error(&why.into());
         }
     };
     match supervision::supervise(again, &mend) {
@@ -134,7 +134,7 @@ fn ended(outcome: Result<(), Error>) -> ExitCode {
         Ok(()) => 0,
         Err(error) => {
             let code = error.exit_code();
-            say::error(error);
+            say::error(&error);
             code
         }
     };

@@ -37,7 +37,7 @@ pub(crate) fn what_was_not_said() -> Option<Error> {
 }
 
 /// Says an error, with its place and what could be done.
-pub(crate) fn error(error: Error) {
+pub(crate) fn error(error: &Error) {
     say!("{}", error.shown(console::colors_enabled_stderr()));
 }
 

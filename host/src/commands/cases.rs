@@ -94,7 +94,7 @@ pub(super) fn run_cases(
     match (outcome, reports) {
         // What became of the run matters more than what became of its report.
         (Err(run), Err(report)) => {
-            say::error(report);
+            say::error(&report);
             Err(run)
         }
         (outcome, reports) => outcome.and(reports),
@@ -141,7 +141,7 @@ fn folder_of(case: &Case, variant: Option<&str>, out: Option<&Path>) -> PathBuf 
 /// Keeps the last failure for the caller to report, and reports the one before it.
 fn keep_last(outcome: &mut Result<(), Error>, error: Error) {
     if let Err(earlier) = std::mem::replace(outcome, Err(error)) {
-        say::error(earlier);
+        say::error(&earlier);
     }
 }
 
