@@ -119,7 +119,7 @@ pub fn run_one(
     }
     let outcome = (|| {
         let stop = observer.stop();
-        let studied = trade_off::reach_until(&case, &folder, &stop, say)?;
+        let studied = trade_off::reach_until(&case, (&folder, true), &stop, say)?;
         let case = studied.as_ref().unwrap_or(&case);
         let ready = ready(case)?;
         let earlier = identity_of_run(&folder).filter(|identity| !identity.is_empty());
