@@ -465,6 +465,7 @@ impl Stage {
     clippy::type_complexity,
     reason = "the search for the others, handed in"
 )]
+#[expect(clippy::float_cmp, reason = "a value that was brought to its bound")]
 fn profile(
     model: &mut Model,
     stage: &Stage,
