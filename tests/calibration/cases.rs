@@ -1,5 +1,4 @@
 //! The calibrations in `cases/`.
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::{holds, number, run};
 use std::path::{Path, PathBuf};

@@ -3,7 +3,12 @@
 //! Goal        values and intervals from tests whose truth is known; words where tests do not tell
 //! Set-up      drivers of interface laws with synthetic scatter; the calibrations in `cases/`
 //! Asserts     true values inside the intervals at the nominal rate; derivatives by a law's rates
-#![allow(clippy::unwrap_used, reason = "these are tests")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::format_push_string,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
 
 mod cases;
 mod coverage;

@@ -1,5 +1,4 @@
 //! `pilum calibrate`: what it shows and writes, and mistakes in its file.
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
 use serde_json::Value;
@@ -147,6 +146,7 @@ fn variants_and_settings() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "one line for each mistake")]
 fn mistakes_are_told_with_file_line_and_key() {
     let place = place();
     for (from, to, line, says) in [

@@ -29,6 +29,7 @@ use input::calibration::{Calibration, Variance};
 use input::material::ParameterValue;
 use law::{Opener, Stop};
 use model::{Model, Subject};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use words::digits;
 
@@ -498,14 +499,14 @@ fn block(calibration: &Calibration, model: &Model, values: &[f64]) -> String {
     let mut add = |table: Option<&String>, id: &str, text: String| {
         let entries = match table {
             None => &mut of_driver,
-            Some(name) => match of_cases.iter().position(|(other, _)| other == name) {
-                Some(place) => &mut of_cases[place].1,
-                None => {
+            Some(name) => {
+                let known = of_cases.iter().position(|(other, _)| other == name);
+                if known.is_none() {
                     of_cases.push((name.clone(), Vec::new()));
-                    let last = of_cases.len() - 1;
-                    &mut of_cases[last].1
                 }
-            },
+                let place = known.unwrap_or(of_cases.len() - 1);
+                &mut of_cases[place].1
+            }
         };
         if !entries.iter().any(|(other, _)| other == id) {
             entries.push((id.to_owned(), text));
@@ -531,7 +532,7 @@ fn block(calibration: &Calibration, model: &Model, values: &[f64]) -> String {
                 .map(|(id, v)| format!("{id} = {v}\n"))
                 .collect();
             let gap = if text.is_empty() { "" } else { "\n" };
-            text += &format!("{gap}[{heading}]\n{}", lines.concat());
+            let _ = write!(text, "{gap}[{heading}]\n{}", lines.concat());
         }
     };
     table("parameters", &of_driver);

@@ -47,6 +47,9 @@ pub(super) enum Gap {
     Outside([f64; 2]),
 }
 
+/// Rows by stretch and place in it, and two columns.
+type Places = (Vec<(usize, usize)>, [usize; 2]);
+
 /// Where a measured point lies among the computed ones: between rows `row` and `row + 1`, this part of
 /// the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +63,7 @@ impl Curve {
     ///
     /// # Errors
     /// They cannot be read off.
-    pub(super) fn places(&self, rows: &Rows) -> Result<(Vec<(usize, usize)>, [usize; 2]), Gap> {
+    pub(super) fn places(&self, rows: &Rows) -> Result<Places, Gap> {
         let column = |name: &str| {
             let place = rows.names.iter().position(|other| other == name);
             place.ok_or_else(|| Gap::NoColumn(name.to_owned()))

@@ -71,25 +71,25 @@ fn remove_figures(folder: &Path) {
     }
 }
 
-impl Outcome {
-    /// Ends of an interval in words.
-    pub(super) fn words_of(&self, interval: Option<Interval>) -> String {
-        match interval {
-            None => "not determined".to_owned(),
-            Some(interval) => match interval.ends {
-                [Some(low), Some(high)] => format!("{} to {}", digits(low), digits(high)),
-                [Some(low), None] => format!("above {}", digits(low)),
-                [None, Some(high)] => format!("below {}", digits(high)),
-                [None, None] => "no limit".to_owned(),
-            },
-        }
+/// Ends of an interval in words.
+pub(super) fn words_of(interval: Option<Interval>) -> String {
+    match interval {
+        None => "not determined".to_owned(),
+        Some(interval) => match interval.ends {
+            [Some(low), Some(high)] => format!("{} to {}", digits(low), digits(high)),
+            [Some(low), None] => format!("above {}", digits(low)),
+            [None, Some(high)] => format!("below {}", digits(high)),
+            [None, None] => "no limit".to_owned(),
+        },
     }
+}
 
+impl Outcome {
     /// Interval, or why there is none.
     pub(super) fn interval_in_words(&self, parameter: usize) -> String {
         let (stage, place) = self.places[parameter];
         match self.stages[stage].on_bound[place] {
-            [false, false] => self.words_of(self.interval(parameter)),
+            [false, false] => words_of(self.interval(parameter)),
             _ => "on its bound".to_owned(),
         }
     }

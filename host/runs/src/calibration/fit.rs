@@ -1,7 +1,7 @@
 //! A stage: the parameters of a group fitted to the tests, from several starts, with what is known of
 //! each afterwards.
 
-use super::coordinates::spread;
+use super::coordinates::{Parameter, spread};
 use super::least_squares::{End, Minimum, Problem, Settings, free, minimise};
 use super::model::Model;
 use super::statistics::{Covariance, joint, two_sided};
@@ -205,7 +205,7 @@ impl Problem for Search<'_> {
                 .collect::<Vec<f64>>();
             let moving = self.moving.clone();
             let numbers: Vec<usize> = moving.iter().map(|&p| self.group.parameters[p]).collect();
-            let by_law = self.model.derivatives_by_law(test, &self.all, &numbers)?;
+            let by_law = self.model.derivatives_by_law(test, &self.all, &numbers);
             for (column, parameter) in numbers.into_iter().enumerate() {
                 if !self.model.tests[test].has(parameter) {
                     continue;
@@ -247,6 +247,10 @@ const FARTHEST: f64 = 12.0;
 ///
 /// # Errors
 /// Stopped; a test that cannot be computed for a reason that is none of the values.
+#[expect(
+    clippy::too_many_lines,
+    reason = "starts, then profiles that may start anew"
+)]
 pub(super) fn fit(
     model: &mut Model,
     group: &Group,
@@ -259,8 +263,8 @@ pub(super) fn fit(
         .iter()
         .map(|&p| model.parameters[p].clone())
         .collect();
-    let bounds: Vec<[f64; 2]> = parameters.iter().map(|p| p.counted_bounds()).collect();
-    let ranges: Vec<[f64; 2]> = parameters.iter().map(|p| p.counted_range()).collect();
+    let bounds: Vec<[f64; 2]> = parameters.iter().map(Parameter::counted_bounds).collect();
+    let ranges: Vec<[f64; 2]> = parameters.iter().map(Parameter::counted_range).collect();
     let settings = Settings {
         reduction: 0.1 * model.exactness,
         step: (1e-2 * model.exactness.sqrt()).max(1e-9),
@@ -461,6 +465,7 @@ impl Stage {
     clippy::type_complexity,
     reason = "the search for the others, handed in"
 )]
+#[expect(clippy::float_cmp, reason = "a value that was brought to its bound")]
 fn profile(
     model: &mut Model,
     stage: &Stage,

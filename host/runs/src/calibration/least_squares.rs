@@ -106,6 +106,8 @@ impl Minimum {
 const FIRST_DAMPING: f64 = 1e-3;
 /// Damping beyond which steps are nothing.
 const MOST_DAMPING: f64 = 1e16;
+/// Relative difference of two sums that may be of rounding.
+const ROUND_OFF: f64 = 1e-13;
 /// A step is taken if it reduces the sum by at least this share of what was foretold.
 const WORTH_IT: f64 = 1e-4;
 
@@ -150,7 +152,15 @@ pub(super) fn minimise<P: Problem>(
         failures += usize::from(there.is_none());
         is_barred |= there.is_none();
         let found = there.as_ref().map(|there| sum - there.norm_squared());
-        let ratio = found.map_or(-1.0, |found| found / foretold);
+        // What is left of the way to the minimum no sum can tell: such a step is taken for a good one.
+        let is_blurred = |found: f64| found.abs() <= ROUND_OFF * sum && foretold <= ROUND_OFF * sum;
+        let ratio = found.map_or(-1.0, |found| {
+            if is_blurred(found) {
+                1.0
+            } else {
+                found / foretold
+            }
+        });
         let is_still = |(d, u): (&f64, &f64)| d.abs() <= settings.step * (u.abs() + settings.step);
         let is_small = moved.iter().zip(&u).all(is_still);
         if let Some(there) = there.filter(|_| foretold > 0.0 && ratio > WORTH_IT) {

@@ -136,6 +136,7 @@ impl Model {
     }
 
     /// Adds a parameter, and what it stands for in each test.
+    #[expect(clippy::float_cmp, reason = "an end that was given as it is")]
     fn add(
         &mut self,
         calibration: &Calibration,
@@ -219,7 +220,7 @@ impl Model {
         }
         let given = [&input.min, &input.max].map(|end| end.as_ref().map(|end| *end.get_ref()));
         let bounds = bounds(law, given, start, scale);
-        if !(bounds[0] < bounds[1]) {
+        if bounds[0] >= bounds[1] {
             let message = format!("`min` is {}, not below `max`, {}", bounds[0], bounds[1]);
             return Err(calibration.error(at(&input.min), message));
         }
@@ -370,21 +371,18 @@ impl Model {
 
     /// Derivatives of a test's residuals by parameters, as the search counts, from the rates of its law;
     /// `None` if it gives none, or an increment took several steps.
-    ///
-    /// # Errors
-    /// As [`Self::computed`].
     pub(super) fn derivatives_by_law(
         &mut self,
         test: usize,
         counted: &[f64],
         parameters: &[usize],
-    ) -> Result<Option<Vec<Vec<f64>>>, Error> {
+    ) -> Option<Vec<Vec<f64>>> {
         self.tests[test].is_by_law = false;
         let Subject::Driver(driver) = &self.tests[test].subject else {
-            return Ok(None);
+            return None;
         };
         if !rates::are_given(driver) {
-            return Ok(None);
+            return None;
         }
         let values: Vec<f64> = self
             .parameters
@@ -397,7 +395,7 @@ impl Model {
             .iter()
             .map(|(p, _, id)| (id.clone(), ParameterValue::Number(values[*p])));
         let Ok(driver) = driver.with_parameters(&set.collect::<Vec<_>>()) else {
-            return Ok(None);
+            return None;
         };
         let declared = &driver.point().law().description().parameters;
         let number = |parameter: usize| {
@@ -407,7 +405,7 @@ impl Model {
         let own: Vec<usize> = parameters.iter().filter_map(|&p| number(p)).collect();
         self.computations += 1;
         let Ok(Some(followed)) = rates::follow(&driver, &own) else {
-            return Ok(None);
+            return None;
         };
         let rows = Rows {
             names: drawable(driver.point()),
@@ -423,7 +421,7 @@ impl Model {
                 let slope = self.parameters[parameter].slope(values[parameter]);
                 for curve in &self.tests[test].curves {
                     let Ok(derivatives) = curve.derivatives(&rows, &of_rows) else {
-                        return Ok(None);
+                        return None;
                     };
                     column.extend(derivatives.into_iter().map(|d| slope * d));
                 }
@@ -431,7 +429,7 @@ impl Model {
             columns.push(column);
         }
         self.tests[test].is_by_law = true;
-        Ok(Some(columns))
+        Some(columns)
     }
 }
 

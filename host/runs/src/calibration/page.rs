@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::figures::Drawn;
+use super::files::words_of;
 use super::words::digits;
 use crate::Error;
 use input::calibration::{Calibration, Variance};
@@ -59,7 +60,7 @@ fn parameters(outcome: &Outcome) -> Vec<Value> {
     let row = |(i, p): (usize, &super::Parameter)| {
         let linear = match outcome.linear_interval(i) {
             None => String::new(),
-            some => outcome.words_of(some),
+            some => words_of(some),
         };
         context! {
             name => p.name.clone(),

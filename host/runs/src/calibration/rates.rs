@@ -124,17 +124,12 @@ fn rates_of_values(driver: &Driver, state: &State, rate: &State) -> Vec<f64> {
     {
         let (normal, normal_rate) = (state.flux[0], rate.flux[0]);
         let shear = state.flux[1..].iter().map(|t| t * t).sum::<f64>().sqrt();
-        let shear_rate = match state.flux[1..] {
-            [_] => rate.flux[1],
-            _ => {
-                let pairs = state.flux[1..].iter().zip(&rate.flux[1..]);
-                pairs.map(|(t, rate)| t * rate).sum::<f64>() / shear
-            }
-        };
-        let shear = if state.flux.len() == 2 {
-            state.flux[1]
+        let pairs = state.flux[1..].iter().zip(&rate.flux[1..]);
+        // In the plane friction has a sign.
+        let (shear, shear_rate) = if state.flux.len() == 2 {
+            (state.flux[1], rate.flux[1])
         } else {
-            shear
+            (shear, pairs.map(|(t, rate)| t * rate).sum::<f64>() / shear)
         };
         // μ = τ/(−t_n).
         rates[place] = -shear_rate / normal + shear * normal_rate / (normal * normal);

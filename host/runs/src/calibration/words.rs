@@ -19,6 +19,10 @@ const PART: f64 = 0.1;
 ///
 /// # Errors
 /// Stopped.
+#[expect(
+    clippy::too_many_lines,
+    reason = "one paragraph for each thing to be said"
+)]
 pub(super) fn of_stage(
     model: &mut Model,
     stage: &Stage,
