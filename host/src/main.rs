@@ -109,7 +109,7 @@ fn watched(again: bool) -> Watched {
             // Its runs have no reports of their own, or write them the next time.
             Ok(true) => return,
             Ok(false) => {}
-            Err(why) => say::error(why),
+            Err(why) => say::error(&why),
         }
         let reported = || {
             let folders = [folder.to_owned()];
