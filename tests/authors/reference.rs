@@ -261,7 +261,7 @@ fn places(file: &str, text: &str) -> BTreeMap<String, String> {
 }
 
 /// All schemas, with the page of each.
-fn schemas() -> [(Schema, &'static str); 3] {
+fn schemas() -> [(Schema, &'static str); 4] {
     [
         (Schema::new("case", "CaseFile"), "case.md"),
         (Schema::new("point", "DriverFile"), "driver.md"),

@@ -81,6 +81,8 @@ pub(crate) fn run(
     let options = Options {
         resume,
         checkpoints: checkpoints.and_then(|every| Duration::try_from_secs_f64(every).ok()),
+        reports: true,
+        ..Options::default()
     };
     let outcome = carry_out(
         py,

@@ -37,6 +37,7 @@ use trial::Scratch;
 
 /// What is asked of a study.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "options of the command line")]
 pub struct Options {
     /// Only this variant.
     pub variant: Option<String>,

@@ -209,7 +209,7 @@ impl Table {
         let number = |value: Option<f64>| value.map(|v| format!("{v:e}")).unwrap_or_default();
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
         let label = quoted(&settings.label());
-        self.text += &match outcome {
+        let row = match outcome {
             Ok(trial) => format!(
                 "{run},{label},{:e},{},{},{},\n",
                 trial.seconds,
@@ -219,6 +219,7 @@ impl Table {
             ),
             Err(error) => format!("{run},{label},,,,,{}\n", quoted(&in_one_line(error))),
         };
+        self.text += &row;
         self.write()
     }
 
