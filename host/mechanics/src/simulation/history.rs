@@ -124,6 +124,7 @@ mod tests {
                 tolerated: 0.0,
                 round_off: 0.0,
                 scales: Vec::new(),
+                open: None,
             };
             history.add(1.0, success);
         }
