@@ -21,6 +21,7 @@ use law::Stop;
 use mechanics::equilibrium::Reuse;
 use results::Figures;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use text::write::replace;
 
 /// Factors of the file's increments.
@@ -301,6 +302,7 @@ impl Search<'_> {
                 ),
                 None => doing,
             });
+            let started = Instant::now();
             let outcome = self.scratch.trial(self.case, &settings, Timing::Once, 0);
             match outcome {
                 Ok(trial) => {
@@ -321,6 +323,7 @@ impl Search<'_> {
                     }
                 }
                 Err(error) if error.kind() == Kind::NoEquilibrium => {
+                    last = Some((factor, started.elapsed().as_secs_f64()));
                     // Finer runs are not compared with coarser ones across a gap.
                     levels.clear();
                     self.table
