@@ -162,11 +162,11 @@ fn a_law_that_returns_what_it_finds_changes_nothing() {
     // q = 53.3 < 2c = 60.
     let phases = LOAD.to_owned() + &swap("swap", 2, "strong");
     let finished = run(&text("law = \"stiff\"", &phases));
-    assert!(
-        finished.observer.warnings.is_empty(),
-        "{:?}",
-        finished.observer.warnings
-    );
+    // Two laws of the file are not taken.
+    let warnings: Vec<&String> = (finished.observer.warnings.iter())
+        .filter(|warning| !warning.starts_with("no group takes the laws"))
+        .collect();
+    assert!(warnings.is_empty(), "{warnings:?}");
     for probe in ["s_11", "s_22", "top"] {
         let [before, .., after] = finished.history(probe)[..] else {
             panic!("three rows")
