@@ -235,6 +235,8 @@ const SAME_OF_ERROR: f64 = 0.2;
 const RESERVE: usize = 4;
 /// Most iterations from one start.
 const ITERATIONS: usize = 60;
+/// Longest step of the search: by a factor of e, or by the width of a range.
+const LONGEST: f64 = 1.0;
 /// A profile is followed for at most so many points on either side.
 const MOST_POINTS: usize = 12;
 /// Steps of a profile, in quantiles.
@@ -271,6 +273,7 @@ pub(super) fn fit(
         gradient: model.exactness.sqrt().min(1e-3),
         blind: blind(model),
         iterations: ITERATIONS,
+        longest: LONGEST,
     };
     let given: Vec<f64> = group.parameters.iter().map(|&p| values[p]).collect();
     // Some places are values that a law refuses: there are others in reserve.
@@ -322,6 +325,31 @@ pub(super) fn fit(
     let Some(mut best) = found.into_iter().min_by(|a, b| a.sum().total_cmp(&b.sum())) else {
         return Ok(None);
     };
+    // What nothing answers to keeps the value that was given, wherever the search happened to start.
+    let norms: Vec<f64> = best.jacobian.column_iter().map(|c| c.norm()).collect();
+    let largest = norms.iter().fold(0.0, |m: f64, norm| m.max(*norm));
+    let mut kept = best.u.clone();
+    for (place, norm) in norms.iter().enumerate() {
+        if *norm <= settings.blind * largest {
+            kept[place] = landings[0].from[place];
+        }
+    }
+    if kept != best.u {
+        let mut search = Search {
+            model,
+            group,
+            all: values.to_vec(),
+            moving: everything.clone(),
+        };
+        let residuals = search.residuals(&kept)?;
+        let same = |residuals: &DVector<f64>| {
+            let change = (residuals.norm_squared() - best.sum()).abs();
+            change <= settings.reduction * best.sum()
+        };
+        if let Some(residuals) = residuals.filter(same) {
+            (best.u, best.residuals) = (kept, residuals);
+        }
+    }
     let mut is_renewed = false;
     let (mut stage, profiles) = loop {
         let stage = known(model, group, &best, &bounds, wish);

@@ -47,6 +47,8 @@ pub(super) struct Settings {
     pub(super) blind: f64,
     /// Most iterations.
     pub(super) iterations: usize,
+    /// Longest change of a variable in a step: what is linear near a start says nothing of a plateau far away.
+    pub(super) longest: f64,
 }
 
 impl Default for Settings {
@@ -58,6 +60,7 @@ impl Default for Settings {
             gradient: 1e-12,
             blind: 0.0,
             iterations: 200,
+            longest: f64::INFINITY,
         }
     }
 }
@@ -145,6 +148,9 @@ pub(super) fn minimise<P: Problem>(
             break;
         }
         let step = step(&jacobian, &residuals, &scale, &free, damping);
+        let length = step.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+        let share = (settings.longest / length).min(1.0);
+        let step: Vec<f64> = step.iter().map(|d| share * d).collect();
         let target = clamped(u.iter().zip(step.iter()).map(|(u, d)| u + d), bounds);
         let moved = DVector::from_iterator(u.len(), target.iter().zip(&u).map(|(t, u)| t - u));
         let foretold = sum - (&residuals + &jacobian * &moved).norm_squared();

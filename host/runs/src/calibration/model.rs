@@ -960,7 +960,8 @@ fn bounds(law: Bounds, given: [Option<f64>; 2], start: f64, scale: Scale) -> [f6
 }
 
 /// The range that other starts are spread over: between the given ends, else usual values, but not
-/// farther than three decades or ten times the start from it.
+/// farther than three decades or ten times the start from it; from a start at nothing, than the range of
+/// usual values is wide.
 fn range(
     bounds: [f64; 2],
     usual: Bounds,
@@ -968,7 +969,14 @@ fn range(
     start: f64,
     scale: Scale,
 ) -> [f64; 2] {
-    let reach = 10.0 * start.abs().max(1e-12);
+    // A start at nothing tells no size: the law's usual values do, or else its unit.
+    let reach = if start.abs() > 0.0 {
+        10.0 * start.abs()
+    } else {
+        Some(usual.upper - usual.lower)
+            .filter(|width| width.is_finite() && *width > 0.0)
+            .unwrap_or(1.0)
+    };
     let near = match scale {
         Scale::Log => [start / 1000.0, start * 1000.0],
         Scale::Linear => [start - reach, start + reach],
