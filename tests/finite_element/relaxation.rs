@@ -224,8 +224,8 @@ normal = {{ group = "skin", quantity = "traction_n" }}
     )
 }
 
-/// The path of a body that creeps is its own: relaxation leads the mirror image to another equilibrium,
-/// 0.03 % away. The lift takes 140 iterations with cut-backs; mirrored and exchanged at once, round-off decides
+/// The path of a body that creeps is its own: relaxation has led the mirror image to another
+/// equilibrium, a thousandth away in displacements. The lift takes 140 iterations with cut-backs; mirrored and exchanged at once, round-off decides
 /// one of them otherwise (149), and the way back starts elsewhere: that is left out.
 #[test]
 fn creep_depends_on_no_unit_mirror_or_numbering() {
