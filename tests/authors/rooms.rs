@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::process::Command;
 
 /// Of every room the rooms that it stands on.
 type Arrows = BTreeMap<String, BTreeSet<String>>;
@@ -110,4 +111,62 @@ fn an_arrow_that_is_not_drawn_is_found() {
         dependencies(manifest),
         ["law".to_owned(), "text".to_owned()].into()
     );
+}
+
+/// Every crate with its features, as `cargo` builds it for these packages.
+fn features(of: &[&str]) -> BTreeSet<String> {
+    let mut tree = Command::new(env!("CARGO"));
+    tree.args([
+        "tree",
+        "--offline",
+        "--locked",
+        "--prefix",
+        "none",
+        "--edges",
+        "normal,build",
+    ])
+    .args(["--format", "{p} [{f}]"])
+    .args(of)
+    .current_dir(root());
+    let output = tree.output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines = text.lines();
+    lines
+        .map(|line| line.replace(" (*)", "").replace(" (proc-macro)", ""))
+        .filter(|line| !line.is_empty())
+        .collect()
+}
+
+/// A crate that one command builds with other features than another is compiled once for each of them, and all that
+/// stands on it.
+#[test]
+fn what_is_built_for_the_program_serves_all() {
+    let all = features(&["--workspace"]);
+    assert!(all.len() > 150, "{}", all.len());
+    // With what libFuzzer needs alone.
+    let of_libfuzzer = [
+        "arbitrary",
+        "cc",
+        "find-msvc-tools",
+        "fuzz",
+        "jobserver",
+        "libc",
+        "libfuzzer-sys",
+        "shlex",
+    ];
+    let fuzz: [&str; 4] = ["-p", "fuzz", "--features", "libfuzzer"];
+    for (part, alone) in [
+        (&[][..], &[][..]),
+        (&["-p", "pilum-python"], &[]),
+        (&fuzz, &of_libfuzzer),
+    ] {
+        let own = features(part);
+        let name = |line: &str| line.split(' ').next().unwrap_or_default().to_owned();
+        let more = own.difference(&all);
+        let more: Vec<&String> = more
+            .filter(|line| !alone.contains(&name(line).as_str()))
+            .collect();
+        assert!(more.is_empty(), "{part:?}: {more:#?}");
+    }
 }

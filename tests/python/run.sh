@@ -24,12 +24,14 @@ environment() { # NAME FILE-OF-REQUIREMENTS: an environment with what the file l
   fi
 }
 
+environment tests tests/python/requirements.txt & # while the compiler works
+requirements=$!
 printf 'maturin>=1.7,<2\n' >"$folder/maturin.txt"
 environment build "$folder/maturin.txt"
 rm -rf "$folder/wheels"
 PATH="$folder/build/bin:$PATH" host/python/wheel.sh "$folder/wheels"
 
-environment tests tests/python/requirements.txt
+wait "$requirements"
 # Nothing of the toolchain, and of the sources the tests alone.
 without_rust() {
   local path="" part
