@@ -105,7 +105,8 @@ fn hint(error: &mechanics::Error) -> Option<&'static str> {
         {
             Some(
                 "`control = \"creep\"` in [solver] follows the motion to the next equilibrium as a path, and may get \
-                 on; results up to the last whole increment in equilibrium are written, the last \
+                 on; `convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, \
+                 where displacements drift; results up to the last whole increment in equilibrium are written, the last \
                  equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
             )
         }

@@ -561,10 +561,14 @@ impl Simulation {
         if success.tolerated > 0.0 {
             record.tolerated += 1;
             record.tolerated_residual = record.tolerated_residual.max(success.tolerated);
+            let scale = success.scales.iter().copied().fold(0.0, f64::max);
+            let force = success.tolerated * scale;
+            record.tolerated_force = record.tolerated_force.max(force);
             if record.tolerated == 1 {
                 watch.warning(&Warning::Tolerated {
                     place: place.clone(),
                     residual: success.tolerated,
+                    force,
                     tolerance: self.problem.settings.force_tolerance,
                 });
             }

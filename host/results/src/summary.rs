@@ -266,9 +266,11 @@ impl Summary {
                     "relaxed_steps": p.relaxed,
                     "tolerated_steps": p.tolerated,
                     "tolerated_residual": p.tolerated_residual,
+                    "tolerated_force": p.tolerated_force,
                     "by_force_steps": p.by_force,
                     "by_force_open": {
                         "residual": p.open.residual,
+                        "force": p.open.force,
                         "correction": p.open.correction,
                         "nodes": p.open.nodes,
                     },

@@ -181,6 +181,7 @@ impl Simulation {
                 phase: record.name.clone(),
                 steps: record.tolerated,
                 largest: record.tolerated_residual,
+                force: record.tolerated_force,
             });
         }
         if record.by_force > 0 {

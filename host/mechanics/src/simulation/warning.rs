@@ -50,6 +50,8 @@ pub enum Warning {
         steps: usize,
         /// The largest of them, relative.
         largest: f64,
+        /// The same as a force: 2-norm over the nodes of a body.
+        force: f64,
     },
     /// Iterations came to a standstill above the tolerance; the residual is tolerated. Said of the first
     /// time in a phase.
@@ -58,6 +60,8 @@ pub enum Warning {
         place: Place,
         /// The relative residual.
         residual: f64,
+        /// The same as a force: 2-norm over the nodes of a body.
+        force: f64,
         /// The tolerance.
         tolerance: f64,
     },
@@ -144,26 +148,31 @@ impl fmt::Display for Warning {
                 phase,
                 steps,
                 largest,
+                force,
             } => write!(
                 f,
-                "phase `{phase}`: a residual was tolerated in {steps} steps in all, at most {largest:.1e}"
+                "phase `{phase}`: a residual was tolerated in {steps} steps in all, at most {largest:.1e}, \
+                 a force of {force:.1e}"
             ),
             Self::Tolerated {
                 place,
                 residual,
+                force,
                 tolerance,
             } => write!(
                 f,
                 "{place}: iterations came to a standstill short of the tolerances, with a residual of \
-                 {residual:.1e} ({tolerance:.1e} asked for); `tolerated_residual` accepts it: forces are out \
-                 of balance by that share, displacements are uncertain by up to a tenth of the increment"
+                 {residual:.1e} ({tolerance:.1e} asked for); `tolerated_residual` accepts it: of all \
+                 forces in play that share is out of balance, {force:.1e} (2-norm over the nodes; hold it against the \
+                 loads asked for); displacements are uncertain by up to a tenth of the increment"
             ),
             Self::ByForce { phase, steps, open } => write!(
                 f,
-                "phase `{phase}`: equilibrium by forces alone in {steps} steps: residuals of at most {:.1e}, \
-                 last corrections of at most {:.1e} of their increment, at most {} nodes out of balance by \
-                 more than the tolerance: loads are known to that share, displacements are not",
-                open.residual, open.correction, open.nodes
+                "phase `{phase}`: equilibrium by forces alone in {steps} steps: residuals of at most {:.1e} of all \
+                 forces in play, which is a force of {:.1e} (2-norm over the nodes; hold it against the loads asked \
+                 for: they are known no better), last corrections of at most {:.1e} of their increment, at most {} \
+                 nodes out of balance by more than the tolerance",
+                open.residual, open.force, open.correction, open.nodes
             ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::Parted(phase, parted) => write!(f, "phase `{phase}`: {parted}"),

@@ -146,12 +146,17 @@ impl Creep {
         self.course == Course::InVain
     }
 
-    /// Whether Newton iterations have come to a standstill, and where they led a motion is still to be
-    /// tried.
-    pub(super) fn is_due(&self, iterations: &[Iteration]) -> bool {
-        let series = self.series(iterations);
+    /// Whether it may lead away from a state that no correction can be computed for.
+    pub(super) fn is_at_hand(&self) -> bool {
         self.course == Course::Ready
-            && (stands_still(series) || (self.is_expected && series.len() == 1))
+    }
+
+    /// Whether Newton iterations have come to a standstill, or to a state that no correction can be computed for
+    /// (`is_singular`), and where they led a motion is still to be tried.
+    pub(super) fn is_due(&self, iterations: &[Iteration], is_singular: bool) -> bool {
+        let series = self.series(iterations);
+        let is_expected = self.is_expected && series.len() == 1;
+        self.is_at_hand() && (is_singular || is_expected || stands_still(series))
     }
 
     /// The equilibrium that a motion leads to; `None` if it leads to none: then the state is that at the

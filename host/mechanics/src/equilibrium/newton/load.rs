@@ -41,6 +41,8 @@ pub(super) struct LoadControl {
     least: Option<(Vec<f64>, f64)>,
     /// Size of the first iterate's displacement increments.
     predicted: Option<f64>,
+    /// No correction can be computed for the present iterate: its tangent matrix is singular.
+    is_singular: bool,
 }
 
 impl LoadControl {
@@ -61,6 +63,7 @@ impl LoadControl {
             least: None,
             first: None,
             predicted: None,
+            is_singular: false,
         }
     }
 
@@ -86,7 +89,15 @@ impl Control for LoadControl {
         let from_tangent = self.guess.is_none();
         let increment = match self.guess.take() {
             Some(guess) => newton.completed(guess, &self.task.prescribed),
-            None => newton.predict(&self.task)?,
+            None => match newton.predict(&self.task) {
+                // What lies ahead may have a stiffness all the same.
+                Err(failure) if failure.is_singular() && self.creep.is_at_hand() => {
+                    self.is_singular = true;
+                    let still = vec![0.0; self.task.external.len()];
+                    newton.completed(still, &self.task.prescribed)
+                }
+                predicted => predicted?,
+            },
         };
         newton.starts_from(&increment, from_tangent);
         if !from_tangent && self.creep.is_wanted() {
@@ -138,57 +149,19 @@ impl Control for LoadControl {
         state: &State,
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
-        if self.creep.is_due(iterations) {
-            let first = self.first.as_deref();
-            let reached = self.creep.relieve(newton, &self.task, first, iterations)?;
-            let (increment, balance) = if let Some(reached) = reached {
-                reached
-            } else {
-                // Newton iterations go on where they stood.
-                let increment = state.increment.clone();
-                let balance = newton.evaluate(&increment, &self.task, Operator::Consistent)?;
-                (increment, balance)
-            };
-            let rise = state.rise;
-            return Ok(State {
-                increment,
-                rise,
-                balance,
-            });
+        if let Some(state) = self.relieved(newton, state, iterations)? {
+            return Ok(state);
         }
-        let relaxed = self
-            .relaxation
-            .relieve(newton, &self.task, &state.increment, iterations)?;
-        if let Some((increment, balance)) = relaxed {
-            let rise = state.rise;
-            return Ok(State {
-                increment,
-                rise,
-                balance,
-            });
+        match self.corrected(newton, state, iterations) {
+            Err(failure) if failure.is_singular() && self.creep.is_at_hand() => {
+                if self.has_settled(newton, state) {
+                    return Err(failure);
+                }
+                self.is_singular = true;
+                self.relieved(newton, state, iterations)?.ok_or(failure)
+            }
+            corrected => corrected,
         }
-        if let Some(acceleration) = &self.acceleration {
-            newton.kept.stalls = acceleration.stalls(iterations);
-        }
-        if newton.renew(self.series(iterations), &state.increment, &self.task)?
-            && let Some(acceleration) = &mut self.acceleration
-        {
-            // What moves with another matrix achieved says nothing of this one.
-            *acceleration = Acceleration::since(iterations.len() - 1);
-        }
-        if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
-            iterations.push(taken);
-            return Ok(next);
-        }
-        let correction = self.correction(newton, state)?;
-        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
-        let ends = newton.probably_ends(state.balance.relative, size);
-        let (length, next) = newton.search(self, state, &correction, ends)?;
-        if let Some(acceleration) = &mut self.acceleration {
-            acceleration.took(&correction.increment, length);
-        }
-        iterations.push(newton.took(&next, &correction.increment, length));
-        Ok(next)
     }
 
     fn line_search(&self, newton: &Newton<'_>, from: &State) -> LineSearch {
@@ -264,6 +237,70 @@ impl Control for LoadControl {
             in_vain.then_some(Motion::Relaxation)
         };
         newton.no_equilibrium(self, state, &self.task, correction, in_vain)
+    }
+}
+
+impl LoadControl {
+    /// The state that a motion leads to where Newton iterations get on no further. `None` where they do.
+    fn relieved(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<Option<State>, StepFailure> {
+        let is_singular = std::mem::take(&mut self.is_singular);
+        let rise = state.rise;
+        let at = |(increment, balance)| State {
+            increment,
+            rise,
+            balance,
+        };
+        if self.creep.is_due(iterations, is_singular) {
+            let first = self.first.as_deref();
+            if let Some(reached) = self.creep.relieve(newton, &self.task, first, iterations)? {
+                return Ok(Some(at(reached)));
+            }
+            // Newton iterations go on where they stood.
+            let increment = state.increment.clone();
+            let balance = newton.evaluate(&increment, &self.task, Operator::Consistent)?;
+            return Ok(Some(at((increment, balance))));
+        }
+        let from = &state.increment;
+        let relaxed = self
+            .relaxation
+            .relieve(newton, &self.task, from, iterations)?;
+        Ok(relaxed.map(at))
+    }
+
+    /// The state that a correction of this one leads to.
+    fn corrected(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<State, StepFailure> {
+        if let Some(acceleration) = &self.acceleration {
+            newton.kept.stalls = acceleration.stalls(iterations);
+        }
+        if newton.renew(self.series(iterations), &state.increment, &self.task)?
+            && let Some(acceleration) = &mut self.acceleration
+        {
+            // What moves with another matrix achieved says nothing of this one.
+            *acceleration = Acceleration::since(iterations.len() - 1);
+        }
+        if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
+            iterations.push(taken);
+            return Ok(next);
+        }
+        let correction = self.correction(newton, state)?;
+        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
+        let ends = newton.probably_ends(state.balance.relative, size);
+        let (length, next) = newton.search(self, state, &correction, ends)?;
+        if let Some(acceleration) = &mut self.acceleration {
+            acceleration.took(&correction.increment, length);
+        }
+        iterations.push(newton.took(&next, &correction.increment, length));
+        Ok(next)
     }
 }
 

@@ -80,6 +80,8 @@ pub struct StepSuccess {
 pub struct Open {
     /// Relative residual.
     pub residual: f64,
+    /// The same as a force: 2-norm over the nodes of a body, in the units of the case.
+    pub force: f64,
     /// Last correction, relative to the increment.
     pub correction: f64,
     /// Nodes whose force out of balance is above the force tolerance times the root mean square of the
@@ -93,6 +95,7 @@ impl Open {
     pub fn and(self, other: &Self) -> Self {
         Self {
             residual: self.residual.max(other.residual),
+            force: self.force.max(other.force),
             correction: self.correction.max(other.correction),
             nodes: self.nodes.max(other.nodes),
         }

@@ -98,6 +98,7 @@ impl Newton<'_> {
         let is_off = |((body, _), square): &(&(usize, usize), &f64)| **square > allowed[*body];
         Some(Open {
             residual: balance.relative,
+            force: balance.relative * balance.scales.iter().copied().fold(0.0, f64::max),
             correction: iterations.last()?.correction.unwrap_or(0.0),
             nodes: squares.iter().filter(is_off).count(),
         })
