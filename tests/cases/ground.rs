@@ -6,7 +6,10 @@
 
 use crate::variant::{Run, finished};
 use std::f64::consts::PI;
+use std::path::Path;
 use std::sync::Arc;
+use tempfile::TempDir;
+use tests::case::{column, run_text};
 
 /// Settlement of the head at the end of a phase, mm.
 fn settlement(run: &Run, phase: &str) -> f64 {
@@ -44,6 +47,52 @@ fn a_bored_pile_settles_alike_on_two_meshes() {
         (a / b - 1.0).abs() < 0.04,
         "{a} mm on the grid, {b} mm on triangles"
     );
+}
+
+/// The bored pile on 8 × 15 elements, pushed to 0.1 D in so many increments.
+fn pushed(control: &str, increments: u32) -> (usize, f64) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/bored_pile/case.toml");
+    let mut text = std::fs::read_to_string(path).unwrap();
+    let unloading = text.find("[[phase]]\nname = \"unloading\"").unwrap();
+    let solver = text.find("[solver]").unwrap();
+    text.replace_range(unloading..solver, "");
+    for (fine, coarse) in [
+        ("n = 2, to = 0.5", "n = 1, to = 0.5"),
+        ("n = 5, to = 1.5", "n = 3, to = 1.5"),
+        ("n = 10, to = 25.0", "n = 4, to = 25.0"),
+        ("n = 8, to = -17.0", "n = 3, to = -17.0"),
+        ("n = 8, to = -15.0", "n = 3, to = -15.0"),
+        ("n = 20, to = -5.0", "n = 6, to = -5.0"),
+        ("n = 8, to = 0.0", "n = 3, to = 0.0"),
+        (
+            "rigid = [\"head\"]\nforce = [{ line = \"head\", z = -7500.0 }]",
+            "displacement = [{ line = \"head\", z = -0.1 }]",
+        ),
+        ("[8, 16, 24, 30]", "[1]"),
+        ("increments = 30", &format!("increments = {increments}")),
+        ("[solver]", &format!("[solver]\ncontrol = \"{control}\"")),
+    ] {
+        assert_eq!(text.matches(fine).count(), 1, "{fine}");
+        text = text.replace(fine, coarse);
+    }
+    let folder = TempDir::new().unwrap();
+    let run = run_text(&text, folder.path()).unwrap_or_else(|error| panic!("{error}"));
+    let load = column(&folder.path().join("history.csv"), "pile_head_load");
+    (run.cut_backs, *load.last().unwrap())
+}
+
+/// Where joints slide and ground yields all around, the tangent of an iterate is singular though the step has an
+/// equilibrium: by creep it is left behind without a cut-back, in ten increments for the same load.
+#[test]
+fn creep_leaves_singular_tangents_behind() {
+    let (_, by_load) = pushed("load", 10);
+    let (cut_backs, by_creep) = pushed("creep", 10);
+    assert_eq!(cut_backs, 0);
+    assert!(
+        (by_creep / by_load - 1.0).abs() < 0.02,
+        "{by_creep} kN, {by_load} kN by load"
+    );
+    assert_eq!(pushed("creep", 3).0, 0);
 }
 
 #[test]
