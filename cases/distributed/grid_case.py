@@ -52,7 +52,7 @@ class Solid:
 
 @dataclass
 class Interface:
-    """An interface without thickness between cells: jump = displacement of the plus side less that of the minus side."""
+    """An interface without thickness: jump = displacement of the plus side less that of the minus side."""
 
     cells: np.ndarray  # (n, 2): on the minus side, on the plus side, towards increasing coordinates
     ends: np.ndarray  # (n, 2, 2): the ends of each facet, m

@@ -70,15 +70,28 @@ class Points:
         """`owners` are the numbers of cells or facets in the case, with `each` so many points; `stress` has a row a
         point, `at` its coordinates (m)."""
         self.law, self.owners, self.each, self.at = law, owners, each, np.ascontiguousarray(at)
-        self.start = law.initial(len(stress), flux=stress)
+        self.start = self._calling(law.initial, len(stress), flux=stress)
         self.end: pilum.State | None = None
         # Those at the start: an increment begins with what the one before it ended with.
-        _, self.tangents, _ = law.integrate(self.start.gradient, self.start, dt=dt, positions=self.at)
+        at_rest = self.start.gradient
+        _, self.tangents, _ = self._calling(law.integrate, at_rest, self.start, dt=dt, positions=self.at)
         self.trial = self.tangents
+
+    def _calling(self, call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        """Calls the law, and says where it fails."""
+        try:
+            return call(*arguments, **named)
+        except pilum.LawError as error:
+            if error.point is None:
+                raise
+            x, y = self.at[error.point]
+            raise LawFailed(f"at ({x:.6g}, {y:.6g}): {error}") from None
 
     def carry(self, gradients: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Fluxes (n, c) and tangents (n, c, c) at these strains or jumps, from the start of the increment."""
-        flux, self.trial, self.end = self.law.integrate(gradients, self.start, dt=dt, out=self.end, positions=self.at)
+        flux, self.trial, self.end = self._calling(
+            self.law.integrate, gradients, self.start, dt=dt, out=self.end, positions=self.at
+        )
         return flux, self.trial
 
     def accept(self) -> None:
@@ -323,18 +336,7 @@ class Body:
     # --- computing --------------------------------------------------------------------------------------------------
 
     def _together(self, work: Callable[[], Any]) -> Any:
-        """Does something that may fail on some ranks only: then all of them raise it, and none waits for ever."""
-        result, error = None, None
-        try:
-            result = work()
-        except (pilum.Error, LawFailed, WrongInput) as met:
-            error = met
-        errors = self.comm.allgather(_told(error))
-        for rank, met in enumerate(errors):
-            if met:
-                kind, text = met
-                raise kind(text if all(other == met for other in errors) else f"rank {rank}: {text}")
-        return result
+        return together(self.comm, work)
 
     def _vector(self, form: fem.Form) -> PETSc.Vec:
         b = petsc.assemble_vector(form)
@@ -456,15 +458,16 @@ class Body:
         The state before it is removed once this one is whole.
         """
         here = folder / f"{self.reached}"
-        here.mkdir(parents=True, exist_ok=True)
-        arrays = {
-            f"{number}_{name}": a for number, points in enumerate(self._every()) for name, a in points.kept().items()
-        }
-        u = self.u.x.array.reshape(-1, 2)[self.V.dofmap.list[: self.n_owned]]
-        np.savez(
-            here / f"{self.comm.rank}.npz", mark=mark, cell=self.number[: self.n_owned], u=u, time=self.time, **arrays
-        )
-        self.comm.barrier()
+        mine = slice(self.n_owned)
+        arrays = {"cell": self.number[mine], "u": self.u.x.array.reshape(-1, 2)[self.V.dofmap.list[mine]]}
+        for number, points in enumerate(self._every()):
+            arrays |= {f"{number}_{name}": array for name, array in points.kept().items()}
+
+        def write() -> None:
+            here.mkdir(parents=True, exist_ok=True)
+            np.savez(here / f"{self.comm.rank}.npz", mark=mark, time=self.time, **arrays)
+
+        self._together(write)
         if self.comm.rank == 0:
             (folder / "new").write_text(f"{self.reached} {self.comm.size}\n")
             (folder / "new").replace(folder / "latest")
@@ -494,11 +497,23 @@ class Body:
             points.go_on_from(kept, self.time, reached)
 
 
-def _told(error: Exception | None) -> tuple[type[Exception], str] | None:
-    if error is None:
-        return None
-    kind = type(error) if isinstance(error, (WrongInput, LawFailed)) else LawFailed
-    return kind, str(error)
+def together(comm: MPI.Comm, work: Callable[[], Any]) -> Any:
+    """Does something that may fail on some ranks only: then all of them raise it, and none waits for ever."""
+    result, met = None, None
+    try:
+        result = work()
+    except pilum.Error as error:
+        met = LawFailed, str(error)
+    except (LawFailed, WrongInput) as error:
+        met = type(error), str(error)
+    except OSError as error:
+        met = WrongInput, str(error)
+    errors = comm.allgather(met)
+    for rank, one in enumerate(errors):
+        if one:
+            kind, text = one
+            raise kind(text if all(other == one for other in errors) else f"rank {rank}: {text}")
+    return result
 
 
 def _distributed(comm: MPI.Comm, case: Case) -> meshes.Mesh:

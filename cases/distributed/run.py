@@ -31,8 +31,18 @@ VERSION = (0, 11)  # of DOLFINx
 
 
 def ended(message: str, code: int) -> NoReturn:
-    print(f"error: {message}", file=sys.stderr, flush=True)
+    """Ends a rank before there is MPI: the others meet the same, and one says it."""
+    ranks = [os.environ.get(name) for name in ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "SLURM_PROCID")]
+    if next((rank for rank in ranks if rank), "0") == "0":
+        print(f"error: {message}", file=sys.stderr, flush=True)
     raise SystemExit(code)
+
+
+class Arguments(argparse.ArgumentParser):
+    """Exit code 1 for a wrong argument, as for all that is wrong in the input."""
+
+    def error(self, message: str) -> NoReturn:
+        ended(f"{message}\n{self.format_usage()}".rstrip(), 1)
 
 
 def check_environment() -> None:
@@ -78,7 +88,7 @@ def natural(text: str) -> int:
 
 
 def arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Runs a case of Pilum on many ranks, in DOLFINx.")
+    parser = Arguments(description="Runs a case of Pilum on many ranks, in DOLFINx.")
     parser.add_argument("case", type=Path, help="a case file, or a folder with case.toml")
     parser.add_argument("--variant", help="one of the file's variants")
     parser.add_argument("--results", type=Path, default=Path("results/distributed"), help="folder of the results")
@@ -93,7 +103,7 @@ def main() -> None:
     import pilum
     from grid_case import WrongInput, load
     from mpi4py import MPI
-    from pilum_dolfinx import Body, LawFailed, NoEquilibrium
+    from pilum_dolfinx import Body, LawFailed, NoEquilibrium, together
 
     comm, began = MPI.COMM_WORLD, time.monotonic()
     first = comm.rank == 0
@@ -115,7 +125,7 @@ def main() -> None:
         raise SystemExit(code)
 
     try:
-        case = load(asked.case, asked.variant)
+        case = together(comm, lambda: load(asked.case, asked.variant))
         body = Body(comm, case)
         warnings.simplefilter("once", pilum.PilumWarning)
         unknowns = 2 * body.V.dofmap.index_map.size_global
@@ -153,8 +163,9 @@ def main() -> None:
             say(f"increment {body.reached}/{case.increments}, {iterations} iterations")
     except WrongInput as error:
         stop(error, 1)
-    except OSError as error:
-        raise RuntimeError(f"{error}") from error
+    except OSError as error:  # of rank 0, which writes the tables
+        print(f"error: {error}", file=sys.stderr, flush=True)
+        comm.Abort(1)
     except NoEquilibrium as error:
         stop(error, 2)
     except LawFailed as error:

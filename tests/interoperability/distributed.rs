@@ -210,6 +210,15 @@ fn mistakes_end_all_ranks_with_a_message() {
             2,
             "increment 1 of 1: ",
         ),
+        // A law that cannot start there.
+        (
+            "laws.loose = { law = \"mepi\", parameters = { k_n = 1e5, k_t = 1e5, n = 0.5, mu_0 = 0.2, mu_p = 0.7, \
+             mu_c0 = 0.4, a = 0.01, c_0 = 40.0, t = 0.002, p_0 = 100.0 } }\n\
+             groups.joint.law = \"loose\"\n\
+             groups.soil.initial_stress = { 11 = 0.0 }\ngroups.pile.initial_stress = { 11 = 0.0 }",
+            3,
+            "rank 0: at (0.01, ",
+        ),
     ] {
         let file = place.path().join("wrong.toml");
         std::fs::write(&file, format!("base = {base}\n{change}\n")).unwrap();
@@ -226,6 +235,7 @@ fn mistakes_end_all_ranks_with_a_message() {
         (&[folder, "--variant", "m20"][..], "--variant is `m20`"),
         (&[folder][..], "--variant is missing, there is: m200"),
         (&["nowhere"][..], "nowhere"),
+        (&[folder, "--bogus"][..], "unrecognized arguments: --bogus"),
     ] {
         refused(
             &on_ranks(&python, 2, arguments, &place.path().join("wrong")),
