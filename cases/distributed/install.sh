@@ -5,7 +5,7 @@
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 target=${CARGO_TARGET_DIR:-$here/../../target}
-folder=${1:-${PILUM_DOLFINX:-$target/dolfinx}}
+folder=$(realpath -m "${1:-${PILUM_DOLFINX:-$target/dolfinx}}")
 fails() { echo "error: $1" >&2 && exit 1; }
 
 [ "$(uname -sm)" = "Linux x86_64" ] || fails "the wheel of DOLFINx is for Linux on x86-64; see README.md for other installations"
