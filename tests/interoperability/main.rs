@@ -1,9 +1,11 @@
 //! Laws in other programs, and laws of other programs here. Routes and traps: abi/interoperability.md.
 //!
 //! What needs OpenGeoSys or Kratos is passed over with a remark where they are not installed, or
-//! fails (`tests::needs`): `install.sh` beside this file installs them.
+//! fails (`tests::needs`): `install.sh` beside this file installs them. What needs DOLFINx is passed over
+//! with a remark in any case: `cases/distributed/install.sh` installs it.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
+mod distributed;
 mod entries;
 mod kratos;
 mod mfront;

@@ -128,6 +128,46 @@ def test_a_state_may_keep_the_array_itself() -> None:
         assert np.array_equal(law.integrate(other, start, copy=False)[0], expected)
 
 
+def test_a_state_is_made_of_what_was_kept_of_it() -> None:
+    """The increments after it are those of the state itself, to the bit."""
+    law = pilum.Law("mepi", **TABLE_4)
+    _, _, state = law.integrate(slips(20), law.initial(20, flux=[-100.0, 0.0]), dt=0.5)
+    kept = {"gradient": state.gradient.copy(), "flux": state.flux.copy(), "internal": state.internal.copy()}
+    again = law.initial(**kept, time=state.time, increment=state.increment)
+    assert (again.time, again.increment) == (0.5, 1)
+    for name, array in kept.items():
+        assert np.array_equal(getattr(again, name), array)
+    expected, tangents, end = law.integrate(2 * slips(20), state)
+    found, others, last = law.integrate(2 * slips(20), again)
+    assert np.array_equal(found, expected) and np.array_equal(others, tangents)
+    assert np.array_equal(last.internal, end.internal) and last.increment == end.increment
+    # Its own variables are others: it would answer otherwise.
+    fresh = law.initial(gradient=kept["gradient"], flux=kept["flux"])
+    assert not np.array_equal(law.integrate(2 * slips(20), fresh)[0], expected)
+    # One row is that of all; another number of rows, or of variables, is none.
+    one = law.initial(3, internal=state.internal[5])
+    assert np.array_equal(one.internal, np.tile(state.internal[5], (3, 1)))
+    with pytest.raises(ValueError, match="internal: found 20 rows, expected 4"):
+        law.initial(4, internal=state.internal)
+    with pytest.raises(ValueError, match="internal: found shape"):
+        law.initial(20, internal=state.flux[:, :1])
+    with pytest.raises(ValueError, match="time: -1 is no time"):
+        law.initial(20, flux=[-100.0, 0.0], time=-1.0)
+
+
+def test_a_joint_that_is_open_goes_on() -> None:
+    """Nothing starts there, as the law says; what was kept does."""
+    parameters = {key: value for key, value in TABLE_4.items() if key != "sigma_ni"}
+    law = pilum.Law("mepi", **parameters)
+    opening = np.array([[1e-3, 0.0]])
+    _, _, state = law.integrate(opening, law.initial(flux=[-100.0, 0.0]))
+    assert np.array_equal(state.flux, [[0.0, 0.0]])
+    with pytest.raises(pilum.LawError, match="not compressive"):
+        law.initial(flux=state.flux)
+    again = law.initial(gradient=state.gradient, flux=state.flux, internal=state.internal)
+    assert np.array_equal(law.integrate(-opening, again)[0], law.integrate(-opening, state)[0])
+
+
 def test_what_is_handed_out_cannot_be_spoilt() -> None:
     law = pilum.Law("coulomb_joint", **COULOMB)
     tractions, tangents, state = law.integrate(slips(5), law.initial(5, flux=[-100.0, 0.0]))

@@ -46,6 +46,9 @@ class Law:
         *,
         flux: ArrayLike | None = None,
         gradient: ArrayLike | None = None,
+        internal: ArrayLike | None = None,
+        time: float = 0.0,
+        increment: int = 0,
     ) -> State: ...
     def integrate(
         self,

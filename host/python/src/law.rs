@@ -1,6 +1,6 @@
 //! A law with its parameters, called for arrays of points.
 
-use crate::arrays::{Rows, looked_at, of_rows};
+use crate::arrays::{Rows, looked_at};
 use crate::error::{exception, of_batch};
 use crate::state::State;
 use crate::{task, value};
@@ -118,42 +118,18 @@ impl Law {
         }))
     }
 
-    /// Points that carry these fluxes before anything has happened.
-    fn start(
-        &self,
-        py: Python<'_>,
-        flux: &Rows<'_>,
-        gradient: Option<&Rows<'_>>,
-    ) -> PyResult<State> {
-        let (law, n) = (self.law(), flux.n_rows());
-        let state = State::zeros(py, n, law.n_components(), 0, &self.variables);
-        let carried = flux.view()?;
-        let started = self.calling(py, |law| law.initial_state(n, carried))?;
+    /// Internal variables of points that carry these fluxes before anything has happened, point by point.
+    fn own_internal(&self, py: Python<'_>, flux: &[f64]) -> PyResult<Vec<f64>> {
+        let law = self.law();
+        let (n, rows) = (law.n_components(), Strided::rows(law.n_components()));
+        let started = self.calling(py, |law| law.initial_state(flux.len() / n, (flux, rows)))?;
         let mut internal = started.map_err(|failure| of_batch(py, law, &failure))?;
         for values in internal.chunks_exact_mut(self.variables.len().max(1)) {
             for (number, value) in &self.initial {
                 values[*number] = *value;
             }
         }
-        state
-            .internal
-            .bind(py)
-            .readwrite()
-            .as_slice_mut()?
-            .copy_from_slice(&internal);
-        copied(
-            carried,
-            state.flux.bind(py).readwrite().as_slice_mut()?,
-            law.n_components(),
-        );
-        if let Some(gradient) = gradient {
-            copied(
-                gradient.view()?,
-                state.gradient.bind(py).readwrite().as_slice_mut()?,
-                law.n_components(),
-            );
-        }
-        Ok(state)
+        Ok(internal)
     }
 }
 
@@ -230,27 +206,39 @@ impl Law {
     ///
     /// `points` is their number, `flux` their tractions or stresses (kPa, tension positive; zero if left out),
     /// shape (n, components) or (components,) for all; `gradient` jumps or strains that they have already,
-    /// likewise.
-    #[pyo3(signature = (points=None, *, flux=None, gradient=None))]
+    /// likewise. With `internal`, shape (n, variables) in the order of `variables`, they have these instead of the
+    /// law's own: with the `time` and the `increment` of a state, what was kept of it goes on from there.
+    #[pyo3(signature = (points=None, *, flux=None, gradient=None, internal=None, time=0.0, increment=0))]
+    #[expect(clippy::too_many_arguments, reason = "named in Python")]
     fn initial(
         &self,
         py: Python<'_>,
         points: Option<usize>,
         flux: Option<&Bound<'_, PyAny>>,
         gradient: Option<&Bound<'_, PyAny>>,
+        internal: Option<&Bound<'_, PyAny>>,
+        time: f64,
+        increment: u32,
     ) -> PyResult<State> {
         let n = self.law().n_components();
+        if !(time >= 0.0 && time.is_finite()) {
+            return Err(PyValueError::new_err(format!("time: {time} is no time")));
+        }
+        let n_variables = self.variables.len();
+        let internal = internal
+            .map(|internal| Rows::of(internal, "internal", n_variables))
+            .transpose()?;
         let flux = flux.map(|flux| Rows::of(flux, "flux", n)).transpose()?;
         let gradient = gradient
             .map(|gradient| Rows::of(gradient, "gradient", n))
             .transpose()?;
-        let most = [&flux, &gradient]
+        let most = [&flux, &gradient, &internal]
             .into_iter()
             .flatten()
             .map(Rows::n_rows)
             .max();
         let n_points = points.or(most).unwrap_or(1);
-        let full = |rows: Option<Rows<'_>>, name: &str| -> PyResult<Vec<f64>> {
+        let full = |rows: Option<Rows<'_>>, name: &str, n: usize| -> PyResult<Vec<f64>> {
             let Some(rows) = rows else {
                 return Ok(vec![0.0; n_points * n]);
             };
@@ -267,14 +255,25 @@ impl Law {
                 Err(PyValueError::new_err(message))
             }
         };
-        let flux = of_rows(py, &full(flux, "flux")?, n)?;
-        let gradient = of_rows(py, &full(gradient, "gradient")?, n)?;
-        let flux = Rows::of(flux.as_any(), "flux", n)?;
-        self.start(
-            py,
-            &flux,
-            Some(&Rows::of(gradient.as_any(), "gradient", n)?),
-        )
+        let flux = full(flux, "flux", n)?;
+        let gradient = full(gradient, "gradient", n)?;
+        // A state that was kept may be none to start from: a joint that is open, say.
+        let internal = match internal {
+            None => self.own_internal(py, &flux)?,
+            some => full(some, "internal", n_variables)?,
+        };
+        let mut state = State::zeros(py, n_points, n, 0, &self.variables);
+        for (array, values) in [
+            (&state.gradient, gradient),
+            (&state.flux, flux),
+            (&state.internal, internal),
+        ] {
+            let mut array = array.bind(py).readwrite();
+            array.as_slice_mut()?.copy_from_slice(&values);
+        }
+        state.time = time;
+        state.increment = increment;
+        Ok(state)
     }
 
     /// Carries points over an increment: `(flux, tangents, state)`.
@@ -319,7 +318,7 @@ impl Law {
             state.get()
         } else {
             let points = Rows::of(gradient, "gradient", n)?.n_rows();
-            fresh = self.initial(py, Some(points), None, None)?;
+            fresh = self.initial(py, Some(points), None, None, None, 0.0, 0)?;
             &fresh
         };
         let n_points = from.n_points(py);
