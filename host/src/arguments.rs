@@ -93,8 +93,8 @@ pub(crate) enum Command {
         /// So many runs at a time, each in a process of its own [default: one for each processor].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         jobs: Option<u16>,
-        /// Check everything, write the table of runs and carry out none.
-        #[arg(long, conflicts_with_all = ["jobs", "run", "retry"])]
+        /// Check everything, write the table of runs and carry out none, whatever `--jobs` and `--retry` say.
+        #[arg(long, conflicts_with = "run")]
         plan: bool,
         /// Carry out this run alone, unless it is done: for programs that distribute work.
         #[arg(long, value_name = "INDEX", conflicts_with_all = ["jobs", "retry"])]
@@ -174,6 +174,9 @@ pub(crate) enum Command {
         /// Folder for the results [default: `results/calibrate_NAME`].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Forget what an earlier call that was ended has computed.
+        #[arg(long)]
+        anew: bool,
         /// Threads of the runs of cases; the results do not depend on it [default: all processors].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,

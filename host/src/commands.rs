@@ -143,6 +143,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             variant,
             set,
             out,
+            anew,
             threads,
         } => {
             start_threads(threads)?;
@@ -152,6 +153,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
                 out,
                 stop: stop_on_signals()?,
                 opener,
+                anew,
             };
             printing(|out| {
                 let mut show = |text: &str| out.line(text);

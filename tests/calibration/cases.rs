@@ -47,8 +47,8 @@ fn mepi_from_three_shear_boxes() {
             fitted.relative
         );
         assert!(
-            fitted.inside > 0.85,
-            "{}: {}",
+            fitted.inside.unwrap() > 0.85,
+            "{}: {:?}",
             fitted.curve.y,
             fitted.inside
         );

@@ -1,4 +1,5 @@
-//! `pilum calibrate`: what it shows and writes, and mistakes in its file.
+//! `pilum calibrate`: what it shows and writes, mistakes in its file, and what becomes of it when it is ended.
+#![allow(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
 use serde_json::Value;
@@ -209,6 +210,24 @@ fn mistakes_are_told_with_file_line_and_key() {
             "a parameter `stiffness`",
         ),
         (
+            "friction_angle = {}",
+            "friction_angle = {}\nphi = { parameter = \"friction_angle\" }",
+            7,
+            "`friction_angle` has two names in test `box`: `friction_angle` of [free] and `phi` of [free]",
+        ),
+        (
+            "[[test]]\nname",
+            "[fixed]\nfriction_angle = { value = 20.0 }\n[[test]]\nname",
+            6,
+            "`friction_angle` of [fixed] and `friction_angle` of [free]",
+        ),
+        (
+            "[[test]]\nname",
+            "[fixed]\ncohesion = { value = 0.0 }\nc = { parameter = \"cohesion\", value = 1.0 }\n[[test]]\nname",
+            10,
+            "`cohesion` has two names",
+        ),
+        (
             "driver = \"driver.toml\"",
             "",
             9,
@@ -408,4 +427,120 @@ noise = 0.1
         "{}",
         outcome.stderr
     );
+}
+
+/// A calibration whose computations take long enough to be ended on the way: its result, and what it is without
+/// having been ended.
+#[cfg(target_os = "linux")]
+fn long() -> Place {
+    let place = place();
+    place.write(
+        "driver.toml",
+        DRIVER.replacen("increments = 20", "increments = 20000", 1),
+    );
+    place
+}
+
+#[cfg(target_os = "linux")]
+const LONG: [&str; 6] = [
+    "calibrate",
+    "joint.toml",
+    "--out",
+    "out",
+    "--set",
+    "starts=4",
+];
+
+/// Everything that was found.
+#[cfg(target_os = "linux")]
+fn found(place: &Place) -> String {
+    std::fs::read_to_string(place.path("out/calibration.json")).unwrap()
+}
+
+/// Starts the calibration, ends it by a signal when it has kept `n` computations, and says how many it then
+/// has. `None` if it was done before.
+#[cfg(target_os = "linux")]
+fn ended(place: &Place, signal: &str, n: usize) -> Option<(Option<i32>, usize, String)> {
+    let said = std::fs::File::create(place.path("said")).unwrap();
+    let mut command = place.command(&LONG);
+    let mut child = command
+        .stderr(said)
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let kept = || {
+        let text = std::fs::read_to_string(place.path("out/computations.jsonl"));
+        text.map_or(0, |text| text.lines().count().saturating_sub(1))
+    };
+    while kept() < n {
+        if child.try_wait().unwrap().is_some() {
+            return None;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let sent = std::process::Command::new("kill")
+        .args([signal, &child.id().to_string()])
+        .status();
+    assert!(sent.unwrap().success());
+    let code = child.wait().unwrap().code();
+    let said = std::fs::read_to_string(place.path("said")).unwrap();
+    (!place.path("out/calibration.json").exists()).then(|| (code, kept(), said))
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_calibration_that_was_ended_goes_on_with_what_it_has_computed() {
+    let undisturbed = long();
+    let outcome = undisturbed.run(&LONG);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let expected = found(&undisturbed);
+    assert!(!undisturbed.path("out/computations.jsonl").exists());
+    let place = long();
+    let mut before = 0;
+    for (signal, more) in [("-INT", 5), ("-KILL", 7), ("-TERM", 9)] {
+        let (code, kept, said) = ended(&place, signal, before + more).unwrap();
+        if signal != "-KILL" {
+            assert_eq!(code, Some(130), "{said}");
+            assert!(said.contains("computations are kept in out"), "{said}");
+            assert!(said.contains("the same command goes on"), "{said}");
+        }
+        assert!(kept >= before + more, "{signal}: {before} {kept}");
+        if before > 0 {
+            let taken_over = format!("{before} computations of an earlier call are taken over");
+            assert!(said.contains(&taken_over), "{taken_over}: {said}");
+        }
+        before = kept;
+    }
+    let outcome = place.run(&LONG);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says("are taken over"), "{}", outcome.stderr);
+    // As if nothing had happened, the number of computations included.
+    assert_eq!(found(&place), expected);
+    assert!(!place.path("out/computations.jsonl").exists());
+    assert!(!place.path("out/.trial").exists());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_was_computed_of_something_else_is_not_taken_over() {
+    let place = long();
+    ended(&place, "-KILL", 5).unwrap();
+    place.write(
+        "driver.toml",
+        DRIVER.replacen("increments = 20", "increments = 30", 1),
+    );
+    let outcome = place.run(&LONG);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(outcome.says("begun anew"), "{}", outcome.stderr);
+    let place = long();
+    ended(&place, "-KILL", 5).unwrap();
+    // The noise is no part of it.
+    place.write("joint.toml", FILE.replace("noise = 0.1", "noise = 0.2"));
+    let outcome = place.run(&LONG);
+    assert!(outcome.says("are taken over"), "{}", outcome.stderr);
+    let place = long();
+    ended(&place, "-KILL", 5).unwrap();
+    let outcome = place.run(&[&LONG[..], &["--anew"]].concat());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(!outcome.says("taken over"), "{}", outcome.stderr);
 }

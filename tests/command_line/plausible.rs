@@ -470,3 +470,59 @@ fn tells_drivers_from_cases() {
     place.write("case.toml", CASE.replace("fixed =", "fixt ="));
     says(&["run", "case.toml"], &["unknown key `fixt`"]);
 }
+
+const SOIL: &str = "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }";
+
+/// A law that relaxes: the descriptor does not say that it depends on the time, its parameter does.
+#[test]
+fn a_phase_without_a_time_is_told_of_where_a_parameter_is_one() {
+    let viscous = |time: &str| {
+        format!(
+            "law = \"mohr_coulomb\"\nparameters = {{ young_modulus = 1e4, poisson_ratio = 0.3, cohesion = 100.0, \
+             friction_angle = 30.0, dilatancy_angle = 0.0, relaxation_time = {time} }}"
+        )
+    };
+    let told = |text: &str, dry: bool| {
+        let place = Place::new();
+        place.write("case.toml", text);
+        let arguments = ["run", "case.toml", "--out", "out", "--dry-run"];
+        let outcome = place.run(if dry { &arguments } else { &arguments[..4] });
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let lines = outcome
+            .stderr
+            .lines()
+            .filter(|line| line.contains("says none"));
+        lines.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let text = CASE.replacen(SOIL, &viscous("2.0"), 1);
+    let line = |text: &str, name: &str| {
+        let at = text.find(&format!("name = \"{name}\"")).unwrap();
+        text[..at].matches('\n').count() + 1
+    };
+    for dry in [true, false] {
+        let lines = told(&text, dry);
+        assert_eq!(lines.len(), 2, "{lines:?}");
+        for (said, phase) in lines.iter().zip(["weight", "push"]) {
+            let place = format!("case.toml:{}:", line(&text, phase));
+            let words = format!(
+                "law `soil` (`relaxation_time` is 2 s) depends on the time, and phase `{phase}` says none: it takes 1"
+            );
+            assert!(said.contains(&place) && said.contains(&words), "{said}");
+        }
+        let with_time = text.replace("name = \"push\"\n", "name = \"push\"\ntime = 10.0\n");
+        assert_eq!(told(&with_time, dry).len(), 1);
+        // Without viscosity time is nothing.
+        assert_eq!(told(&CASE.replacen(SOIL, &viscous("0.0"), 1), dry).len(), 0);
+    }
+    // A law alone.
+    let place = Place::new();
+    let driver = format!(
+        "{}\nhypothesis = \"plane_strain\"\n[[segment]]\nincrements = 2\ncontrol = {{ 12 = {{ strain = 1e-3 }} }}\n",
+        viscous("2.0")
+    );
+    place.write("driver.toml", driver);
+    let outcome = place.run(&["point", "driver.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let words = "law `mohr_coulomb` (`relaxation_time` is 2 s) depends on the time, and segment 1 says none";
+    assert!(outcome.says(words), "{}", outcome.stderr);
+}

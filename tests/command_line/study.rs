@@ -108,6 +108,15 @@ fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
     is("tau_max", taus.iter().copied().fold(f64::MIN, f64::max));
     is("first", taus[2].min(taus[3]));
     is("tau", taus[3]);
+    // A plan is a plan, with the options of the command that is to follow, too.
+    let planned = study(&place, &["--plan", "--jobs", "2", "--retry"]);
+    done(&planned);
+    assert!(
+        planned.stdout.contains("6 runs\ntable in"),
+        "{}",
+        planned.stdout
+    );
+    assert_eq!(self::table(&place), table);
     // Nothing is done twice.
     let written = || {
         std::fs::metadata(place.path("out/00004/history.csv"))
@@ -323,6 +332,30 @@ const MISTAKES: &[(&str, &str, &str, &str)] = &[
         "a number is one of both",
     ),
     (
+        "a key and a part of it",
+        "key = \"phase.push.displacement.1.x\"",
+        "key = ^\"laws.joint.parameters\"",
+        "`laws.joint.parameters.cohesion` is a part of `laws.joint.parameters`",
+    ),
+    (
+        "a part of a key",
+        "key = \"phase.push.displacement.1.x\"",
+        "key = ^\"laws.joint.parameters.cohesion.x\"",
+        "is a part of `laws.joint.parameters.cohesion`",
+    ),
+    (
+        "one value twice",
+        "5.0, 10.0]",
+        "5.0, ^5]",
+        "5 is there twice",
+    ),
+    (
+        "no whole number",
+        "uniform = [1e-5, 2e-5]",
+        "whole = true\nuniform = ^[1.2, 1.8]",
+        "no whole number from 1.2 to 1.8",
+    ),
+    (
         "a variant",
         "method",
         "variant = ^\"a\"\nmethod",
@@ -392,11 +425,68 @@ fn runs_that_fail_are_rows_with_their_reason() {
     );
     let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
     assert!(report.contains("1 run could not come to the end"));
+    // Its last value is none of the study's.
+    assert!(report.contains("1 run has none that counts"), "{report}");
     // It is left alone, unless it is asked for.
     let left = |more: &[&str]| study(&place, more).stderr;
     assert!(left(&[]).contains("3 of them done already"));
     assert!(left(&["--retry"]).contains("2 of them done already"));
     assert_eq!(study(&place, &["--run", "2"]).code, Some(NO_EQUILIBRIUM));
+}
+
+/// What a run has passed counts, whatever comes later; a grid with a hole has no η².
+#[test]
+fn of_a_run_that_fails_counts_what_it_has_passed() {
+    let place = Place::new();
+    place.write("case.toml", sliding());
+    let grid = "case = \"case.toml\"\nmethod = \"grid\"\n\
+                [[parameter]]\nname = \"load\"\nkey = \"phase.push.pressure.1.value\"\nvalues = [20.0, 30.0, 100.0]\n\
+                [[parameter]]\nname = \"label\"\nkey = \"title\"\nvalues = [\"nan\", \"inf\"]\n\
+                [outputs]\nfinal = { probe = \"PROBE\" }\nearly = { probe = \"PROBE\", take = \"max\" }\n";
+    let probe = sliding();
+    let (_, probes) = probe.split_once("[probes]").unwrap();
+    let probe = probes.trim().split([' ', '=', '.']).next().unwrap();
+    place.write("study.toml", grid.replace("PROBE", probe));
+    done(&study(&place, &[]));
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(
+        report.contains("The grid has holes, 2 of 6 runs"),
+        "{report}"
+    );
+    assert!(!report.contains("The share is η²"));
+    let (_, data) = report.split_once("id=\"data\">").unwrap();
+    let data: serde_json::Value =
+        serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();
+    let final_numbers = data["outputs"][0]["numbers"].as_array().unwrap();
+    let there: Vec<bool> = final_numbers.iter().map(|n| !n.is_null()).collect();
+    assert_eq!(there, [true, true, true, true, false, false]);
+    // Texts that look like numbers that are none.
+    assert_eq!(
+        data["parameters"][1]["texts"],
+        serde_json::json!(["nan", "inf"])
+    );
+}
+
+/// A run without its results is not done.
+#[test]
+fn an_emptied_history_is_carried_out_again() {
+    let place = place(STUDY);
+    done(&study(&place, &[]));
+    let history = place.path("out/00002/history.csv");
+    let expected = std::fs::read(&history).unwrap();
+    let header = expected.iter().position(|&byte| byte == b'\n').unwrap() + 1;
+    for rest in [&[][..], &expected[..header]] {
+        std::fs::write(&history, rest).unwrap();
+        assert_eq!(column(&table(&place), "status")[1], "lost");
+        let again = study(&place, &[]);
+        done(&again);
+        assert!(
+            again.stderr.contains("6 runs, 5 of them done already"),
+            "{}",
+            again.stderr
+        );
+        assert_eq!(std::fs::read(&history).unwrap(), expected);
+    }
 }
 
 /// A law that crashes the process is a row like any other.

@@ -227,6 +227,7 @@ fn draw(input: &str) -> TempDir {
             out: Some(place.path().to_owned()),
             stop: law::Stop::never(),
             opener: law::Opener::default(),
+            anew: false,
         };
         runs::calibration::run(&path, &options, &mut |_| (), &mut |_| ()).unwrap();
         return place;

@@ -20,6 +20,7 @@ use mechanics::problem::{
     Pressure, Problem, Refusal, Support,
 };
 use mechanics::settings::Control;
+use mechanics::simulation::Warning;
 use mechanics::{Simulation, model};
 use results::{About, Wanted};
 use std::ops::Range;
@@ -237,6 +238,44 @@ impl Case {
     pub fn warnings(&self, simulation: &Simulation) -> Vec<String> {
         let mut warnings = probes::reactions(self, simulation.problem());
         warnings.extend(self.forgetful_swaps(simulation.problem()));
+        warnings.extend(self.timeless_phases(simulation.problem()));
+        warnings
+    }
+
+    /// Phases that say no time while a law that depends on it is called.
+    fn timeless_phases(&self, problem: &Problem) -> Vec<String> {
+        let groups = &problem.groups;
+        let mut active: Vec<bool> = groups.iter().map(|group| group.is_active).collect();
+        let mut materials: Vec<_> = groups.iter().map(|group| &group.material).collect();
+        let mut warnings = Vec::new();
+        for (phase, written) in problem.phases.iter().zip(&self.file.phases) {
+            phase
+                .activate
+                .iter()
+                .for_each(|&group| active[group] = true);
+            phase
+                .deactivate
+                .iter()
+                .for_each(|&group| active[group] = false);
+            for (group, material) in &phase.materials {
+                materials[*group] = material;
+            }
+            let called = materials.iter().zip(&active).filter(|(_, active)| **active);
+            let mut dependent = called.filter_map(|(material, _)| {
+                Some((material, material.built.law.time_dependence()?))
+            });
+            if phase.time.is_none()
+                && let Some((material, by)) = dependent.next()
+            {
+                let warning = Warning::NoTime {
+                    phase: phase.name.clone(),
+                    law: material.name.clone(),
+                    by,
+                };
+                let place = self.source.place(&written.name.span());
+                warnings.push(format!("{place}: {warning}"));
+            }
+        }
         warnings
     }
 

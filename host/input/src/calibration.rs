@@ -117,7 +117,7 @@ pub struct FreeInput {
     #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
     /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone, which have
-    /// one law each.
+    /// one law each, and goes there before names that have some.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
@@ -142,7 +142,8 @@ pub struct FixedInput {
     /// Id of the law's parameter, if it is not the name.
     #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
-    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone.
+    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone, and goes there
+    /// before names that have some.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
@@ -170,7 +171,8 @@ pub struct TestInput {
     /// The test is predicted with what the others give, not fitted.
     #[serde(default)]
     pub predict: bool,
-    /// How often its squared residuals count.
+    /// How much its squared residuals count. It moves the values found, and is no information: equal weights change
+    /// no interval.
     #[serde(default = "weight")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub weight: Spanned<f64>,
@@ -212,7 +214,8 @@ pub struct CurveInput {
     /// A part of it that grows with the value measured.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub relative_noise: Option<Spanned<f64>>,
-    /// How often its squared residuals count.
+    /// How much its squared residuals count. It moves the values found, and is no information: equal weights change
+    /// no interval.
     #[serde(default = "weight")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub weight: Spanned<f64>,

@@ -390,6 +390,11 @@ impl Driver {
         self.source.path()
     }
 
+    /// Text of the file.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
     /// Title.
     pub fn title(&self) -> &str {
         &self.title

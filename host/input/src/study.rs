@@ -212,6 +212,17 @@ pub enum Spread {
     Normal(NormalInput),
 }
 
+impl Spread {
+    /// Smallest and largest number of a distribution.
+    pub fn ends(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Values(_) => None,
+            Self::Uniform(ends) | Self::LogUniform(ends) => Some(*ends),
+            Self::Normal(normal) => Some([normal.min, normal.max]),
+        }
+    }
+}
+
 impl Study {
     /// Reads a study file, or `study.toml` in a folder.
     ///
@@ -244,11 +255,9 @@ impl Study {
                 let error = source.error(span, message);
                 return Err(error.hint("`name` gives it another one").into());
             }
-            let taken = parameters.iter().flat_map(|other| &other.keys);
-            if let Some(key) = taken.into_iter().find(|key| parameter.keys.contains(key)) {
-                let message = format!("`{key}` is the key of two parameters");
-                return Err(source.error(parameter.key, message).into());
-            }
+            let earlier = parameters.iter().flat_map(|other| &other.keys);
+            let earlier: Vec<&str> = earlier.map(String::as_str).collect();
+            check_keys(&source, &parameter, &earlier)?;
             parameters.push(parameter);
         }
         let study = Self {
@@ -439,6 +448,46 @@ impl Parameter {
     }
 }
 
+/// Whether two values are one: 1 and 1.0 are.
+fn is_equal(a: &Value, b: &Value) -> bool {
+    let number = |value: &Value| match value {
+        Value::Integer(number) => Some(*number as f64),
+        Value::Float(number) => Some(*number),
+        _ => None,
+    };
+    match (number(a), number(b)) {
+        (Some(a), Some(b)) => a.total_cmp(&b).is_eq(),
+        _ => a == b,
+    }
+}
+
+/// Whether the keys of a parameter are keys of its own, beside those of earlier ones.
+fn check_keys(source: &Source, parameter: &Parameter, earlier: &[&str]) -> Result<(), Error> {
+    let of =
+        |key: &str| -> Vec<String> { key.split('.').map(|part| part.trim().to_owned()).collect() };
+    for (number, key) in parameter.keys.iter().enumerate() {
+        let own = parameter.keys[..number].iter().map(String::as_str);
+        for other in own.chain(earlier.iter().copied()) {
+            let (a, b) = (of(key), of(other));
+            let message = if a == b {
+                format!("`{key}` is the key of two parameters, or twice that of one")
+            } else if a.starts_with(&b) {
+                format!(
+                    "`{key}` is a part of `{other}`, which varies as well: one would undo the other"
+                )
+            } else if b.starts_with(&a) {
+                format!(
+                    "`{other}` is a part of `{key}`, and varies as well: one would undo the other"
+                )
+            } else {
+                continue;
+            };
+            return Err(source.error(parameter.key.clone(), message).into());
+        }
+    }
+    Ok(())
+}
+
 /// A value as a setting has it: a text in quotes, a number with all its digits.
 fn written(value: &Value) -> String {
     value.to_string()
@@ -523,6 +572,38 @@ fn spreads(source: &Source, input: &ParameterInput) -> Result<Vec<Given>, Error>
     Ok(spreads)
 }
 
+/// Whether there are values at all, and in a grid each once; `places` is where they stand.
+fn check_values(
+    source: &Source,
+    (method, is_whole): (Method, bool),
+    spread: &Spread,
+    places: &[Range<usize>],
+) -> Result<(), Error> {
+    let wrong =
+        |number: usize, message: String| Err(source.error(places[number].clone(), message).into());
+    if is_whole
+        && let Some([from, to]) = spread.ends()
+        && from.ceil() > to.floor()
+    {
+        let message = format!("`whole`: there is no whole number from {from} to {to}");
+        return wrong(0, message);
+    }
+    if method == Method::Grid
+        && let Spread::Values(listed) = spread
+    {
+        let equal =
+            (1..listed.len()).find(|&i| listed[..i].iter().any(|v| is_equal(v, &listed[i])));
+        if let Some(i) = equal {
+            let message = format!(
+                "`values`: {} is there twice: a grid would repeat its runs",
+                listed[i]
+            );
+            return wrong(i, message);
+        }
+    }
+    Ok(())
+}
+
 fn parameter(
     source: &Source,
     method: Method,
@@ -605,6 +686,7 @@ fn parameter(
             "`whole` is for distributions: these are the values".to_owned(),
         );
     }
+    check_values(source, (method, input.whole), &spread, &values)?;
     Ok(Parameter {
         name,
         keys,

@@ -73,6 +73,25 @@ impl LawInstance {
     }
 }
 
+/// Why a law's response depends on how long an increment takes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TimeDependence {
+    /// The law says so.
+    Declared,
+    /// A parameter is a time or a rate: its id, value and unit.
+    By(String, f64, String),
+}
+
+impl std::fmt::Display for TimeDependence {
+    /// What is put behind the law's name: nothing, or the parameter in parentheses.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Declared => Ok(()),
+            Self::By(id, value, unit) => write!(f, " (`{id}` is {value} {unit})"),
+        }
+    }
+}
+
 impl Law {
     /// Description of the law.
     pub fn description(&self) -> &LawDescription {
@@ -107,6 +126,26 @@ impl Law {
     /// Values of its parameters, in declared order.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
+    }
+
+    /// Whether its response is known to depend on how long an increment takes, and by what: it says so, or a
+    /// parameter is a time or a rate, by its unit, and is not 0.
+    pub fn time_dependence(&self) -> Option<TimeDependence> {
+        if self.formulation.time_dependent {
+            return Some(TimeDependence::Declared);
+        }
+        let with_values = self.description().parameters.iter().zip(&self.parameters);
+        let mut times = with_values.filter(|(p, value)| {
+            let is_time = p
+                .unit
+                .split(|c: char| !c.is_ascii_alphabetic())
+                .any(|part| part == "s");
+            // Left to the law, it has no value here.
+            is_time && value.abs() > 0.0
+        });
+        times
+            .next()
+            .map(|(p, value)| TimeDependence::By(p.id.clone(), *value, p.unit.clone()))
     }
 
     /// Why internal variables of another law with the same id mean nothing to this one; `None` if they

@@ -42,7 +42,7 @@ pub use description::{
 };
 pub use digest::{hexadecimal, hexadecimal_sha256};
 pub use error::Error;
-pub use law::Law;
+pub use law::{Law, TimeDependence};
 #[cfg(target_os = "linux")]
 pub use library::SharedMemory;
 #[doc(hidden)]

@@ -161,11 +161,14 @@ impl Driver {
         search.moment.step_length = self.length_of_step(0);
         let notes = self.notes.iter().cloned();
         let mut warnings: Vec<Warning> = notes.map(Warning::Note).collect();
-        let depends = self.law.formulation().time_dependent;
+        let dependence = self.law.time_dependence();
+        let depends = dependence.is_some();
         let says_none = |segment: &Segment| segment.time.is_none();
-        if let Some(number) = self.segments.iter().position(says_none).filter(|_| depends) {
+        let first = self.segments.iter().position(says_none);
+        if let (Some(number), Some(by)) = (first, dependence) {
             warnings.push(Warning::NoTime {
                 law: self.law.description().id.clone(),
+                by,
                 segment: number + 1,
             });
         }

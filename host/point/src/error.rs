@@ -2,7 +2,7 @@
 //! `words`.
 
 use abi::Hypothesis;
-use law::BatchFailure;
+use law::{BatchFailure, TimeDependence};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -169,6 +169,8 @@ pub enum Warning {
     NoTime {
         /// Id of the law.
         law: String,
+        /// Why it does.
+        by: TimeDependence,
         /// The first such segment.
         segment: usize,
     },

@@ -226,9 +226,9 @@ impl Display for Warning {
                     moved.law
                 )
             }
-            Self::NoTime { law, segment } => write!(
+            Self::NoTime { law, by, segment } => write!(
                 f,
-                "law `{law}` depends on the time, and segment {segment} says none: each of its increments \
+                "law `{law}`{by} depends on the time, and segment {segment} says none: each of its increments \
                  takes 1"
             ),
             Self::DoesNotLast(moved) => {

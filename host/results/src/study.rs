@@ -281,6 +281,11 @@ pub fn standing(folder: &Path) -> Standing {
     match State::of_word(&record.state) {
         // Without a lock to be had, nobody is there any more.
         State::Running if !is_held(folder) => Standing::plain(State::Lost),
+        // What was done has its results; a run without them has been, and is begun anew.
+        State::Done if !History::has_rows(folder) => Standing {
+            state: State::Lost,
+            reason: "its history.csv is gone, or has no rows".to_owned(),
+        },
         state => Standing {
             state,
             reason: record.reason,

@@ -4,34 +4,45 @@
 //! looks for the values whose curves come nearest, by least squares from several starts, and says how
 //! well the tests determine them.
 
+mod block;
 mod coordinates;
 mod curve;
+mod derivatives;
 mod figures;
 mod files;
 mod fit;
+mod fitted;
+mod kept;
 mod least_squares;
+mod misfit;
 mod model;
 mod page;
+mod profile;
+mod propagation;
 mod rates;
+mod reading;
 mod statistics;
 mod words;
 
 pub use coordinates::Parameter;
 pub use curve::Curve;
-pub use fit::{Group, Landing, Optimum, Profile, Stage};
+pub use fit::{Group, Landing, Optimum, Stage};
+pub use fitted::{Fitted, FittedCurve};
 pub use least_squares::End;
+pub use profile::{Profile, Side};
 pub use statistics::Covariance;
 
 use crate::Error;
 use crate::variants::keep;
+use block::block;
 use fit::{Wish, fit};
+use fitted::fitted;
+use input::Kind;
 use input::calibration::{Calibration, Variance};
-use input::material::ParameterValue;
-use law::{Opener, Stop};
+use law::{Opener, Stop, Stopped};
 use model::{Model, Subject};
-use std::fmt::Write as _;
+use propagation::Errors;
 use std::path::{Path, PathBuf};
-use words::digits;
 
 /// What is asked of a calibration.
 #[derive(Clone, Debug)]
@@ -46,6 +57,8 @@ pub struct Options {
     pub stop: Stop,
     /// What libraries of laws are opened with.
     pub opener: Opener,
+    /// What an earlier call that was ended has computed is forgotten.
+    pub anew: bool,
 }
 
 /// What a calibration has found.
@@ -73,52 +86,44 @@ pub struct Outcome {
     pub confidence: f64,
     /// Whether the noise was given, or only its proportions.
     pub variance: Variance,
-    /// Computations of a test in all.
+    /// Computations of a test in all, those of earlier calls that were ended included.
     pub computations: usize,
-}
-
-/// A test beside its measured points.
-#[derive(Clone, Debug)]
-pub struct Fitted {
-    /// Name.
-    pub name: String,
-    /// It was predicted, not fitted.
-    pub is_predicted: bool,
-    /// Its derivatives came from the rates of its law, not from differences.
-    pub is_by_law: bool,
-    /// Its curves.
-    pub curves: Vec<FittedCurve>,
-}
-
-/// A curve beside its measured points.
-#[derive(Clone, Debug)]
-pub struct FittedCurve {
-    /// What was measured.
-    pub curve: Curve,
-    /// Computed values at the measured points.
-    pub computed: Vec<f64>,
-    /// The computed curve.
-    pub line: Vec<(f64, f64)>,
-    /// Standard deviation of a new measured value at each point: of its noise, and of the computed value
-    /// as far as that follows from the parameters' own.
-    pub deviations: Vec<f64>,
-    /// Root of the mean square of computed less measured values, in the unit of the curve.
-    pub rms: f64,
-    /// The same of residuals over their noise as given.
-    pub relative: f64,
-    /// Correlation of neighbouring residuals.
-    pub neighbours: f64,
-    /// Part of the measured points inside the interval of prediction.
-    pub inside: f64,
 }
 
 /// An interval of confidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Its ends; `None` where the tests set no limit.
+    /// Its ends; `None` where there is none, or none is known.
     pub ends: [Option<f64>; 2],
+    /// What becomes of an end that is `None`.
+    pub open: [Open; 2],
     /// From the profile, else from the covariance.
     pub is_of_profile: bool,
+}
+
+/// What is beyond a side of an interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Open {
+    /// It has an end.
+    No,
+    /// The tests set no limit.
+    Unlimited,
+    /// It goes on to this value at least, beyond which tests cannot be computed.
+    Barred(f64),
+    /// It goes on to this value at least; it was not followed further.
+    Unfinished(f64),
+}
+
+impl Open {
+    /// As tables have it.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::No => "limit",
+            Self::Unlimited => "none",
+            Self::Barred(_) => "barred",
+            Self::Unfinished(_) => "unfinished",
+        }
+    }
 }
 
 impl Outcome {
@@ -127,20 +132,29 @@ impl Outcome {
         let (stage, place) = self.places[parameter];
         let stage = &self.stages[stage];
         let p = &self.parameters[parameter];
-        if stage.on_bound[place] != [false, false] || !stage.is_seen(place, p.counted_range()) {
+        if stage.on_bound[place] != [false, false] || !stage.seen[place] {
             return None;
         }
         let profile = stage
             .profiles
             .get(place)
             .filter(|profile| profile.points.len() > 1);
-        if let Some(profile) = profile {
-            return Some(Interval {
-                ends: profile.interval.map(|end| end.map(|u| p.value(u))),
-                is_of_profile: true,
-            });
-        }
-        self.linear_interval(parameter)
+        let Some(profile) = profile else {
+            return self.linear_interval(parameter);
+        };
+        let end = |side: &Side| match side {
+            Side::Limit(u) => (Some(p.value(*u)), Open::No),
+            Side::Bound | Side::Flat(_) => (None, Open::Unlimited),
+            Side::Barred(u) => (None, Open::Barred(p.value(*u))),
+            Side::Unfinished(u) => (None, Open::Unfinished(p.value(*u))),
+            Side::Unknown => (None, Open::Unfinished(p.value(stage.best[place]))),
+        };
+        let [below, above] = profile.sides.each_ref().map(end);
+        Some(Interval {
+            ends: [below.0, above.0],
+            open: [below.1, above.1],
+            is_of_profile: true,
+        })
     }
 
     /// The interval from the covariance alone.
@@ -150,8 +164,14 @@ impl Outcome {
         let p = &self.parameters[parameter];
         let half = stage.quantile * stage.error(place)?;
         let end = |u: f64| half.is_finite().then(|| p.value(u));
+        let open = if half.is_finite() {
+            Open::No
+        } else {
+            Open::Unlimited
+        };
         Some(Interval {
             ends: [end(stage.best[place] - half), end(stage.best[place] + half)],
+            open: [open; 2],
             is_of_profile: false,
         })
     }
@@ -187,6 +207,7 @@ pub fn run(
             }
         })?;
         files::write(&outcome, calibration, &folder)?;
+        kept::remove(&folder);
         show(&outcome.text());
         show(&format!("results in {}", folder.display()));
         show(&format!(
@@ -209,7 +230,8 @@ impl Options {
     }
 }
 
-/// Carries out a calibration; `folder` takes what trials of cases leave for a while.
+/// Carries out a calibration. `folder` takes what trials of cases leave for a while, and what was computed,
+/// from which the same call goes on if this one is stopped or killed.
 ///
 /// # Errors
 /// As [`run`].
@@ -219,8 +241,42 @@ pub fn calibrate(
     options: &Options,
     say: &mut dyn FnMut(&str),
 ) -> Result<Outcome, Error> {
-    let file = &calibration.file;
     let mut model = Model::new(calibration, &options.opener, folder, &options.stop)?;
+    model.keep_in(folder, options.anew)?;
+    if model.kept.were_others {
+        say(
+            "what an earlier call has computed is of other tests, parameters, laws or another version of the program: begun \
+             anew",
+        );
+    } else if model.kept.of_before > 0 {
+        say(&format!(
+            "{} computations of an earlier call are taken over",
+            model.kept.of_before
+        ));
+    }
+    carry_out(calibration, &mut model, say).map_err(|error| match error.kind() {
+        Kind::Stopped => Stopped {
+            doing: format!(
+                "{} computations are kept in {}, and the same command goes on from there",
+                model.kept.len(),
+                folder.display()
+            ),
+        }
+        .into(),
+        Kind::Internal => error,
+        _ => {
+            kept::remove(folder);
+            error
+        }
+    })
+}
+
+fn carry_out(
+    calibration: &Calibration,
+    model: &mut Model,
+    say: &mut dyn FnMut(&str),
+) -> Result<Outcome, Error> {
+    let file = &calibration.file;
     let starts = file.starts.as_ref().map(|starts| *starts.get_ref());
     let is_slow = model
         .tests
@@ -240,9 +296,10 @@ pub fn calibrate(
         .collect();
     let mut words = std::mem::take(&mut model.notes);
     let mut stages = Vec::new();
-    let groups = groups(calibration, &model);
+    let mut errors = Errors::new(model);
+    let groups = groups(calibration, model);
     for group in &groups {
-        let Some(stage) = fit(&mut model, group, &counted, wish, say)? else {
+        let Some(stage) = fit(model, group, &counted, wish, say)? else {
             let message = format!(
                 "stage `{}`: with no start can all tests be computed: {}",
                 group.name,
@@ -253,7 +310,8 @@ pub fn calibrate(
         for (&parameter, u) in group.parameters.iter().zip(&stage.best) {
             counted[parameter] = *u;
         }
-        let of_stage = words::of_stage(&mut model, &stage, &counted, wish.variance)?;
+        errors.add(model, &stage, &counted)?;
+        let of_stage = words::of_stage(model, &stage, &counted, wish.variance)?;
         let name = |word: String| match groups.len() {
             1 => word,
             _ => format!("stage `{}`: {word}", group.name),
@@ -279,21 +337,14 @@ pub fn calibrate(
     };
     let places: Vec<(usize, usize)> = (0..model.parameters.len()).map(last).collect();
     if groups.len() > 1 {
-        words.push(
-            "an interval holds for the values of the parameters that its stage did not fit; a last stage with all of \
-             them gives intervals that hold together"
-                .to_owned(),
-        );
+        words.extend(words::of_stages(model, &stages, &places, &errors));
     }
-    let tests = fitted(&mut model, &stages, &counted)?;
-    words.extend(misfits(&tests));
-    let values: Vec<f64> = model
-        .parameters
-        .iter()
-        .zip(&counted)
-        .map(|(p, u)| p.value(*u))
-        .collect();
-    let block = block(calibration, &model, &values);
+    let (tests, of_tests) = fitted(model, &stages, &errors, &counted, wish)?;
+    // What makes all the rest worth nothing comes first.
+    words.splice(0..0, of_tests.bad);
+    words.extend(of_tests.others);
+    let values = model.values(&counted);
+    let block = block(calibration, model, &values);
     Ok(Outcome {
         name: calibration.name(),
         title: if file.title.is_empty() {
@@ -310,7 +361,7 @@ pub fn calibrate(
         block,
         confidence: wish.confidence,
         variance: wish.variance,
-        computations: model.computations,
+        computations: model.kept.len(),
     })
 }
 
@@ -347,197 +398,4 @@ fn groups(calibration: &Calibration, model: &Model) -> Vec<Group> {
         }
     };
     stages.iter().map(named).collect()
-}
-
-/// All tests with the values found, those that are predicted included.
-fn fitted(model: &mut Model, stages: &[Stage], counted: &[f64]) -> Result<Vec<Fitted>, Error> {
-    let mut all = Vec::new();
-    for number in 0..model.tests.len() {
-        let (name, is_predicted) = (
-            model.tests[number].name.clone(),
-            model.tests[number].is_predicted,
-        );
-        let rows = match model.computed(number, counted)? {
-            Ok(rows) => rows,
-            Err(why) => {
-                let message =
-                    format!("test `{name}` cannot be computed with the values found: {why}");
-                return Err(Error::usage(message));
-            }
-        };
-        // The stage that has most to say of it.
-        let stage = stages
-            .iter()
-            .max_by_key(|stage| stage.group.parameters.len());
-        let gradients = match stage {
-            Some(stage) => model.gradients(number, counted, &stage.group.parameters)?,
-            None => Vec::new(),
-        };
-        let mut curves = Vec::new();
-        let mut first = 0;
-        for curve in model.tests[number].curves.clone() {
-            let n = curve.points.len();
-            let (Ok(computed), Ok(line)) = (curve.computed(&rows), curve.line(&rows)) else {
-                let message = format!(
-                    "test `{name}`: with the values found `{}` ends before the last measured point; `x` is best what \
-                     the test imposes",
-                    curve.x
-                );
-                return Err(Error::usage(message));
-            };
-            let residuals = curve.residuals(&computed);
-            let variance = stage.map_or(1.0, |stage| stage.variance);
-            let deviation = |i: usize| {
-                let gradient: Vec<f64> = gradients.iter().map(|column| column[first + i]).collect();
-                let own = stage.map_or(0.0, |stage| stage.covariance.variance_along(&gradient));
-                (variance * (own + curve.deviations[i].powi(2))).sqrt()
-            };
-            let deviations: Vec<f64> = (0..n).map(deviation).collect();
-            let quantile = stage.map_or(2.0, |stage| stage.quantile);
-            let points = curve.points.iter().zip(&computed).zip(&deviations);
-            let inside = points
-                .filter(|(((_, y), c), d)| (y - *c).abs() <= quantile * **d)
-                .count();
-            let squares = |values: &mut dyn Iterator<Item = f64>| {
-                (values.map(|v| v * v).sum::<f64>() / n.max(1) as f64).sqrt()
-            };
-            let mut differences = curve.points.iter().zip(&computed).map(|((_, y), c)| c - y);
-            let rms = squares(&mut differences);
-            let factor = curve.weight.sqrt();
-            let relative = squares(&mut residuals.iter().map(|r| r / factor));
-            curves.push(FittedCurve {
-                computed,
-                line,
-                deviations,
-                rms,
-                relative,
-                neighbours: statistics::of_neighbours(&residuals),
-                inside: inside as f64 / n.max(1) as f64,
-                curve,
-            });
-            first += n;
-        }
-        all.push(Fitted {
-            name,
-            is_predicted,
-            is_by_law: model.tests[number].is_by_law,
-            curves,
-        });
-    }
-    Ok(all)
-}
-
-/// Neighbouring residuals that go together more than this, on a curve of so many points.
-const FOLLOW: f64 = 0.5;
-const ENOUGH: usize = 10;
-
-/// Curves whose residuals are no noise.
-fn misfits(tests: &[Fitted]) -> Vec<String> {
-    let mut words = Vec::new();
-    for test in tests.iter().filter(|test| !test.is_predicted) {
-        for fitted in &test.curves {
-            let rho = fitted.neighbours;
-            // So small a residual is the last digit of a measured value.
-            let is_exact = fitted.relative < 1e-3;
-            if rho > FOLLOW && fitted.curve.points.len() >= ENOUGH && !is_exact {
-                let factor = ((1.0 + rho) / (1.0 - rho).max(1e-3)).sqrt();
-                words.push(format!(
-                    "{}, {}: residuals follow each other (correlation of neighbours {rho:.2}): that is no noise but what \
-                     the law does not follow, or points that were measured too densely; the intervals are too narrow, \
-                     by a factor of about {factor:.1} as far as this curve counts",
-                    test.name, fitted.curve.y
-                ));
-            }
-        }
-    }
-    words
-}
-
-/// The set to paste: into drivers, and into cases.
-fn block(calibration: &Calibration, model: &Model, values: &[f64]) -> String {
-    let mut of_driver: Vec<(String, String)> = Vec::new();
-    let mut of_cases: Vec<(String, Vec<(String, String)>)> = Vec::new();
-    let number = |value: f64| {
-        let text = digits(value);
-        if text.contains(['.', 'e']) {
-            text
-        } else {
-            format!("{text}.0")
-        }
-    };
-    let written = |value: &ParameterValue| match value {
-        ParameterValue::Number(value) => Some(number(*value)),
-        ParameterValue::Integer(value) => Some(value.to_string()),
-        ParameterValue::Label(label) => Some(format!("{label:?}")),
-        ParameterValue::Varying(_) => None,
-    };
-    // What all drivers give alike belongs to the set.
-    let drivers: Vec<_> = model
-        .tests
-        .iter()
-        .filter_map(|test| match &test.subject {
-            Subject::Driver(driver) => driver.parameters(),
-            Subject::Case(_) => None,
-        })
-        .collect();
-    let is_looked_for = |id: &str| {
-        let mut targets = model.tests.iter().flat_map(|test| &test.targets);
-        targets.any(|(_, table, other)| table.is_none() && other == id)
-    };
-    for (id, value) in drivers.first().into_iter().flat_map(|table| table.iter()) {
-        let is_alike = drivers.iter().all(|table| {
-            let mut others = table
-                .iter()
-                .filter(|(other, _)| other.get_ref() == id.get_ref());
-            others.any(|(_, other)| other.get_ref() == value.get_ref())
-        });
-        if is_alike && !is_looked_for(id.get_ref()) {
-            let text = written(value.get_ref());
-            of_driver.extend(text.map(|text| (id.get_ref().clone(), text)));
-        }
-    }
-    let mut add = |table: Option<&String>, id: &str, text: String| {
-        let entries = match table {
-            None => &mut of_driver,
-            Some(name) => {
-                let known = of_cases.iter().position(|(other, _)| other == name);
-                if known.is_none() {
-                    of_cases.push((name.clone(), Vec::new()));
-                }
-                let place = known.unwrap_or(of_cases.len() - 1);
-                &mut of_cases[place].1
-            }
-        };
-        if !entries.iter().any(|(other, _)| other == id) {
-            entries.push((id.to_owned(), text));
-        }
-    };
-    for (name, input) in &calibration.file.fixed {
-        let input = input.get_ref();
-        let id = input.parameter.as_ref().unwrap_or(name).get_ref();
-        for law in &input.laws {
-            if let Some(text) = written(input.value.get_ref()) {
-                add(Some(law.get_ref()), id, text);
-            }
-        }
-    }
-    for (parameter, table, id) in model.tests.iter().flat_map(|test| &test.targets) {
-        add(table.as_ref(), id, number(values[*parameter]));
-    }
-    let mut text = String::new();
-    let mut table = |heading: &str, entries: &[(String, String)]| {
-        if !entries.is_empty() {
-            let lines: Vec<String> = entries
-                .iter()
-                .map(|(id, v)| format!("{id} = {v}\n"))
-                .collect();
-            let gap = if text.is_empty() { "" } else { "\n" };
-            let _ = write!(text, "{gap}[{heading}]\n{}", lines.concat());
-        }
-    };
-    table("parameters", &of_driver);
-    for (name, entries) in &of_cases {
-        table(&format!("laws.{name}.parameters"), entries);
-    }
-    text
 }

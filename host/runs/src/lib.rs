@@ -8,6 +8,7 @@ mod ending;
 pub mod memory;
 pub mod point;
 pub mod run;
+mod sampling;
 pub mod study;
 pub mod supervision;
 pub mod trade_off;

@@ -122,10 +122,18 @@ impl Watch for Start<'_> {
     }
 
     fn warning(&mut self, warning: &Warning) {
+        if was_said(warning) {
+            return;
+        }
         let message = warning.to_string();
         self.observer.warning(&message);
         self.warnings.push(message);
     }
+}
+
+/// Whether a case has said it before its first phase, with its place in the file.
+fn was_said(warning: &Warning) -> bool {
+    matches!(warning, Warning::NoTime { .. })
 }
 
 /// What is to be said of a case before its first phase.
@@ -448,6 +456,9 @@ impl Watch for Follower<'_> {
     }
 
     fn warning(&mut self, warning: &Warning) {
+        if was_said(warning) {
+            return;
+        }
         let message = warning.to_string();
         if !(warning.is_said_once() && self.warnings.contains(&message)) {
             self.say(&message);

@@ -137,13 +137,16 @@ impl Simulation {
             watch.warning(&other);
         }
         let phase = &self.problem.phases[number];
-        let depends =
-            |group: &&Group| group.is_active && group.law.built.law.formulation().time_dependent;
-        let dependent = self.groups.iter().find(depends);
-        if let Some(group) = dependent.filter(|_| phase.time.is_none()) {
+        let active = self.groups.iter().filter(|group| group.is_active);
+        let mut dependent =
+            active.filter_map(|group| Some((group, group.law.built.law.time_dependence()?)));
+        if phase.time.is_none()
+            && let Some((group, by)) = dependent.next()
+        {
             watch.warning(&Warning::NoTime {
                 phase: phase.name.clone(),
                 law: group.law.name.clone(),
+                by,
             });
         }
         self.done = number;

@@ -4,6 +4,7 @@ use crate::equilibrium::Open;
 use crate::error::Place;
 use crate::group::{Parted, TakeOver};
 use crate::settings::Method;
+use law::TimeDependence;
 use std::fmt;
 
 /// Something that should be known of a simulation under way.
@@ -28,6 +29,8 @@ pub enum Warning {
         phase: String,
         /// Name of the law in the problem.
         law: String,
+        /// Why it does.
+        by: TimeDependence,
     },
     /// The tolerance of the residual is below round-off.
     RoundOff {
@@ -120,9 +123,9 @@ impl fmt::Display for Warning {
                 method.name(),
                 asked.name()
             ),
-            Self::NoTime { phase, law } => write!(
+            Self::NoTime { phase, law, by } => write!(
                 f,
-                "law `{law}` depends on the time, and phase `{phase}` says none: it takes 1"
+                "law `{law}`{by} depends on the time, and phase `{phase}` says none: it takes 1"
             ),
             Self::RoundOff {
                 phase,

@@ -85,10 +85,11 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
         .outputs
         .iter()
         .map(|output| {
-            histories
-                .iter()
-                .map(|history| history.output(output))
-                .collect()
+            let runs = histories.iter().zip(&rows);
+            let number = |(history, row): (&History, &Row)| {
+                history.counted(output, row.standing.state == State::Done)
+            };
+            runs.map(number).collect()
         })
         .collect();
     let parameters: Vec<Varied> = (0..)
@@ -159,7 +160,9 @@ fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
 
 fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
     let values = || rows.iter().map(|row| row.values[number].as_str());
-    let numbers: Option<Vec<f64>> = values().map(|value| value.parse().ok()).collect();
+    // `nan` and `inf` are texts, as any other.
+    let number = |value: &str| value.parse().ok().filter(|number: &f64| number.is_finite());
+    let numbers: Option<Vec<f64>> = values().map(number).collect();
     let (numbers, texts) = if let Some(numbers) = numbers {
         (numbers, None)
     } else {
@@ -251,7 +254,9 @@ fn page(
         .iter()
         .zip(&drawn.outputs)
         .zip(numbers)
-        .map(|((output, counted), numbers)| output_context(output, counted, numbers, drawn))
+        .map(|((output, counted), numbers)| {
+            output_context(output, counted, (numbers, record.is_grid), drawn)
+        })
         .collect();
     let row = |(number, row): (usize, &Row)| {
         let of_run: Vec<String> = numbers
@@ -283,13 +288,6 @@ fn page(
         unfinished => unfinished(rows),
         parameters,
         outputs,
-        levels => if record.is_grid {
-            "The share is η², which counts what a parameter does alone."
-        } else {
-            "The values of a parameter that has more than twelve are divided into levels of as many runs each; the \
-             share is Kelley's ε², which counts what a parameter does alone and takes off what the scatter of the \
-             runs makes up by chance."
-        },
         thinned => left_out.map(|most| format!(
             "About {most} rows of each history are shown, evenly spaced, with the last of each phase; history.csv has all."
         )),
@@ -320,7 +318,7 @@ fn unfinished(rows: &[Row]) -> Vec<String> {
 fn output_context(
     output: &Output,
     counted: &Counted<'_>,
-    numbers: &[Option<f64>],
+    (numbers, is_grid): (&[Option<f64>], bool),
     drawn: &Drawn<'_>,
 ) -> Template {
     let known: Vec<f64> = numbers.iter().copied().flatten().collect();
@@ -332,7 +330,8 @@ fn output_context(
             let missing = numbers.len() - known.len();
             let missing = match missing {
                 0 => String::new(),
-                n => format!("; {n} runs have none"),
+                1 => "; 1 run has none that counts".to_owned(),
+                n => format!("; {n} runs have none that counts"),
             };
             format!(
                 "{} to {}, mean {}{missing}",
@@ -361,7 +360,29 @@ fn output_context(
         words => in_words(output),
         range,
         effects,
+        levels => levels(is_grid, numbers),
     }
+}
+
+/// What is behind the shares of an output.
+fn levels(is_grid: bool, numbers: &[Option<f64>]) -> String {
+    let of_scatter = "Kelley's ε², which counts what a parameter does alone and takes off what the scatter of the runs makes \
+                      up by chance.";
+    if !is_grid {
+        return format!(
+            "The values of a parameter that has more than twelve are divided into levels of as many runs each; the share is \
+             {of_scatter}"
+        );
+    }
+    let holes = numbers.iter().filter(|number| number.is_none()).count();
+    if holes == 0 {
+        return "The share is η², which counts what a parameter does alone.".to_owned();
+    }
+    format!(
+        "The grid has holes, {holes} of {} runs without a number that counts: means at the levels are over different \
+         values of the other parameters, so that what these do is in them, too. The share is {of_scatter}",
+        numbers.len()
+    )
 }
 
 fn in_words(output: &Output) -> String {

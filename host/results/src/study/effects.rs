@@ -5,8 +5,8 @@
 //! values, are divided into levels of as many runs each. The main effect of a level is the mean of the
 //! number over its runs. The share of the variance that the levels explain is
 //!
-//! - in a grid, where the others have the same values at every level, the sum of squares between levels
-//!   over the whole one, η²;
+//! - in a grid without holes, where the others have the same values at every level, the sum of squares between
+//!   levels over the whole one, η²;
 //! - else Kelley's ε² = 1 − (n−1)/(n−k) · within/whole, which takes off what the scatter of n runs in k
 //!   levels makes up by chance; at least 0.
 //!
@@ -48,8 +48,10 @@ impl Effect {
 }
 
 /// What every parameter does to a number of the runs, those first that do most. `parameters`: values by
-/// parameter and run, texts as the number of the text; `numbers` by run, `None` where a run has none.
+/// parameter and run, texts as the number of the text; `numbers` by run, `None` where a run has none that
+/// counts. A grid with such runs is none: means at its levels are over different values of the others.
 pub fn effects(parameters: &[Vec<f64>], numbers: &[Option<f64>], is_grid: bool) -> Vec<Effect> {
+    let is_grid = is_grid && numbers.iter().all(Option::is_some);
     let mut effects: Vec<Effect> = (0..)
         .zip(parameters)
         .filter_map(|(parameter, values)| {
@@ -163,6 +165,25 @@ mod tests {
         // Means at the lowest and highest tenth: 5 · 0.05 and 5 · 0.95.
         let levels = &found[0].levels;
         assert!((levels[0].mean - 0.25).abs() < 0.02 && (levels[9].mean - 4.75).abs() < 0.02);
+    }
+
+    /// y = a + b on {0, 1, 2, 3}², without the run at (3, 3): η² of a would be what it is between levels of 4, 4,
+    /// 4 and 3 runs. With n = 15, k = 4: means of b are 1.5, 1.5, 1.5 and 1, those of a's levels 1.5, 2.5, 3.5, 4.
+    #[test]
+    fn a_grid_with_a_hole_is_none() {
+        let (mut a, mut b, mut y) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..16 {
+            let (x, z) = (f64::from(i / 4), f64::from(i % 4));
+            a.push(x);
+            b.push(z);
+            y.push((i < 15).then_some(x + z));
+        }
+        let found = effects(&[a, b], &y, true);
+        let means: Vec<f64> = found[0].levels.iter().map(|level| level.mean).collect();
+        assert_eq!(means, [1.5, 2.5, 3.5, 4.0]);
+        // Within: 3 · 5 + 2 = 17. Whole: Σ(x + z)² − 15 · 2.8² = 148 − 117.6 = 30.4.
+        let share = 1.0 - 14.0 / 11.0 * 17.0 / 30.4;
+        assert!((found[0].share.unwrap() - share).abs() < 1e-12, "{found:?}");
     }
 
     #[test]

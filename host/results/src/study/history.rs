@@ -1,6 +1,7 @@
 //! `history.csv` of a run, and the numbers of it that count.
 
 use super::{Output, Take};
+use std::io::BufRead as _;
 use std::path::Path;
 
 /// Columns of numbers, by increment.
@@ -64,6 +65,20 @@ impl History {
     pub fn column(&self, name: &str) -> Option<&[Option<f64>]> {
         let number = self.names.iter().position(|other| other == name)?;
         Some(&self.values[number])
+    }
+
+    /// Whether the history in the folder of a run has a row.
+    pub(super) fn has_rows(folder: &Path) -> bool {
+        let file = std::fs::File::open(folder.join("history.csv"));
+        let rows = file.map(|file| std::io::BufReader::new(file).split(b'\n').take(2).count());
+        rows.is_ok_and(|n| n == 2)
+    }
+
+    /// The number of this run that an output asks for, as far as it counts. A run that did not come to its end
+    /// has a value where another probe came to a given one, but no last, largest or smallest.
+    pub fn counted(&self, output: &Output, is_done: bool) -> Option<f64> {
+        let counts = is_done || output.at.is_some();
+        counts.then(|| self.output(output)).flatten()
     }
 
     /// The number of this run that an output asks for; `None` where the run has none.
@@ -130,6 +145,18 @@ mod tests {
         assert_eq!(output(Take::Min, None, Some("b")), Some(10.0));
         assert_eq!(output(Take::Final, None, Some("c")), None);
         assert!(History::of(b"").output(&Output::last("q")).is_none());
+    }
+
+    #[test]
+    fn what_was_passed_counts_of_a_run_that_failed_and_its_end_does_not() {
+        let history = History::of(TEXT.as_bytes());
+        let at = Output {
+            at: Some(("w".to_owned(), 2.5)),
+            ..Output::last("q")
+        };
+        assert_eq!(history.counted(&at, false), Some(25.0));
+        assert_eq!(history.counted(&Output::last("q"), false), None);
+        assert_eq!(history.counted(&Output::last("q"), true), Some(20.0));
     }
 
     #[test]

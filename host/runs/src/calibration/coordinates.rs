@@ -1,6 +1,7 @@
 //! Parameters as the search counts them: by their logarithm or in widths of their range, so that units do
 //! not matter.
 
+use crate::sampling::{Random, stratified};
 use input::calibration::Scale;
 
 /// A parameter that is looked for.
@@ -70,35 +71,13 @@ impl Parameter {
 /// Places spread over a box by a Latin hypercube: in every direction one of them in each of `n` slices.
 /// The same seed gives the same places.
 pub(super) fn spread(ranges: &[[f64; 2]], n: usize, seed: u64) -> Vec<Vec<f64>> {
-    let mut random = Random(seed);
-    let mut places = vec![vec![0.0; ranges.len()]; n];
-    for (direction, [low, high]) in ranges.iter().enumerate() {
-        let mut slices: Vec<usize> = (0..n).collect();
-        for last in (1..n).rev() {
-            slices.swap(last, (random.unit() * (last + 1) as f64) as usize);
-        }
-        for (place, slice) in places.iter_mut().zip(slices) {
-            let part = (slice as f64 + random.unit()) / n as f64;
-            place[direction] = low + part * (high - low);
-        }
-    }
-    places
-}
-
-/// Random numbers by SplitMix64 (Steele, Lea & Flood 2014).
-#[derive(Clone, Debug)]
-struct Random(u64);
-
-impl Random {
-    /// The next number in [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
-    }
+    let column = |(direction, [low, high]): (usize, &[f64; 2])| {
+        let parts = stratified(n, &mut Random::of(seed, direction)).into_iter();
+        parts.map(|part| low + part * (high - low)).collect()
+    };
+    let columns: Vec<Vec<f64>> = ranges.iter().enumerate().map(column).collect();
+    let place = |i: usize| columns.iter().map(|column| column[i]).collect();
+    (0..n).map(place).collect()
 }
 
 #[cfg(test)]

@@ -117,7 +117,7 @@ impl Curve {
         Ok(places.iter().map(at).collect())
     }
 
-    /// Derivatives of the residuals where those of the rows are known.
+    /// Derivatives of the computed values at the measured points where those of the rows are known.
     ///
     /// # Errors
     /// The curve cannot be read off.
@@ -128,8 +128,7 @@ impl Curve {
     ) -> Result<Vec<f64>, Gap> {
         let (places, [x, y]) = self.places(rows)?;
         let line = self.line(rows)?;
-        let factor = self.weight.sqrt();
-        let derivative = |(spot, deviation): (Spot, &f64)| {
+        let derivative = |spot: Spot| {
             let rate = |number: usize, column: usize| {
                 let (stretch, row) = places[spot.row + number];
                 of_rows[stretch][row][column]
@@ -138,15 +137,9 @@ impl Curve {
             // The measured x stays, the rows beside it move.
             let moved = rate(0, x) + spot.part * (rate(1, x) - rate(0, x));
             let part = -moved / (b.0 - a.0);
-            let value = rate(0, y) + spot.part * (rate(1, y) - rate(0, y)) + part * (b.1 - a.1);
-            factor * value / deviation
+            rate(0, y) + spot.part * (rate(1, y) - rate(0, y)) + part * (b.1 - a.1)
         };
-        let spots = self.spots(&line)?;
-        Ok(spots
-            .into_iter()
-            .zip(&self.deviations)
-            .map(derivative)
-            .collect())
+        Ok(self.spots(&line)?.into_iter().map(derivative).collect())
     }
 
     /// Where the measured points lie among computed ones.
@@ -172,13 +165,24 @@ impl Curve {
             .collect())
     }
 
+    /// The largest measured value, without its sign.
+    pub(super) fn largest(&self) -> f64 {
+        let values = self.points.iter().map(|(_, y)| y.abs());
+        values.fold(0.0, f64::max)
+    }
+
     /// Differences of computed and measured values over their deviations, squares of which are summed.
     pub(super) fn residuals(&self, computed: &[f64]) -> Vec<f64> {
+        let differences = self.points.iter().zip(computed);
+        let differences: Vec<f64> = differences.map(|((_, y), computed)| computed - y).collect();
+        self.weighed(&differences)
+    }
+
+    /// What differences of values are as residuals: over their deviations, times the root of the weight.
+    pub(super) fn weighed(&self, differences: &[f64]) -> Vec<f64> {
         let factor = self.weight.sqrt();
-        let points = self.points.iter().zip(&self.deviations).zip(computed);
-        points
-            .map(|(((_, y), deviation), computed)| factor * (computed - y) / deviation)
-            .collect()
+        let pairs = differences.iter().zip(&self.deviations);
+        pairs.map(|(d, deviation)| factor * d / deviation).collect()
     }
 }
 
@@ -284,6 +288,7 @@ mod tests {
                 .map(|k| vec![by_p * k, by_q * k * k])
                 .collect()];
             let found = curve.derivatives(&of(1.0, 10.0), &of_rows).unwrap();
+            let found = curve.weighed(&found);
             let side = |sign: f64| {
                 let there = of(1.0 + sign * step * by_p, 10.0 + sign * step * by_q);
                 curve.residuals(&curve.computed(&there).unwrap())

@@ -163,11 +163,13 @@ fn profile(outcome: &Outcome, parameter: usize, name: &str) -> Option<Figures> {
         ..Figure::default()
     };
     let mut figures = Figures::new(&outcome.title, &[figure], columns);
+    // What a weight adds to the sum is no information: it is divided out.
+    let variance = stage.variance * stage.covariance.growth(place);
     let limit = stage.quantile.powi(2);
     let best = stage.best[place];
     // The root of the growth, with a sign, is nearly straight between points.
     let root = |(u, sum): &(f64, f64)| {
-        let root = ((sum - stage.sum) / stage.variance).max(0.0).sqrt();
+        let root = ((sum - stage.sum) / variance).max(0.0).sqrt();
         (*u, if *u < best { -root } else { root })
     };
     let roots: Vec<(f64, f64)> = profile.points.iter().map(root).collect();

@@ -2,7 +2,7 @@
 
 use super::curve::Curve;
 use super::words::digits;
-use super::{Interval, Outcome, figures, page};
+use super::{Interval, Open, Outcome, figures, page};
 use crate::Error;
 use input::calibration::{Calibration, Scale, Variance};
 use results::number;
@@ -73,14 +73,26 @@ fn remove_figures(folder: &Path) {
 
 /// Ends of an interval in words.
 pub(super) fn words_of(interval: Option<Interval>) -> String {
-    match interval {
-        None => "not determined".to_owned(),
-        Some(interval) => match interval.ends {
-            [Some(low), Some(high)] => format!("{} to {}", digits(low), digits(high)),
-            [Some(low), None] => format!("above {}", digits(low)),
-            [None, Some(high)] => format!("below {}", digits(high)),
-            [None, None] => "no limit".to_owned(),
-        },
+    let Some(interval) = interval else {
+        return "not determined".to_owned();
+    };
+    let [low, high] = interval.ends.map(|end| end.map(digits));
+    match (low, high, interval.open) {
+        (Some(low), Some(high), _) => format!("{low} to {high}"),
+        (Some(low), None, [_, Open::Unlimited]) => format!("above {low}"),
+        (None, Some(high), [Open::Unlimited, _]) => format!("below {high}"),
+        (None, None, [Open::Unlimited, Open::Unlimited]) => "no limit".to_owned(),
+        (low, high, open) => {
+            let side = |end: Option<String>, open: Open| {
+                end.unwrap_or_else(|| match open {
+                    Open::Barred(value) | Open::Unfinished(value) => {
+                        format!("beyond {} (unknown)", digits(value))
+                    }
+                    _ => "no limit".to_owned(),
+                })
+            };
+            format!("{} to {}", side(low, open[0]), side(high, open[1]))
+        }
     }
 }
 
@@ -88,9 +100,10 @@ impl Outcome {
     /// Interval, or why there is none.
     pub(super) fn interval_in_words(&self, parameter: usize) -> String {
         let (stage, place) = self.places[parameter];
-        match self.stages[stage].on_bound[place] {
-            [false, false] => words_of(self.interval(parameter)),
-            _ => "on its bound".to_owned(),
+        let stage = &self.stages[stage];
+        match stage.on_bound[place] {
+            [true, _] | [_, true] if stage.seen[place] => "on its bound".to_owned(),
+            _ => words_of(self.interval(parameter)),
         }
     }
 
@@ -197,7 +210,8 @@ fn optional(value: Option<f64>) -> String {
 
 fn parameters(outcome: &Outcome) -> String {
     let mut text =
-        "parameter,value,lower,upper,linear_lower,linear_upper,relative_error,unit\n".to_owned();
+        "parameter,value,lower,upper,lower_end,upper_end,linear_lower,linear_upper,relative_error,unit\n"
+            .to_owned();
     for (i, p) in outcome.parameters.iter().enumerate() {
         let ends =
             |interval: Option<Interval>| interval.map_or([None, None], |interval| interval.ends);
@@ -207,14 +221,19 @@ fn parameters(outcome: &Outcome) -> String {
         let error = outcome.stages[stage].error(place);
         let relative =
             error.map(|error| error * (p.slope(outcome.values[i]) / outcome.values[i]).abs());
-        let cells = [low, high, below, above, relative.filter(|r| r.is_finite())].map(optional);
+        let open = outcome
+            .interval(i)
+            .map(|interval| interval.open.map(Open::word));
+        let cells = [below, above, relative.filter(|r| r.is_finite())].map(optional);
         let _ = writeln!(
             text,
-            "{},{},{},{}",
+            "{},{},{},{},{},{}",
             cell(&p.name),
             number(outcome.values[i]),
+            [low, high].map(optional).join(","),
+            open.unwrap_or(["", ""]).join(","),
             cells.join(","),
-            cell(&p.unit)
+            cell(&p.unit),
         );
     }
     text
@@ -254,19 +273,14 @@ fn fit(outcome: &Outcome) -> String {
                 ..
             } = &fitted.curve;
             for (i, (at, measured)) in points.iter().enumerate() {
-                let values = [
-                    *at,
-                    *measured,
-                    fitted.computed[i],
-                    deviations[i],
-                    fitted.deviations[i],
-                ];
+                let values = [*at, *measured, fitted.computed[i], deviations[i]];
                 let _ = writeln!(
                     text,
-                    "{},{},{x},{y},{}",
+                    "{},{},{x},{y},{},{}",
                     cell(&test.name),
                     test.is_predicted,
-                    values.map(number).join(",")
+                    values.map(number).join(","),
+                    optional(fitted.deviations[i])
                 );
             }
         }
@@ -340,6 +354,7 @@ fn summary(outcome: &Outcome, calibration: &Calibration) -> Value {
             "doc": p.doc,
             "value": outcome.values[i],
             "interval": interval.map(|interval| interval.ends),
+            "interval_ends": interval.map(|interval| interval.open.map(Open::word)),
             "interval_from": interval.map(|i| if i.is_of_profile { "profile" } else { "covariance" }),
             "linear_interval": outcome.linear_interval(i).map(|interval| interval.ends),
             "start": p.start,
@@ -369,6 +384,7 @@ fn summary(outcome: &Outcome, calibration: &Calibration) -> Value {
             "parameters": (0..n).map(name).collect::<Vec<_>>(),
             "tests": stage.group.tests.iter().map(|&t| outcome.tests[t].name.clone()).collect::<Vec<_>>(),
             "sum_of_squares": stage.sum,
+            "sum_without_weights": stage.plain_sum,
             "residuals": stage.n_residuals,
             "degrees_of_freedom": stage.degrees,
             "variance": stage.variance,
@@ -395,6 +411,7 @@ fn summary(outcome: &Outcome, calibration: &Calibration) -> Value {
                 "points": fitted.curve.points.len(),
                 "rms": fitted.rms,
                 "rms_over_noise": fitted.relative,
+                "explained": fitted.explained,
                 "correlation_of_neighbours": fitted.neighbours,
                 "inside_interval_of_prediction": fitted.inside,
             })).collect::<Vec<_>>(),

@@ -2,8 +2,10 @@
 //! each afterwards.
 
 use super::coordinates::{Parameter, spread};
+use super::derivatives::Sides;
 use super::least_squares::{End, Minimum, Problem, Settings, free, minimise};
 use super::model::Model;
+use super::profile::{Profile, follow};
 use super::statistics::{Covariance, joint, two_sided};
 use crate::Error;
 use input::calibration::Variance;
@@ -58,19 +60,6 @@ pub struct Optimum {
     pub is_as_good: bool,
 }
 
-/// The least sum of squares for values of one parameter beside the best.
-#[derive(Clone, Debug, Default)]
-pub struct Profile {
-    /// Values of the parameter, as the search counts it, ascending, with the sum of squares of the best of
-    /// the others; the best one among them.
-    pub points: Vec<(f64, f64)>,
-    /// Where the profile leaves the interval of confidence below and above; `None` where it does not up to
-    /// the bound, or cannot be followed.
-    pub interval: [Option<f64>; 2],
-    /// Whether the bound was reached inside the interval, below and above.
-    pub meets_bound: [bool; 2],
-}
-
 /// What a stage has found.
 #[derive(Clone, Debug)]
 pub struct Stage {
@@ -84,13 +73,19 @@ pub struct Stage {
     pub n_residuals: usize,
     /// How the search ended there.
     pub end: End,
-    /// Degrees of freedom: residuals less parameters that are not on a bound.
+    /// The same without weights.
+    pub plain_sum: f64,
+    /// Degrees of freedom: residuals less what they determine of parameters that are not on a bound.
     pub degrees: usize,
-    /// Variance of residuals that were divided by their noise.
+    /// Variance of residuals that were divided by their noise, without weights.
     pub variance: f64,
+    /// The residuals are smaller than what computed values are known to: that is the variance.
+    pub is_exact: bool,
+    /// The residuals there.
+    pub residuals: DVector<f64>,
     /// Derivatives of residuals there.
     pub jacobian: DMatrix<f64>,
-    /// Covariance for unit variance, of the parameters that are not on a bound.
+    /// Covariance for unit variance, of the parameters that are seen and not on a bound.
     pub covariance: Covariance,
     /// Quantile of Student's distribution for the level of confidence; of the normal one where the
     /// variance is given.
@@ -99,6 +94,9 @@ pub struct Stage {
     pub on_bound: Vec<[bool; 2]>,
     /// Of each parameter, the norm of its column of derivatives.
     pub answers: Vec<f64>,
+    /// Of each parameter, whether the tests answer to it at all: over the whole of its range residuals change
+    /// by more than a thousandth of the noise, and by more than derivatives are known to.
+    pub seen: Vec<bool>,
     /// Where the starts have led to.
     pub landings: Vec<Landing>,
     /// Places where no way leads down, the best first.
@@ -130,45 +128,31 @@ impl Search<'_> {
 
     /// Residuals of a test at a place.
     fn of_test(&mut self, test: usize, place: &[f64]) -> Result<Option<Vec<f64>>, Error> {
-        let rows = self.model.computed(test, place)?;
-        Ok(rows
-            .ok()
-            .and_then(|rows| self.model.tests[test].residuals(&rows).ok()))
+        let computed = self.model.computed(test, place)?.ok();
+        Ok(computed.map(|values| self.model.tests[test].residuals(&values)))
     }
 
-    /// Derivatives of a test's residuals by one parameter: central differences, one-sided at bounds, where
-    /// a side has no answer, or where a test takes long.
-    fn derivative(
-        &mut self,
-        test: usize,
-        parameter: usize,
-        here: &[f64],
-    ) -> Result<Option<Vec<f64>>, Error> {
-        let step = self.model.difference;
-        let [lower, upper] = self.model.parameters[parameter].counted_bounds();
-        let mut sides = [None, None];
-        for (side, sign) in sides.iter_mut().zip([1.0, -1.0]) {
-            let mut place = self.all.clone();
-            place[parameter] += sign * step;
-            if (lower..=upper).contains(&place[parameter]) {
-                *side = self.of_test(test, &place)?;
-            }
-            if side.is_some() && self.model.tests[test].is_slow() {
-                break;
-            }
-        }
-        let between = |a: &[f64], b: &[f64], width: f64| {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| (a - b) / width)
-                .collect::<Vec<f64>>()
+    /// Derivatives of a test's residuals by one parameter.
+    fn derivative(&mut self, test: usize, parameter: usize) -> Result<Option<Vec<f64>>, Error> {
+        let sides = if self.model.tests[test].is_slow() {
+            Sides::One
+        } else {
+            Sides::Both
         };
-        Ok(match &sides {
-            [Some(above), Some(below)] => Some(between(above, below, 2.0 * step)),
-            [Some(above), None] => Some(between(above, here, step)),
-            [None, Some(below)] => Some(between(here, below, step)),
-            [None, None] => None,
-        })
+        let Ok(here) = self.model.computed(test, &self.all)? else {
+            return Ok(None);
+        };
+        let derivative = self
+            .model
+            .difference(test, parameter, (&self.all, &here), sides)?;
+        let of_test = &self.model.tests[test];
+        let weighed = |derivative: Vec<f64>| {
+            let of_curves = of_test.of_curves(&derivative);
+            of_curves
+                .flat_map(|(curve, own)| curve.weighed(own))
+                .collect()
+        };
+        Ok(derivative.map(weighed))
     }
 }
 
@@ -198,21 +182,16 @@ impl Problem for Search<'_> {
         let mut first = 0;
         for &test in &self.group.tests {
             let n = self.model.tests[test].n_points();
-            let here = residuals
-                .rows(first, n)
-                .iter()
-                .copied()
-                .collect::<Vec<f64>>();
             let moving = self.moving.clone();
             let numbers: Vec<usize> = moving.iter().map(|&p| self.group.parameters[p]).collect();
-            let by_law = self.model.derivatives_by_law(test, &self.all, &numbers);
+            let by_law = self.model.derivatives_by_law(test, &self.all, &numbers)?;
             for (column, parameter) in numbers.into_iter().enumerate() {
                 if !self.model.tests[test].has(parameter) {
                     continue;
                 }
                 let derivative = match &by_law {
                     Some(columns) => Some(columns[column].clone()),
-                    None => self.derivative(test, parameter, &here)?,
+                    None => self.derivative(test, parameter)?,
                 };
                 let Some(derivative) = derivative else {
                     return Ok(None);
@@ -237,12 +216,6 @@ const RESERVE: usize = 4;
 const ITERATIONS: usize = 60;
 /// Longest step of the search: by a factor of e, or by the width of a range.
 const LONGEST: f64 = 1.0;
-/// A profile is followed for at most so many points on either side.
-const MOST_POINTS: usize = 12;
-/// Steps of a profile, in quantiles.
-const STEP_OF_PROFILE: f64 = 0.4;
-/// On a logarithmic scale or in widths of the range, a profile goes no farther than this.
-const FARTHEST: f64 = 12.0;
 
 /// Fits a group; `values` are all parameters of the model as the search counts, those of the group where
 /// it starts.
@@ -350,7 +323,7 @@ pub(super) fn fit(
             (best.u, best.residuals) = (kept, residuals);
         }
     }
-    let mut is_renewed = false;
+    let (mut is_renewed, mut was_tried) = (false, false);
     let (mut stage, profiles) = loop {
         let stage = known(model, group, &best, &bounds, wish);
         if !wish.profiles {
@@ -359,7 +332,7 @@ pub(super) fn fit(
         let mut profiles = Vec::new();
         let mut better: Option<Vec<f64>> = None;
         for place in 0..parameters.len() {
-            if !stage.is_seen(place, ranges[place]) {
+            if !stage.seen[place] {
                 profiles.push(Profile::default());
                 continue;
             }
@@ -397,16 +370,19 @@ pub(super) fn fit(
                     (u.collect::<Vec<f64>>(), sum)
                 }))
             };
-            let (profile, lower) = profile(model, &stage, place, bounds[place], &mut at)?;
+            let (profile, lower) = follow(model, &stage, place, bounds[place], &mut at)?;
             better = better.or(lower);
             profiles.push(profile);
         }
-        match better.filter(|_| !is_renewed) {
+        match better.filter(|_| !was_tried) {
             None => break (stage, profiles),
             Some(from) => {
-                is_renewed = true;
+                was_tried = true;
                 match search(model, &from, &everything, values)? {
-                    Some(minimum) if minimum.sum() < best.sum() => best = minimum,
+                    Some(minimum) if minimum.sum() < best.sum() => {
+                        is_renewed = true;
+                        best = minimum;
+                    }
                     _ => break (stage, profiles),
                 }
             }
@@ -421,41 +397,84 @@ pub(super) fn fit(
 }
 
 /// What moves the residuals by less than their differences are known to is not seen.
-fn blind(model: &Model) -> f64 {
+pub(super) fn blind(model: &Model) -> f64 {
     (model.exactness / model.difference).max(1e-6)
+}
+
+/// Square of what residuals without weights are known to, in the mean, and the norm of what is measured: of
+/// the largest value of each curve over its noise, with weights.
+pub(super) fn known_to(model: &Model, group: &Group) -> [f64; 2] {
+    let (mut n, mut squares, mut weighed) = (0, 0.0, 0.0);
+    for curve in group
+        .tests
+        .iter()
+        .flat_map(|&test| &model.tests[test].curves)
+    {
+        let largest = curve.largest();
+        n += curve.points.len();
+        let of_curve: f64 = curve.deviations.iter().map(|d| (largest / d).powi(2)).sum();
+        squares += of_curve;
+        weighed += curve.weight * of_curve;
+    }
+    let mean = squares / n.max(1) as f64;
+    [model.exactness.powi(2) * mean, weighed.sqrt()]
 }
 
 /// What residuals and derivatives say of the best place.
 fn known(model: &Model, group: &Group, best: &Minimum, bounds: &[[f64; 2]], wish: Wish) -> Stage {
     let blind = blind(model);
-    let moving = free(&best.u, &best.jacobian, &best.residuals, bounds, blind);
     let n = best.u.len();
+    let weights: Vec<f64> = group
+        .tests
+        .iter()
+        .flat_map(|&test| &model.tests[test].curves)
+        .flat_map(|curve| std::iter::repeat_n(curve.weight, curve.points.len()))
+        .collect();
+    let squares = best.residuals.iter().zip(&weights).map(|(r, w)| r * r / w);
+    let plain_sum: f64 = squares.sum();
+    let [floor, signal] = known_to(model, group);
+    let variance_of = |degrees: usize| match wish.variance {
+        Variance::Estimated => (plain_sum / degrees.max(1) as f64).max(floor),
+        Variance::Given => 1.0,
+    };
+    let may_move = free(&best.u, &best.jacobian, &best.residuals, bounds, blind);
+    let answers: Vec<f64> = best
+        .jacobian
+        .column_iter()
+        .map(|column| column.norm())
+        .collect();
+    let noise = variance_of(best.residuals.len().saturating_sub(may_move.len())).sqrt();
+    let is_seen = |place: usize| {
+        let [low, high] = model.parameters[group.parameters[place]].counted_range();
+        let range = high - low;
+        answers[place] * range > 1e-3 * noise && answers[place] > blind * signal
+    };
+    let seen: Vec<bool> = (0..n).map(is_seen).collect();
+    let moving: Vec<usize> = may_move.iter().copied().filter(|&i| seen[i]).collect();
     let on_bound = (0..n).map(|i| {
-        let is_held = !moving.contains(&i);
+        let is_held = !may_move.contains(&i);
         let [lower, upper] = bounds[i];
         [is_held && best.u[i] <= lower, is_held && best.u[i] >= upper]
     });
-    let degrees = best.residuals.len().saturating_sub(moving.len());
-    let variance = match wish.variance {
-        Variance::Estimated => best.sum() / degrees.max(1) as f64,
-        Variance::Given => 1.0,
-    };
+    let covariance = Covariance::weighted(&best.jacobian, &weights, &moving, blind);
+    let rank = moving.len().saturating_sub(covariance.blind.len());
+    let degrees = best.residuals.len().saturating_sub(rank);
     let counted = (wish.variance == Variance::Estimated).then_some(degrees);
     Stage {
         group: group.clone(),
         best: best.u.clone(),
         sum: best.sum(),
+        plain_sum,
         n_residuals: best.residuals.len(),
         end: best.end,
         degrees,
-        variance,
+        variance: variance_of(degrees),
+        is_exact: plain_sum <= floor * degrees as f64,
         on_bound: on_bound.collect(),
-        answers: best
-            .jacobian
-            .column_iter()
-            .map(|column| column.norm())
-            .collect(),
-        covariance: Covariance::new(&best.jacobian, &moving, blind),
+        answers,
+        seen,
+        covariance,
+        residuals: best.residuals.clone(),
         jacobian: best.jacobian.clone(),
         quantile: two_sided(wish.confidence, counted),
         landings: Vec::new(),
@@ -474,93 +493,36 @@ impl Stage {
         Some((variance * self.variance).sqrt())
     }
 
-    /// Whether the tests answer to a parameter at all: over the whole of its range a residual would change
-    /// by more than a thousandth of the noise.
-    pub fn is_seen(&self, place: usize, range: [f64; 2]) -> bool {
-        let noise = self.variance.sqrt().max(1e-12);
-        self.answers[place] * (range[1] - range[0]) > 1e-3 * noise
+    /// How much the sum may grow for a value of a parameter to stay in the interval of confidence.
+    pub(super) fn allowance(&self, place: usize) -> f64 {
+        self.variance * self.quantile.powi(2) * self.covariance.growth(place)
     }
 
-    /// How much the sum may grow for a value to stay in the interval of confidence.
-    fn allowance(&self) -> f64 {
-        self.variance * self.quantile.powi(2)
-    }
-}
-
-/// Follows the profile of a parameter to either side, until it leaves the interval of confidence; and a
-/// better place, if one was met.
-#[expect(
-    clippy::type_complexity,
-    reason = "the search for the others, handed in"
-)]
-#[expect(clippy::float_cmp, reason = "a value that was brought to its bound")]
-fn profile(
-    model: &mut Model,
-    stage: &Stage,
-    place: usize,
-    bounds: [f64; 2],
-    at: &mut dyn FnMut(&mut Model, f64, &[f64]) -> Result<Option<(Vec<f64>, f64)>, Error>,
-) -> Result<(Profile, Option<Vec<f64>>), Error> {
-    let best = stage.best[place];
-    let allowance = stage.allowance();
-    let mut profile = Profile::default();
-    let mut better = None;
-    let error = stage.error(place).filter(|error| *error > 0.0);
-    let first = error.map_or(0.05, |error| STEP_OF_PROFILE * stage.quantile * error);
-    let first = first.clamp(1e-9, 0.5);
-    let mut sides = [Vec::new(), Vec::new()];
-    for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
-        let (mut near, mut value, mut step) = (stage.best.clone(), best, first);
-        let mut last = (best, 0.0);
-        for _ in 0..MOST_POINTS {
-            if value == bounds[side] || !allowance.is_finite() || allowance <= 0.0 {
-                break;
-            }
-            let target = if sign < 0.0 {
-                (value - step).max(bounds[0])
-            } else {
-                (value + step).min(bounds[1])
-            };
-            let Some((u, sum)) = at(model, target, &near)? else {
-                // The law cannot follow there: a shorter step may do.
-                step *= 0.3;
-                if step < 1e-2 * first {
-                    break;
-                }
+    /// Whether two places are one optimum: parameters that are determined agree, and what differs of the
+    /// others changes no residual.
+    fn is_same(&self, (a, a_sum): (&[f64], f64), (b, b_sum): (&[f64], f64)) -> bool {
+        let mut rest = DVector::zeros(self.residuals.len());
+        let (mut is_open, mut most) = (false, 0.0_f64);
+        for (place, (a, b)) in a.iter().zip(b).enumerate() {
+            let apart = a - b;
+            let error = self.error(place);
+            if apart.abs() <= SAME.max(SAME_OF_ERROR * error.unwrap_or(0.0)) {
                 continue;
-            };
-            let rise = sum - stage.sum;
-            if rise < -1e-3 * allowance && better.is_none() {
-                better = Some(u.clone());
             }
-            sides[side].push((target, sum));
-            if rise >= allowance {
-                // √ of the rise is nearly straight.
-                let (a, b) = (last.1, rise.sqrt());
-                let part = (allowance.sqrt() - a) / (b - a);
-                profile.interval[side] = Some(last.0 + part * (target - last.0));
-                break;
+            let is_held = self.on_bound[place] != [false, false];
+            if error.is_some() || self.seen[place] && is_held {
+                return false;
             }
-            let slope = (rise.max(0.0).sqrt() - last.1) / (target - value).abs();
-            last = (target, rise.max(0.0).sqrt());
-            (near, value) = (u, target);
-            if value == bounds[side] {
-                profile.meets_bound[side] = true;
+            is_open = true;
+            if self.seen[place] {
+                rest += self.jacobian.column(place) * apart;
+                most = most.max(self.answers[place]);
             }
-            if (value - best).abs() > FARTHEST {
-                break;
-            }
-            // The next step is one that takes the root as far again, but no leap.
-            let wanted = STEP_OF_PROFILE * allowance.sqrt() / slope.max(1e-12);
-            step = wanted.clamp(0.5 * step, 3.0 * step);
         }
+        let little = SAME_OF_ERROR * self.variance.sqrt();
+        !is_open
+            || rest.norm() <= little.max(SAME * most) && (a_sum - b_sum).abs() <= little * little
     }
-    let [mut below, above] = sides;
-    below.reverse();
-    profile.points = below;
-    profile.points.push((best, stage.sum));
-    profile.points.extend(above);
-    Ok((profile, better))
 }
 
 /// The different places that the starts have led to, the best first; which of them each start led to.
@@ -572,26 +534,25 @@ fn optima(stage: &Stage, landings: &mut [Landing], wish: Wish) -> Vec<Optimum> {
         |i: usize, landings: &[Landing]| landings[i].to.as_ref().map_or(f64::INFINITY, |to| to.1);
     order.sort_by(|&a, &b| sum(a, landings).total_cmp(&sum(b, landings)));
     let counted = (wish.variance == Variance::Estimated).then_some(stage.degrees);
-    let room = stage.variance * joint(wish.confidence, stage.best.len(), counted);
+    let rank = stage.covariance.variables.len() - stage.covariance.blind.len();
+    let room = stage.variance
+        * stage.covariance.mean_growth()
+        * joint(wish.confidence, rank.max(1), counted);
     let mut optima = vec![Optimum {
         u: stage.best.clone(),
         sum: stage.sum,
         times: 0,
         is_as_good: true,
     }];
-    let is_same = |a: &[f64], b: &[f64]| {
-        a.iter().zip(b).enumerate().all(|(place, (a, b))| {
-            let error = stage.error(place).unwrap_or(f64::INFINITY);
-            (a - b).abs() <= SAME.max(SAME_OF_ERROR * error)
-        })
-    };
     for i in order {
         let Some((u, sum)) = landings[i].to.clone() else {
             continue;
         };
         // A place on the way to another, where a search was given up, is no optimum.
         let is_settled = landings[i].end == Some(End::Converged);
-        let known = optima.iter().position(|optimum| is_same(&optimum.u, &u));
+        let known = optima
+            .iter()
+            .position(|known| stage.is_same((&known.u, known.sum), (&u, sum)));
         let number = match known {
             Some(number) => number,
             None if !is_settled => continue,

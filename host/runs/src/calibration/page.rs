@@ -87,7 +87,8 @@ fn tests(outcome: &Outcome) -> Vec<Value> {
                 rms => digits(fitted.rms),
                 relative => format!("{:.2}", fitted.relative),
                 neighbours => format!("{:.2}", fitted.neighbours),
-                inside => format!("{:.0}", 100.0 * fitted.inside),
+                explained => fitted.explained.map_or("–".to_owned(), |part| format!("{:.1}", 100.0 * part)),
+                inside => fitted.inside.map_or("no interval".to_owned(), |part| format!("{:.0}", 100.0 * part)),
             }
         })
     });

@@ -39,7 +39,7 @@ pub(super) fn are_given(driver: &Driver) -> bool {
     let is_plain =
         |segment: &Segment| segment.restrictions.is_none() && segment.frame == Frame::Cartesian;
     formulation.rates
-        && !formulation.time_dependent
+        && driver.point().law().time_dependence().is_none()
         && driver.point().segments().iter().all(is_plain)
 }
 

@@ -4,7 +4,12 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
-/// Covariance of some variables for residuals of unit variance, (JᵀJ)⁻¹, as far as J determines them.
+/// Covariance of some variables where measured values scatter by their noise, as far as the residuals
+/// determine them.
+///
+/// Least squares with weights w take r = √w ρ for ρ, which have unit variance. With J = ∂r/∂u, A = JᵀJ and
+/// B = Jᵀ W J the error of û is A⁻¹ Jᵀ √w ε, its covariance A⁻¹ B A⁻¹. Without weights that is A⁻¹. A weight
+/// says what matters, not what is known: w for all of them changes nothing.
 #[derive(Clone, Debug)]
 pub struct Covariance {
     /// The variables, by number.
@@ -12,23 +17,46 @@ pub struct Covariance {
     /// Directions that the residuals do not see, in the scale of unit columns: one entry for each of
     /// `variables`.
     pub blind: Vec<Vec<f64>>,
+    /// A⁻¹ B A⁻¹.
     matrix: DMatrix<f64>,
+    /// A⁻¹.
+    inverse: DMatrix<f64>,
+    /// Trace of A⁻¹ B over its rank.
+    mean_growth: f64,
+    /// Largest weight.
+    most: f64,
 }
 
 /// A variable belongs to a blind direction if it has at least this part of it.
 const PART: f64 = 0.1;
 
 impl Covariance {
-    /// From derivatives of residuals. Columns are brought to unit length; a direction along which the
-    /// residuals then change by less than `blind` times the largest change is one that they do not see.
-    pub fn new(jacobian: &DMatrix<f64>, variables: &[usize], blind: f64) -> Self {
+    /// From derivatives of residuals without weights.
+    #[cfg(test)]
+    pub(super) fn new(jacobian: &DMatrix<f64>, variables: &[usize], blind: f64) -> Self {
+        Self::weighted(jacobian, &vec![1.0; jacobian.nrows()], variables, blind)
+    }
+
+    /// From derivatives of residuals, and the weight of each. Columns are brought to unit length; a
+    /// direction along which the residuals then change by less than `blind` times the largest change is one
+    /// that they do not see.
+    pub fn weighted(
+        jacobian: &DMatrix<f64>,
+        weights: &[f64],
+        variables: &[usize],
+        blind: f64,
+    ) -> Self {
         let n = variables.len();
+        let most = weights.iter().fold(0.0_f64, |most, w| most.max(*w));
         if n == 0 || jacobian.nrows() == 0 {
             let blind = |k: usize| (0..n).map(|i| f64::from(u8::from(i == k))).collect();
             return Self {
                 variables: variables.to_vec(),
                 blind: (0..n).map(blind).collect(),
                 matrix: DMatrix::zeros(n, n),
+                inverse: DMatrix::zeros(n, n),
+                mean_growth: most,
+                most,
             };
         }
         let norms: Vec<f64> = variables
@@ -42,8 +70,8 @@ impl Covariance {
         let unit = DMatrix::from_fn(jacobian.nrows(), n, |row, k| {
             jacobian[(row, variables[k])] / norms[k]
         });
-        let svd = unit.svd(false, true);
-        let mut matrix = DMatrix::zeros(n, n);
+        let svd = unit.clone().svd(false, true);
+        let mut inverse = DMatrix::zeros(n, n);
         let mut directions = Vec::new();
         let largest = svd.singular_values.iter().fold(0.0_f64, |a, b| a.max(*b));
         let v_t = svd.v_t.unwrap_or_else(|| DMatrix::identity(0, n));
@@ -52,13 +80,14 @@ impl Covariance {
             let v = v_t.row(number).transpose();
             seen += &v * v.transpose();
             if value > blind * largest {
-                matrix += &v * v.transpose() / (value * value);
+                inverse += &v * v.transpose() / (value * value);
             } else {
                 directions.push(v.iter().copied().collect::<Vec<_>>());
             }
         }
+        let rank = n.min(jacobian.nrows()) - directions.len();
         // With fewer residuals than variables some directions have no singular value.
-        for k in 0..n.saturating_sub(svd.singular_values.len()) {
+        for _ in 0..n.saturating_sub(svd.singular_values.len()) {
             let rest = DMatrix::identity(n, n) - &seen;
             let Some(widest) = (0..n).max_by(|&a, &b| rest[(a, a)].total_cmp(&rest[(b, b)])) else {
                 break;
@@ -71,14 +100,43 @@ impl Covariance {
             let direction = direction / norm;
             seen += &direction * direction.transpose();
             directions.push(direction.iter().copied().collect());
-            debug_assert!(k < n, "a direction for each that is missing");
         }
-        let matrix = DMatrix::from_fn(n, n, |a, b| matrix[(a, b)] / (norms[a] * norms[b]));
+        let weighed = DMatrix::from_fn(unit.nrows(), n, |row, k| weights[row] * unit[(row, k)]);
+        let scatter = unit.transpose() * weighed;
+        let growth = &inverse * scatter;
+        let matrix = &growth * &inverse;
+        let scaled = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(n, n, |a, b| matrix[(a, b)] / (norms[a] * norms[b]))
+        };
         Self {
             variables: variables.to_vec(),
             blind: directions,
-            matrix,
+            matrix: scaled(&matrix),
+            inverse: scaled(&inverse),
+            mean_growth: growth.trace() / rank.max(1) as f64,
+            most,
         }
+    }
+
+    /// How much the sum of squares grows, over the variance, where a variable leaves its best value by one
+    /// standard error and the others follow: 1 without weights.
+    pub(super) fn growth(&self, variable: usize) -> f64 {
+        let place = self
+            .position(variable)
+            .filter(|_| self.determines(variable));
+        place.map_or(self.most, |k| self.matrix[(k, k)] / self.inverse[(k, k)])
+    }
+
+    /// The mean of that over all directions.
+    pub(super) fn mean_growth(&self) -> f64 {
+        self.mean_growth
+    }
+
+    /// How the variables follow changes of the residuals: −A⁻¹ Jᵀ, a row for each variable, a column for each
+    /// residual.
+    pub(super) fn answer(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+        let own = jacobian.select_columns(&self.variables);
+        -(&self.inverse * own.transpose())
     }
 
     fn position(&self, variable: usize) -> Option<usize> {
@@ -102,16 +160,6 @@ impl Covariance {
         let product = self.variance(a)? * self.variance(b)?;
         let [i, j] = [self.position(a)?, self.position(b)?];
         Some(self.matrix[(i, j)] / product.sqrt())
-    }
-
-    /// Variance of what changes with the variables by `gradient` (one entry for each variable of the
-    /// fit, those that are not among [`Self::variables`] included).
-    pub fn variance_along(&self, gradient: &[f64]) -> f64 {
-        let of = |k: usize| gradient.get(self.variables[k]).copied().unwrap_or(0.0);
-        let n = self.variables.len();
-        let terms = (0..n).flat_map(|a| (0..n).map(move |b| (a, b)));
-        let terms = terms.map(|(a, b)| of(a) * self.matrix[(a, b)] * of(b));
-        terms.sum::<f64>().max(0.0)
     }
 }
 
@@ -187,11 +235,33 @@ mod tests {
             expected,
             epsilon = 1e-12
         );
-        // Of the mean of y at x = 2: 1/4 + (2 − 1.5)²/5.
-        assert_relative_eq!(covariance.variance_along(&[1.0, 2.0]), 0.3, epsilon = 1e-12);
         let alone = Covariance::new(&jacobian, &[1], 1e-12);
         assert_relative_eq!(alone.variance(1).unwrap(), 1.0 / 14.0, epsilon = 1e-12);
         assert_eq!(alone.variance(0), None);
+    }
+
+    #[test]
+    fn weights_are_no_information() {
+        // A mean of y with weights w: û = Σ w y/Σ w, so that its variance is Σ w²/(Σ w)².
+        let weights = [4.0, 1.0, 1.0];
+        let jacobian = DMatrix::from_fn(3, 1, |i, _| f64::sqrt(weights[i]));
+        let covariance = Covariance::weighted(&jacobian, &weights, &[0], 1e-12);
+        assert_relative_eq!(
+            covariance.variance(0).unwrap(),
+            18.0 / 36.0,
+            epsilon = 1e-12
+        );
+        // S − Ŝ = Σ w (u − û)², 6 times 1/2 at one standard error.
+        assert_relative_eq!(covariance.growth(0), 3.0, epsilon = 1e-12);
+        assert_relative_eq!(covariance.mean_growth(), 3.0, epsilon = 1e-12);
+        // The same weight for all: that of three values, 1/3.
+        let all = [9.0; 3];
+        let covariance = Covariance::weighted(&DMatrix::from_element(3, 1, 3.0), &all, &[0], 1e-12);
+        assert_relative_eq!(covariance.variance(0).unwrap(), 1.0 / 3.0, epsilon = 1e-12);
+        assert_relative_eq!(covariance.growth(0), 9.0, epsilon = 1e-12);
+        // A variable answers to a residual that grows by sinking.
+        let answer = covariance.answer(&DMatrix::from_element(3, 1, 3.0));
+        assert_relative_eq!(answer[(0, 1)], -1.0 / 9.0, epsilon = 1e-12);
     }
 
     #[test]

@@ -4,7 +4,10 @@ use super::coordinates::Parameter;
 use super::curve::Rows;
 use super::fit::Stage;
 use super::least_squares::End;
+use super::misfit;
 use super::model::{Model, Subject};
+use super::profile::Side;
+use super::propagation::Errors;
 use crate::Error;
 use input::calibration::{Scale, Variance};
 
@@ -36,6 +39,14 @@ pub(super) fn of_stage(
         .iter()
         .map(|&p| model.parameters[p].clone())
         .collect();
+    if stage.is_exact && variance == Variance::Estimated {
+        words.push(
+            "the residuals are smaller than what computed values are known to, as those of points that the law itself has \
+             made: nothing is told of the scatter of measured values, and intervals are those of the numbers"
+                .to_owned(),
+        );
+    }
+    let is_bad = is_bad(model, stage);
     match stage.end {
         End::Converged => {}
         End::Exhausted => words.push(
@@ -58,14 +69,9 @@ pub(super) fn of_stage(
         ),
     }
     for (place, parameter) in parameters.iter().enumerate() {
-        if !stage.is_seen(place, parameter.counted_range()) {
-            words.push(unseen(
-                model,
-                &group.tests,
-                parameter,
-                group.parameters[place],
-                values,
-            )?);
+        if !stage.seen[place] {
+            let asked = (parameter, group.parameters[place]);
+            words.push(unseen(model, &group.tests, asked, values, is_bad)?);
             continue;
         }
         match stage.on_bound[place] {
@@ -105,33 +111,13 @@ pub(super) fn of_stage(
         }
     }
     for (place, parameter) in parameters.iter().enumerate() {
-        if !stage.is_seen(place, parameter.counted_range()) {
+        if !stage.seen[place] {
             continue;
         }
-        if let Some(profile) = stage.profiles.get(place) {
-            let open = [("downwards", 0), ("upwards", 1)].into_iter();
-            let open = open.filter(|(_, side)| {
-                profile.interval[*side].is_none()
-                    && profile.points.len() > 1
-                    && !stage.on_bound[place][*side]
-            });
-            for (way, side) in open {
-                let why = if profile.meets_bound[side] {
-                    format!("up to its bound {}", digits(parameter.bounds[side]))
-                } else {
-                    let end = if side == 0 {
-                        profile.points.first()
-                    } else {
-                        profile.points.last()
-                    };
-                    let end = end.map_or(f64::NAN, |(u, _)| parameter.value(*u));
-                    format!("as far as it was followed, {}", digits(end))
-                };
-                words.push(format!(
-                    "the tests set `{}` no limit {way}: the best fit stays as good {why}",
-                    parameter.name
-                ));
-            }
+        if let Some(profile) = stage.profiles.get(place).filter(|p| p.points.len() > 1) {
+            let sides = profile.sides.into_iter().zip(stage.on_bound[place]);
+            let open = sides.enumerate().filter(|(_, (_, on_bound))| !on_bound);
+            words.extend(open.filter_map(|(number, (side, _))| open_side(parameter, number, side)));
         }
         let Some(error) = stage.error(place) else {
             continue;
@@ -205,7 +191,7 @@ pub(super) fn of_stage(
         ));
     }
     if variance == Variance::Given && stage.degrees > 0 {
-        let ratio = (stage.sum / stage.degrees as f64).sqrt();
+        let ratio = (stage.plain_sum / stage.degrees as f64).sqrt();
         if !(0.5..=2.0).contains(&ratio) {
             words.push(format!(
                 "residuals are {ratio:.2} times the noise that is given: either that is not the noise, or the law does \
@@ -219,6 +205,97 @@ pub(super) fn of_stage(
         );
     }
     Ok(words)
+}
+
+/// Ratio of two standard errors that is worth a word.
+const WIDER: f64 = 1.1;
+
+/// What is to be said where parameters of earlier stages are held: how much of their errors goes into those
+/// of later ones.
+pub(super) fn of_stages(
+    model: &Model,
+    stages: &[Stage],
+    places: &[(usize, usize)],
+    errors: &Errors,
+) -> Vec<String> {
+    let mut words = vec![
+        "an interval of a parameter holds for the values of the parameters that its stage did not fit; a last stage with all of \
+         them gives intervals that hold together. Intervals of prediction have the errors of all stages"
+            .to_owned(),
+    ];
+    for (parameter, &(number, place)) in places.iter().enumerate() {
+        let stage = &stages[number];
+        let Some(own) = stage.covariance.variance(place) else {
+            continue;
+        };
+        let name = &model.parameters[parameter].name;
+        match errors.of_parameter(parameter) {
+            None => words.push(format!(
+                "stage `{}`: `{name}` follows what an earlier stage does not determine: its interval holds for the values \
+                 held there, and no others",
+                stage.group.name
+            )),
+            Some(all) if (all / own).sqrt() > WIDER => words.push(format!(
+                "stage `{}`: with the errors of the values that are held, the standard error of `{name}` is {:.1} times that of \
+                 its interval",
+                stage.group.name,
+                (all / own).sqrt()
+            )),
+            Some(_) => {}
+        }
+    }
+    words
+}
+
+/// Whether a curve of the stage is not followed at all.
+fn is_bad(model: &Model, stage: &Stage) -> bool {
+    let mut residuals = stage.residuals.iter();
+    let mut curves = stage
+        .group
+        .tests
+        .iter()
+        .flat_map(|&test| &model.tests[test].curves);
+    curves.any(|curve| {
+        let root = curve.weight.sqrt();
+        let points = curve.points.iter().zip(&curve.deviations);
+        let computed: Vec<f64> = points
+            .zip(residuals.by_ref())
+            .map(|(((_, y), deviation), r)| y + r * deviation / root)
+            .collect();
+        misfit::is_bad(curve, &computed)
+    })
+}
+
+/// A side of a profile without a limit, and why; `None` if it has one.
+fn open_side(parameter: &Parameter, number: usize, side: Side) -> Option<String> {
+    let way = ["downwards", "upwards"][number];
+    let name = &parameter.name;
+    let shown = |u: f64| digits(parameter.value(u));
+    let none = |why: String| {
+        format!("the tests set `{name}` no limit {way}: the best fit stays as good {why}")
+    };
+    let not_known = |u: f64, why: &str| {
+        format!(
+            "how far `{name}` may go {way} is not known: as good up to {}, {why}",
+            shown(u)
+        )
+    };
+    match side {
+        Side::Limit(_) | Side::Unknown => None,
+        Side::Bound => {
+            let bound = digits(parameter.bounds[number]);
+            Some(none(format!("up to its bound {bound}")))
+        }
+        Side::Flat(u) => Some(none(format!("as far as it was followed, {}", shown(u)))),
+        Side::Barred(u) => Some(not_known(
+            u,
+            "and beyond a test cannot be computed: other parameters fixed, or `min` and `max` that the law can follow",
+        )),
+        Side::Unfinished(u) => Some(not_known(
+            u,
+            "where the profile was left after as many points as are spent on it",
+        )),
+    }
 }
 
 /// Values of parameters, as a list.
@@ -277,17 +354,34 @@ fn together(parts: &[(&Parameter, f64)]) -> String {
 
 /// Part by which a value is changed to see what it moves.
 const TRIED: f64 = 0.1;
+/// Shares of a parameter's range where curves are looked at, whether they answer there.
+const ELSEWHERE: [f64; 4] = [0.0, 0.25, 0.75, 1.0];
 /// Relative change of a column that counts as one.
 const MOVES: f64 = 1e-5;
 
-/// Why no curve answers to a parameter.
+/// Why no curve answers to a parameter at the values found.
 fn unseen(
     model: &mut Model,
     tests: &[usize],
-    parameter: &Parameter,
-    number: usize,
+    (parameter, number): (&Parameter, usize),
     values: &[f64],
+    is_bad: bool,
 ) -> Result<String, Error> {
+    let name = &parameter.name;
+    if is_bad {
+        return Ok(format!(
+            "nothing can be said of `{name}`: no measured curve changes with it at the values found, but these are far from \
+             following the curves"
+        ));
+    }
+    if let Some(value) = elsewhere(model, tests, (parameter, number), values)? {
+        return Ok(format!(
+            "`{name}` is not told: at {}, where the search ended, no measured curve changes with it, while with {} they do: \
+             the tests set it a limit at most, unless another `start` leads to a better place",
+            digits(parameter.value(values[number])),
+            digits(value)
+        ));
+    }
     let mut moved: Vec<String> = Vec::new();
     let mut all = Vec::new();
     let mut compared: Vec<String> = Vec::new();
@@ -298,13 +392,13 @@ fn unseen(
                 .iter()
                 .flat_map(|c| [c.x.clone(), c.y.clone()]),
         );
-        let Ok(here) = model.computed(test, values)? else {
+        let Ok(here) = model.rows(test, values)? else {
             continue;
         };
         for sign in [1.0, -1.0] {
             let mut other = values.to_vec();
             other[number] += sign * TRIED;
-            if let Ok(there) = model.computed(test, &other)? {
+            if let Ok(there) = model.rows(test, &other)? {
                 for name in changes(&here, &there) {
                     if !moved.contains(&name) {
                         moved.push(name);
@@ -316,10 +410,7 @@ fn unseen(
         all.push((test, here));
     }
     moved.retain(|name| !compared.contains(name));
-    let head = format!(
-        "`{}` cannot be identified: no measured curve changes with it",
-        parameter.name
-    );
+    let head = format!("`{name}` cannot be identified: no measured curve changes with it");
     if !moved.is_empty() {
         let names: Vec<String> = moved.iter().map(|name| format!("`{name}`")).collect();
         let it = if moved.len() == 1 {
@@ -328,9 +419,8 @@ fn unseen(
             "one of them"
         };
         return Ok(format!(
-            "{head}; it moves {} alone: measure {it}, or fix `{}`",
-            names.join(", "),
-            parameter.name
+            "{head}; it moves {} alone: measure {it}, or fix `{name}`",
+            names.join(", ")
         ));
     }
     let facts = facts(model, &all);
@@ -342,6 +432,41 @@ fn unseen(
     Ok(format!(
         "{head}, nor does anything else in these tests{why}; fix it, or add a test of another kind"
     ))
+}
+
+/// Another value of a parameter with which measured curves are others.
+fn elsewhere(
+    model: &mut Model,
+    tests: &[usize],
+    (parameter, number): (&Parameter, usize),
+    values: &[f64],
+) -> Result<Option<f64>, Error> {
+    let [low, high] = parameter.counted_range();
+    for share in ELSEWHERE {
+        let mut other = values.to_vec();
+        other[number] = low + share * (high - low);
+        for &test in tests {
+            let (Ok(here), Ok(there)) =
+                (model.computed(test, values)?, model.computed(test, &other)?)
+            else {
+                continue;
+            };
+            let of_test = &model.tests[test];
+            let mut curves = of_test.of_curves(&here).zip(of_test.of_curves(&there));
+            let is_other = curves.any(|((curve, a), (_, b))| {
+                let most = a
+                    .iter()
+                    .zip(b)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max);
+                most > MOVES * curve.largest()
+            });
+            if is_other {
+                return Ok(Some(parameter.value(other[number])));
+            }
+        }
+    }
+    Ok(None)
 }
 
 /// Columns that differ between two computations.

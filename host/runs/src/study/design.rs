@@ -2,6 +2,7 @@
 
 use super::sobol;
 use crate::Error;
+use crate::sampling::{Random, stratified};
 use input::Study;
 use input::study::{MOST_RUNS, Method, Parameter, Spread};
 use libm::erfc;
@@ -102,12 +103,7 @@ fn levels(parameter: &Parameter) -> Vec<Value> {
         }
     };
     let mut levels: Vec<Value> = (0..n)
-        .map(|i| {
-            number(
-                parameter,
-                quantile(&parameter.spread, share(i)).round_if(parameter.whole),
-            )
-        })
+        .map(|i| number(parameter, quantile(&parameter.spread, share(i))))
         .collect();
     levels.dedup();
     levels
@@ -118,10 +114,7 @@ fn levels(parameter: &Parameter) -> Vec<Value> {
 pub(super) fn extremes(parameter: &Parameter) -> Vec<Value> {
     let Spread::Values(values) = &parameter.spread else {
         let ends = [0.0, 1.0].map(|share| quantile(&parameter.spread, share));
-        return ends
-            .into_iter()
-            .map(|end| number(parameter, end.round_if(parameter.whole)))
-            .collect();
+        return ends.into_iter().map(|end| number(parameter, end)).collect();
     };
     let as_number = |value: &Value| match value {
         Value::Float(number) => Some(*number),
@@ -161,27 +154,17 @@ fn value(parameter: &Parameter, share: f64) -> Value {
             let among = (from + share * (to - from + 1.0)).floor().min(to);
             number(parameter, among)
         }
-        spread => number(parameter, quantile(spread, share).round_if(parameter.whole)),
+        spread => number(parameter, quantile(spread, share)),
     }
 }
 
+/// A number, of whole ones the nearest between the ends.
 fn number(parameter: &Parameter, value: f64) -> Value {
-    if parameter.whole {
-        Value::Integer(value as i64)
-    } else {
-        Value::Float(value)
+    if !parameter.whole {
+        return Value::Float(value);
     }
-}
-
-/// Rounding where whole numbers are wanted.
-trait Round {
-    fn round_if(self, whole: bool) -> Self;
-}
-
-impl Round for f64 {
-    fn round_if(self, whole: bool) -> Self {
-        if whole { self.round() } else { self }
-    }
+    let [from, to] = parameter.spread.ends().unwrap_or([f64::MIN, f64::MAX]);
+    Value::Integer(value.round().clamp(from.ceil(), to.floor()) as i64)
 }
 
 /// The number below which this share of a distribution lies; both ends exactly.
@@ -248,51 +231,6 @@ fn truncated_normal(a: f64, b: f64, share: f64) -> f64 {
     }
 }
 
-/// One number in each of n equal parts of 0 to 1, in random order.
-fn stratified(n: usize, random: &mut Random) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..n).collect();
-    for i in (1..n).rev() {
-        order.swap(i, random.below(i + 1));
-    }
-    let inside = |part: usize| {
-        let x = (part as f64 + random.fraction()) / n as f64;
-        // Rounding must not carry it into the next part.
-        x.min(((part + 1) as f64 / n as f64).next_down())
-    };
-    order.into_iter().map(inside).collect()
-}
-
-/// SplitMix64 (G. L. Steele, D. Lea & C. H. Flood, OOPSLA 2014): the same numbers everywhere and for ever.
-struct Random(u64);
-
-impl Random {
-    /// Numbers of their own for each dimension: one more parameter leaves those of the others alone.
-    fn of(seed: u64, dimension: usize) -> Self {
-        let mut seeds = Self(seed);
-        for _ in 0..dimension {
-            seeds.next();
-        }
-        Self(seeds.next())
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// At least 0 and below 1.
-    fn fraction(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / 2_f64.powi(53)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        ((u128::from(self.next()) * n as u128) >> 64) as usize
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,20 +252,6 @@ mod tests {
             other => panic!("{other}"),
         };
         rows.iter().map(number).collect()
-    }
-
-    /// The first numbers of the reference implementation (S. Vigna) from the seed 1234567.
-    #[test]
-    fn random_numbers_are_the_published_ones() {
-        let mut random = Random(1_234_567);
-        let published = [
-            6_457_827_717_110_365_317,
-            3_203_168_211_198_807_973,
-            9_817_491_932_198_370_423,
-            4_593_380_528_125_082_431,
-            16_408_922_859_458_223_821,
-        ];
-        assert_eq!(std::array::from_fn(|_| random.next()), published);
     }
 
     #[test]
@@ -401,6 +325,30 @@ mod tests {
         for whole in 3..=6 {
             let count = found.iter().filter(|x| **x as i32 == whole).count();
             assert_eq!(count, 64, "{whole}");
+        }
+    }
+
+    /// Not 0 and 4, which are the nearest ones of the ends.
+    #[test]
+    fn whole_numbers_lie_between_the_ends() {
+        let spreads = [
+            "uniform = [0.4, 3.6]",
+            "log_uniform = [0.4, 3.6]",
+            "normal = { mean = 2.0, deviation = 5.0, min = 0.4, max = 3.6 }",
+        ];
+        for (method, levels) in [("\"grid\"", "levels = 9"), ("\"sobol\"\nruns = 16", "")] {
+            for spread in spreads {
+                let text = format!(
+                    "method = {method}\n[[parameter]]\nkey = \"a\"\nwhole = true\n{levels}\n{spread}\n"
+                );
+                let study = study(&text);
+                let mut found = numbers(&rows(&study).unwrap(), 0);
+                found.extend(numbers(&[extremes(&study.parameters[0])], 0));
+                assert!(
+                    found.iter().all(|x| (1.0..=3.0).contains(x)),
+                    "{text}: {found:?}"
+                );
+            }
         }
     }
 

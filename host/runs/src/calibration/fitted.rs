@@ -1,0 +1,332 @@
+//! What is computed with the values found, beside what was measured.
+
+use super::curve::Curve;
+use super::fit::{Group, Stage, Wish, blind, known_to};
+use super::misfit;
+use super::model::{Model, Test};
+use super::profile::Side;
+use super::propagation::{Errors, Known};
+use super::statistics::{of_neighbours, two_sided};
+use crate::Error;
+use input::calibration::Variance;
+
+/// A test beside its measured points.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// Name.
+    pub name: String,
+    /// It was predicted, not fitted.
+    pub is_predicted: bool,
+    /// Its derivatives came from the rates of its law, not from differences.
+    pub is_by_law: bool,
+    /// Its curves.
+    pub curves: Vec<FittedCurve>,
+}
+
+/// A curve beside its measured points.
+#[derive(Clone, Debug)]
+pub struct FittedCurve {
+    /// What was measured.
+    pub curve: Curve,
+    /// Computed values at the measured points.
+    pub computed: Vec<f64>,
+    /// The computed curve.
+    pub line: Vec<(f64, f64)>,
+    /// Standard deviation of a new measured value at each point: of its noise, and of the computed value
+    /// as far as that follows from the parameters' own; `None` where it depends on what the tests do not
+    /// determine: it may be anywhere.
+    pub deviations: Vec<Option<f64>>,
+    /// Root of the mean square of computed less measured values, in the unit of the curve.
+    pub rms: f64,
+    /// The same of residuals over their noise as given.
+    pub relative: f64,
+    /// Correlation of neighbouring residuals.
+    pub neighbours: f64,
+    /// R², the part of what measured values vary by that computed ones explain; `None` where they do not vary.
+    pub explained: Option<f64>,
+    /// Part of the measured points inside their interval of prediction, of those that have one.
+    pub inside: Option<f64>,
+}
+
+/// What is to be said of the tests.
+#[derive(Debug, Default)]
+pub(super) struct Said {
+    /// Fits that are none.
+    pub(super) bad: Vec<String>,
+    /// All else.
+    pub(super) others: Vec<String>,
+}
+
+/// How measured values scatter about the computed ones.
+#[derive(Clone, Copy, Debug)]
+struct Scatter {
+    variance: f64,
+    quantile: f64,
+}
+
+/// Neighbouring residuals that go together more than this, on a curve of so many points.
+const FOLLOW: f64 = 0.5;
+const ENOUGH: usize = 10;
+/// Part of a prediction's deviation from which on a parameter without a limit is named.
+const COUNTS: f64 = 0.1;
+/// A prediction depends on what is not determined if it changes by more than this part of its noise
+/// where that goes once through the range of a parameter.
+const LITTLE: f64 = 0.1;
+/// Sums of gradients are known to this many times what derivatives of the residuals are.
+const CANCEL: f64 = 10.0;
+
+/// All tests with the values found, those that are predicted included, and what is to be said of them.
+///
+/// # Errors
+/// Stopped; a test that cannot be computed with the values found.
+pub(super) fn fitted(
+    model: &mut Model,
+    stages: &[Stage],
+    errors: &Errors,
+    counted: &[f64],
+    wish: Wish,
+) -> Result<(Vec<Fitted>, Said), Error> {
+    let scatter = scatter(model, errors, counted, wish)?;
+    let of = errors.of_parameters();
+    let mut said = Said::default();
+    let mut all = Vec::new();
+    for number in 0..model.tests.len() {
+        let computed = model.computed(number, counted)?;
+        let rows = model.rows(number, counted)?;
+        let (Ok(computed), Ok(rows)) = (computed, rows) else {
+            let why = model.first_failure.clone().unwrap_or_default();
+            let name = &model.tests[number].name;
+            let message = format!("test `{name}` cannot be computed with the values found: {why}");
+            return Err(Error::usage(message));
+        };
+        let gradients = model.gradients(number, counted, &of)?;
+        let test = &model.tests[number];
+        let known = known(model, test, (errors, &of, &gradients), scatter);
+        let noise = test.curves.iter().flat_map(|curve| &curve.deviations);
+        let of_known = |(known, noise): (&Known, &f64)| match known {
+            Known::Variance(variance) if scatter.quantile.is_finite() => {
+                Some((scatter.variance * (variance + noise * noise)).sqrt())
+            }
+            _ => None,
+        };
+        let deviations: Vec<Option<f64>> = known.iter().zip(noise).map(of_known).collect();
+        said.others.extend(without_interval(model, test, &known));
+        said.others.extend(without_limit(
+            model,
+            stages,
+            test,
+            (&of, &gradients),
+            &deviations,
+        ));
+        let values = test.of_curves(&computed).zip(test.of_curves(&deviations));
+        let mut curves = Vec::new();
+        for (place, ((curve, computed), (_, deviations))) in values.enumerate() {
+            let line = curve.line(&rows).map_err(|_| {
+                Error::internal(format!("a curve of test `{}` that is none", test.name))
+            })?;
+            let fitted = curve_of(curve, computed, line, deviations, scatter);
+            if !test.is_predicted {
+                if misfit::is_bad(curve, computed) {
+                    let at_start = &test.at_start[place];
+                    said.bad
+                        .push(misfit::in_words(&test.name, curve, computed, at_start));
+                }
+                said.others.extend(followed(&test.name, &fitted));
+            }
+            curves.push(fitted);
+        }
+        all.push(Fitted {
+            name: test.name.clone(),
+            is_predicted: test.is_predicted,
+            is_by_law: test.is_by_law,
+            curves,
+        });
+    }
+    Ok((all, said))
+}
+
+/// What is known of the computed values of a test, curve by curve, since their units differ.
+fn known(
+    model: &Model,
+    test: &Test,
+    (errors, of, gradients): (&Errors, &[usize], &[Option<Vec<f64>>]),
+    scatter: Scatter,
+) -> Vec<Known> {
+    let blind = blind(model);
+    let mut first = 0;
+    let of_curve = |curve: &Curve| {
+        let own = first..first + curve.points.len();
+        first = own.end;
+        let columns = gradients
+            .iter()
+            .map(|column| Some(&column.as_ref()?[own.clone()]));
+        let columns: Vec<Option<&[f64]>> = columns.collect();
+        let noise = scatter.variance.sqrt();
+        let exact = blind * curve.largest();
+        let least = curve
+            .deviations
+            .iter()
+            .map(|d| (LITTLE * noise * d).max(exact));
+        errors.of_values(of, &columns, &least.collect::<Vec<_>>(), CANCEL * blind)
+    };
+    test.curves.iter().flat_map(of_curve).collect()
+}
+
+fn curve_of(
+    curve: &Curve,
+    computed: &[f64],
+    line: Vec<(f64, f64)>,
+    deviations: &[Option<f64>],
+    scatter: Scatter,
+) -> FittedCurve {
+    let n = curve.points.len();
+    let root_mean_square = |values: &mut dyn Iterator<Item = f64>| {
+        (values.map(|v| v * v).sum::<f64>() / n.max(1) as f64).sqrt()
+    };
+    let differences = || curve.points.iter().zip(computed).map(|((_, y), c)| c - y);
+    let residuals = curve.residuals(computed);
+    let factor = curve.weight.sqrt();
+    let with_interval = differences().zip(deviations);
+    let with_interval: Vec<bool> = with_interval
+        .filter_map(|(d, deviation)| Some(d.abs() <= scatter.quantile * (*deviation)?))
+        .collect();
+    let inside = with_interval.iter().filter(|inside| **inside).count();
+    FittedCurve {
+        computed: computed.to_vec(),
+        line,
+        deviations: deviations.to_vec(),
+        rms: root_mean_square(&mut differences()),
+        relative: root_mean_square(&mut residuals.iter().map(|r| r / factor)),
+        neighbours: of_neighbours(&residuals),
+        explained: misfit::explained(curve, computed),
+        inside: (!with_interval.is_empty()).then(|| inside as f64 / with_interval.len() as f64),
+        curve: curve.clone(),
+    }
+}
+
+/// The scatter of all measured values that were fitted, about what is computed with the values found.
+fn scatter(
+    model: &mut Model,
+    errors: &Errors,
+    counted: &[f64],
+    wish: Wish,
+) -> Result<Scatter, Error> {
+    if wish.variance == Variance::Given {
+        return Ok(Scatter {
+            variance: 1.0,
+            quantile: two_sided(wish.confidence, None),
+        });
+    }
+    let fitted = (0..model.tests.len()).filter(|&test| !model.tests[test].is_predicted);
+    let all = Group {
+        name: String::new(),
+        parameters: Vec::new(),
+        tests: fitted.collect(),
+    };
+    let (mut sum, mut n) = (0.0, 0);
+    for &test in &all.tests {
+        if let Ok(computed) = model.computed(test, counted)? {
+            for (curve, own) in model.tests[test].of_curves(&computed) {
+                sum += curve
+                    .residuals(own)
+                    .iter()
+                    .map(|r| r * r / curve.weight)
+                    .sum::<f64>();
+                n += own.len();
+            }
+        }
+    }
+    let degrees = n.saturating_sub(errors.n_determined());
+    let [floor, _] = known_to(model, &all);
+    Ok(Scatter {
+        variance: (sum / degrees.max(1) as f64).max(floor),
+        quantile: two_sided(wish.confidence, Some(degrees)),
+    })
+}
+
+/// Curves with points whose prediction depends on what is not determined.
+fn without_interval(model: &Model, test: &Test, known: &[Known]) -> Vec<String> {
+    let word = |(curve, known): (&Curve, &[Known])| {
+        let mut parameters: Vec<usize> = Vec::new();
+        let open = known.iter().filter_map(|known| match known {
+            Known::Open(of) => Some(of),
+            Known::Variance(_) => None,
+        });
+        let n = open.inspect(|of| parameters.extend(*of)).count();
+        parameters.sort_unstable();
+        parameters.dedup();
+        let names = parameters
+            .iter()
+            .map(|&p| format!("`{}`", model.parameters[p].name));
+        let names: Vec<String> = names.collect();
+        (n > 0).then(|| {
+            format!(
+                "{}, {}: {n} of {} points have no interval of prediction: what is computed there depends on {}, which \
+                 the tests do not determine, and may be anything",
+                test.name,
+                curve.y,
+                known.len(),
+                names.join(" and ")
+            )
+        })
+    };
+    test.of_curves(known).filter_map(word).collect()
+}
+
+/// Parameters that a prediction depends on and whose profile has a side without a limit: the covariance
+/// knows nothing of that.
+fn without_limit(
+    model: &Model,
+    stages: &[Stage],
+    test: &Test,
+    (of, gradients): (&[usize], &[Option<Vec<f64>>]),
+    deviations: &[Option<f64>],
+) -> Option<String> {
+    let counts = |(&parameter, gradient): (&usize, &Option<Vec<f64>>)| {
+        let last = stages.iter().rev().find_map(|stage| {
+            let place = stage
+                .group
+                .parameters
+                .iter()
+                .position(|&p| p == parameter)?;
+            Some((stage, place))
+        });
+        let (stage, place) = last?;
+        let profile = stage.profiles.get(place).filter(|p| p.points.len() > 1)?;
+        let is_open = profile
+            .sides
+            .iter()
+            .any(|side| !matches!(side, Side::Limit(_)));
+        let error = stage.error(place).filter(|_| is_open)?;
+        let gradient = gradient.as_ref()?;
+        let mut pairs = gradient.iter().zip(deviations);
+        let does = pairs.any(|(g, d)| d.is_some_and(|d| (g * error).abs() > COUNTS * d));
+        does.then(|| format!("`{}`", model.parameters[parameter].name))
+    };
+    let names: Vec<String> = of.iter().zip(gradients).filter_map(counts).collect();
+    (test.is_predicted && !names.is_empty()).then(|| {
+        format!(
+            "{}: what is computed depends on {}, which has an interval without an end: the interval of prediction, from \
+             the covariance alone, is too narrow",
+            test.name,
+            names.join(" and ")
+        )
+    })
+}
+
+/// A curve whose residuals are no noise.
+fn followed(test: &str, fitted: &FittedCurve) -> Option<String> {
+    let rho = fitted.neighbours;
+    // So small a residual is the last digit of a measured value.
+    let is_exact = fitted.relative < 1e-3;
+    let is_noise = rho <= FOLLOW || fitted.curve.points.len() < ENOUGH || is_exact;
+    (!is_noise).then(|| {
+        let factor = ((1.0 + rho) / (1.0 - rho).max(1e-3)).sqrt();
+        format!(
+            "{test}, {}: residuals follow each other (correlation of neighbours {rho:.2}): that is no noise but what \
+             the law does not follow, or points that were measured too densely; the intervals are too narrow, \
+             by a factor of about {factor:.1} as far as this curve counts",
+            fitted.curve.y
+        )
+    })
+}
