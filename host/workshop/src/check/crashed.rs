@@ -1,0 +1,64 @@
+//! The call that a check has crashed in, found once it is over.
+
+use super::{ANSWER, Answer, Subject};
+use crate::replay::probed;
+use law::capsule::{Capsule, status};
+use law::child::{self, Work};
+use law::probe::kept::KeptCall;
+use std::ffi::OsString;
+use std::path::Path;
+use std::time::Duration;
+use text::Source;
+
+/// Points of a batch that are tried one by one.
+const ONE_BY_ONE: usize = 128;
+/// How long the process takes that reads what was kept.
+const READING: Duration = Duration::from_secs(30);
+
+/// The call that was made last, as a capsule: what it lacks is the outcome.
+pub(super) fn capsule(subject: &Subject, kept: &Path) -> Option<String> {
+    let call = KeptCall::last(kept)?;
+    let laws = subject.laws().ok()?;
+    let law = laws.iter().find(|law| law.description().id == call.law)?;
+    let mut hypotheses = super::specimen::hypotheses(law).into_iter();
+    let (formulation, hypothesis) = hypotheses.find(|(_, h)| h.name() == call.hypothesis)?;
+    let with = (hypothesis, call.parameters());
+    let capsule = Capsule::of_probe(
+        law,
+        &formulation,
+        (with.0, &with.1),
+        (call.function, call.form),
+        &call.points(),
+        &[],
+    );
+    Some(capsule?.to_string())
+}
+
+/// The capsule of the last call, made as small as it can be: of one point that crashes alone, or else of
+/// its whole batch. `None` if it does not crash again.
+pub(super) fn repeated(tell: Vec<OsString>, scratch: &Path, limit: Duration) -> Option<Capsule> {
+    let work = Work {
+        arguments: tell,
+        folder: None,
+        time: READING,
+        memory: None,
+    };
+    let told = child::run(&work).ok()?;
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    let line = told.lines().find_map(|line| line.strip_prefix(ANSWER))?;
+    let text = serde_json::from_str::<Answer>(line).ok()?.capsule?;
+    let whole = Capsule::of_source(Source::new(scratch, text)).ok()?;
+    let crash = |capsule: &Capsule| {
+        capsule.write(scratch).ok()?;
+        probed::run(scratch, limit).ok()?.1
+    };
+    let of_whole = crash(&whole)?;
+    let singles = (0..whole.n_points().min(ONE_BY_ONE)).map(|i| whole.of_one(i));
+    let single = (whole.n_points() > 1)
+        .then(|| singles.filter_map(|one| Some((crash(&one)?, one))).next())
+        .flatten();
+    let (message, mut capsule) = single.unwrap_or((of_whole, whole));
+    status(abi::status::Outcome::Internal).clone_into(&mut capsule.outcome.status);
+    capsule.outcome.message = message;
+    Some(capsule)
+}
