@@ -87,7 +87,7 @@ pub struct Arguments {
     /// Write every call of the child to this file before it is made.
     #[arg(long, hide = true, requires = "child")]
     kept: Option<PathBuf>,
-    /// Answer with a capsule of the call in this file.
+    /// Make the call in this file a capsule beside it.
     #[arg(long, hide = true, requires = "child", conflicts_with = "kept")]
     tell: Option<PathBuf>,
 }
@@ -343,14 +343,10 @@ pub fn run(
         if let Some(kept) = &arguments.kept {
             kept::keep_in(std::fs::File::create(kept).map_err(internal)?);
         }
-        let answer = match &arguments.tell {
-            Some(kept) => Answer {
-                outcome: Outcome::Crashed,
-                details: String::new(),
-                capsule: crashed::capsule(&Subject::new(arguments, opener, &path), kept),
-            },
-            None => answer(arguments, opener, &path)?,
-        };
+        if let Some(kept) = &arguments.tell {
+            return crashed::tell(&Subject::new(arguments, opener, &path), kept);
+        }
+        let answer = answer(arguments, opener, &path)?;
         // A law that forks would have two processes answer.
         if std::process::id() == started {
             let answer = serde_json::to_string(&answer);
@@ -811,8 +807,8 @@ fn in_child(
     let mut answer = answer;
     if answer.outcome == Outcome::Crashed {
         let limit = Duration::from_secs_f64(arguments.time_limit.min(10.0));
-        let told = [told, vec!["--tell".into(), kept.into()]].concat();
-        let found = crashed::repeated(told, &folder.with_extension("toml"), limit);
+        let told = [told, vec!["--tell".into(), kept.clone().into()]].concat();
+        let found = crashed::repeated(told, &kept, limit);
         answer.capsule = found.map(|mut capsule| {
             stamp(&mut capsule, check, arguments.seed);
             capsule.to_string()

@@ -1,6 +1,7 @@
 //! The call that a check has crashed in, found once it is over.
 
-use super::{ANSWER, Answer, Subject};
+use super::Subject;
+use crate::Error;
 use crate::replay::probed;
 use law::capsule::{Capsule, status};
 use law::child::{self, Work};
@@ -8,15 +9,25 @@ use law::probe::kept::KeptCall;
 use std::ffi::OsString;
 use std::path::Path;
 use std::time::Duration;
-use text::Source;
+use text::write::replace;
 
 /// Points of a batch that are tried one by one.
 const ONE_BY_ONE: usize = 128;
 /// How long the process takes that reads what was kept.
 const READING: Duration = Duration::from_secs(30);
 
-/// The call that was made last, as a capsule: what it lacks is the outcome.
-pub(super) fn capsule(subject: &Subject, kept: &Path) -> Option<String> {
+/// Makes the call that was made last a capsule beside its file: what it lacks is the outcome.
+///
+/// # Errors
+/// It cannot be written.
+pub(super) fn tell(subject: &Subject, kept: &Path) -> Result<(), Error> {
+    match capsule(subject, kept) {
+        Some(text) => Ok(replace(&kept.with_extension("toml"), text)?),
+        None => Ok(()),
+    }
+}
+
+fn capsule(subject: &Subject, kept: &Path) -> Option<String> {
     let call = KeptCall::last(kept)?;
     let laws = subject.laws().ok()?;
     let law = laws.iter().find(|law| law.description().id == call.law)?;
@@ -36,18 +47,16 @@ pub(super) fn capsule(subject: &Subject, kept: &Path) -> Option<String> {
 
 /// The capsule of the last call, made as small as it can be: of one point that crashes alone, or else of
 /// its whole batch. `None` if it does not crash again.
-pub(super) fn repeated(tell: Vec<OsString>, scratch: &Path, limit: Duration) -> Option<Capsule> {
+pub(super) fn repeated(tell: Vec<OsString>, kept: &Path, limit: Duration) -> Option<Capsule> {
     let work = Work {
         arguments: tell,
         folder: None,
         time: READING,
         memory: None,
     };
-    let told = child::run(&work).ok()?;
-    let told = String::from_utf8_lossy(&told.stdout).into_owned();
-    let line = told.lines().find_map(|line| line.strip_prefix(ANSWER))?;
-    let text = serde_json::from_str::<Answer>(line).ok()?.capsule?;
-    let whole = Capsule::of_source(Source::new(scratch, text)).ok()?;
+    child::run(&work).ok()?;
+    let scratch = &kept.with_extension("toml");
+    let whole = Capsule::read(scratch).ok()?;
     let crash = |capsule: &Capsule| {
         capsule.write(scratch).ok()?;
         probed::run(scratch, limit).ok()?.1

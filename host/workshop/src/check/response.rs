@@ -176,6 +176,14 @@ impl Piece<'_> {
         off.fold(0.0, f64::max)
     }
 
+    /// By how much the flux jumps in it: that much it has changed, and is off.
+    fn jump(&self) -> f64 {
+        let [(_, a), (_, b)] = &self.ends;
+        let changes = a.flux.iter().zip(&b.flux);
+        let changed = changes.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        self.off().min(changed)
+    }
+
     /// Something opens or closes in it, or an internal variable switches.
     fn switches(&self, specimen: &Specimen) -> bool {
         let [(_, a), (_, b)] = &self.ends;
@@ -247,10 +255,9 @@ fn response_is_continuous(subject: &Subject) -> Found {
                 })
                 .collect();
         }
-        if let Some(piece) = pieces
-            .iter()
-            .find(|piece| piece.off() > JUMP * flux_scale(piece.step) && !piece.switches(&specimen))
-        {
+        if let Some(piece) = pieces.iter().find(|piece| {
+            piece.jump() > JUMP * flux_scale(piece.step) && !piece.switches(&specimen)
+        }) {
             let [(at, a), (_, b)] = &piece.ends;
             let start = part(piece.step, 1.0);
             let why = format!(

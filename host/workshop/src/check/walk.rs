@@ -224,14 +224,6 @@ impl Specimen {
                 for (one, walker) in moves.iter_mut().zip(&walkers) {
                     let length = walker.size * random.logarithmic(0.03, 10.0);
                     *one = self.direction(length, random);
-                    // Where something does not move at all, what is kept of earlier calls may count.
-                    let alone = random.below(4 * one.len());
-                    if self.is_free(alone.min(one.len() - 1)) && alone < one.len() {
-                        let others = one.iter_mut().enumerate();
-                        others
-                            .filter(|(c, _)| *c != alone)
-                            .for_each(|(_, value)| *value = 0.0);
-                    }
                 }
             }
             for (walker, step) in walkers.iter_mut().zip(&moves) {
