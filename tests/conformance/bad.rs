@@ -354,7 +354,7 @@ const WARNED: [(&str, &str); 12] = [
     ("bad_tangential_axis", "tangential-axis-is-arbitrary"),
     ("bad_unit", "units-are-known"),
     ("bad_usual_range", "ranges-are-plausible"),
-    ("bad_elastic_asymmetry", "elastic-operator-is-plausible"),
+    ("bad_negative_stiffness", "elastic-operator-is-plausible"),
     ("bad_elastic_operator", "elastic-operator-is-plausible"),
     ("bad_init_unfit", "initial-states-fit"),
     ("bad_jump", "response-is-continuous"),

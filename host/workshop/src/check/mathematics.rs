@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 pub(super) const NEEDS: &[&str] = &[
     "repeatable",
     "independent-of-split",
+    "independent-of-request",
     "results-are-finite",
     "writes-stay-inside",
 ];
