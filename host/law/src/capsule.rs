@@ -570,6 +570,7 @@ fn table(values: &IndexMap<String, f64>) -> String {
 }
 
 impl std::fmt::Display for Capsule {
+    #[expect(clippy::too_many_lines, reason = "the file from its head to its end")]
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (gradient, flux) = self.hypothesis().map_or(("jump", "traction"), words);
         writeln!(

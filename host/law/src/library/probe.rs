@@ -523,6 +523,7 @@ impl Probe {
         }
     }
 
+    #[expect(clippy::too_many_lines, reason = "a batch has many arrays")]
     fn call(
         &self,
         function: Function,

@@ -679,7 +679,7 @@ impl Environment {
             signals: process::signal_handlers(),
             arithmetic: process::arithmetic(),
             locale: process::locale(),
-            has_alarm: process::alarm() > 0,
+            has_alarm: process::alarm(),
             limits: std::fs::read_to_string("/proc/self/limits").ok(),
             masks: std::fs::read_to_string("/proc/thread-self/status")
                 .unwrap_or_default()

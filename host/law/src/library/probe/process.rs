@@ -114,9 +114,9 @@ pub fn arithmetic() -> u32 {
     0
 }
 
-/// Seconds until an alarm, 0 if none is set.
+/// Whether an alarm is set.
 #[cfg(unix)]
-pub fn alarm() -> i64 {
+pub fn alarm() -> bool {
     use nix::libc;
     let mut timer = std::mem::MaybeUninit::<libc::itimerval>::zeroed();
     // SAFETY: nothing is set; what is left is written to a struct of that type, for which zeros are a
@@ -125,11 +125,11 @@ pub fn alarm() -> i64 {
         libc::getitimer(libc::ITIMER_REAL, timer.as_mut_ptr());
         timer.assume_init()
     };
-    i64::from(left.it_value.tv_sec) + i64::from(left.it_value.tv_usec > 0)
+    left.it_value.tv_sec > 0 || left.it_value.tv_usec > 0
 }
 
 /// Not known.
 #[cfg(not(unix))]
-pub fn alarm() -> i64 {
-    0
+pub fn alarm() -> bool {
+    false
 }
