@@ -318,6 +318,7 @@ struct Report<'a> {
 /// # Errors
 /// [`text::Error::Usage`] for an unknown check or settings that no law can have, [`text::Error::Unreadable`],
 /// [`law::Error::Library`] if there is no such law or a check fails or crashes.
+#[expect(clippy::too_many_lines, reason = "what is asked for, case by case")]
 pub fn run(
     arguments: &Arguments,
     opener: &Opener,

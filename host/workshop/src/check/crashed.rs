@@ -62,9 +62,9 @@ pub(super) fn repeated(tell: Vec<OsString>, kept: &Path, limit: Duration) -> Opt
         probed::run(scratch, limit).ok()?.1
     };
     let of_whole = crash(&whole)?;
-    let singles = (0..whole.n_points().min(ONE_BY_ONE)).map(|i| whole.of_one(i));
+    let mut singles = (0..whole.n_points().min(ONE_BY_ONE)).map(|i| whole.of_one(i));
     let single = (whole.n_points() > 1)
-        .then(|| singles.filter_map(|one| Some((crash(&one)?, one))).next())
+        .then(|| singles.find_map(|one| Some((crash(&one)?, one))))
         .flatten();
     let (message, mut capsule) = single.unwrap_or((of_whole, whole));
     status(abi::status::Outcome::Internal).clone_into(&mut capsule.outcome.status);

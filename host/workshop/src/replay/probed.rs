@@ -51,7 +51,7 @@ pub(super) fn outside(
         .probe
         .is_some_and(|p| p.function == Function::Integrate);
     if is_update && capsule.n_points() == 1 && crash != STUCK {
-        let shorter = ScratchFile::new()?;
+        let shorter = ScratchFile::new();
         let succeeds = |fraction| {
             capsule.shortened(fraction).write(&shorter.0).is_ok()
                 && run(&shorter.0, limit).is_ok_and(|(_, crash)| crash.is_none())
@@ -65,9 +65,9 @@ pub(super) fn outside(
 struct ScratchFile(PathBuf);
 
 impl ScratchFile {
-    fn new() -> Result<Self, Error> {
+    fn new() -> Self {
         let name = format!("pilum-replay-{}.toml", std::process::id());
-        Ok(Self(std::env::temp_dir().join(name)))
+        Self(std::env::temp_dir().join(name))
     }
 }
 
@@ -122,6 +122,7 @@ pub(crate) fn run(path: &Path, limit: Duration) -> Result<(String, Option<String
 const FAULTLESS: &str = "the call succeeds";
 
 /// Repeats the call in this process, once more, and in other ways that must not matter.
+#[expect(clippy::too_many_lines, reason = "one call after the other")]
 pub(super) fn inside(
     capsule: &Capsule,
     loaded: &LoadedLaw,
@@ -226,17 +227,13 @@ pub(super) fn inside(
         .or_else(|| differs(&again, when))
         .or_else(|| differs(&alone, "alone"))
         .or_else(|| differs(&back, "in reverse order"));
-    match fault {
-        Some(fault) => {
-            say(&fault);
-            Err(fails("internal"))
-        }
-        None => {
-            say(FAULTLESS);
-            first.points.iter().take(1).for_each(|end| say(&shown(end)));
-            Ok(())
-        }
+    if let Some(fault) = fault {
+        say(&fault);
+        return Err(fails("internal"));
     }
+    say(FAULTLESS);
+    first.points.iter().take(1).for_each(|end| say(&shown(end)));
+    Ok(())
 }
 
 /// What the function makes of the points; nothing if the law lacks it.
