@@ -22,7 +22,7 @@ fn probe(law: &LoadedLaw, values: &[f64]) -> Probe {
         message: Some(200),
         more_host: 0,
         host_minor: abi::raw::PILUM_ABI_MINOR,
-        n_components: 2,
+        hypothesis: abi::Hypothesis::Interface2d,
         n_states: 2,
         lacks_tangent: false,
     };

@@ -1,5 +1,5 @@
 //! What helps an author: a path of his own, calls that can be repeated, less to read, a debugger.
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
 
 use crate::program::{
     check, compiled, compiled_with, folder, library_of, pilum, pilum_in, refused,
@@ -99,6 +99,98 @@ fn a_wrong_call_can_be_repeated() {
         said.contains("at most 9.9e-3 of its largest component off"),
         "{said}"
     );
+}
+
+/// The capsule of the one check of a fixture, and what replaying it says.
+fn replayed(fixture: &str, id: &str) -> Option<(String, String)> {
+    let folder = folder();
+    let library = compiled(fixture, folder.path())?;
+    let report = check(&library, &["--only", id]);
+    let capsule = report.check(id)["capsule"].as_str();
+    let capsule = capsule.unwrap_or_else(|| panic!("{fixture}: {:#}", report.json));
+    let output = pilum(&["replay", capsule]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{fixture}: {said}");
+    Some((std::fs::read_to_string(capsule).unwrap(), said))
+}
+
+/// A check that crashes leaves its last call: of one point where that is enough, in the form that it
+/// crashes in, of the function that it crashes in.
+#[test]
+fn a_call_that_crashes_can_be_repeated() {
+    for (fixture, id, request, says) in [
+        (
+            "bad_abort",
+            "integrate-works",
+            "fluxes",
+            "the law crashed: signal 6 (aborted)",
+        ),
+        (
+            "bad_exit",
+            "integrate-works",
+            "fluxes",
+            "the law ended its process: exit code 0",
+        ),
+        (
+            "bad_create_abort",
+            "create-works",
+            "an instance",
+            "the law crashed: signal 6 (aborted)",
+        ),
+        (
+            "bad_overread",
+            "reads-stay-inside",
+            "fluxes",
+            "the law crashed: signal 11 (segmentation fault)",
+        ),
+        (
+            "bad_long_array",
+            "independent-of-split",
+            "fluxes",
+            "the law crashed: signal 11 (segmentation fault)",
+        ),
+    ] {
+        let Some((capsule, said)) = replayed(fixture, id) else {
+            return;
+        };
+        assert!(
+            capsule.contains(&format!("request = \"{request}")),
+            "{fixture}: {capsule}"
+        );
+        assert!(
+            said.contains(&format!("as recorded: `internal`: {says}")),
+            "{fixture}: {said}"
+        );
+        let n_points = capsule.matches("[[point]]").count();
+        assert_eq!(
+            n_points > 0,
+            fixture == "bad_long_array",
+            "{fixture}: {n_points}"
+        );
+    }
+}
+
+/// What is wrong with `init_state` shows again.
+#[test]
+fn a_wrong_initial_state_can_be_repeated() {
+    for (fixture, id, says) in [
+        (
+            "bad_init_last",
+            "initial-states-are-written",
+            "`travel` is not written",
+        ),
+        ("bad_init_random", "repeatable", "; called again: flux"),
+        ("bad_init_split", "independent-of-split", "; alone: flux"),
+    ] {
+        let Some((capsule, said)) = replayed(fixture, id) else {
+            return;
+        };
+        assert!(
+            capsule.contains("request = \"initial state\""),
+            "{fixture}: {capsule}"
+        );
+        assert!(said.contains(says), "{fixture}: {said}");
+    }
 }
 
 #[test]

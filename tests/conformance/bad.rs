@@ -14,7 +14,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 70] = [
+const GALLERY: [(&str, &str, &str, Point); 80] = [
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -295,15 +295,72 @@ const GALLERY: [(&str, &str, &str, Point); 70] = [
         "failed",
         CannotTell,
     ),
+    (
+        "bad_request_flux",
+        "independent-of-request",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_long_array",
+        "independent-of-split",
+        "crashed",
+        CannotTell,
+    ),
+    (
+        "bad_locale",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_trap",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_alarm",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_umask",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_closed_file",
+        "environment-is-left-alone",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_leak_mapped", "memory-is-freed", "failed", CannotTell),
+    ("bad_leak_refused", "memory-is-freed", "failed", CannotTell),
+    (
+        "bad_rest_nan",
+        "zero-increment-changes-nothing",
+        "failed",
+        CannotTell,
+    ),
 ];
 
 /// Mistakes that may be meant: the fixture, and the one check that warns.
-const WARNED: [(&str, &str); 5] = [
+const WARNED: [(&str, &str); 12] = [
     ("bad_compression", "compression-is-negative"),
     ("bad_engineering_shear", "response-is-isotropic"),
     ("bad_tangential_axis", "tangential-axis-is-arbitrary"),
     ("bad_unit", "units-are-known"),
     ("bad_usual_range", "ranges-are-plausible"),
+    ("bad_negative_stiffness", "elastic-operator-is-plausible"),
+    ("bad_elastic_operator", "elastic-operator-is-plausible"),
+    ("bad_init_unfit", "initial-states-fit"),
+    ("bad_jump", "response-is-continuous"),
+    ("bad_not_summed", "states-are-carried-on"),
+    ("bad_time", "independent-of-time"),
+    ("bad_time_increment", "independent-of-time"),
 ];
 
 /// The one check that fails is this one, and says how to repeat it.

@@ -2,14 +2,17 @@
 //! repeated bit for bit, without the case it comes from.
 
 use crate::Error;
+use crate::FormulationDescription;
 use crate::adapter::{Adapter, Externals, Order};
 use crate::description::words;
-use crate::{BatchFailure, Law, Moment, Operator, PointCall, Request, ShearZone, Site};
+use crate::library::probe::kept::Function;
+use crate::library::probe::{Form, PointStart};
+use crate::{BatchFailure, Law, LoadedLaw, Moment, Operator, PointCall, Request, ShearZone, Site};
 use abi::Hypothesis;
+use abi::raw;
 use abi::status::Outcome;
 use indexmap::IndexMap;
-use serde::Deserialize;
-use std::fmt::Write as _;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use text::{Source, suggestion, toml_error, write::replace};
@@ -35,9 +38,18 @@ pub struct Capsule {
     #[serde(default)]
     pub parameters: IndexMap<String, f64>,
     call: CallPart,
+    #[serde(default)]
     start: Values,
     #[serde(default)]
     end: Values,
+    /// How a check has called it, if replaying it is to do the same.
+    pub probe: Option<ProbePart>,
+    /// The points of its batch behind the first one.
+    #[serde(default, rename = "point")]
+    more: Vec<PointPart>,
+    /// Points that were called for before.
+    #[serde(default)]
+    before: Vec<PointPart>,
     /// The file it was read from.
     #[serde(skip)]
     source: Option<Source>,
@@ -89,6 +101,25 @@ struct CallPart {
     time_increment: f64,
     moment: Option<MomentPart>,
     site: Option<SitePart>,
+}
+
+/// A call as a check makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbePart {
+    /// Which function.
+    pub function: Function,
+    /// How it is called; as usual if left out.
+    pub form: Option<Form>,
+}
+
+/// A point of a batch.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PointPart {
+    start: Values,
+    #[serde(default)]
+    end: Values,
 }
 
 /// Which step it is; laws of the contract do not ask.
@@ -144,6 +175,63 @@ const REQUESTS: [(&str, Request); 4] = [
     ("initial state", Request::InitialState),
 ];
 
+/// What `create` is asked for.
+const CREATE: &str = "an instance";
+
+/// The name of a request in files.
+fn name(request: Request) -> &'static str {
+    let mut all = REQUESTS.iter();
+    all.find(|(_, other)| *other == request)
+        .map_or(CREATE, |(name, _)| name)
+}
+
+/// The operator that a call of a check asks for.
+fn operator(request: u32) -> Operator {
+    if request & raw::PILUM_REQ_ELASTIC != 0 {
+        Operator::Elastic
+    } else if request & raw::PILUM_REQ_TANGENT != 0 {
+        Operator::Consistent
+    } else {
+        Operator::None
+    }
+}
+
+/// The form of a call of a check that is as usual.
+fn usual(request: &str, time: f64, time_increment: f64) -> Form {
+    let named = REQUESTS.iter().find(|(name, _)| *name == request);
+    let bits = match named.map(|(_, request)| *request) {
+        Some(Request::Update(Operator::Elastic)) => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
+        Some(Request::Update(Operator::Consistent)) => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT,
+        Some(Request::Update(Operator::None)) => raw::PILUM_REQ_FLUX,
+        Some(Request::InitialState) | None => 0,
+    };
+    Form {
+        time,
+        time_increment,
+        ..Form::of(bits)
+    }
+}
+
+impl LawPart {
+    fn of(law: &LoadedLaw, hypothesis: Hypothesis) -> Option<Self> {
+        let description = law.description();
+        let library = law.library();
+        let foreign = library.foreign();
+        Some(Self {
+            id: description.id.clone(),
+            version: description.version.clone(),
+            hypothesis: hypothesis.name().to_owned(),
+            library: std::path::absolute(library.path()).ok()?,
+            sha256: library.sha256().to_owned(),
+            adapter: foreign.map(|foreign| foreign.adapter),
+            sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
+            externals: foreign.and_then(|foreign| foreign.externals),
+            tangent_order: foreign.and_then(|foreign| foreign.tangent_order),
+            shear_zone: law.shear_zone(),
+        })
+    }
+}
+
 impl Capsule {
     /// The capsule of a failed call; `None` if it is not known. `origin` says where it happened, by
     /// key.
@@ -162,18 +250,7 @@ impl Capsule {
         let foreign = law.library().foreign();
         Some(Self {
             version: 1,
-            law: LawPart {
-                id: description.id.clone(),
-                version: description.version.clone(),
-                hypothesis: hypothesis.name().to_owned(),
-                library: std::path::absolute(law.library().path()).ok()?,
-                sha256: law.library().sha256().to_owned(),
-                adapter: foreign.map(|foreign| foreign.adapter),
-                sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
-                externals: foreign.and_then(|foreign| foreign.externals),
-                tangent_order: foreign.and_then(|foreign| foreign.tangent_order),
-                shear_zone: law.loaded().shear_zone(),
-            },
+            law: LawPart::of(law.loaded(), hypothesis)?,
             origin: origin
                 .into_iter()
                 .map(|(key, value)| (key.to_owned(), value))
@@ -210,8 +287,163 @@ impl Capsule {
                 jump: components(&call.gradient_end),
                 ..Values::default()
             },
+            probe: None,
+            more: Vec::new(),
+            before: Vec::new(),
             source: None,
         })
+    }
+
+    /// The capsule of a call as a check makes it, for these points, after a call for others. `None` if the
+    /// library has no place.
+    pub fn of_probe(
+        law: &LoadedLaw,
+        formulation: &FormulationDescription,
+        (hypothesis, parameters): (Hypothesis, &[f64]),
+        (function, form): (Function, Form),
+        points: &[PointStart],
+        before: &[PointStart],
+    ) -> Option<Self> {
+        let named = |values: &[f64]| -> IndexMap<String, f64> {
+            let names = hypothesis.components().iter();
+            let names = names.map(|name| (*name).to_owned());
+            names.zip(values.iter().copied()).collect()
+        };
+        let part = |point: &PointStart| {
+            let ids = formulation.internal_variables.iter().map(|v| v.id.clone());
+            PointPart {
+                start: Values {
+                    jump: named(&point.gradient0),
+                    traction: named(&point.flux0),
+                    internal: ids.zip(point.state0.iter().copied()).collect(),
+                },
+                end: Values {
+                    jump: named(&point.gradient1),
+                    ..Values::default()
+                },
+            }
+        };
+        let mut parts = points.iter().map(part);
+        let first = parts.next();
+        let (start, end) = first.map_or_else(Default::default, |p| (p.start, p.end));
+        let ids = law.description().parameters.iter().map(|p| p.id.clone());
+        let request = match function {
+            Function::Create => CREATE,
+            Function::InitState => name(Request::InitialState),
+            Function::Integrate => name(Request::Update(operator(form.request))),
+        };
+        let is_usual = form == usual(request, form.time, form.time_increment);
+        // Those that keep no contract are called as in a run.
+        let probe = law.library().foreign().is_none().then_some(ProbePart {
+            function,
+            form: (!is_usual).then_some(form),
+        });
+        Some(Self {
+            version: 1,
+            law: LawPart::of(law, hypothesis)?,
+            origin: IndexMap::new(),
+            outcome: OutcomePart {
+                status: status(Outcome::Ok).to_owned(),
+                message: String::new(),
+                step_factor: None,
+            },
+            parameters: ids.zip(parameters.iter().copied()).collect(),
+            call: CallPart {
+                request: request.to_owned(),
+                time: form.time,
+                time_increment: form.time_increment,
+                moment: None,
+                site: None,
+            },
+            start,
+            end,
+            probe,
+            more: parts.collect(),
+            before: before.iter().map(part).collect(),
+            source: None,
+        })
+    }
+
+    /// How a check has called it.
+    pub fn form(&self) -> Form {
+        let form = self.probe.and_then(|probe| probe.form);
+        let (time, length) = (self.call.time, self.call.time_increment);
+        form.unwrap_or_else(|| usual(&self.call.request, time, length))
+    }
+
+    /// The same with a part of the increment alone.
+    #[must_use]
+    pub fn shortened(&self, fraction: f64) -> Self {
+        let mut shorter = self.clone();
+        for (name, end) in &mut shorter.end.jump {
+            let start = self.start.jump.get(name).copied().unwrap_or_default();
+            *end = start + fraction * (*end - start);
+        }
+        shorter
+    }
+
+    /// Points of the batch, and those that were called for before, in the order of this law's values.
+    ///
+    /// # Errors
+    /// A name that the law does not know, or that is missing.
+    pub fn batch(
+        &self,
+        hypothesis: Hypothesis,
+        formulation: &FormulationDescription,
+    ) -> Result<[Vec<PointStart>; 2], Error> {
+        let (gradient, flux) = words(hypothesis);
+        let point = |start: &Values, end: &Values, key: &str| -> Result<PointStart, Error> {
+            let components = |values: &IndexMap<String, f64>, what: &str| {
+                if values.is_empty() {
+                    return Ok(Vec::new());
+                }
+                let names = hypothesis.components().iter().copied();
+                self.in_order(values, names, &[key, what], what)
+            };
+            let variables = formulation.internal_variables.iter();
+            let state0 = if start.internal.is_empty() {
+                Vec::new()
+            } else {
+                let ids = variables.map(|v| v.id.as_str());
+                let what = "internal variable";
+                self.in_order(&start.internal, ids, &[key, "internal"], what)?
+            };
+            Ok(PointStart {
+                gradient0: components(&start.jump, gradient)?,
+                gradient1: components(&end.jump, gradient)?,
+                flux0: components(&start.traction, flux)?,
+                state0,
+            })
+        };
+        let all = |parts: &[PointPart], key: &str| -> Result<Vec<PointStart>, Error> {
+            let parts = parts.iter();
+            parts
+                .map(|part| point(&part.start, &part.end, key))
+                .collect()
+        };
+        let mut points = Vec::new();
+        if !self.start.traction.is_empty() {
+            points.push(point(&self.start, &self.end, "start")?);
+        }
+        points.extend(all(&self.more, "point")?);
+        Ok([points, all(&self.before, "before")?])
+    }
+
+    /// The same for one of its points alone.
+    #[must_use]
+    pub fn of_one(&self, i: usize) -> Self {
+        let mut one = self.clone();
+        if let Some(point) = i.checked_sub(1).and_then(|i| self.more.get(i)) {
+            one.start = point.start.clone();
+            one.end = point.end.clone();
+        }
+        one.more.clear();
+        one
+    }
+
+    /// Number of points.
+    pub fn n_points(&self) -> usize {
+        usize::from(!self.start.traction.is_empty()) + self.more.len()
     }
 
     /// Reads a capsule.
@@ -246,7 +478,7 @@ impl Capsule {
                 .error(&["law", "hypothesis"], message)
                 .with_hint(&hint));
         }
-        if capsule.request().is_none() {
+        if capsule.request().is_none() && capsule.probe.is_none() {
             let message = format!("there is no request `{}`", capsule.call.request);
             let hint = suggestion(&capsule.call.request, REQUESTS.map(|(name, _)| name));
             return Err(capsule
@@ -338,6 +570,7 @@ fn table(values: &IndexMap<String, f64>) -> String {
 }
 
 impl std::fmt::Display for Capsule {
+    #[expect(clippy::too_many_lines, reason = "the file from its head to its end")]
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (gradient, flux) = self.hypothesis().map_or(("jump", "traction"), words);
         writeln!(
@@ -421,19 +654,41 @@ impl std::fmt::Display for Capsule {
             )?;
         }
         writeln!(f, "\n[start]")?;
-        let mut lines = String::new();
-        for (name, values) in [
-            (gradient, &self.start.jump),
-            (flux, &self.start.traction),
-            ("internal", &self.start.internal),
-        ] {
-            if !values.is_empty() {
-                writeln!(lines, "{name} = {}", table(values))?;
-            }
-        }
-        f.write_str(&lines)?;
+        let entries = |values: &Values| -> Vec<String> {
+            [
+                (gradient, &values.jump),
+                (flux, &values.traction),
+                ("internal", &values.internal),
+            ]
+            .into_iter()
+            .filter(|(_, values)| !values.is_empty())
+            .map(|(name, values)| format!("{name} = {}", table(values)))
+            .collect()
+        };
+        entries(&self.start)
+            .iter()
+            .try_for_each(|line| writeln!(f, "{line}"))?;
         if !self.end.jump.is_empty() {
             writeln!(f, "\n[end]\n{gradient} = {}", table(&self.end.jump))?;
+        }
+        if let Some(probe) = &self.probe {
+            let whole = toml::Value::try_from(probe).map_err(|_| std::fmt::Error)?;
+            writeln!(f, "\n[probe]")?;
+            for (key, value) in whole.as_table().into_iter().flatten() {
+                writeln!(f, "{key} = {value}")?;
+            }
+        }
+        for (key, points) in [("point", &self.more), ("before", &self.before)] {
+            for point in points {
+                writeln!(
+                    f,
+                    "\n[[{key}]]\nstart = {{ {} }}",
+                    entries(&point.start).join(", ")
+                )?;
+                if !point.end.jump.is_empty() {
+                    writeln!(f, "end = {{ {} }}", entries(&point.end).join(", "))?;
+                }
+            }
         }
         Ok(())
     }

@@ -135,7 +135,7 @@ impl LoadedLaw {
     /// # Errors
     /// There is no memory, or the law is in a worker process.
     pub fn probe(&self, form: &probe::CreateForm<'_>) -> std::io::Result<probe::Created> {
-        probe::create(self.here()?, form)
+        probe::create(&self.description().id, self.here()?, form)
     }
 
     /// Calls `destroy` with null.

@@ -6,22 +6,24 @@
 
 mod contract;
 mod course;
+mod crashed;
 mod description;
 mod load;
 mod mathematics;
 mod memory;
 mod purity;
 mod random;
+mod response;
 mod robustness;
 mod routine;
-mod specimen;
+pub(crate) mod specimen;
 mod walk;
 
 use crate::Error;
 use abi::raw;
 use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
-use law::probe::NO_OUTCOME;
+use law::probe::{NO_OUTCOME, kept};
 use law::{LoadedLaw, Opener, SearchPath, Trust, hexadecimal_sha256};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -82,6 +84,12 @@ pub struct Arguments {
     /// Run the one check as a child; its answer is the last line.
     #[arg(long, hide = true, requires = "only", conflicts_with = "in_process")]
     child: bool,
+    /// Write every call of the child to this file before it is made.
+    #[arg(long, hide = true, requires = "child")]
+    kept: Option<PathBuf>,
+    /// Make the call in this file a capsule beside it.
+    #[arg(long, hide = true, requires = "child", conflicts_with = "kept")]
+    tell: Option<PathBuf>,
 }
 
 fn setting(text: &str) -> Result<(String, f64), String> {
@@ -136,6 +144,7 @@ fn checks() -> impl Iterator<Item = &'static Check> {
         purity::CHECKS,
         robustness::CHECKS,
         mathematics::CHECKS,
+        response::CHECKS,
         routine::CHECKS,
     ]
     .into_iter()
@@ -198,7 +207,7 @@ fn status_name(status: raw::Status) -> String {
 }
 
 /// A failure in words: its status, and what the law says of it.
-fn refusal(status: raw::Status, message: Option<&str>) -> String {
+pub(crate) fn refusal(status: raw::Status, message: Option<&str>) -> String {
     let name = status_name(status);
     match message {
         Some(message) if !message.is_empty() => format!("{name}: {message}"),
@@ -309,6 +318,7 @@ struct Report<'a> {
 /// # Errors
 /// [`text::Error::Usage`] for an unknown check or settings that no law can have, [`text::Error::Unreadable`],
 /// [`law::Error::Library`] if there is no such law or a check fails or crashes.
+#[expect(clippy::too_many_lines, reason = "what is asked for, case by case")]
 pub fn run(
     arguments: &Arguments,
     opener: &Opener,
@@ -329,7 +339,14 @@ pub fn run(
     let path = library_path(arguments.library.as_deref().unwrap_or_default())?;
     if arguments.child {
         let started = std::process::id();
-        child::enter().map_err(|error| Error::internal(error.to_string()))?;
+        let internal = |error: std::io::Error| Error::internal(error.to_string());
+        child::enter().map_err(internal)?;
+        if let Some(kept) = &arguments.kept {
+            kept::keep_in(std::fs::File::create(kept).map_err(internal)?);
+        }
+        if let Some(kept) = &arguments.tell {
+            return crashed::tell(&Subject::new(arguments, opener, &path), kept);
+        }
         let answer = answer(arguments, opener, &path)?;
         // A law that forks would have two processes answer.
         if std::process::id() == started {
@@ -644,17 +661,19 @@ struct Answer {
     capsule: Option<String>,
 }
 
+/// Notes where the call of a capsule comes from.
+fn stamp(capsule: &mut Capsule, check: &Check, seed: u64) {
+    let keys = [("check", check.id.to_owned()), ("seed", seed.to_string())];
+    for (key, value) in keys {
+        capsule.origin.insert(key.to_owned(), value.into());
+    }
+}
+
 /// Runs one check here.
 fn run_check(check: &Check, subject: &Subject) -> Answer {
     let (verdict, capsule) = match (check.run)(subject) {
         Err(Verdict::At(verdict, mut capsule)) => {
-            let keys = [
-                ("check", check.id.to_owned()),
-                ("seed", subject.seed.to_string()),
-            ];
-            for (key, value) in keys {
-                capsule.origin.insert(key.to_owned(), value.into());
-            }
+            stamp(&mut capsule, check, subject.seed);
             (Err(*verdict), Some(capsule.to_string()))
         }
         verdict => (verdict, None),
@@ -737,6 +756,10 @@ fn in_child(
     let mut all: Vec<OsString> = vec!["check".into(), path.into()];
     all.extend(own_arguments(check, arguments));
     all.push("--child".into());
+    let told = all.clone();
+    // Beside the folder, since what stands in that is the law's.
+    let kept = folder.with_extension("call");
+    all.extend(["--kept".into(), kept.clone().into()]);
     let outcome = child::run(&Work {
         arguments: all,
         folder: Some(folder.clone()),
@@ -782,6 +805,16 @@ fn in_child(
             ))
         }
     };
+    let mut answer = answer;
+    if answer.outcome == Outcome::Crashed {
+        let limit = Duration::from_secs_f64(arguments.time_limit.min(10.0));
+        let told = [told, vec!["--tell".into(), kept.clone().into()]].concat();
+        let found = crashed::repeated(told, &kept, limit);
+        answer.capsule = found.map(|mut capsule| {
+            stamp(&mut capsule, check, arguments.seed);
+            capsule.to_string()
+        });
+    }
     answer.reported(check, arguments, path)
 }
 

@@ -1,6 +1,8 @@
 //! Repeating the call of a capsule: what comes out, how far the increment can be followed, and
 //! whether the tangent is the derivative of the update.
 
+pub(crate) mod probed;
+
 use crate::Error;
 use abi::status::Outcome;
 use law::adapter::Foreign;
@@ -32,6 +34,9 @@ type Answer = (Vec<f64>, Vec<f64>, Vec<f64>);
 /// [`Error::CallFails`].
 pub fn replay(path: &Path, opener: &Opener, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
     let capsule = Capsule::read(path)?;
+    if capsule.probe.is_some() {
+        return probed::replay(path, &capsule, opener, say);
+    }
     repeat(&capsule, &find(&capsule, opener)?, say)
 }
 
@@ -97,7 +102,8 @@ fn compare(capsule: &Capsule, law: &Law, say: &mut dyn FnMut(&str)) -> Result<()
         Err(failure) => failure,
     };
     let outcome = outcome(capsule, law, &failure, say);
-    if let Some(fraction) = bisect(law, &call, say) {
+    let succeeds = |fraction| update(law, &call, call.request, fraction).is_ok();
+    if let Some(fraction) = bisect(succeeds, say) {
         say(&tangent(law, &call, fraction));
     }
     outcome
@@ -260,8 +266,7 @@ fn outcome(
 }
 
 /// The largest fraction of the increment that succeeds, found by halving.
-fn bisect(law: &Law, call: &PointCall, say: &mut dyn FnMut(&str)) -> Option<f64> {
-    let succeeds = |fraction| update(law, call, call.request, fraction).is_ok();
+fn bisect(succeeds: impl Fn(f64) -> bool, say: &mut dyn FnMut(&str)) -> Option<f64> {
     let started = Instant::now();
     let mut good = 0.5;
     let mut bad = 1.0;

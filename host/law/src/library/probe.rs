@@ -2,14 +2,18 @@
 //! protection are chosen, and with arguments that a host in earnest never gives. All that a caller
 //! hands over and gets back is safe.
 
+pub mod kept;
 mod pages;
 pub mod process;
 
 use super::{HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, load};
+use abi::Hypothesis;
 use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};
 use abi::version;
+use kept::{Function, KeptCall};
 pub use pages::Fence;
 use pages::Pages;
+use serde::{Deserialize, Serialize};
 use std::ffi::c_char;
 use std::io;
 use std::mem::size_of;
@@ -24,7 +28,8 @@ pub const NO_OUTCOME: Status = -0x5a5a;
 pub const BATCH_BYTES: usize = size_of::<Batch>();
 
 /// How the values of several points stand in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Order {
     /// Point by point.
     Points,
@@ -90,7 +95,7 @@ fn terminated(buffer: &[u8]) -> Option<String> {
 }
 
 /// The form of a call.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Form {
     /// Requests.
     pub request: u32,
@@ -110,6 +115,8 @@ pub struct Form {
     pub batch_bytes: usize,
     /// Number of the first point.
     pub first_point: u64,
+    /// Time at which the increment begins, in all and in its step.
+    pub time: f64,
     /// Length of the increment in time.
     pub time_increment: f64,
     /// Ask for the consistent tangent even of a law that declares none; else its elastic operator
@@ -146,6 +153,7 @@ impl Form {
             message: Some(512),
             batch_bytes: BATCH_BYTES,
             first_point: 0,
+            time: 0.0,
             time_increment: 1.0,
             verbatim: false,
         }
@@ -265,6 +273,9 @@ fn doubles_mut(pages: &mut Pages) -> &mut [f64] {
 #[derive(Debug)]
 pub struct Probe {
     instance: OwnedInstance,
+    id: String,
+    hypothesis: Hypothesis,
+    values: Vec<f64>,
     n_components: usize,
     n_states: usize,
     lacks_tangent: bool,
@@ -285,8 +296,8 @@ pub struct CreateForm<'a> {
     pub more_host: usize,
     /// Minor version that the host says it has.
     pub host_minor: u16,
-    /// Components of gradient and flux, for later calls.
-    pub n_components: usize,
+    /// Its hypothesis, for later calls.
+    pub hypothesis: Hypothesis,
     /// Internal variables, for later calls.
     pub n_states: usize,
     /// The formulation declares no consistent tangent, for later calls.
@@ -346,7 +357,7 @@ fn other_host(more: usize, abi_minor: u16) -> io::Result<*const Host> {
 ///
 /// # Errors
 /// There is no memory.
-pub(crate) fn create(law: LawHandle, form: &CreateForm<'_>) -> io::Result<Created> {
+pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Result<Created> {
     let Some(create) = law.known.create else {
         return Err(io::Error::other("`create` is null"));
     };
@@ -365,6 +376,11 @@ pub(crate) fn create(law: LawHandle, form: &CreateForm<'_>) -> io::Result<Create
         .transpose()?;
     let message = message_buffer(form.message)?;
     let mut instance: *mut Instance = null_mut();
+    let all = form.values.unwrap_or_default();
+    kept::keep(|| {
+        let names = (id, form.hypothesis.name());
+        KeptCall::new(names, Function::Create, Form::of(0), all, &[])
+    })?;
     // SAFETY: contract, "create": `law.at` is the law itself; values, messages and `out` are as
     // long as told, or null, which the law has to refuse.
     let status = unsafe {
@@ -386,7 +402,10 @@ pub(crate) fn create(law: LawHandle, form: &CreateForm<'_>) -> io::Result<Create
         message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
         probe: (!instance.is_null()).then(|| Probe {
             instance: OwnedInstance { law, instance },
-            n_components: form.n_components,
+            id: id.to_owned(),
+            hypothesis: form.hypothesis,
+            values: all.to_vec(),
+            n_components: form.hypothesis.n_components(),
             n_states: form.n_states,
             lacks_tangent: form.lacks_tangent,
         }),
@@ -414,13 +433,6 @@ fn message_buffer(capacity: Option<usize>) -> io::Result<Option<Pages>> {
     Ok(Some(pages))
 }
 
-/// Which function of a law is called.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Function {
-    InitState,
-    Integrate,
-}
-
 impl Probe {
     /// Number of components of gradient and flux.
     pub fn n_components(&self) -> usize {
@@ -430,6 +442,11 @@ impl Probe {
     /// Number of internal variables.
     pub fn n_states(&self) -> usize {
         self.n_states
+    }
+
+    /// Where its instance stands in memory.
+    pub fn address(&self) -> usize {
+        self.instance.instance.addr()
     }
 
     /// Asks for the internal variables of points that carry these fluxes. `None` if the law has no
@@ -506,6 +523,7 @@ impl Probe {
         }
     }
 
+    #[expect(clippy::too_many_lines, reason = "a batch has many arrays")]
     fn call(
         &self,
         function: Function,
@@ -515,6 +533,7 @@ impl Probe {
     ) -> io::Result<(Answer, Vec<EndRates>)> {
         let known = &self.instance.law.known;
         let Some(called) = (match function {
+            Function::Create => None,
             Function::InitState => known.init_state,
             Function::Integrate => known.integrate,
         }) else {
@@ -563,7 +582,7 @@ impl Probe {
             request: self.asked(form),
             n_points: n as u64,
             first_point: form.first_point,
-            time: 0.0,
+            time: form.time,
             time_increment: form.time_increment,
             gradient0: gradient0.view(),
             gradient1: gradient1.view(),
@@ -584,10 +603,14 @@ impl Probe {
             },
             message: message.as_ref().map_or(null_mut(), |m| m.pointer().cast()),
             message_capacity: form.message.unwrap_or(0),
-            step_time: 0.0,
+            step_time: form.time,
             rates: given.as_ref().map_or(null(), std::ptr::from_ref),
         };
         let letter = in_pages(&batch, form.batch_bytes)?;
+        kept::keep(|| {
+            let names = (self.id.as_str(), self.hypothesis.name());
+            KeptCall::new(names, function, *form, &self.values, starts)
+        })?;
         // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
         // function; a batch that tells less than version 1.0 has to be refused unread.
         let returned = unsafe { called(self.instance.instance, letter.pointer().cast()) };

@@ -73,7 +73,7 @@ fn followed(driver: &Driver, states: &[State], parameters: &[usize]) -> Option<F
         message: Some(200),
         more_host: 0,
         host_minor: raw::PILUM_ABI_MINOR,
-        n_components: law.n_components(),
+        hypothesis: law.hypothesis(),
         n_states: law.n_states(),
         lacks_tangent: false,
     };

@@ -307,16 +307,16 @@ fn initial_states_are_written(subject: &Subject) -> Found {
                 for (i, end) in answer.points.iter().enumerate() {
                     let point = format!("`init_state`, point {i} of {n}");
                     if end.status == NO_OUTCOME && answer.status != raw::PILUM_E_ARGUMENT {
-                        return Err(specimen.fails(format!("{point}: there is no outcome")));
+                        let why = format!("{point}: there is no outcome");
+                        return Err(specimen.fails_to_start(&fluxes, &form, &[], why));
                     }
                     let unwritten = end.state.iter().position(|value| !value.is_finite());
                     if let Some(k) = unwritten
                         && end.status == raw::PILUM_OK
                     {
-                        return Err(specimen.fails(format!(
-                            "{point}: `{}` is not written, or not finite",
-                            specimen.formulation.internal_variables[k].id
-                        )));
+                        let id = &specimen.formulation.internal_variables[k].id;
+                        let why = format!("{point}: `{id}` is not written, or not finite");
+                        return Err(specimen.fails_to_start(&fluxes, &form, &[], why));
                     }
                     n_points += 1;
                 }

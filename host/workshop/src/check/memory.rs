@@ -42,8 +42,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "memory-is-freed",
         family: Family::Memory,
-        description: "What is in use of the heap does not grow with calls of `integrate`, good and \
-                      failing, of `init_state`, nor with instances that are created and destroyed.",
+        description: "What is in use of the heap, and what is mapped, does not grow with calls of \
+                      `integrate`, good and failing, of `init_state`, nor with instances that are \
+                      created and destroyed, nor with refused ones.",
         needs: &["writes-stay-inside"],
         run: memory_is_freed,
     },
@@ -94,7 +95,8 @@ fn in_form(
                 .init_state(&fluxes, &form)?
                 .is_some_and(|answer| answer.stray)
             {
-                return Err(specimen.fails("`init_state` writes between the cells of `state1`"));
+                let why = "`init_state` writes between the cells of `state1`";
+                return Err(specimen.fails_to_start(&fluxes, &form, &[], why));
             }
         }
     }
@@ -174,7 +176,11 @@ fn memory_is_freed(subject: &Subject) -> Found {
         let mut broken = point.clone();
         broken[0].gradient1[0] = f64::NAN;
         let fluxes = vec![point[0].flux0.clone()];
-        let kinds: [(&str, Work<'_>); 4] = [
+        let mut refused = specimen.values.clone();
+        if let Some(first) = refused.first_mut() {
+            *first = f64::INFINITY;
+        }
+        let kinds: [(&str, Work<'_>); 5] = [
             (
                 "a call of `integrate`",
                 Box::new(|| specimen.call(&point, UPDATE).map(drop)),
@@ -199,25 +205,44 @@ fn memory_is_freed(subject: &Subject) -> Found {
                     Ok(())
                 }),
             ),
+            (
+                "`create` that refuses",
+                Box::new(|| {
+                    let form = create_form(&specimen.formulation, specimen.hypothesis, &refused);
+                    specimen.law.probe(&form)?;
+                    Ok(())
+                }),
+            ),
         ];
         for (what, work) in kinds {
-            let mut least = usize::MAX;
+            let mut least = [usize::MAX; 2];
             // The first calls may fill what later ones use again.
             for look in 0..=LOOKS {
-                let before = process::heap_in_use().unwrap_or_default();
+                let in_use =
+                    || [process::heap_in_use(), process::mapped()].map(Option::unwrap_or_default);
+                let before = in_use();
                 for _ in 0..CALLS {
                     work()?;
                 }
-                let after = process::heap_in_use().unwrap_or_default();
+                let after = in_use();
                 if look > 0 {
-                    least = least.min(after.saturating_sub(before));
+                    for k in 0..2 {
+                        least[k] = least[k].min(after[k].saturating_sub(before[k]));
+                    }
                 }
             }
-            if least >= 8 * CALLS {
+            let [heap, mapped] = least;
+            if heap >= 8 * CALLS {
                 return Err(specimen.fails(format!(
                     "{what} leaves {} bytes of the heap in use",
-                    least / CALLS
+                    heap / CALLS
                 )));
+            }
+            // Less than a page in each of many calls is the allocator's.
+            if mapped >= 4096 * CALLS {
+                return Err(
+                    specimen.fails(format!("{what} leaves {} bytes mapped", mapped / CALLS))
+                );
             }
         }
     }

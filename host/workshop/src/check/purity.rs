@@ -26,8 +26,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "independent-of-split",
         family: Family::Purity,
-        description: "Points give the same bits in one batch, one by one, and in batches of \
-                      random sizes.",
+        description: "Points give the same bits in one batch, one by one, in batches of random \
+                      sizes, and in one of 20 011 points.",
         needs: &["repeatable"],
         run: independent_of_split,
     },
@@ -37,6 +37,23 @@ pub(super) const CHECKS: &[Check] = &[
         description: "Points give the same bits in another order.",
         needs: &["independent-of-split"],
         run: independent_of_order,
+    },
+    Check {
+        id: "independent-of-request",
+        family: Family::Purity,
+        description: "Flux and internal variables have the same bits whatever operator is asked for, \
+                      and whatever number the first point has.",
+        needs: &["repeatable"],
+        run: independent_of_request,
+    },
+    Check {
+        id: "independent-of-time",
+        family: Family::Purity,
+        description: "Results have the same bits at whatever time an increment begins; and, where no \
+                      parameter has a unit of time, however long it takes, 0 too (warning, since a \
+                      law may age).",
+        needs: &["repeatable"],
+        run: independent_of_time,
     },
     Check {
         id: "independent-of-layout",
@@ -74,9 +91,10 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "environment-is-left-alone",
         family: Family::Purity,
-        description: "Rounding, subnormal numbers, working directory, signal handlers and variables \
-                      of the environment are as before; no process was started, no thread and no \
-                      open file is left behind.",
+        description: "Rounding, subnormal numbers, traps of arithmetic, locale, working directory, \
+                      signal handlers, alarms, limits, the mask of files and variables of the \
+                      environment are as before; no process was started, no thread and no open file \
+                      is left behind, and none is closed.",
         needs: &["integrate-works"],
         run: environment_is_left_alone,
     },
@@ -148,13 +166,15 @@ fn differs(
 ) -> Verdict {
     let specimen = called.specimen;
     if called.function == Function::InitState {
-        return specimen.fails(format!(
+        let why = format!(
             "`init_state`, point {i} of {}: flux {:?} gave internal variables {:?}, then {:?}",
             points.len(),
             points[i].flux0,
             expected.state,
             found.map(|end| end.state.clone()).unwrap_or_default()
-        ));
+        );
+        let fluxes: Vec<Vec<f64>> = points.iter().map(|point| point.flux0.clone()).collect();
+        return specimen.fails_to_start(&fluxes, &specimen.form(0), &[], why);
     }
     let why = format!(
         "point {i} of {}: {:?} gave flux {:?}, then {:?}",
@@ -202,12 +222,35 @@ fn independent_of_split(subject: &Subject) -> Found {
         let differing = first_difference(&singles, &parts).is_some();
         let whole = called.update(points)?;
         let singles_differ = first_difference(&singles, &whole).is_some();
+        if !differing && !singles_differ {
+            return in_one_of_many(called, points);
+        }
         Ok(if differing && !singles_differ {
             parts
         } else {
             singles
         })
     })
+}
+
+/// Points of a batch as large as those of a run: no array of a fixed size, no stack for all of them.
+const MANY: usize = 20_011;
+
+/// The points over and over in one batch. Of each the result that differs from its first one, if any
+/// does.
+fn in_one_of_many(called: &Called<'_>, points: &[PointStart]) -> Result<Vec<PointEnd>, Verdict> {
+    let many: Vec<PointStart> = points.iter().cycle().take(MANY).cloned().collect();
+    let ends = called.requested(&many, raw::PILUM_REQ_FLUX)?;
+    let few = called.requested(points, raw::PILUM_REQ_FLUX)?;
+    let mut expected = called.update(points)?;
+    for (i, end) in ends.into_iter().enumerate() {
+        let k = i % points.len();
+        if !is_same(&few[k], &end) {
+            let tangent = std::mem::take(&mut expected[k].tangent);
+            expected[k] = PointEnd { tangent, ..end };
+        }
+    }
+    Ok(expected)
 }
 
 fn independent_of_order(subject: &Subject) -> Found {
@@ -249,6 +292,86 @@ fn independent_of_layout(subject: &Subject) -> Found {
         }
         Ok(ends)
     })
+}
+
+fn independent_of_request(subject: &Subject) -> Found {
+    let forms: [(u32, u64); 4] = [
+        (raw::PILUM_REQ_FLUX, 0),
+        (raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC, 0),
+        (UPDATE, 1),
+        (UPDATE, 1 << 40),
+    ];
+    for (request, first_point) in forms {
+        compare(subject, "request", |called, points, _| {
+            let form = Form {
+                first_point,
+                ..called.specimen.form(request)
+            };
+            let expected = called.update(points)?;
+            let mut ends = called.specimen.ask(called.function, points, &form)?;
+            for (end, expected) in ends.iter_mut().zip(expected) {
+                end.tangent = expected.tangent;
+            }
+            Ok(ends)
+        })?;
+    }
+    Ok(String::new())
+}
+
+/// Times at which an increment may begin, and lengths of it.
+const TIMES: [f64; 2] = [0.125, 1e5];
+const LENGTHS: [f64; 3] = [0.0, 1e-3, 1e4];
+
+fn independent_of_time(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "time");
+    let mut n = 0;
+    for specimen in &subject.specimens(3, &mut random)? {
+        let points = specimen.points(48, &mut random)?;
+        let parameters = &specimen.law.description().parameters;
+        let may_depend = parameters.iter().any(|p| has_time(&p.unit));
+        for function in Function::BOTH {
+            let called = Called { specimen, function };
+            let ordinary = specimen.form(UPDATE);
+            let expected = called.update(&points)?;
+            let began = TIMES.map(|time| (format!("at time {time}"), Form { time, ..ordinary }));
+            let lengths = LENGTHS.map(|time_increment| {
+                let form = Form {
+                    time_increment,
+                    ..ordinary
+                };
+                (format!("over a time of {time_increment}"), form)
+            });
+            let lengths = lengths.into_iter().filter(|_| !may_depend);
+            for (when, form) in began.into_iter().chain(lengths) {
+                let found = specimen.ask(function, &points, &form)?;
+                n += found.len();
+                let Some(i) = first_difference(&expected, &found) else {
+                    continue;
+                };
+                let why = format!(
+                    "{}: `{}` gives flux {:?} and internal variables {:?}, {when} {:?} and {:?}, \
+                     at {:?}; a law that depends on how long an increment takes has a parameter with \
+                     a unit of time",
+                    specimen.name(),
+                    function.name(),
+                    expected[i].flux,
+                    expected[i].state,
+                    found[i].flux,
+                    found[i].state,
+                    points[i]
+                );
+                return Err(specimen.recorded(&points[i], Verdict::Warning(why)));
+            }
+        }
+    }
+    Ok(format!("{n} points"))
+}
+
+/// Whether a unit has one of time in it.
+fn has_time(unit: &str) -> bool {
+    unit.split(['/', '·', '*', ' '])
+        .filter_map(|factor| factor.split('^').next())
+        .any(|name| ["s", "h", "d"].contains(&name))
 }
 
 fn independent_of_thread(subject: &Subject) -> Found {
@@ -399,18 +522,26 @@ fn after_alike(
         one(point, &form)?;
         let found = one(start, form_of_it)?;
         if first_difference(&expected, &found).is_some() {
-            return Err(specimen.fails_at(
-                start,
-                format!(
-                    "`{}` gives another result after a call that differs in {what} alone: \
-                     flux {:?} and internal variables {:?}, else {:?} and {:?}, at {start:?}",
-                    function.name(),
-                    found[0].flux,
-                    found[0].state,
-                    expected[0].flux,
-                    expected[0].state
-                ),
-            ));
+            let why = format!(
+                "`{}` gives another result after a call that differs in {what} alone: \
+                 flux {:?} and internal variables {:?}, else {:?} and {:?}, at {start:?}",
+                function.name(),
+                found[0].flux,
+                found[0].state,
+                expected[0].flux,
+                expected[0].state
+            );
+            return Err(if *function == Function::InitState {
+                let before = [point.flux0.clone()];
+                specimen.fails_to_start(
+                    std::slice::from_ref(&start.flux0),
+                    form_of_it,
+                    &before,
+                    why,
+                )
+            } else {
+                specimen.fails_at(start, why)
+            });
         }
     }
     Ok(calls.len())
@@ -463,11 +594,8 @@ fn after_other_instances(
         // Where the first one stood.
         forget()?;
         one(&other, point)?;
-        drop(other);
-        let Some(again) = create(&specimen.values)? else {
-            continue;
-        };
-        let there = one(&again, point)?;
+        let again = in_place_of(other, || create(&specimen.values))?;
+        let there = again.map(|again| one(&again, point)).transpose()?;
         forget()?;
         let own = one(&specimen.probe, point)?;
         let what = if first_difference(&expected, &found).is_some() {
@@ -475,20 +603,45 @@ fn after_other_instances(
                 "after the same call of an instance that differs in `{}` alone",
                 parameter.id
             )
-        } else if first_difference(&own, &there).is_some() {
+        } else if there.is_some_and(|there| first_difference(&own, &there).is_some()) {
             "in an instance that stands where another one stood".to_owned()
         } else {
             continue;
         };
-        return Err(specimen.fails_at(
-            point,
-            format!(
-                "`{}` gives another result {what}, at {point:?}",
-                function.name()
-            ),
-        ));
+        let why = format!(
+            "`{}` gives another result {what}, at {point:?}",
+            function.name()
+        );
+        return Err(if *function == Function::InitState {
+            let fluxes = std::slice::from_ref(&point.flux0);
+            specimen.fails_to_start(fluxes, &specimen.form(0), &[], why)
+        } else {
+            specimen.fails_at(point, why)
+        });
     }
     Ok(())
+}
+
+/// Instances that are made until one stands where another one stood.
+const PLACES: usize = 256;
+
+/// An instance that stands where this one stands, which is destroyed; nothing if none comes to stand there.
+fn in_place_of(
+    other: Probe,
+    create: impl Fn() -> Result<Option<Probe>, Verdict>,
+) -> Result<Option<Probe>, Verdict> {
+    let address = other.address();
+    drop(other);
+    // Each takes a free place, and keeps it while the right one is looked for.
+    let mut elsewhere = Vec::new();
+    while elsewhere.len() < PLACES {
+        match create()? {
+            Some(again) if again.address() == address => return Ok(Some(again)),
+            Some(again) => elsewhere.push(again),
+            None => break,
+        }
+    }
+    Ok(None)
 }
 
 /// What a law could change about numbers and the process.
@@ -498,6 +651,12 @@ struct Environment {
     subnormal: u64,
     folder: Option<PathBuf>,
     signals: Vec<usize>,
+    arithmetic: u32,
+    locale: String,
+    has_alarm: bool,
+    /// Limits, and of the status what masks signals and files, where the system tells.
+    limits: Option<String>,
+    masks: Vec<String>,
     variables: Vec<(OsString, OsString)>,
     process: u32,
     had_children: bool,
@@ -518,6 +677,16 @@ impl Environment {
             subnormal: (black_box(f64::MIN_POSITIVE) * black_box(0.5)).to_bits(),
             folder: std::env::current_dir().ok(),
             signals: process::signal_handlers(),
+            arithmetic: process::arithmetic(),
+            locale: process::locale(),
+            has_alarm: process::alarm(),
+            limits: std::fs::read_to_string("/proc/self/limits").ok(),
+            masks: std::fs::read_to_string("/proc/thread-self/status")
+                .unwrap_or_default()
+                .lines()
+                .filter(|line| line.starts_with("Umask:") || line.starts_with("SigBlk:"))
+                .map(str::to_owned)
+                .collect(),
             variables: std::env::vars_os().collect(),
             process: std::process::id(),
             had_children: process::has_had_children(),
@@ -538,6 +707,16 @@ impl Environment {
             "the treatment of subnormal numbers has changed"
         } else if self.rounded != after.rounded {
             "the rounding mode has changed"
+        } else if self.arithmetic != after.arithmetic {
+            "what the processor does on exceptions of arithmetic has changed"
+        } else if self.locale != after.locale {
+            return Some(format!("the locale is {} now", after.locale));
+        } else if self.has_alarm != after.has_alarm {
+            "an alarm is set"
+        } else if self.limits != after.limits {
+            "the limits of the process have changed"
+        } else if self.masks != after.masks {
+            "the mask of signals or of new files has changed"
         } else if self.process != after.process || self.had_children != after.had_children {
             "a process was started"
         } else if let Some(number) = (1..)
@@ -551,6 +730,8 @@ impl Environment {
             return Some(format!("threads are left behind: {n}"));
         } else if let Some(n) = more(self.files, after.files) {
             return Some(format!("open files are left behind: {n}"));
+        } else if let Some(n) = more(after.files, self.files) {
+            return Some(format!("files that it has not opened are closed: {n}"));
         } else {
             return None;
         };

@@ -7,8 +7,11 @@ use super::random::Random;
 use super::{Check, Family, Found, Subject, Verdict, failed, skipped};
 use crate::Error;
 use abi::Hypothesis;
+use abi::raw;
 use abi::status::Outcome;
 use law::adapter::{Foreign, sidecar, sidecar_of};
+use law::probe::kept::{self, Function, KeptCall};
+use law::probe::{Form, PointStart};
 use law::{
     BatchFailure, End, Law, Moment, Operator, ParameterDescription, Start, Strided, Tangent,
 };
@@ -287,8 +290,41 @@ impl Routine {
             state: &mut after.state,
             operator: &mut after.tangent,
         };
+        let kept = || self.kept(point, operator, time);
+        // Without it a crash is known all the same.
+        let _ = kept::keep(kept);
         self.law.integrate(&start, operator, end)?;
         Ok(after)
+    }
+
+    /// The call, for who looks after a crash.
+    fn kept(&self, point: &Point, operator: Operator, time_increment: f64) -> KeptCall {
+        let request = match operator {
+            Operator::None => raw::PILUM_REQ_FLUX,
+            Operator::Consistent => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT,
+            Operator::Elastic => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
+        };
+        let form = Form {
+            time_increment,
+            ..Form::of(request)
+        };
+        let start = PointStart {
+            gradient0: point.gradient.clone(),
+            gradient1: point.gradient_end.clone(),
+            flux0: point.flux.clone(),
+            state0: point.state.clone(),
+        };
+        let names = (
+            self.law.description().id.as_str(),
+            self.law.hypothesis().name(),
+        );
+        KeptCall::new(
+            names,
+            Function::Integrate,
+            form,
+            self.law.parameters(),
+            &[start],
+        )
     }
 
     fn update(&self, point: &Point) -> Result<After, BatchFailure> {

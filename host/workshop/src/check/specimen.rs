@@ -6,7 +6,7 @@ use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
 use law::capsule::Capsule;
-use law::probe::{Answer, CreateForm, Form, PointEnd, PointStart, Probe};
+use law::probe::{Answer, CreateForm, Form, PointEnd, PointStart, Probe, kept};
 use law::{
     BatchFailure, FormulationDescription, LoadedLaw, Moment, Operator, ParameterDescription,
     PointCall, Request, Site,
@@ -63,7 +63,7 @@ pub(super) fn hypotheses(law: &LoadedLaw) -> Vec<(FormulationDescription, Hypoth
 }
 
 /// The form of an ordinary `create`.
-pub(super) fn create_form<'a>(
+pub(crate) fn create_form<'a>(
     formulation: &FormulationDescription,
     hypothesis: Hypothesis,
     values: &'a [f64],
@@ -75,7 +75,7 @@ pub(super) fn create_form<'a>(
         message: Some(512),
         more_host: 0,
         host_minor: raw::PILUM_ABI_MINOR,
-        n_components: hypothesis.n_components(),
+        hypothesis,
         n_states: formulation.internal_variables.len(),
         lacks_tangent: formulation.tangent == law::Tangent::None,
     }
@@ -356,6 +356,48 @@ impl Specimen {
         }
     }
 
+    /// A failure of this specimen in a call of `init_state` for points that carry these fluxes, after
+    /// one for others.
+    pub(super) fn fails_to_start(
+        &self,
+        fluxes: &[Vec<f64>],
+        form: &Form,
+        before: &[Vec<f64>],
+        why: impl std::fmt::Display,
+    ) -> Verdict {
+        let verdict = self.fails(why);
+        let points = |fluxes: &[Vec<f64>]| -> Vec<PointStart> {
+            let fluxes = fluxes.iter().cloned();
+            let of_flux = |flux0| PointStart {
+                gradient0: Vec::new(),
+                gradient1: Vec::new(),
+                flux0,
+                state0: Vec::new(),
+            };
+            fluxes.map(of_flux).collect()
+        };
+        let capsule = Capsule::of_probe(
+            &self.law,
+            &self.formulation,
+            (self.hypothesis, &self.values),
+            (
+                kept::Function::InitState,
+                Form {
+                    request: 0,
+                    ..*form
+                },
+            ),
+            &points(fluxes),
+            &points(before),
+        );
+        // Without a capsule the words remain.
+        let Some(mut capsule) = capsule else {
+            return verdict;
+        };
+        verdict.words().clone_into(&mut capsule.outcome.message);
+        Verdict::At(Box::new(verdict), Box::new(capsule))
+    }
+
     fn capsule(&self, start: &PointStart, why: &str) -> Option<Capsule> {
         let law = self.law.build(self.hypothesis, &self.values).ok()?;
         let call = PointCall {
@@ -421,18 +463,18 @@ impl Specimen {
 }
 
 /// Whether outputs are claimed to be valid.
-pub(super) fn is_success(status: raw::Status) -> bool {
+pub(crate) fn is_success(status: raw::Status) -> bool {
     status == raw::PILUM_OK || status == raw::PILUM_OK_UNRELIABLE
 }
 
 /// Whether all results are finite.
-pub(super) fn is_finite(end: &PointEnd) -> bool {
+pub(crate) fn is_finite(end: &PointEnd) -> bool {
     let mut all = end.flux.iter().chain(&end.state).chain(&end.tangent);
     all.all(|value| value.is_finite())
 }
 
 /// Whether two results have the same bits.
-pub(super) fn is_same(a: &PointEnd, b: &PointEnd) -> bool {
+pub(crate) fn is_same(a: &PointEnd, b: &PointEnd) -> bool {
     let bits = |end: &PointEnd| -> Vec<u64> {
         let all = end.flux.iter().chain(&end.state).chain(&end.tangent);
         all.map(|value| value.to_bits()).collect()
@@ -441,7 +483,7 @@ pub(super) fn is_same(a: &PointEnd, b: &PointEnd) -> bool {
 }
 
 /// The first point whose results differ.
-pub(super) fn first_difference(a: &[PointEnd], b: &[PointEnd]) -> Option<usize> {
+pub(crate) fn first_difference(a: &[PointEnd], b: &[PointEnd]) -> Option<usize> {
     (0..a.len().max(b.len())).find(|&i| match (a.get(i), b.get(i)) {
         (Some(a), Some(b)) => !is_same(a, b),
         _ => true,

@@ -1,9 +1,11 @@
 //! Memory with chosen neighbours.
 
+use serde::{Deserialize, Serialize};
 use std::io;
 
 /// What lies beside an array.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Fence {
     /// At least a page of ordinary memory on both sides.
     Far,

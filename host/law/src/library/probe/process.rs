@@ -62,3 +62,74 @@ pub fn heap_in_use() -> Option<usize> {
 pub fn heap_in_use() -> Option<usize> {
     None
 }
+
+/// Bytes of memory that the process has mapped; `None` where the system does not tell.
+pub fn mapped() -> Option<usize> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmSize:"))?;
+    let kibibytes: usize = line.split_whitespace().next()?.parse().ok()?;
+    Some(kibibytes << 10)
+}
+
+/// The name of the locale, of each of its parts if they differ.
+#[cfg(unix)]
+pub fn locale() -> String {
+    use nix::libc;
+    use std::ffi::CStr;
+    // SAFETY: nothing is set; the name stands until the locale is set, which only the library would
+    // do, and it does not run now.
+    unsafe {
+        let name = libc::setlocale(libc::LC_ALL, std::ptr::null());
+        if name.is_null() {
+            String::new()
+        } else {
+            CStr::from_ptr(name).to_string_lossy().into_owned()
+        }
+    }
+}
+
+/// Not known.
+#[cfg(not(unix))]
+pub fn locale() -> String {
+    String::new()
+}
+
+/// How the processor treats exceptions of arithmetic, rounding and subnormal numbers, without what has
+/// happened.
+#[cfg(target_arch = "x86_64")]
+pub fn arithmetic() -> u32 {
+    let mut control = 0_u32;
+    // SAFETY: it stores a register of the processor into these four bytes.
+    unsafe {
+        std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut control, options(nostack, preserves_flags));
+    }
+    control & !0x3f
+}
+
+/// Not known.
+#[cfg(not(target_arch = "x86_64"))]
+pub fn arithmetic() -> u32 {
+    0
+}
+
+/// Whether an alarm is set.
+#[cfg(unix)]
+pub fn alarm() -> bool {
+    use nix::libc;
+    let mut timer = std::mem::MaybeUninit::<libc::itimerval>::zeroed();
+    // SAFETY: nothing is set; what is left is written to a struct of that type, for which zeros are a
+    // value.
+    let left = unsafe {
+        libc::getitimer(libc::ITIMER_REAL, timer.as_mut_ptr());
+        timer.assume_init()
+    };
+    left.it_value.tv_sec > 0 || left.it_value.tv_usec > 0
+}
+
+/// Not known.
+#[cfg(not(unix))]
+pub fn alarm() -> bool {
+    false
+}

@@ -1,0 +1,365 @@
+//! What can be said of a response without knowing its equations: where it jumps, what becomes of it in
+//! smaller increments, whether its elastic operator is one.
+
+use super::mathematics::{ELASTIC, ITERATED, NEEDS, UPDATE, flux_scale, increment, largest};
+use super::random::Random;
+use super::specimen::{Specimen, is_finite, is_success};
+use super::walk::Step;
+use super::{Check, Family, Found, Subject, Verdict, skipped};
+use abi::raw;
+use law::Tangent;
+use law::probe::{PointEnd, PointStart};
+use nalgebra::DMatrix;
+
+pub(super) const CHECKS: &[Check] = &[
+    Check {
+        id: "elastic-operator-is-plausible",
+        family: Family::Mathematics,
+        description: "The elastic operator is symmetric, has no negative stiffness, and is the \
+                      consistent tangent of some very small increments (warning).",
+        needs: NEEDS,
+        run: elastic_operator_is_plausible,
+    },
+    Check {
+        id: "response-is-continuous",
+        family: Family::Mathematics,
+        description: "Along an increment the flux does not jump, as it does where branches do not \
+                      meet or where tolerances of yielding are wide. Exempt are jumps to or from no \
+                      flux at all, as where an interface opens, and those with an internal variable \
+                      of unit - that switches by a half or more (warning, since more may break).",
+        needs: NEEDS,
+        run: response_is_continuous,
+    },
+    Check {
+        id: "states-are-carried-on",
+        family: Family::Mathematics,
+        description: "No internal variable is halved where an increment is done in two, and halved again \
+                      in four, as what is not added to its value at the start (warning, since a law may \
+                      keep the last increment's).",
+        needs: NEEDS,
+        run: states_are_carried_on,
+    },
+];
+
+/// Asymmetry and negative stiffness, relative to the largest entry.
+const ROUND_OFF: f64 = 1e-9;
+/// How near a tangent is to the elastic operator, relative to its largest entry.
+const NEAR: f64 = 1e-4;
+/// Length of very small increments, relative to those that change the flux by as much as it is.
+const SMALL: f64 = 1e-6;
+
+/// At most so many steps, evenly.
+fn some(steps: &[Step], most: usize) -> impl Iterator<Item = &Step> {
+    steps.iter().step_by(steps.len().div_ceil(most).max(1))
+}
+
+fn elastic_operator_is_plausible(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "elastic");
+    let mut n = 0;
+    for specimen in subject.specimens_by_default(3, &mut random)? {
+        let steps = specimen.paths(24, &mut random)?.steps;
+        let mut points = Vec::new();
+        for step in some(&steps, 200) {
+            let length = SMALL * flux_scale(step) / step.stiffness;
+            // On the way back, or anywhere.
+            let last = increment(&step.start);
+            let size = largest(&last);
+            let back: Vec<f64> = last.iter().map(|c| -c / size * length).collect();
+            for by in [back, specimen.direction(length, &mut random)] {
+                let gradient1 = step.start.gradient1.iter().zip(&by).map(|(g, d)| g + d);
+                points.push(PointStart {
+                    gradient0: step.start.gradient1.clone(),
+                    gradient1: gradient1.collect(),
+                    flux0: step.end.flux.clone(),
+                    state0: step.end.state.clone(),
+                });
+            }
+        }
+        let elastic = specimen.call(&points, ELASTIC)?.points;
+        let consistent = specimen.call(&points, UPDATE)?.points;
+        let (mut n_met, mut unmet) = (0, None);
+        for ((point, elastic), consistent) in points.iter().zip(&elastic).zip(&consistent) {
+            if !(is_success(elastic.status) && is_success(consistent.status)) {
+                continue;
+            }
+            n += 1;
+            if let Some(why) = implausible(elastic) {
+                let verdict = Verdict::Warning(format!("{}: {why}, at {point:?}", specimen.name()));
+                return Err(specimen.recorded(point, verdict));
+            }
+            let off = elastic.tangent.iter().zip(&consistent.tangent);
+            let off = off.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+            if off <= NEAR * largest(&elastic.tangent) {
+                n_met += 1;
+            } else {
+                unmet = unmet.or(Some((point, elastic, consistent)));
+            }
+        }
+        if let (0, Some((point, elastic, consistent))) = (n_met, unmet)
+            && specimen.formulation.tangent == Tangent::Consistent
+        {
+            let why = format!(
+                "{}: no very small increment, there or back, has the elastic operator for its tangent: \
+                 {:?} and {:?}, at {point:?}",
+                specimen.name(),
+                elastic.tangent,
+                consistent.tangent
+            );
+            return Err(specimen.recorded(point, Verdict::Warning(why)));
+        }
+    }
+    if n == 0 {
+        return Err(skipped("no very small increment succeeded"));
+    }
+    Ok(format!("{n} operators"))
+}
+
+/// What cannot be of an elastic operator.
+fn implausible(end: &PointEnd) -> Option<String> {
+    let n = end.flux.len();
+    let operator = DMatrix::from_row_slice(n, n, &end.tangent);
+    let bound = ROUND_OFF * largest(&end.tangent);
+    if (&operator - operator.transpose()).amax() > bound {
+        return Some(format!(
+            "the elastic operator is not symmetric, so that a cycle gives or takes work: {:?}",
+            end.tangent
+        ));
+    }
+    let least = operator.symmetric_eigenvalues().min();
+    (least < -bound).then(|| {
+        format!(
+            "the elastic operator has the negative stiffness {least:.6e}: {:?}",
+            end.tangent
+        )
+    })
+}
+
+/// Pieces of an increment that are looked at first, and how often the suspicious ones are halved.
+const PIECES: usize = 32;
+const HALVINGS: usize = 30;
+/// Pieces of each increment that are halved.
+const SUSPICIOUS: usize = 2;
+/// Least jump, relative to the fluxes in play.
+const JUMP: f64 = 1e-7;
+/// How much an internal variable without a unit changes where it switches.
+const SWITCH: f64 = 0.5;
+
+/// A piece of an increment, from one part of it to another.
+struct Piece<'a> {
+    step: &'a Step,
+    ends: [(f64, PointEnd); 2],
+}
+
+/// The start of a part of an increment.
+fn part(step: &Step, fraction: f64) -> PointStart {
+    let mut start = step.start.clone();
+    for (end, begin) in start.gradient1.iter_mut().zip(&step.start.gradient0) {
+        *end = begin + fraction * (*end - begin);
+    }
+    start
+}
+
+impl Piece<'_> {
+    /// By how much the flux at its end is off the tangent at its start: all of a jump, and little else
+    /// of a short piece.
+    fn off(&self) -> f64 {
+        let [(from, a), (to, b)] = &self.ends;
+        if !(is_success(a.status) && is_success(b.status)) {
+            return 0.0;
+        }
+        let whole = increment(&self.step.start);
+        let n = a.flux.len();
+        let off = (0..n).map(|row| {
+            let rise: f64 = (0..n).map(|c| a.tangent[row * n + c] * whole[c]).sum();
+            (b.flux[row] - a.flux[row] - (to - from) * rise).abs()
+        });
+        off.fold(0.0, f64::max)
+    }
+
+    /// By how much the flux jumps in it: that much it has changed, and is off.
+    fn jump(&self) -> f64 {
+        let [(_, a), (_, b)] = &self.ends;
+        let changes = a.flux.iter().zip(&b.flux);
+        let changed = changes.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        self.off().min(changed)
+    }
+
+    /// Something opens or closes in it, or an internal variable switches.
+    fn switches(&self, specimen: &Specimen) -> bool {
+        let [(_, a), (_, b)] = &self.ends;
+        if [a, b].iter().any(|end| largest(&end.flux) == 0.0) {
+            return true;
+        }
+        let variables = specimen.formulation.internal_variables.iter();
+        let mut pairs = variables.zip(a.state.iter().zip(&b.state));
+        pairs.any(|(v, (a, b))| v.unit == "-" && (a - b).abs() >= SWITCH)
+    }
+}
+
+fn response_is_continuous(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "jumps");
+    let mut n = 0;
+    for specimen in subject.specimens_by_default(4, &mut random)? {
+        let steps = specimen.paths(24, &mut random)?.steps;
+        let chosen: Vec<&Step> = some(&steps, 120).collect();
+        let whole = |step: &&Step| {
+            (0..=PIECES)
+                .map(|k| part(step, k as f64 / PIECES as f64))
+                .collect::<Vec<_>>()
+        };
+        let points: Vec<PointStart> = chosen.iter().flat_map(whole).collect();
+        let ends = specimen.call(&points, UPDATE)?.points;
+        let mut pieces = Vec::new();
+        for (step, ends) in chosen.iter().copied().zip(ends.chunks(PIECES + 1)) {
+            let of_step = ends.windows(2).enumerate().map(|(k, pair)| Piece {
+                step,
+                ends: [0, 1].map(|i| ((k + i) as f64 / PIECES as f64, pair[i].clone())),
+            });
+            let mut of_step: Vec<Piece<'_>> = of_step.collect();
+            of_step.sort_by(|a, b| b.off().total_cmp(&a.off()));
+            pieces.extend(of_step.into_iter().take(SUSPICIOUS));
+            n += 1;
+        }
+        for _ in 0..HALVINGS {
+            let middles = pieces
+                .iter()
+                .map(|piece| f64::midpoint(piece.ends[0].0, piece.ends[1].0));
+            let middles: Vec<f64> = middles.collect();
+            let points = pieces
+                .iter()
+                .zip(&middles)
+                .map(|(piece, at)| part(piece.step, *at));
+            let points: Vec<PointStart> = points.collect();
+            let ends = specimen.call(&points, UPDATE)?.points;
+            pieces = pieces
+                .into_iter()
+                .zip(middles.into_iter().zip(ends))
+                .map(|(piece, middle)| {
+                    let Piece {
+                        step,
+                        ends: [start, end],
+                    } = piece;
+                    let first = Piece {
+                        step,
+                        ends: [start, middle.clone()],
+                    };
+                    let second = Piece {
+                        step,
+                        ends: [middle, end],
+                    };
+                    if first.off() > second.off() {
+                        first
+                    } else {
+                        second
+                    }
+                })
+                .collect();
+        }
+        if let Some(piece) = pieces.iter().find(|piece| {
+            piece.jump() > JUMP * flux_scale(piece.step) && !piece.switches(&specimen)
+        }) {
+            let [(at, a), (_, b)] = &piece.ends;
+            let start = part(piece.step, 1.0);
+            let why = format!(
+                "{}: the flux jumps from {:?} to {:?} at the fraction {at:.9} of an increment, \
+                 internal variables from {:?} to {:?}: {start:?}",
+                specimen.name(),
+                a.flux,
+                b.flux,
+                a.state,
+                b.state
+            );
+            return Err(specimen.recorded(&start, Verdict::Warning(why)));
+        }
+    }
+    if n == 0 {
+        return Err(skipped("no increment succeeded"));
+    }
+    Ok(format!("{n} increments"))
+}
+
+/// How near to a half a half is, and in how many increments it has to be seen.
+const HALF: f64 = 0.02;
+const SEEN: usize = 3;
+
+fn states_are_carried_on(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "halves");
+    let mut n = 0;
+    for specimen in subject.specimens_by_default(3, &mut random)? {
+        let n_states = specimen.probe.n_states();
+        if n_states == 0 {
+            continue;
+        }
+        let steps = specimen.paths(24, &mut random)?.steps;
+        let chosen: Vec<&Step> = some(&steps, 120).collect();
+        let in_two = in_parts(&specimen, &chosen, 2)?;
+        let in_four = in_parts(&specimen, &chosen, 4)?;
+        n += chosen.len();
+        for k in 0..n_states {
+            // Halved, and changed otherwise.
+            let (mut halved, mut other) = (Vec::new(), 0);
+            for ((step, two), four) in chosen.iter().zip(&in_two).zip(&in_four) {
+                let (Some(two), Some(four)) = (two, four) else {
+                    continue;
+                };
+                let (once, before) = (step.end.state[k], step.start.state0[k]);
+                let is_half = |part: f64, whole: f64| (part / whole - 0.5).abs() <= HALF;
+                if (once - before).abs() <= ITERATED * once.abs() {
+                    continue;
+                }
+                if is_half(two[k], once) && is_half(four[k], two[k]) {
+                    halved.push((step, once, two[k], four[k]));
+                } else {
+                    other += 1;
+                }
+            }
+            if let Some((step, once, two, four)) = halved.first()
+                && halved.len() >= SEEN.max(other / 4)
+            {
+                let why = format!(
+                    "{}: `{}` is {once:e} after an increment, {two:e} if it is done in two, {four:e} in \
+                     four: is it added to its value at the start? At {:?}",
+                    specimen.name(),
+                    specimen.formulation.internal_variables[k].id,
+                    step.start
+                );
+                return Err(specimen.recorded(&step.start, Verdict::Warning(why)));
+            }
+        }
+    }
+    if n == 0 {
+        return Err(skipped("no law has internal variables"));
+    }
+    Ok(format!("{n} increments"))
+}
+
+/// Internal variables after increments that are done in so many parts; nothing where the law does not
+/// follow.
+fn in_parts(
+    specimen: &Specimen,
+    steps: &[&Step],
+    parts: usize,
+) -> Result<Vec<Option<Vec<f64>>>, Verdict> {
+    let mut points: Vec<PointStart> = steps.iter().map(|step| step.start.clone()).collect();
+    let mut goes_on = vec![true; steps.len()];
+    for k in 1..=parts {
+        for (point, step) in points.iter_mut().zip(steps) {
+            point.gradient1 = part(step, k as f64 / parts as f64).gradient1;
+        }
+        let ends = specimen.call(&points, raw::PILUM_REQ_FLUX)?.points;
+        for ((point, end), goes_on) in points.iter_mut().zip(ends).zip(&mut goes_on) {
+            if !(is_success(end.status) && is_finite(&end)) {
+                *goes_on = false;
+            }
+            if *goes_on {
+                point.gradient0.clone_from(&point.gradient1);
+                point.flux0 = end.flux;
+                point.state0 = end.state;
+            }
+        }
+    }
+    let ends = points.into_iter().zip(goes_on);
+    Ok(ends
+        .map(|(point, goes_on)| goes_on.then_some(point.state0))
+        .collect())
+}
