@@ -424,3 +424,35 @@ subroutine GetParamName(iMod, iParam, Name)
   if (iParam == 2) Name = '@n#'
 end subroutine
 """
+
+
+def test_points_beyond_all_memory_are_refused() -> None:
+    law = pilum.Law("elastic", young_modulus=1e4, poisson_ratio=0.3, hypothesis="plane_strain")
+    for points in (2**40, 2**62):
+        with pytest.raises(MemoryError, match="points"):
+            law.initial(points)
+
+
+def test_a_start_whose_memory_is_written_to_is_refused() -> None:
+    law = pilum.Law("elastic", young_modulus=1e4, poisson_ratio=0.3, hypothesis="plane_strain")
+    n = 400_000
+    strain = np.full((n, len(law.components)), 1e-6)
+    first, other = law.initial(n), law.initial(n)
+    seen: list[str] = []
+
+    def onto_first() -> None:
+        for _ in range(5):
+            try:
+                law.integrate(strain, other, out=first)
+            except ValueError as error:
+                seen.append(str(error))
+
+    thread = threading.Thread(target=onto_first)
+    thread.start()
+    while thread.is_alive():
+        try:
+            law.integrate(strain[:n], first, tangent=None)
+        except ValueError as error:
+            seen.append(str(error))
+    thread.join()
+    assert all("in use" in message for message in seen), seen

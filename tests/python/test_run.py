@@ -327,3 +327,54 @@ def test_licences_of_what_is_inside_are_there() -> None:
     text = (pages / "licences.txt").read_text()
     for crate in ("faer", "pyo3", "numpy", "arrow-array"):
         assert f"\n{crate} " in text, crate
+
+
+def test_results_of_another_run_are_not_taken_for_these(here: Path) -> None:
+    first = pilum.run(COLUMN, results="same")
+    once = first.history["w"][-1]
+    softer = {**COLUMN, "laws": {"soil": {**SOIL, "parameters": {**SOIL["parameters"], "young_modulus": 5e3}}}}
+    again = pilum.run(softer, results="same")
+    assert again.history["w"][-1] == pytest.approx(2.0 * once)
+    for name in ("profile", "fields", "summary", "points"):
+        with pytest.raises(pilum.InputError, match="another run has written"):
+            getattr(first, name)
+
+
+def test_a_table_goes_to_pandas_by_columns(here: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    history = pilum.run(COLUMN).history
+    frame = pandas.DataFrame(history)
+    assert list(frame.columns) == history.names
+    assert frame.shape == (len(history), len(history.names))
+    np.testing.assert_array_equal(frame["w"].to_numpy(), history["w"])
+    with pytest.raises(KeyError, match="there is no column `nothing`"):
+        history["nothing"]
+
+
+def test_a_law_keeps_its_library_in_a_case(here: Path) -> None:
+    folder = here / "own"
+    folder.mkdir()
+    theirs = pilum.Law("elastic", **SOIL["parameters"], hypothesis="plane_strain").library
+    library = folder / theirs.name
+    # Other bytes, the same law.
+    library.write_bytes(theirs.read_bytes() + b"\0")
+    own = pilum.Law("elastic", law_path=[folder], **SOIL["parameters"], hypothesis="plane_strain")
+    assert own.library == library and own.law_path == [folder]
+    done = pilum.run({**COLUMN, "laws": {"soil": own}}, results="own_results")
+    assert own.sha256 in str(done.summary["laws"])
+    apart = pilum.Law("elastic", isolate=5.0, **SOIL["parameters"], hypothesis="plane_strain")
+    assert apart.isolate == 5.0
+    assert pilum.Problem({**COLUMN, "laws": {"soil": apart}})._isolate == 5.0
+
+
+def test_what_holds_itself_is_no_case() -> None:
+    endless: dict = {}
+    endless["mesh"] = endless
+    deep: list = []
+    for _ in range(5000):
+        deep = [deep]
+    for case in (endless, {"mesh": deep}):
+        with pytest.raises(TypeError, match="hold themselves"):
+            pilum.run(case)
+    with pytest.raises(TypeError, match="hold themselves"):
+        pilum.Law("elastic", parameters=endless)

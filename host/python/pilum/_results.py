@@ -17,17 +17,21 @@ __all__ = ["Results"]
 
 
 class Results:
-    """What a run has written into a folder. Tables are read when they are asked for."""
+    """What a run has written into a folder. Tables are read when they are asked for, and refused with InputError
+    where another run has written there since: give each run its own folder with `results`.
+    """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
         """The folder."""
         if not (self.folder / "history.csv").is_file():
             raise InputError(f"{self.folder} has no `history.csv`: it is not the folder of a run")
+        self._written = self._mark()
 
     @cached_property
     def history(self) -> Table:
         """A row for every increment: `phase`, `increment`, `time`, the probes by their names, `iterations`."""
+        self._check()
         return Table.read(self.folder / "history.csv")
 
     @cached_property
@@ -53,11 +57,13 @@ class Results:
     @cached_property
     def fields(self) -> Fields:
         """Fields over the mesh, as often as `output.fields` says."""
+        self._check()
         return Fields(self.folder / "fields.pvd")
 
     @cached_property
     def summary(self) -> dict[str, Any]:
         """What was run with what, and how it ended: `status`, `warnings`, `laws` and more."""
+        self._check()
         with open(self.folder / "summary.json", encoding="utf-8") as file:
             summary: dict[str, Any] = json.load(file)
         return summary
@@ -77,7 +83,26 @@ class Results:
         """The report, a page that needs no network."""
         return self.folder / "report.html"
 
+    def _mark(self) -> tuple[int, int] | None:
+        """Tells the summary of a run that has ended from that of another one."""
+        path = self.folder / "summary.json"
+        try:
+            with open(path, encoding="utf-8") as file:
+                is_running = json.load(file).get("status") == "running"
+            found = path.stat()
+        except (OSError, ValueError, AttributeError):
+            return None
+        return None if is_running else (found.st_ino, found.st_mtime_ns)
+
+    def _check(self) -> None:
+        if self._written is not None and self._mark() != self._written:
+            raise InputError(
+                f"another run has written into {self.folder} since",
+                hint="give each run its own folder: results=…",
+            )
+
     def _table(self, name: str, setting: str | None) -> Table:
+        self._check()
         path = self.folder / name
         if not path.is_file():
             hint = f"set={{{setting}}} asks for it" if setting else "the case has no `[pile]`"

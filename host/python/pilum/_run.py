@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple, Union
 
 from . import _pilum
@@ -36,7 +37,7 @@ class Problem:
     """What is to be computed: a case, as a file or as a dictionary with the same keys, perhaps on a mesh of arrays.
 
     `case` is a case file, a folder with `case.toml`, or a dictionary with the keys of a case file; its `laws` may
-    be `pilum.Law`s. `mesh` is a `pilum.Mesh` or a mesh of meshio; then the dictionary needs no key `mesh`. `set`
+    be `pilum.Law`s, which are looked for in their `law_path`, too; if one of them is isolated, all are. `mesh` is a `pilum.Mesh` or a mesh of meshio; then the dictionary needs no key `mesh`. `set`
     gives settings over the case, `{"phase.push.increments": 80}`; `variant` names one of several; `isolate` calls
     laws in processes of their own, which may take so many seconds for a call. Paths in a dictionary are relative
     to the working folder.
@@ -62,6 +63,19 @@ class Problem:
                 mesh = Mesh.from_meshio(mesh)
             self._mesh = mesh._content()
             case = {**case, "mesh": {"file": "mesh of arrays", **case.get("mesh", {})}}
+        if isinstance(case, Mapping):
+            laws = case.get("laws")
+            own = [
+                law
+                for law in (laws.values() if isinstance(laws, Mapping) else ())
+                if isinstance(law, _pilum.Law)
+            ]
+            folders = [str(Path(folder).absolute()) for law in own for folder in law.law_path]
+            if folders:
+                case = {**case, "law_path": [*dict.fromkeys(folders), *case.get("law_path", [])]}
+            apart = [law.isolate for law in own if law.isolate is not None]
+            if isolate is None and apart:
+                isolate = min(apart)
         self._case: Any = dict(case) if isinstance(case, Mapping) else os.fspath(case)
         self._set = None if set is None else dict(set)
         self._variant = variant

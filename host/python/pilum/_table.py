@@ -20,17 +20,17 @@ _WHOLE = {"increment", "iterations", "element", "point"}
 _SHOWN = 10
 
 
-class Table(Mapping[str, NDArray[Any]]):
+class Table(dict[str, NDArray[Any]]):
     """Columns of arrays by name, all of one length; what is missing is NaN.
 
-    A mapping of names to one-dimensional arrays: float64, int64 of numbers that count, texts of names. pandas and
-    polars take it as it is: `pandas.DataFrame(table)`, `polars.DataFrame(table)`; by the Arrow C stream
+    A dictionary of names and one-dimensional arrays: float64, int64 of numbers that count, texts of names. Its length
+    is the number of rows. pandas and polars take it as it is: `pandas.DataFrame(table)`, `polars.DataFrame(table)`; by the Arrow C stream
     interface so do pyarrow, DuckDB and others.
     """
 
     def __init__(self, columns: Mapping[str, Any]) -> None:
-        self._columns = {name: np.asarray(values) for name, values in columns.items()}
-        for name, values in self._columns.items():
+        super().__init__({name: np.asarray(values) for name, values in columns.items()})
+        for name, values in self.items():
             if values.shape != (len(self),):
                 message = f"column `{name}` has shape {values.shape}, expected ({len(self)},)"
                 raise ValueError(message)
@@ -58,49 +58,28 @@ class Table(Mapping[str, NDArray[Any]]):
     @property
     def names(self) -> list[str]:
         """Names of the columns, in order."""
-        return list(self._columns)
+        return list(self.keys())
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        try:
-            return self._columns[name]
-        except KeyError:
-            raise KeyError(f"there is no column `{name}`: {', '.join(self.names)}") from None
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
+    def __missing__(self, name: str) -> NDArray[Any]:
+        raise KeyError(f"there is no column `{name}`: {', '.join(self.names)}")
 
     def __len__(self) -> int:
         """Number of rows."""
-        for values in self._columns.values():
+        for values in self.values():
             return int(values.shape[0])
         return 0
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._columns
-
-    def keys(self) -> Any:
-        """Names of the columns."""
-        return self._columns.keys()
-
-    def values(self) -> Any:
-        """The columns."""
-        return self._columns.values()
-
-    def items(self) -> Any:
-        """Names and columns."""
-        return self._columns.items()
 
     def where(self, **equal: Any) -> Table:
         """The rows in which columns have these values: `profile.where(phase="push", increment=10)`."""
         chosen = np.ones(len(self), dtype=bool)
         for name, value in equal.items():
             chosen &= self[name] == value
-        return Table({name: values[chosen] for name, values in self._columns.items()})
+        return Table({name: values[chosen] for name, values in self.items()})
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """The columns as a stream of Arrow, copied; float64, int64 and texts."""
         columns: list[tuple[str, Any]] = []
-        for name, values in self._columns.items():
+        for name, values in self.items():
             if values.dtype.kind == "f":
                 columns.append((name, np.ascontiguousarray(values, dtype=np.float64)))
             elif values.dtype.kind in "iub":
@@ -122,7 +101,7 @@ class Table(Mapping[str, NDArray[Any]]):
             "<tr>"
             + "".join(
                 "<td>…</td>" if row < 0 else f"<td>{escape(_short(values[row]))}</td>"
-                for values in self._columns.values()
+                for values in self.values()
             )
             + "</tr>"
             for row in rows

@@ -9,8 +9,8 @@ use input::material::law_alone;
 use law::{
     BatchFailure, BuiltLaw, End, Moment, Opener, Operator, SearchPath, Site, Start, Strided,
 };
-use numpy::{PyArrayMethods, PyReadwriteArray1};
-use pyo3::exceptions::{PyUserWarning, PyValueError};
+use numpy::{PyArray2, PyArrayMethods, PyReadwriteArray1};
+use pyo3::exceptions::{PyMemoryError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::ffi::CString;
@@ -55,6 +55,10 @@ pub(crate) struct Law {
     variables: Vec<String>,
     /// Its library is called in processes of their own.
     is_apart: bool,
+    /// Folders that it was looked for in before all others.
+    folders: Vec<PathBuf>,
+    /// Seconds that a call may take in a process of its own.
+    isolate: Option<f64>,
 }
 
 /// Keys of a table of laws that are no parameters.
@@ -133,6 +137,17 @@ impl Law {
     }
 }
 
+/// Whether there is memory for so many points with so many values.
+///
+/// # Errors
+/// `MemoryError` if not.
+fn has_room(n_points: usize, n_values: usize) -> PyResult<()> {
+    let all = n_points.checked_mul(n_values).unwrap_or(usize::MAX);
+    Vec::<f64>::new()
+        .try_reserve_exact(all)
+        .map_err(|_| PyMemoryError::new_err(format!("points: no memory for {n_points} of them")))
+}
+
 /// Copies values point by point.
 fn copied((from, place): (&[f64], Strided), to: &mut [f64], n: usize) {
     if (place.offset, place.point, place.component) == (0, n, 1) {
@@ -192,13 +207,31 @@ impl Law {
         let variables = variables.map(|variable| variable.id.clone()).collect();
         let library = built.law.library();
         let is_apart = library.foreign().is_some() || isolate.is_some();
+        // What stands in a case is this library and no other of its name.
+        if !folders.is_empty() && !table.contains_key("adapter") {
+            table.insert("sha256".to_owned(), library.sha256().into());
+        }
         Ok(Self {
             built: Arc::new(built),
             initial,
             table,
             variables,
             is_apart,
+            folders,
+            isolate,
         })
+    }
+
+    /// Folders that it was looked for in before all others.
+    #[getter]
+    fn law_path(&self) -> Vec<PathBuf> {
+        self.folders.clone()
+    }
+
+    /// Seconds that a call may take in a process of its own; None if it is called in this one.
+    #[getter]
+    fn isolate(&self) -> Option<f64> {
+        self.isolate
     }
 
     /// Points that carry these fluxes before anything has happened, with the internal variables that the law gives
@@ -238,6 +271,7 @@ impl Law {
             .map(Rows::n_rows)
             .max();
         let n_points = points.or(most).unwrap_or(1);
+        has_room(n_points, 2 * n + n_variables)?;
         let full = |rows: Option<Rows<'_>>, name: &str, n: usize| -> PyResult<Vec<f64>> {
             let Some(rows) = rows else {
                 return Ok(vec![0.0; n_points * n]);
@@ -350,8 +384,11 @@ impl Law {
         end.increment = from.increment + 1;
         let sites = self.sites(py, n_points, positions)?;
         {
-            let [start_gradient, start_flux, start_internal] =
-                [&from.gradient, &from.flux, &from.internal].map(|array| array.bind(py).readonly());
+            let start_busy = |_| PyValueError::new_err("state: its memory is in use");
+            let start_of =
+                |array: &Py<PyArray2<f64>>| array.bind(py).try_readonly().map_err(start_busy);
+            let (start_gradient, start_flux) = (start_of(&from.gradient)?, start_of(&from.flux)?);
+            let start_internal = start_of(&from.internal)?;
             let busy = |_| PyValueError::new_err("out: its memory is in use");
             let own = (!end.is_lent).then(|| end.gradient.bind(py).try_readwrite());
             let mut own = own.transpose().map_err(busy)?;

@@ -6,16 +6,23 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyMapping, PyString};
 use std::path::PathBuf;
 use toml::{Table, Value};
 
+/// Dictionaries and lists in one another, at most: those of files are not as deep, one that holds itself is deeper.
+const DEPTH: usize = 100;
+
 /// The keys of a dictionary. What is `None` is left out.
 ///
 /// # Errors
 /// `TypeError` with the key that has no value of a file.
 pub(crate) fn table(written: &Bound<'_, PyAny>) -> PyResult<Table> {
+    table_at(written, 0)
+}
+
+fn table_at(written: &Bound<'_, PyAny>, depth: usize) -> PyResult<Table> {
     let mut table = Table::new();
     for item in written.cast::<PyMapping>()?.items()? {
         let (key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
         let key = key.str()?.to_string();
-        if let Some(value) = value_of(&value).map_err(|error| in_key(&value, &key, error))? {
+        if let Some(value) = value_of(&value, depth).map_err(|error| in_key(&value, &key, error))? {
             table.insert(key, value);
         }
     }
@@ -28,7 +35,12 @@ fn in_key(value: &Bound<'_, PyAny>, key: &str, error: PyErr) -> PyErr {
 }
 
 /// A value; nothing of `None`.
-fn value_of(written: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
+fn value_of(written: &Bound<'_, PyAny>, depth: usize) -> PyResult<Option<Value>> {
+    if depth > DEPTH {
+        return Err(PyTypeError::new_err(format!(
+            "dictionaries and lists are more than {DEPTH} deep, or hold themselves"
+        )));
+    }
     if written.is_none() {
         return Ok(None);
     }
@@ -49,11 +61,11 @@ fn value_of(written: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
         return Ok(Some(Value::String(written.extract()?)));
     }
     if written.cast::<PyMapping>().is_ok() {
-        return Ok(Some(Value::Table(table(written)?)));
+        return Ok(Some(Value::Table(table_at(written, depth + 1)?)));
     }
     // Numbers and arrays of NumPy.
     if written.hasattr("tolist")? {
-        return value_of(&written.call_method0("tolist")?);
+        return value_of(&written.call_method0("tolist")?, depth + 1);
     }
     if written.hasattr("__fspath__")? {
         let path: PathBuf = written.extract()?;
@@ -67,7 +79,7 @@ fn value_of(written: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
         return Err(PyTypeError::new_err(message));
     };
     let items = items.map(|item| {
-        let value = value_of(&item?)?;
+        let value = value_of(&item?, depth + 1)?;
         value.ok_or_else(|| PyTypeError::new_err("None in a list"))
     });
     Ok(Some(Value::Array(items.collect::<PyResult<_>>()?)))

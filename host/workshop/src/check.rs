@@ -840,12 +840,18 @@ struct ScratchFolder(PathBuf);
 
 impl ScratchFolder {
     fn new() -> Result<Self, Error> {
-        let name = format!("pilum-check-{}", std::process::id());
-        let path = std::env::temp_dir().join(name);
-        match std::fs::create_dir(&path) {
-            Ok(()) => Ok(Self(path)),
-            Err(source) => Err(text::Error::unwritable(&path, source).into()),
+        let id = std::process::id();
+        // What was killed may have left a folder behind, and the system gives the numbers of processes again.
+        for number in 0..1000 {
+            let path = std::env::temp_dir().join(format!("pilum-check-{id}-{number}"));
+            match std::fs::create_dir(&path) {
+                Ok(()) => return Ok(Self(path)),
+                Err(why) if why.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(why) => return Err(text::Error::unwritable(&path, why).into()),
+            }
         }
+        let why = "a thousand folders of earlier checks are in the way";
+        Err(text::Error::unwritable(&std::env::temp_dir(), std::io::Error::other(why)).into())
     }
 
     fn inner(&self, name: &str) -> std::io::Result<PathBuf> {
