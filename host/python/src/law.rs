@@ -9,7 +9,7 @@ use input::material::law_alone;
 use law::{
     BatchFailure, BuiltLaw, End, Moment, Opener, Operator, SearchPath, Site, Start, Strided,
 };
-use numpy::{PyArray2, PyArrayMethods, PyReadwriteArray1};
+use numpy::{PyArrayMethods, PyReadwriteArray1};
 use pyo3::exceptions::{PyMemoryError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -142,7 +142,7 @@ impl Law {
 /// # Errors
 /// `MemoryError` if not.
 fn has_room(n_points: usize, n_values: usize) -> PyResult<()> {
-    let all = n_points.checked_mul(n_values).unwrap_or(usize::MAX);
+    let all = n_points.saturating_mul(n_values);
     Vec::<f64>::new()
         .try_reserve_exact(all)
         .map_err(|_| PyMemoryError::new_err(format!("points: no memory for {n_points} of them")))
@@ -384,11 +384,7 @@ impl Law {
         end.increment = from.increment + 1;
         let sites = self.sites(py, n_points, positions)?;
         {
-            let start_busy = |_| PyValueError::new_err("state: its memory is in use");
-            let start_of =
-                |array: &Py<PyArray2<f64>>| array.bind(py).try_readonly().map_err(start_busy);
-            let (start_gradient, start_flux) = (start_of(&from.gradient)?, start_of(&from.flux)?);
-            let start_internal = start_of(&from.internal)?;
+            let [start_gradient, start_flux, start_internal] = from.read(py)?;
             let busy = |_| PyValueError::new_err("out: its memory is in use");
             let own = (!end.is_lent).then(|| end.gradient.bind(py).try_readwrite());
             let mut own = own.transpose().map_err(busy)?;

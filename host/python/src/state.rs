@@ -1,7 +1,8 @@
 //! Points on their way: what a law needs to carry them over an increment.
 
 use crate::arrays::looked_at;
-use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Points of a law: the gradients and fluxes that they have reached, their internal variables, and the time.
@@ -90,6 +91,22 @@ impl State {
 }
 
 impl State {
+    /// Gradients, fluxes and internal variables, to be read.
+    ///
+    /// # Errors
+    /// `ValueError` if another thread writes in them.
+    pub(crate) fn read<'py>(&self, py: Python<'py>) -> PyResult<[PyReadonlyArray2<'py, f64>; 3]> {
+        let read = |array: &Py<PyArray2<f64>>| {
+            let busy = |_| PyValueError::new_err("state: its memory is in use");
+            array.bind(py).try_readonly().map_err(busy)
+        };
+        Ok([
+            read(&self.gradient)?,
+            read(&self.flux)?,
+            read(&self.internal)?,
+        ])
+    }
+
     /// Number of points.
     pub(crate) fn n_points(&self, py: Python<'_>) -> usize {
         self.flux.bind(py).shape()[0]
