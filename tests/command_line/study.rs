@@ -6,6 +6,7 @@ use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, Outcome, Place, edit
 use crate::results::sliding;
 use crate::troubled;
 use std::collections::BTreeMap;
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -487,6 +488,30 @@ fn an_emptied_history_is_carried_out_again() {
         );
         assert_eq!(std::fs::read(&history).unwrap(), expected);
     }
+}
+
+/// Its library was built once more: a run that is done is not called failed for it, nor begun anew.
+#[test]
+fn a_run_that_is_done_outlives_its_library() {
+    let place = place(STUDY);
+    let name = format!("{DLL_PREFIX}coulomb_joint{DLL_SUFFIX}");
+    let ours = std::env::current_exe().unwrap().with_file_name(&name);
+    let library = std::fs::read(ours).unwrap();
+    place.write(&format!("laws/{name}"), &library);
+    place.write("case.toml", format!("law_path = [\"laws\"]\n{CASE}"));
+    done(&study(&place, &["--run", "1"]));
+    let history = std::fs::read(place.path("out/00001/history.csv")).unwrap();
+    place.write(
+        &format!("laws/{name}"),
+        [library.as_slice(), b"\0"].concat(),
+    );
+    for _ in 0..2 {
+        let again = study(&place, &["--run", "1"]);
+        assert_eq!(again.code, Some(BAD_INPUT), "{}", again.stderr);
+        assert_eq!(column(&table(&place), "status")[0], "done");
+    }
+    let kept = std::fs::read(place.path("out/00001/history.csv")).unwrap();
+    assert_eq!(kept, history);
 }
 
 /// A law that crashes the process is a row like any other.

@@ -117,6 +117,7 @@ pub fn run_one(
         checkpoint::remove(&folder)?;
         held.begin("")?;
     }
+    let mut may_end = before != State::Done;
     let outcome = (|| {
         let stop = observer.stop();
         let studied = trade_off::reach_until(&case, (&folder, true), &stop, say)?;
@@ -130,6 +131,7 @@ pub fn run_one(
             return Ok(false);
         }
         held.begin(ready.identity())?;
+        may_end = true;
         let options = Options {
             resume: true,
             checkpoints: Some(once.checkpoints),
@@ -143,8 +145,9 @@ pub fn run_one(
         Ok(true)
     })();
     supervision::end_run();
-    if let Ok(false) = outcome {
-        return Ok(false);
+    // A run that is done stays so where its library is another one now, or its case cannot be read any more.
+    if !may_end || matches!(outcome, Ok(false)) {
+        return outcome;
     }
     let standing = standing_after(outcome.as_ref().err());
     held.end(&standing)?;
