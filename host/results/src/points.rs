@@ -2,8 +2,7 @@
 
 use crate::file::Extent;
 use crate::pressures::Pressure;
-use crate::recorder::{Table, internal_variables};
-use crate::table;
+use crate::recorder::{Cell, Table, internal_variables};
 use crate::wanted::When;
 use mechanics::simulation::Snapshot;
 use mechanics::{Place, Simulation};
@@ -67,26 +66,25 @@ impl Points {
                     break;
                 };
                 let (element, within) = group.kinematics.place_of(point);
-                let mut row = vec![
-                    place.phase.clone(),
-                    place.increment.to_string(),
-                    group.name.clone(),
-                    (element + 1).to_string(),
-                    (within + 1).to_string(),
+                let place = [
+                    Cell::Text(&place.phase),
+                    Cell::Count(place.increment),
+                    Cell::Text(&group.name),
+                    Cell::Count(element + 1),
+                    Cell::Count(within + 1),
                 ];
-                row.extend(group.kinematics.position(point).map(table::number));
-                row.extend(stress.map(table::number));
-                row.extend(self.pressures.iter().map(|quantity| {
-                    let value = quantity.at(snapshot, number, point);
-                    value.map(table::number).unwrap_or_default()
-                }));
-                row.extend(self.variables.iter().map(|id| {
-                    group
-                        .internal_variable(point, id)
-                        .map(table::number)
-                        .unwrap_or_default()
-                }));
-                self.table.row(&row)?;
+                let values = group.kinematics.position(point).into_iter().chain(stress);
+                let pressures = self
+                    .pressures
+                    .iter()
+                    .map(|quantity| quantity.at(snapshot, number, point));
+                let internal = self
+                    .variables
+                    .iter()
+                    .map(|id| group.internal_variable(point, id));
+                let numbers = values.map(Some).chain(pressures).chain(internal);
+                self.table
+                    .row(place.into_iter().chain(numbers.map(Cell::Number)))?;
             }
         }
         self.table.flush()

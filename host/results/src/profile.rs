@@ -2,8 +2,7 @@
 
 use crate::file::Extent;
 use crate::pressures::Pressure;
-use crate::recorder::{Table, internal_variables};
-use crate::table;
+use crate::recorder::{Cell, Table, internal_variables};
 use crate::wanted::When;
 use mechanics::group::Group;
 use mechanics::simulation::Snapshot;
@@ -73,26 +72,24 @@ impl Profile {
                 let (element, within) = group.kinematics.place_of(point);
                 let along = group.kinematics.axes(element).along;
                 let s = along[0] * x + along[1] * y;
-                let mut row = vec![
-                    place.phase.clone(),
-                    place.increment.to_string(),
-                    group.name.clone(),
-                    (element + 1).to_string(),
-                    (within + 1).to_string(),
+                let place = [
+                    Cell::Text(&place.phase),
+                    Cell::Count(place.increment),
+                    Cell::Text(&group.name),
+                    Cell::Count(element + 1),
+                    Cell::Count(within + 1),
                 ];
-                let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]];
-                row.extend(values.map(table::number));
-                if self.has_water {
-                    let pressure = Pressure::Pore.at(snapshot, number, point);
-                    row.push(pressure.map(table::number).unwrap_or_default());
-                }
-                row.extend(self.variables.iter().map(|id| {
-                    group
-                        .internal_variable(point, id)
-                        .map(table::number)
-                        .unwrap_or_default()
-                }));
-                self.table.row(&row)?;
+                let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]].map(Some);
+                let pressure = self
+                    .has_water
+                    .then(|| Pressure::Pore.at(snapshot, number, point));
+                let internal = self
+                    .variables
+                    .iter()
+                    .map(|id| group.internal_variable(point, id));
+                let numbers = values.into_iter().chain(pressure).chain(internal);
+                self.table
+                    .row(place.into_iter().chain(numbers.map(Cell::Number)))?;
             }
         }
         self.table.flush()

@@ -12,7 +12,7 @@ use crate::points::Points;
 use crate::probe::Probes;
 use crate::profile::Profile;
 use crate::summary::{About, Course, Ending, Stopped, Summary};
-use crate::table::number;
+use crate::table::Number;
 use crate::wanted::{Output, Wanted, When};
 use mechanics::equilibrium::Iteration;
 use mechanics::group::Group;
@@ -20,6 +20,8 @@ use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
 use mechanics::{Place, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use std::borrow::Borrow;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use text::Error;
@@ -105,6 +107,15 @@ fn empty_figures(wanted: &Wanted) -> Figures {
     Figures::new(&wanted.title, &wanted.figures, names)
 }
 
+/// What stands in a cell of a table.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Cell<'a> {
+    Text(&'a str),
+    Count(usize),
+    /// Empty where there is none.
+    Number(Option<f64>),
+}
+
 /// A CSV file.
 #[derive(Debug)]
 pub(crate) struct Table {
@@ -125,18 +136,27 @@ impl Table {
             rows: csv::Writer::from_writer(Vec::new()),
         };
         if from.is_none() {
-            table.row(columns)?;
+            table.row(columns.into_iter().map(Cell::Text))?;
             table.flush()?;
         }
         Ok(table)
     }
 
-    pub(crate) fn row<I: IntoIterator<Item = T>, T: AsRef<[u8]>>(
+    pub(crate) fn row<'a>(
         &mut self,
-        cells: I,
+        cells: impl IntoIterator<Item = Cell<'a>>,
     ) -> Result<(), Error> {
-        self.rows
-            .write_record(cells)
+        let rows = &mut self.rows;
+        let mut write = |cell: Cell<'_>| match cell {
+            Cell::Text(text) => rows.write_field(text),
+            Cell::Count(count) => rows.write_field(count.to_string()),
+            Cell::Number(None) => rows.write_field(b""),
+            Cell::Number(Some(value)) => rows.write_field(Number::of(value).as_bytes()),
+        };
+        cells
+            .into_iter()
+            .try_for_each(&mut write)
+            .and_then(|()| rows.write_record(None::<&[u8]>))
             .map_err(|error| Error::unwritable(self.file.path(), std::io::Error::other(error)))
     }
 
@@ -175,13 +195,43 @@ pub(crate) fn internal_variables(
     ids
 }
 
+/// A row of the history, or of the path: `at` is the time, or the load factor.
+fn history_row<'a>(
+    place: &'a Place,
+    at: f64,
+    probes: &'a [Option<f64>],
+    iterations: usize,
+) -> impl Iterator<Item = Cell<'a>> {
+    [
+        Cell::Text(&place.phase),
+        Cell::Count(place.increment),
+        Cell::Number(Some(at)),
+    ]
+    .into_iter()
+    .chain(probes.iter().copied().map(Cell::Number))
+    .chain([Cell::Count(iterations)])
+}
+
 /// One JSON object a line. As long as it is open, no other run writes into the folder.
 #[derive(Debug)]
 struct LogFile(Appended);
 
 impl LogFile {
     fn line(&mut self, value: &Value) -> Result<(), Error> {
-        self.0.append(format!("{value}\n").as_bytes())
+        self.lines([value])
+    }
+
+    /// All of them at once.
+    fn lines<T: Borrow<Value>>(
+        &mut self,
+        values: impl IntoIterator<Item = T>,
+    ) -> Result<(), Error> {
+        let mut text = String::new();
+        for value in values {
+            // A string takes whatever is written.
+            let _ = writeln!(text, "{}", value.borrow());
+        }
+        self.0.append(text.as_bytes())
     }
 }
 
@@ -341,8 +391,9 @@ impl Recorder {
         lambda: f64,
         iterations: &[Iteration],
     ) -> Result<(), Error> {
-        for (number, iteration) in iterations.iter().enumerate() {
-            self.log.line(&json!({
+        self.log
+            .lines(iterations.iter().enumerate().map(|(number, iteration)| {
+                json!({
                 "event": "iteration",
                 "phase": place.phase,
                 "increment": place.increment,
@@ -352,9 +403,8 @@ impl Recorder {
                 "correction": iteration.correction,
                 "step_length": iteration.step_length,
                 "viscosity": iteration.viscosity,
-            }))?;
-        }
-        Ok(())
+                })
+            }))
     }
 
     /// Logs a cut-back.
@@ -419,15 +469,7 @@ impl Recorder {
         let Some(path) = &mut self.path else {
             return Ok(());
         };
-        let mut row = vec![
-            place.phase.clone(),
-            place.increment.to_string(),
-            number(load_factor),
-        ];
-        let values = probes.iter().map(|value| value.map(number));
-        row.extend(values.map(Option::unwrap_or_default));
-        row.push(iterations.to_string());
-        path.row(&row)?;
+        path.row(history_row(place, load_factor, &probes, iterations))?;
         Ok(path.flush()?)
     }
 
@@ -498,15 +540,8 @@ impl Recorder {
         } = increment;
         let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
-        let mut row = vec![
-            place.phase.clone(),
-            place.increment.to_string(),
-            number(*time),
-        ];
-        let values = probes.iter().map(|value| value.map(number));
-        row.extend(values.map(Option::unwrap_or_default));
-        row.push(increment.iterations.to_string());
-        self.history.row(&row)?;
+        self.history
+            .row(history_row(place, *time, &probes, increment.iterations))?;
         self.history.flush()?;
         if self.settings.profile.includes(place.increment, *of)
             && let Some(profile) = &mut self.profile

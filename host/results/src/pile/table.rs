@@ -2,8 +2,7 @@
 
 use super::{OF_STATION, State};
 use crate::file::Extent;
-use crate::recorder::Table;
-use crate::table::number;
+use crate::recorder::{Cell, Table};
 use mechanics::Place;
 use std::path::Path;
 use text::Error;
@@ -24,8 +23,8 @@ impl Stations {
 
     pub(crate) fn write(&mut self, place: &Place, state: &State) -> Result<(), Error> {
         for station in &state.stations {
-            let cell = |name: &str| station.named(name).map(number).unwrap_or_default();
-            let place = [place.phase.clone(), place.increment.to_string()];
+            let cell = |name: &str| Cell::Number(station.named(name));
+            let place = [Cell::Text(&place.phase), Cell::Count(place.increment)];
             self.table
                 .row(place.into_iter().chain(OF_STATION.map(cell)))?;
         }
