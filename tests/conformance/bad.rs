@@ -14,7 +14,14 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 80] = [
+const GALLERY: [(&str, &str, &str, Point); 82] = [
+    (
+        "bad_init_zero",
+        "initial-states-are-written",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_still", "independent-of-order", "failed", CannotTell),
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -348,7 +355,12 @@ const GALLERY: [(&str, &str, &str, Point); 80] = [
 ];
 
 /// Mistakes that may be meant: the fixture, and the one check that warns.
-const WARNED: [(&str, &str); 12] = [
+const WARNED: [(&str, &str); 17] = [
+    ("bad_idle_parameter", "parameters-matter"),
+    ("bad_plastic_variable", "plastic-variables-rest"),
+    ("bad_stiffness_left", "tangent-matches-differences"),
+    ("bad_two_versions", "independent-of-request"),
+    ("bad_unit_inside", "units-belong-together"),
     ("bad_compression", "compression-is-negative"),
     ("bad_engineering_shear", "response-is-isotropic"),
     ("bad_tangential_axis", "tangential-axis-is-arbitrary"),

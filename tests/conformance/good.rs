@@ -61,6 +61,28 @@ fn tz_curve_passes() {
     passes(&library_of("tz_curve"));
 }
 
+/// What creeps, relaxes, keeps rates, counts, or takes substeps by a tolerance looks faulty and is not.
+#[test]
+fn unusual_laws_pass() {
+    let folder = folder();
+    let Some(library) = compiled("unusual_laws", folder.path()) else {
+        return;
+    };
+    passes(&library);
+}
+
+/// Laws of this repository with what makes them unusual: viscosity, and friction that begins with nothing, so
+/// that any shear at first is more than the law carries.
+#[test]
+fn unusual_parameters_pass() {
+    for (law, settings) in [("mohr_coulomb", "relaxation_time=1"), ("mepi", "mu_0=0")] {
+        let report = check(&library_of(law), &["--set", settings]);
+        let bad = report.with(&["warning", "failed", "crashed"]);
+        assert_eq!(bad, [""; 0], "{law}: {:#}", report.json);
+        assert_eq!(report.code, Some(0), "{law}: {}", report.stderr);
+    }
+}
+
 /// Structs of a later minor version are longer, and tables have another stride.
 #[test]
 fn a_library_of_a_later_minor_version_passes() {
@@ -157,6 +179,9 @@ fn ids_are_stable() {
             "elastic-operator-is-plausible",
             "response-is-continuous",
             "states-are-carried-on",
+            "plastic-variables-rest",
+            "parameters-matter",
+            "units-belong-together",
             "sidecar-is-read",
             "routine-answers",
             "routine-stays-inside",

@@ -15,6 +15,8 @@ use text::suggestion;
 
 /// Draws of parameters until a law must have accepted one.
 const MOST_DRAWS: usize = 500;
+/// The part of an increment's length in time that is next to none.
+pub(super) const INSTANT: f64 = 1e-12;
 
 /// A law under one hypothesis with one set of parameters.
 #[derive(Debug)]
@@ -84,6 +86,8 @@ pub(crate) fn create_form<'a>(
 /// Which parameters are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Draw {
+    /// Defaults and the middle of usual ranges.
+    Plausible,
     /// The most ordinary ones.
     Ordinary,
     /// Any, but choices stay at their defaults: the other labels may stand for approximations.
@@ -94,6 +98,9 @@ pub(super) enum Draw {
 
 /// A value for a parameter.
 fn draw(p: &ParameterDescription, random: &mut Random, how: Draw) -> f64 {
+    if how == Draw::Plausible {
+        return law::vetting::plausible(p);
+    }
     let is_first = how == Draw::Ordinary;
     if let Some(default) = p.default {
         let unlimited = !p.usual.lower.is_finite() || !p.usual.upper.is_finite();
@@ -183,6 +190,12 @@ impl Subject {
         let mut specimens = Vec::new();
         for law in self.laws()? {
             for (formulation, hypothesis) in hypotheses(&law) {
+                if law.library().foreign().is_some() {
+                    // A routine refuses no parameters, so that random ones would say little.
+                    let draws = [Draw::Plausible].into_iter();
+                    specimens.push(self.specimen(&law, &formulation, hypothesis, draws, random)?);
+                    continue;
+                }
                 for set in 0..n_sets {
                     let first = if set == 0 { Draw::Ordinary } else { how };
                     let draws = [first].into_iter().chain(std::iter::repeat(how));
@@ -347,6 +360,11 @@ impl Specimen {
         self.recorded(start, self.fails(why))
     }
 
+    /// A warning of this specimen in a call that can be repeated.
+    pub(super) fn warns_at(&self, start: &PointStart, why: impl std::fmt::Display) -> Verdict {
+        self.recorded(start, Verdict::Warning(format!("{}: {why}", self.name())))
+    }
+
     /// A verdict with the call that it is about.
     pub(super) fn recorded(&self, start: &PointStart, verdict: Verdict) -> Verdict {
         // Without a capsule the words remain.
@@ -433,6 +451,20 @@ impl Specimen {
     /// An ordinary call.
     pub(super) fn call(&self, starts: &[PointStart], request: u32) -> Result<Answer, Verdict> {
         Ok(self.probe.integrate(starts, &self.form(request))?)
+    }
+
+    /// A call over increments that take so much longer.
+    pub(super) fn lasting(
+        &self,
+        factor: f64,
+        starts: &[PointStart],
+        request: u32,
+    ) -> Result<Vec<PointEnd>, Verdict> {
+        let form = Form {
+            time_increment: factor * self.time_increment,
+            ..self.form(request)
+        };
+        Ok(self.probe.integrate(starts, &form)?.points)
     }
 
     /// What one of the functions makes of the points; nothing if the law lacks it.
