@@ -916,8 +916,9 @@ fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
 /// Pairs of points that are led side by side, and the increments of each.
 const TWINS: usize = 24;
 const TWIN_INCREMENTS: usize = 8;
-/// Differences of fluxes after several increments, relative to the fluxes in play.
-const ROTATED: f64 = 1e-6;
+/// Differences of fluxes after several increments, relative to the fluxes in play: substeps whose number
+/// follows from a tolerance need not be the same in other axes.
+const ROTATED: f64 = 1e-4;
 
 /// Fluxes of a point and of its image that do not belong together.
 struct Unlike {

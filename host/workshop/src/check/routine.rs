@@ -5,7 +5,7 @@
 
 use super::mathematics::{ITERATED, ROUND_OFF, Slope, UPDATE, flux_scale, largest, slope};
 use super::random::Random;
-use super::specimen::{Specimen, first_difference, is_success};
+use super::specimen::{LONG, Specimen, first_difference, is_success};
 use super::walk::Step;
 use super::{Check, Family, Found, Subject, Verdict, refusal, skipped};
 use crate::Error;
@@ -159,6 +159,19 @@ pub(super) fn foreign(subject: &Subject) -> Foreign {
         in_process: true,
         ..Foreign::umat(&subject.path)
     }
+}
+
+/// What a check of responses says of a routine: it is not led far if its calls take long, and a failure of
+/// a law is a warning.
+pub(super) fn of_response(check: &Check, subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "speed");
+    let routines = subject.specimens_by_default(1, &mut random)?;
+    if routines.iter().any(|routine| routine.is_slow) {
+        return Err(skipped(format!(
+            "a call takes longer than {LONG:?}, so that paths are short"
+        )));
+    }
+    (check.run)(subject).map_err(Verdict::milder)
 }
 
 /// Walks of every routine, far too; what is made of each of them.
@@ -416,7 +429,7 @@ fn time_as_declared(subject: &Subject) -> Found {
         Ok(steps.len())
     })?;
     if declared && !seen {
-        let why = "`time_dependent = true`, and neither DTIME nor TIME changes anything";
+        let why = "`time_dependent = true`, and DTIME changes nothing, nor does TIME";
         return Err(Verdict::Warning(why.to_owned()));
     }
     Ok(format!("{n} increments"))
@@ -490,7 +503,7 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
                     let names = routine.hypothesis.components();
                     let why = format!(
                         "DDSDDE({}, {}), {} by {}, is {by_law:.6e}, differences give {by_differences:.6e}: \
-                         wrong by {off:.1e} of the stiffness, the most of all; a run needs more iterations. \
+                         wrong by {off:.1e} of the stiffness, the most of all, which a run pays for with iterations. \
                          An elastic or otherwise approximate one is declared by `tangent = \
                          \"approximate\"` in the sidecar. At {:?}",
                         row + 1,

@@ -1,6 +1,7 @@
 //! Laws with sample parameters, or with those of the author's own driver.
 
 use super::random::Random;
+use super::walk::Origin;
 use super::{Found, Subject, Verdict, failed, refusal};
 use abi::Hypothesis;
 use abi::raw;
@@ -11,8 +12,12 @@ use law::{
     BatchFailure, FormulationDescription, LoadedLaw, Moment, Operator, ParameterDescription,
     PointCall, Request, Site,
 };
+use std::time::{Duration, Instant};
 use text::suggestion;
 
+/// A call of a routine that is longer than this, in the mean of so many, is a slow one.
+pub(super) const LONG: Duration = Duration::from_micros(300);
+const TIMED: u32 = 8;
 /// Draws of parameters until a law must have accepted one.
 const MOST_DRAWS: usize = 500;
 /// The part of an increment's length in time that is next to none.
@@ -30,6 +35,8 @@ pub(super) struct Specimen {
     pub(super) course: Option<Vec<PointStart>>,
     /// Length of its increments in time.
     pub(super) time_increment: f64,
+    /// Calls take so long that its paths are short.
+    pub(super) is_slow: bool,
 }
 
 /// Which function of a law is called.
@@ -193,7 +200,9 @@ impl Subject {
                 if law.library().foreign().is_some() {
                     // A routine refuses no parameters, so that random ones would say little.
                     let draws = [Draw::Plausible].into_iter();
-                    specimens.push(self.specimen(&law, &formulation, hypothesis, draws, random)?);
+                    let mut one = self.specimen(&law, &formulation, hypothesis, draws, random)?;
+                    one.is_slow = one.takes_long(&mut Random::new(self.seed, "speed"))?;
+                    specimens.push(one);
                     continue;
                 }
                 for set in 0..n_sets {
@@ -252,6 +261,7 @@ impl Subject {
                     probe,
                     course: None,
                     time_increment: 1.0,
+                    is_slow: false,
                 }));
             }
             let why = if created.status == raw::PILUM_OK {
@@ -451,6 +461,22 @@ impl Specimen {
     /// An ordinary call.
     pub(super) fn call(&self, starts: &[PointStart], request: u32) -> Result<Answer, Verdict> {
         Ok(self.probe.integrate(starts, &self.form(request))?)
+    }
+
+    /// Whether updates that double the flux take longer than they may.
+    fn takes_long(&self, random: &mut Random) -> Result<bool, Verdict> {
+        let Ok(Origin { start, size, .. }) = self.origin(random) else {
+            return Ok(false);
+        };
+        let starts: Vec<PointStart> = (0..TIMED)
+            .map(|_| PointStart {
+                gradient1: self.direction(size, random),
+                ..start.clone()
+            })
+            .collect();
+        let began = Instant::now();
+        self.call(&starts, raw::PILUM_REQ_FLUX)?;
+        Ok(began.elapsed() > LONG * TIMED)
     }
 
     /// A call over increments that take so much longer.

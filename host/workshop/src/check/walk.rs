@@ -215,10 +215,11 @@ impl Specimen {
             return self.along(course);
         }
         let mut walk = Walk::default();
-        let mut walkers = (0..WALKERS)
+        let n_walkers = if self.is_slow { 1 } else { WALKERS };
+        let mut walkers = (0..n_walkers)
             .map(|_| self.origin(random))
             .collect::<Result<Vec<_>, _>>()?;
-        let mut moves = vec![Vec::new(); WALKERS];
+        let mut moves = vec![Vec::new(); n_walkers];
         for increment in 0..n_increments {
             if increment % STRAIGHT == 0 {
                 for (one, walker) in moves.iter_mut().zip(&walkers) {
@@ -246,7 +247,7 @@ impl Specimen {
     /// into what the law does.
     pub(super) fn paths(&self, n_increments: usize, random: &mut Random) -> Result<Walk, Verdict> {
         let mut walk = self.walk(n_increments, random)?;
-        if self.course.is_none() {
+        if self.course.is_none() && !self.is_slow {
             self.lead(&mut walk, LED, random)?;
         }
         Ok(walk)
@@ -437,7 +438,7 @@ impl Specimen {
         let why = walk.why();
         let mut starts = walk.successes;
         starts.reverse();
-        if self.course.is_none() {
+        if self.course.is_none() && !self.is_slow {
             let mut led = Walk::default();
             self.lead(&mut led, LED_FOR_POINTS, random)?;
             let far: Vec<PointStart> = (0..(n / 2).min(led.successes.len()))
