@@ -734,6 +734,26 @@ fn a_run_does_not_believe_whatever_a_law_claims() {
     }
 }
 
+/// More than is kept of what a process prints: the checks answer all the same.
+#[test]
+fn what_a_law_prints_hides_nothing() {
+    let folder = folder();
+    let prints = "#define IN_INTEGRATE static int calls; if (calls++ == 0) \
+                  for (int k = 0; k < 1 << 21; k++) putchar(k % 64 ? 'x' : '\\n')";
+    let Some(library) = compiled_with(prints, "prints_much", folder.path()) else {
+        return;
+    };
+    let only = [
+        "--only",
+        "empty-batch-is-accepted",
+        "--only",
+        "prints-nothing",
+    ];
+    let report = check(&library, &only);
+    assert_eq!(report.with(&["passed"]), ["empty-batch-is-accepted"]);
+    fails(&report, &library, "prints-nothing", "failed");
+}
+
 #[test]
 fn the_command_of_a_failure_repeats_it() {
     let folder = folder();

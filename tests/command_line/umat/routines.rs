@@ -327,6 +327,7 @@ fn sound_routines_pass_every_check() {
             ],
         ),
         ("rows", &[]),
+        ("doubtful", &[]),
     ] {
         let Some(place) = place(name) else {
             return;
@@ -357,7 +358,42 @@ fn sound_routines_pass_every_check() {
 #[expect(clippy::too_many_lines, reason = "a table of faults")]
 fn faults_of_routines_are_found_by_name() {
     // The routine, a change of its sidecar, the check that finds it, and what is said.
-    let cases: [(&str, [&str; 2], &str, &str, &str); 10] = [
+    let cases: [(&str, [&str; 2], &str, &str, &str); 15] = [
+        (
+            "doubtful",
+            ["default = 0.0\n", "default = 1.0\n"],
+            "states-are-carried-on",
+            "warning",
+            "`plastic_slip` is",
+        ),
+        (
+            "doubtful",
+            ["default = 0.0\n", "default = 2.0\n"],
+            "ddsdde-matches-differences",
+            "warning",
+            "DDSDDE(2, 2), t by t, is 5.000000e2, differences give 0.000000e0",
+        ),
+        (
+            "doubtful",
+            ["default = 0.0\n", "default = 3.0\n"],
+            "response-is-continuous",
+            "warning",
+            "the flux jumps from",
+        ),
+        (
+            "doubtful",
+            ["default = 0.0\n", "default = 4.0\n"],
+            "compression-is-negative",
+            "warning",
+            "compression is negative here",
+        ),
+        (
+            "rows",
+            ["", ""],
+            "response-is-isotropic",
+            "warning",
+            "a law that is meant to have directions says so in its `doc`",
+        ),
         (
             "saves",
             ["", ""],

@@ -14,8 +14,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "parameters-matter",
         family: Family::Mathematics,
-        description: "Every parameter changes some result, by a tenth of it more or less (warning, since \
-                      some may count only where no path leads).",
+        description: "Every parameter changes some result (warning, since some may count only where no \
+                      path leads).",
         needs: NEEDS,
         run: parameters_matter,
     },
@@ -44,14 +44,18 @@ fn starts(steps: &[Step], most: usize) -> Vec<&Step> {
     steps.iter().step_by(every).collect()
 }
 
-/// Another value of a parameter, near it if it is one.
+/// Other values of a parameter: near it, then far, since a limit of iterations counts only if it is low.
 fn others(p: &ParameterDescription, value: f64) -> Vec<f64> {
-    if value != 0.0 {
-        return vec![1.1 * value, 0.9 * value];
-    }
-    let upper = p.usual.upper.min(p.bounds.upper);
-    let upper = if upper.is_finite() { upper } else { 1.0 };
-    vec![0.5 * upper, 0.1 * upper, 1e-3 * upper, 0.1 * p.usual.lower]
+    let usual = [p.usual.lower, p.usual.upper];
+    let near = if value == 0.0 {
+        [0.5, 0.1, 1e-3]
+            .map(|part| part * p.usual.upper.min(p.bounds.upper))
+            .to_vec()
+    } else {
+        [1.1, 0.9, 10.0, 0.1].map(|factor| factor * value).to_vec()
+    };
+    let all = near.into_iter().chain(usual).chain([1.0]);
+    all.filter(|other| other.is_finite()).collect()
 }
 
 /// Values of the parameters, and the same with each other label of each choice.
@@ -234,7 +238,8 @@ fn units_belong_together(subject: &Subject) -> Found {
     Ok(format!("{n} increments"))
 }
 
-/// Compares steps with the same in smaller units; nothing where no parameter has such a unit.
+/// Compares steps with the same in smaller units; nothing where no parameter and no internal variable has
+/// such a unit.
 fn in_smaller_units(
     specimen: &Specimen,
     steps: &[Step],
@@ -247,13 +252,15 @@ fn in_smaller_units(
     let (Some(factors), Some(of_states)) = (factors, of_states) else {
         return Ok(None);
     };
-    let mut with_units = factors.iter().zip(&specimen.values);
     // Powers of two are exact.
-    let has_none = |factor: f64| factor.log2().abs() < 0.1;
-    if with_units.all(|(factor, value)| has_none(*factor) || value.is_nan() || *value == 0.0) {
+    let has_unit = |factor: &f64| factor.log2().abs() > 0.1;
+    let given = factors.iter().zip(&specimen.values);
+    let mut counting = given.filter(|(_, value)| value.abs() > 0.0);
+    if !counting.any(|(factor, _)| has_unit(factor)) && !of_states.iter().any(has_unit) {
         return Ok(None);
     }
-    let Some(probe) = with_values(specimen, &times(&specimen.values, &factors))? else {
+    let scaled = times(&specimen.values, &factors);
+    let Some(probe) = with_values(specimen, &scaled)? else {
         return Ok(Some(0));
     };
     let n = specimen.probe.n_components();
