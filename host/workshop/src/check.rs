@@ -85,6 +85,9 @@ pub struct Arguments {
     /// Run the one check as a child; its answer is the last line, or beside the file of its calls.
     #[arg(long, hide = true, requires = "only", conflicts_with = "in_process")]
     child: bool,
+    /// Lead a routine a short way only.
+    #[arg(long, hide = true, requires = "child")]
+    near: bool,
     /// Write every call of the child to this file before it is made.
     #[arg(long, hide = true, requires = "child")]
     kept: Option<PathBuf>,
@@ -251,6 +254,8 @@ struct Subject {
     opener: Opener,
     /// The author's own path.
     driver: Option<PathBuf>,
+    /// A routine is led a short way only.
+    near: bool,
 }
 
 impl Subject {
@@ -261,6 +266,7 @@ impl Subject {
             settings: arguments.set.clone(),
             opener: opener.clone(),
             driver: arguments.driver.clone(),
+            near: arguments.near,
         }
     }
 
@@ -791,18 +797,46 @@ fn own_arguments(check: &Check, arguments: &Arguments) -> Vec<OsString> {
     own
 }
 
-/// Runs one check in a child.
+/// Runs one check in a child. A routine may end its process where it does not converge, far away: then what
+/// it does on short paths is told too.
 fn in_child(
     check: &Check,
     arguments: &Arguments,
     path: &Path,
     scratch: &ScratchFolder,
 ) -> Result<Finding, Error> {
+    let far = led_in_child(check, arguments, path, scratch, false)?;
+    if far.outcome != Outcome::Crashed || !routine::is_one(path) {
+        return Ok(far);
+    }
+    let near = led_in_child(check, arguments, path, scratch, true)?;
+    Ok(match near.outcome {
+        Outcome::Crashed => far,
+        Outcome::Failed => near,
+        Outcome::Passed | Outcome::Warning | Outcome::Skipped => Finding {
+            outcome: Outcome::Warning,
+            details: format!("far away {}; on short paths: {}", far.details, near.details),
+            replay: None,
+            ..far
+        },
+    })
+}
+
+fn led_in_child(
+    check: &Check,
+    arguments: &Arguments,
+    path: &Path,
+    scratch: &ScratchFolder,
+    is_near: bool,
+) -> Result<Finding, Error> {
     let internal = |error: std::io::Error| Error::internal(error.to_string());
-    let folder = scratch.inner(check.id).map_err(internal)?;
+    let name = if is_near { "-near" } else { "" };
+    let folder = scratch.inner(&format!("{}{name}", check.id));
+    let folder = folder.map_err(internal)?;
     let mut all: Vec<OsString> = vec!["check".into(), path.into()];
     all.extend(own_arguments(check, arguments));
     all.push("--child".into());
+    all.extend(is_near.then(|| OsString::from("--near")));
     let told = all.clone();
     // Beside the folder, since what stands in that is the law's.
     let kept = folder.with_extension("call");

@@ -354,6 +354,29 @@ fn sound_routines_pass_every_check() {
     }
 }
 
+/// Where a routine ends its process far away, the checks go on nearby, and say so.
+#[test]
+fn a_routine_that_gives_up_far_away_is_checked_nearby() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    let more = ["young_modulus=1e7", "how=2", "limit=0.05"].map(|set| format!("--set={set}"));
+    let more: Vec<&str> = more.iter().map(String::as_str).collect();
+    let (checks, outcome) = checked(&place, "stops", &more);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    for id in ["routine-stays-inside", "ddsdde-matches-differences"] {
+        let [found, details] = &checks[id];
+        assert_eq!(found, "warning", "{id}: {details}");
+        for said in [
+            "far away the process ended",
+            "called XIT",
+            "on short paths: ",
+        ] {
+            assert!(details.contains(said), "{id}: {details}");
+        }
+    }
+}
+
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table of faults")]
 fn faults_of_routines_are_found_by_name() {

@@ -166,10 +166,13 @@ pub(super) fn foreign(subject: &Subject) -> Foreign {
 pub(super) fn of_response(check: &Check, subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "speed");
     let routines = subject.specimens_by_default(1, &mut random)?;
-    if routines.iter().any(|routine| routine.is_slow) {
-        return Err(skipped(format!(
-            "a call takes longer than {LONG:?}, so that paths are short"
-        )));
+    if routines.iter().any(|routine| routine.is_led_near) {
+        let why = if subject.near {
+            "it is not led far".to_owned()
+        } else {
+            format!("a call takes longer than {LONG:?}, so that paths are short")
+        };
+        return Err(skipped(why));
     }
     (check.run)(subject).map_err(Verdict::milder)
 }

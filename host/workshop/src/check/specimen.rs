@@ -35,8 +35,8 @@ pub(super) struct Specimen {
     pub(super) course: Option<Vec<PointStart>>,
     /// Length of its increments in time.
     pub(super) time_increment: f64,
-    /// Calls take so long that its paths are short.
-    pub(super) is_slow: bool,
+    /// Its paths are short: calls take long, or end the process far away.
+    pub(super) is_led_near: bool,
 }
 
 /// Which function of a law is called.
@@ -201,7 +201,8 @@ impl Subject {
                     // A routine refuses no parameters, so that random ones would say little.
                     let draws = [Draw::Plausible].into_iter();
                     let mut one = self.specimen(&law, &formulation, hypothesis, draws, random)?;
-                    one.is_slow = one.takes_long(&mut Random::new(self.seed, "speed"))?;
+                    one.is_led_near =
+                        self.near || one.takes_long(&mut Random::new(self.seed, "speed"))?;
                     specimens.push(one);
                     continue;
                 }
@@ -261,7 +262,7 @@ impl Subject {
                     probe,
                     course: None,
                     time_increment: 1.0,
-                    is_slow: false,
+                    is_led_near: false,
                 }));
             }
             let why = if created.status == raw::PILUM_OK {
@@ -322,6 +323,7 @@ pub(super) fn settings_fit(subject: &Subject) -> Found {
         settings: Vec::new(),
         opener: subject.opener.clone(),
         driver: None,
+        near: false,
     };
     for law in laws {
         for (formulation, hypothesis) in hypotheses(&law) {

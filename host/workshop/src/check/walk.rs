@@ -215,7 +215,7 @@ impl Specimen {
             return self.along(course);
         }
         let mut walk = Walk::default();
-        let n_walkers = if self.is_slow { 1 } else { WALKERS };
+        let n_walkers = if self.is_led_near { 1 } else { WALKERS };
         let mut walkers = (0..n_walkers)
             .map(|_| self.origin(random))
             .collect::<Result<Vec<_>, _>>()?;
@@ -247,7 +247,7 @@ impl Specimen {
     /// into what the law does.
     pub(super) fn paths(&self, n_increments: usize, random: &mut Random) -> Result<Walk, Verdict> {
         let mut walk = self.walk(n_increments, random)?;
-        if self.course.is_none() && !self.is_slow {
+        if self.course.is_none() && !self.is_led_near {
             self.lead(&mut walk, LED, random)?;
         }
         Ok(walk)
@@ -438,7 +438,7 @@ impl Specimen {
         let why = walk.why();
         let mut starts = walk.successes;
         starts.reverse();
-        if self.course.is_none() && !self.is_slow {
+        if self.course.is_none() && !self.is_led_near {
             let mut led = Walk::default();
             self.lead(&mut led, LED_FOR_POINTS, random)?;
             let far: Vec<PointStart> = (0..(n / 2).min(led.successes.len()))
