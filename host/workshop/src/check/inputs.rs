@@ -294,10 +294,10 @@ struct Scaled<'a> {
 }
 
 impl Scaled<'_> {
-    fn form(&self) -> Form {
+    fn form(&self, request: u32) -> Form {
         Form {
             time_increment: self.smaller.time * self.specimen.time_increment,
-            ..self.specimen.form(raw::PILUM_REQ_FLUX)
+            ..self.specimen.form(request)
         }
     }
 
@@ -321,7 +321,7 @@ impl Scaled<'_> {
             let scaled = [times(flux, &self.of_flux)];
             let (Ok(before), Some(after)) = (
                 self.specimen.initial_state(flux)?,
-                self.probe.init_state(&scaled, &self.form())?,
+                self.probe.init_state(&scaled, &self.form(0))?,
             ) else {
                 continue;
             };
@@ -358,7 +358,8 @@ impl Scaled<'_> {
                 state0: times(&step.start.state0, &self.of_states),
             })
             .collect();
-        let ends = self.probe.integrate(&scaled, &self.form())?.points;
+        let form = self.form(raw::PILUM_REQ_FLUX);
+        let ends = self.probe.integrate(&scaled, &form)?.points;
         let mut compared = 0;
         for ((step, start), end) in steps.iter().zip(&scaled).zip(&ends) {
             if !is_success(end.status) {
