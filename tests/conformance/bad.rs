@@ -14,7 +14,14 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 80] = [
+const GALLERY: [(&str, &str, &str, Point); 82] = [
+    (
+        "bad_init_zero",
+        "initial-states-are-written",
+        "failed",
+        CannotTell,
+    ),
+    ("bad_still", "independent-of-order", "failed", CannotTell),
     ("bad_magic", "handshake-is-accepted", "failed", Refuses),
     ("bad_major", "handshake-is-accepted", "failed", Refuses),
     (
@@ -348,7 +355,12 @@ const GALLERY: [(&str, &str, &str, Point); 80] = [
 ];
 
 /// Mistakes that may be meant: the fixture, and the one check that warns.
-const WARNED: [(&str, &str); 12] = [
+const WARNED: [(&str, &str); 17] = [
+    ("bad_idle_parameter", "parameters-matter"),
+    ("bad_plastic_variable", "plastic-variables-rest"),
+    ("bad_stiffness_left", "tangent-matches-differences"),
+    ("bad_two_versions", "independent-of-request"),
+    ("bad_unit_inside", "units-belong-together"),
     ("bad_compression", "compression-is-negative"),
     ("bad_engineering_shear", "response-is-isotropic"),
     ("bad_tangential_axis", "tangential-axis-is-arbitrary"),
@@ -720,6 +732,26 @@ fn a_run_does_not_believe_whatever_a_law_claims() {
         assert_eq!(outcome.status.code(), Some(3), "{fixture}: {said}");
         assert!(words(&said).contains(says), "{fixture}: {said}");
     }
+}
+
+/// More than is kept of what a process prints: the checks answer all the same.
+#[test]
+fn what_a_law_prints_hides_nothing() {
+    let folder = folder();
+    let prints = "#define IN_INTEGRATE static int calls; if (calls++ == 0) \
+                  for (int k = 0; k < 1 << 21; k++) putchar(k % 64 ? 'x' : '\\n')";
+    let Some(library) = compiled_with(prints, "prints_much", folder.path()) else {
+        return;
+    };
+    let only = [
+        "--only",
+        "empty-batch-is-accepted",
+        "--only",
+        "prints-nothing",
+    ];
+    let report = check(&library, &only);
+    assert_eq!(report.with(&["passed"]), ["empty-batch-is-accepted"]);
+    fails(&report, &library, "prints-nothing", "failed");
 }
 
 #[test]

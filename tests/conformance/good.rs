@@ -61,6 +61,39 @@ fn tz_curve_passes() {
     passes(&library_of("tz_curve"));
 }
 
+/// What creeps, relaxes, keeps rates, counts, or takes substeps by a tolerance looks faulty and is not.
+#[test]
+fn unusual_laws_pass() {
+    let folder = folder();
+    let Some(library) = compiled("unusual_laws", folder.path()) else {
+        return;
+    };
+    passes(&library);
+}
+
+/// Laws of this repository with what makes them unusual: viscosity, and friction that begins with nothing, so
+/// that any shear at first is more than the law carries.
+#[test]
+fn unusual_parameters_pass() {
+    for (law, settings, ids) in [
+        (
+            "mohr_coulomb",
+            "relaxation_time=1",
+            &[
+                "elastic-operator-is-plausible",
+                "response-is-continuous",
+                "states-are-carried-on",
+            ][..],
+        ),
+        ("mepi", "mu_0=0", &["initial-states-fit"]),
+    ] {
+        let only = ids.iter().flat_map(|id| ["--only", *id]);
+        let arguments: Vec<&str> = ["--set", settings].into_iter().chain(only).collect();
+        let report = check(&library_of(law), &arguments);
+        assert_eq!(report.with(&["passed"]), ids, "{law}: {:#}", report.json);
+    }
+}
+
 /// Structs of a later minor version are longer, and tables have another stride.
 #[test]
 fn a_library_of_a_later_minor_version_passes() {
@@ -157,6 +190,9 @@ fn ids_are_stable() {
             "elastic-operator-is-plausible",
             "response-is-continuous",
             "states-are-carried-on",
+            "plastic-variables-rest",
+            "parameters-matter",
+            "units-belong-together",
             "sidecar-is-read",
             "routine-answers",
             "routine-stays-inside",

@@ -130,12 +130,16 @@ impl LoadedLaw {
         &self.library
     }
 
-    /// Calls `create` as a check does.
+    /// Calls `create` as a check does. Of a law behind an adapter, that takes its place.
     ///
     /// # Errors
     /// There is no memory, or the law is in a worker process.
     pub fn probe(&self, form: &probe::CreateForm<'_>) -> std::io::Result<probe::Created> {
-        probe::create(&self.description().id, self.here()?, form)
+        let id = &self.description().id;
+        match &self.library.laws[self.number].1 {
+            Origin::Foreign(law) => probe::create_foreign(id, &**law, form),
+            _ => probe::create(id, self.here()?, form),
+        }
     }
 
     /// Calls `destroy` with null.

@@ -8,6 +8,7 @@ mod contract;
 mod course;
 mod crashed;
 mod description;
+mod inputs;
 mod load;
 mod mathematics;
 mod memory;
@@ -81,9 +82,12 @@ pub struct Arguments {
     /// hangs takes the program with it, and there are no limits of time and memory.
     #[arg(long)]
     in_process: bool,
-    /// Run the one check as a child; its answer is the last line.
+    /// Run the one check as a child; its answer is the last line, or beside the file of its calls.
     #[arg(long, hide = true, requires = "only", conflicts_with = "in_process")]
     child: bool,
+    /// Lead a routine a short way only.
+    #[arg(long, hide = true, requires = "child")]
+    near: bool,
     /// Write every call of the child to this file before it is made.
     #[arg(long, hide = true, requires = "child")]
     kept: Option<PathBuf>,
@@ -145,6 +149,7 @@ fn checks() -> impl Iterator<Item = &'static Check> {
         robustness::CHECKS,
         mathematics::CHECKS,
         response::CHECKS,
+        inputs::CHECKS,
         routine::CHECKS,
     ]
     .into_iter()
@@ -167,6 +172,25 @@ impl Verdict {
         match self {
             Self::Skipped(why) | Self::Warning(why) | Self::Failed(why) => why,
             Self::At(inner, _) => inner.words(),
+        }
+    }
+
+    /// The same with words before it.
+    fn led_by(self, before: &str) -> Self {
+        match self {
+            Self::Skipped(why) => Self::Skipped(format!("{before}{why}")),
+            Self::Warning(why) => Self::Warning(format!("{before}{why}")),
+            Self::Failed(why) => Self::Failed(format!("{before}{why}")),
+            Self::At(inner, capsule) => Self::At(Box::new(inner.led_by(before)), capsule),
+        }
+    }
+
+    /// A warning where it was a failure.
+    fn milder(self) -> Self {
+        match self {
+            Self::Failed(why) => Self::Warning(why),
+            Self::At(inner, capsule) => Self::At(Box::new(inner.milder()), capsule),
+            other => other,
         }
     }
 }
@@ -230,6 +254,8 @@ struct Subject {
     opener: Opener,
     /// The author's own path.
     driver: Option<PathBuf>,
+    /// A routine is led a short way only.
+    near: bool,
 }
 
 impl Subject {
@@ -240,6 +266,7 @@ impl Subject {
             settings: arguments.set.clone(),
             opener: opener.clone(),
             driver: arguments.driver.clone(),
+            near: arguments.near,
         }
     }
 
@@ -352,7 +379,11 @@ pub fn run(
         if std::process::id() == started {
             let answer = serde_json::to_string(&answer);
             let answer = answer.map_err(|error| Error::internal(error.to_string()))?;
-            print(&format!("\n{ANSWER}{answer}\n"));
+            match &arguments.kept {
+                // However much the law has printed.
+                Some(kept) => replace(&kept.with_extension(ANSWERED), answer)?,
+                None => print(&format!("\n{ANSWER}{answer}\n")),
+            }
         }
         return Ok(());
     }
@@ -556,7 +587,8 @@ fn refuse_settings(arguments: &Arguments, path: &Path) -> Result<(), Error> {
 /// Whether a check is for such a library: a UMAT with a sidecar, or one of the contract.
 fn applies(id: &str, is_routine: bool) -> bool {
     let is_of_routines = routine::CHECKS.iter().any(|check| check.id == id);
-    is_of_routines == is_routine || is_routine && routine::SHARED.contains(&id)
+    let is_shared = routine::SHARED.contains(&id) || routine::OF_RESPONSES.contains(&id);
+    is_of_routines == is_routine || is_routine && is_shared
 }
 
 /// The checks that are asked for.
@@ -567,9 +599,22 @@ fn chosen(arguments: &Arguments, is_routine: bool) -> Vec<&'static Check> {
         .collect()
 }
 
+/// The checks that this one builds on.
+fn needs(check: &Check, is_routine: bool) -> &'static [&'static str] {
+    if is_routine && routine::OF_RESPONSES.contains(&check.id) {
+        &["routine-is-repeatable"]
+    } else {
+        check.needs
+    }
+}
+
 /// The check that this one builds on and that has not passed, if there is one.
-fn missing(check: &Check, findings: &BTreeMap<&str, Finding>) -> Option<&'static str> {
-    let mut needs = check.needs.iter();
+fn missing(
+    check: &Check,
+    is_routine: bool,
+    findings: &BTreeMap<&str, Finding>,
+) -> Option<&'static str> {
+    let mut needs = needs(check, is_routine).iter();
     needs
         .find(|id| {
             findings.get(**id).is_some_and(|finding| {
@@ -590,7 +635,7 @@ fn run_all(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<F
             let waits = |id: &&str| {
                 !findings.contains_key(*id) && chosen.iter().any(|other| other.id == *id)
             };
-            !check.needs.iter().any(waits)
+            !needs(check, is_routine).iter().any(waits)
         };
         let ready: Vec<&&Check> = chosen.iter().filter(is_open).filter(is_ready).collect();
         if ready.is_empty() {
@@ -598,7 +643,7 @@ fn run_all(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<F
         }
         let done: Vec<Finding> = ready
             .par_iter()
-            .map(|check| match missing(check, &findings) {
+            .map(|check| match missing(check, is_routine, &findings) {
                 Some(id) => Ok(finding(check, Outcome::Skipped, format!("needs `{id}`"))),
                 None => in_child(check, arguments, path, &folder),
             })
@@ -621,7 +666,7 @@ fn run_here(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<
     let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
     let chosen = chosen(arguments, is_routine);
     for check in &chosen {
-        let done = if let Some(id) = missing(check, &findings) {
+        let done = if let Some(id) = missing(check, is_routine, &findings) {
             finding(check, Outcome::Skipped, format!("needs `{id}`"))
         } else {
             let answer = run_check(check, &Subject::new(arguments, &opener, path));
@@ -647,8 +692,10 @@ fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
     }
 }
 
-/// What starts the line with a child's answer.
+/// What starts the line with a child's answer, where it is printed.
 const ANSWER: &str = "pilum-check-answer ";
+/// The ending of the file with it, else.
+const ANSWERED: &str = "answer";
 /// Most memory of a check, in bytes.
 const MEMORY: u64 = 8 << 30;
 
@@ -671,7 +718,13 @@ fn stamp(capsule: &mut Capsule, check: &Check, seed: u64) {
 
 /// Runs one check here.
 fn run_check(check: &Check, subject: &Subject) -> Answer {
-    let (verdict, capsule) = match (check.run)(subject) {
+    let is_routine = routine::OF_RESPONSES.contains(&check.id) && routine::is_one(&subject.path);
+    let found = if is_routine {
+        routine::of_response(check, subject)
+    } else {
+        (check.run)(subject)
+    };
+    let (verdict, capsule) = match found {
         Err(Verdict::At(verdict, mut capsule)) => {
             stamp(&mut capsule, check, subject.seed);
             (Err(*verdict), Some(capsule.to_string()))
@@ -744,18 +797,46 @@ fn own_arguments(check: &Check, arguments: &Arguments) -> Vec<OsString> {
     own
 }
 
-/// Runs one check in a child.
+/// Runs one check in a child. A routine may end its process where it does not converge, far away: then what
+/// it does on short paths is told too.
 fn in_child(
     check: &Check,
     arguments: &Arguments,
     path: &Path,
     scratch: &ScratchFolder,
 ) -> Result<Finding, Error> {
+    let far = led_in_child(check, arguments, path, scratch, false)?;
+    if far.outcome != Outcome::Crashed || !routine::is_one(path) {
+        return Ok(far);
+    }
+    let near = led_in_child(check, arguments, path, scratch, true)?;
+    Ok(match near.outcome {
+        Outcome::Crashed => far,
+        Outcome::Failed => near,
+        Outcome::Passed | Outcome::Warning | Outcome::Skipped => Finding {
+            outcome: Outcome::Warning,
+            details: format!("far away {}; on short paths: {}", far.details, near.details),
+            replay: None,
+            ..far
+        },
+    })
+}
+
+fn led_in_child(
+    check: &Check,
+    arguments: &Arguments,
+    path: &Path,
+    scratch: &ScratchFolder,
+    is_near: bool,
+) -> Result<Finding, Error> {
     let internal = |error: std::io::Error| Error::internal(error.to_string());
-    let folder = scratch.inner(check.id).map_err(internal)?;
+    let name = if is_near { "-near" } else { "" };
+    let folder = scratch.inner(&format!("{}{name}", check.id));
+    let folder = folder.map_err(internal)?;
     let mut all: Vec<OsString> = vec!["check".into(), path.into()];
     all.extend(own_arguments(check, arguments));
     all.push("--child".into());
+    all.extend(is_near.then(|| OsString::from("--near")));
     let told = all.clone();
     // Beside the folder, since what stands in that is the law's.
     let kept = folder.with_extension("call");
@@ -769,10 +850,8 @@ fn in_child(
     .map_err(internal)?;
     let stdout = String::from_utf8_lossy(&outcome.stdout).into_owned();
     let stderr = String::from_utf8_lossy(&outcome.stderr).into_owned();
-    let answer = stdout
-        .lines()
-        .find_map(|line| line.strip_prefix(ANSWER))
-        .and_then(|line| serde_json::from_str::<Answer>(line).ok());
+    let answer = file::read_text(&kept.with_extension(ANSWERED)).ok();
+    let answer = answer.and_then(|text| serde_json::from_slice::<Answer>(&text).ok());
     let crashed = |details| Answer {
         outcome: Outcome::Crashed,
         details,

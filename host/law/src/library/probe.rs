@@ -6,9 +6,12 @@ pub mod kept;
 mod pages;
 pub mod process;
 
-use super::{HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, load};
+use super::{Call, HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, Strided, load};
+use crate::adapter::{ForeignInstance, ForeignLaw};
+use crate::{Moment, Site};
 use abi::Hypothesis;
 use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};
+use abi::status::most_severe;
 use abi::version;
 use kept::{Function, KeptCall};
 pub use pages::Fence;
@@ -272,13 +275,20 @@ fn doubles_mut(pages: &mut Pages) -> &mut [f64] {
 /// A law whose parameters are fixed, to be probed.
 #[derive(Debug)]
 pub struct Probe {
-    instance: OwnedInstance,
+    instance: Held,
     id: String,
     hypothesis: Hypothesis,
     values: Vec<f64>,
     n_components: usize,
     n_states: usize,
     lacks_tangent: bool,
+}
+
+/// What keeps the parameters.
+#[derive(Debug)]
+enum Held {
+    Own(OwnedInstance),
+    Foreign(Box<dyn ForeignInstance>),
 }
 
 /// Arguments of `create`.
@@ -401,7 +411,7 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
         status,
         message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
         probe: (!instance.is_null()).then(|| Probe {
-            instance: OwnedInstance { law, instance },
+            instance: Held::Own(OwnedInstance { law, instance }),
             id: id.to_owned(),
             hypothesis: form.hypothesis,
             values: all.to_vec(),
@@ -410,6 +420,49 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
             lacks_tangent: form.lacks_tangent,
         }),
     })
+}
+
+/// Fixes the parameters of a law behind an adapter, which gets those of the form and nothing else of it.
+///
+/// # Errors
+/// What is kept of the call cannot be written.
+pub(crate) fn create_foreign(
+    id: &str,
+    law: &dyn ForeignLaw,
+    form: &CreateForm<'_>,
+) -> io::Result<Created> {
+    let values = form.values.unwrap_or_default();
+    kept::keep(|| {
+        let names = (id, form.hypothesis.name());
+        KeptCall::new(names, Function::Create, Form::of(0), values, &[])
+    })?;
+    Ok(match law.create(form.hypothesis, values) {
+        Ok(instance) => Created {
+            status: raw::PILUM_OK,
+            message: vec![0],
+            probe: Some(Probe {
+                instance: Held::Foreign(instance),
+                id: id.to_owned(),
+                hypothesis: form.hypothesis,
+                values: values.to_vec(),
+                n_components: form.hypothesis.n_components(),
+                n_states: form.n_states,
+                lacks_tangent: form.lacks_tangent,
+            }),
+        },
+        Err((status, text)) => Created {
+            status,
+            message: ended(text),
+            probe: None,
+        },
+    })
+}
+
+/// A text as a message buffer holds it.
+fn ended(text: String) -> Vec<u8> {
+    let mut bytes = text.into_bytes();
+    bytes.push(0);
+    bytes
 }
 
 /// Calls `destroy` with null, which the contract allows.
@@ -444,9 +497,29 @@ impl Probe {
         self.n_states
     }
 
-    /// Where its instance stands in memory.
+    /// Where its instance stands in memory; 0 of a law behind an adapter.
     pub fn address(&self) -> usize {
-        self.instance.instance.addr()
+        match &self.instance {
+            Held::Own(own) => own.instance.addr(),
+            Held::Foreign(_) => 0,
+        }
+    }
+
+    /// Whether the law has `init_state`.
+    fn has_init_state(&self) -> bool {
+        match &self.instance {
+            Held::Own(own) => own.law.known.init_state.is_some(),
+            Held::Foreign(_) => false,
+        }
+    }
+
+    /// Arguments that the routine behind an adapter has overwritten though it is given them to read,
+    /// those that were not told before.
+    pub fn take_overwritten(&self) -> Vec<String> {
+        match &self.instance {
+            Held::Own(_) => Vec::new(),
+            Held::Foreign(instance) => instance.take_overwritten(),
+        }
     }
 
     /// Asks for the internal variables of points that carry these fluxes. `None` if the law has no
@@ -455,7 +528,7 @@ impl Probe {
     /// # Errors
     /// There is no memory.
     pub fn init_state(&self, fluxes: &[Vec<f64>], form: &Form) -> io::Result<Option<Answer>> {
-        if self.instance.law.known.init_state.is_none() {
+        if !self.has_init_state() {
             return Ok(None);
         }
         let starts: Vec<PointStart> = fluxes
@@ -505,7 +578,7 @@ impl Probe {
         rates: &[PointRates],
         parameter: &[f64],
     ) -> io::Result<Option<(Answer, Vec<EndRates>)>> {
-        if self.instance.law.known.init_state.is_none() {
+        if !self.has_init_state() {
             return Ok(None);
         }
         let form = Form::of(raw::PILUM_REQ_RATES);
@@ -531,7 +604,14 @@ impl Probe {
         rates: Option<(&[PointRates], &[f64])>,
         form: &Form,
     ) -> io::Result<(Answer, Vec<EndRates>)> {
-        let known = &self.instance.law.known;
+        let own = match &self.instance {
+            Held::Own(own) => own,
+            Held::Foreign(instance) => {
+                let answer = self.call_foreign(&**instance, function, starts, form)?;
+                return Ok((answer, Vec::new()));
+            }
+        };
+        let known = &own.law.known;
         let Some(called) = (match function {
             Function::Create => None,
             Function::InitState => known.init_state,
@@ -613,7 +693,7 @@ impl Probe {
         })?;
         // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
         // function; a batch that tells less than version 1.0 has to be refused unread.
-        let returned = unsafe { called(self.instance.instance, letter.pointer().cast()) };
+        let returned = unsafe { called(own.instance, letter.pointer().cast()) };
         let statuses = status
             .bytes()
             .chunks_exact(size_of::<Status>())
@@ -638,6 +718,80 @@ impl Probe {
             answer,
             directions.map_or(Vec::new(), |written| written.rows()),
         ))
+    }
+}
+
+impl Probe {
+    /// A call through an adapter, which has arrays of its own: requests and times are those of the form. A
+    /// point whose gradient at the start is zero is told that the increment is the first one; the number of
+    /// the element follows from that of the first point.
+    fn call_foreign(
+        &self,
+        instance: &dyn ForeignInstance,
+        function: Function,
+        starts: &[PointStart],
+        form: &Form,
+    ) -> io::Result<Answer> {
+        if function != Function::Integrate {
+            return Err(io::Error::other("there is no such function"));
+        }
+        let c = self.n_components;
+        let request = self.asked(form);
+        let wants_tangent = request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
+        let rows = Strided::rows(c);
+        kept::keep(|| {
+            let names = (self.id.as_str(), self.hypothesis.name());
+            KeptCall::new(names, function, *form, &self.values, starts)
+        })?;
+        let mut worst = (raw::PILUM_OK, String::new());
+        let mut points = Vec::new();
+        for (i, start) in starts.iter().enumerate() {
+            let is_first = start.gradient0.iter().all(|value| *value == 0.0);
+            let site = Site {
+                element: (form.first_point + 1) as u32,
+                ..Site::default()
+            };
+            let mut end = PointEnd {
+                status: NO_OUTCOME,
+                step_factor: f64::NAN,
+                flux: vec![f64::NAN; c],
+                state: vec![f64::NAN; self.n_states],
+                tangent: vec![f64::NAN; if wants_tangent { c * c } else { 0 }],
+            };
+            let (returned, text) = instance.integrate(Call {
+                request,
+                n_points: 1,
+                n_components: c,
+                n_states: self.n_states,
+                time: form.time,
+                time_increment: form.time_increment,
+                moment: Moment {
+                    increment: if is_first { 1 } else { 2 },
+                    ..Moment::default()
+                },
+                sites: &[site],
+                gradient0: Some((&start.gradient0, rows)),
+                gradient1: Some((&start.gradient1, rows)),
+                flux0: (&start.flux0, rows),
+                state0: &start.state0,
+                flux1: Some((&mut end.flux, rows)),
+                state1: &mut end.state,
+                tangent: &mut end.tangent,
+                status: std::slice::from_mut(&mut end.status),
+                step_factor: std::slice::from_mut(&mut end.step_factor),
+            });
+            let status = most_severe(worst.0, returned);
+            if status != worst.0 {
+                worst = (status, text.replacen("point 0:", &format!("point {i}:"), 1));
+            }
+            points.push(end);
+        }
+        Ok(Answer {
+            status: worst.0,
+            message: ended(worst.1),
+            points,
+            stray: false,
+        })
     }
 }
 

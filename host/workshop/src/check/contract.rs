@@ -293,9 +293,14 @@ fn initial_states_are_written(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "initial states");
     let mut n_points = 0;
     for specimen in subject.specimens(2, &mut random)? {
-        for n in [1, 2, 5, 16, 33] {
+        // One point without any flux, and so many under pressure.
+        for n in [0, 1, 2, 5, 16, 33] {
             let pressures = (0..n).map(|_| random.logarithmic(1.0, 1000.0));
-            let fluxes: Vec<Vec<f64>> = pressures.map(|p| specimen.under_pressure(p)).collect();
+            let mut fluxes: Vec<Vec<f64>> = pressures.map(|p| specimen.under_pressure(p)).collect();
+            if n == 0 {
+                fluxes.push(specimen.under_pressure(0.0));
+            }
+            let n = fluxes.len();
             for order in [Order::Points, Order::Components, Order::Spread] {
                 let form = Form {
                     order,
@@ -305,7 +310,7 @@ fn initial_states_are_written(subject: &Subject) -> Found {
                     continue;
                 };
                 for (i, end) in answer.points.iter().enumerate() {
-                    let point = format!("`init_state`, point {i} of {n}");
+                    let point = format!("`init_state`, point {i} of {n}, flux {:?}", fluxes[i]);
                     if end.status == NO_OUTCOME && answer.status != raw::PILUM_E_ARGUMENT {
                         let why = format!("{point}: there is no outcome");
                         return Err(specimen.fails_to_start(&fluxes, &form, &[], why));

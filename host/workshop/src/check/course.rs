@@ -120,6 +120,7 @@ fn of_driver(driver: &Driver) -> Result<Vec<Specimen>, Verdict> {
             probe,
             course: Some(course),
             time_increment,
+            is_led_near: false,
         });
     }
     Ok(specimens)

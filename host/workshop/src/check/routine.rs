@@ -3,18 +3,18 @@
 //!
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
+use super::mathematics::{ITERATED, ROUND_OFF, Slope, UPDATE, flux_scale, largest, slope};
 use super::random::Random;
-use super::{Check, Family, Found, Subject, Verdict, failed, skipped};
+use super::specimen::{LONG, Specimen, first_difference, is_success};
+use super::walk::Step;
+use super::{Check, Family, Found, Subject, Verdict, refusal, skipped};
 use crate::Error;
 use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
+use law::Tangent;
 use law::adapter::{Foreign, sidecar, sidecar_of};
-use law::probe::kept::{self, Function, KeptCall};
 use law::probe::{Form, PointStart};
-use law::{
-    BatchFailure, End, Law, Moment, Operator, ParameterDescription, Start, Strided, Tangent,
-};
 use std::path::Path;
 use text::{Source, suggestion};
 
@@ -37,8 +37,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "routine-stays-inside",
         family: Family::Routine,
-        description: "UMAT: on random paths nothing is written beyond an array or over sizes, names and \
-                      PROPS, results are finite, PNEWDT is sound; a copy that is used up is a warning.",
+        description: "UMAT: on random paths and on those that go far, there and back, nothing is written \
+                      beyond an array or over sizes, names and PROPS, and PNEWDT is sound; results are finite \
+                      on random ones; a copy that is used up is a warning.",
         needs: &["routine-answers"],
         run: routine_stays_inside,
     },
@@ -46,7 +47,8 @@ pub(super) const CHECKS: &[Check] = &[
         id: "routine-is-repeatable",
         family: Family::Routine,
         description: "UMAT: the same call gives the same bits after other calls, and in another image of \
-                      the library: nothing is kept in SAVE or COMMON from point to point.",
+                      the library: nothing is kept in SAVE or COMMON from point to point. In another element \
+                      too (warning, since NOEL may stand for its properties).",
         needs: &["routine-stays-inside"],
         run: routine_is_repeatable,
     },
@@ -61,16 +63,18 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "time-as-declared",
         family: Family::Routine,
-        description: "UMAT: DTIME changes the response where the sidecar says `time_dependent = true`, and \
-                      nowhere else (warning).",
+        description: "UMAT: DTIME or TIME changes the response where the sidecar says `time_dependent = \
+                      true`, and nowhere else (warning).",
         needs: &["routine-is-repeatable"],
         run: time_as_declared,
     },
     Check {
         id: "ddsdde-matches-differences",
         family: Family::Routine,
-        description: "UMAT: DDSDDE is the derivative of STRESS within 10⁻⁴ of the stiffness, and symmetric \
-                      where the sidecar says so. Kinks are exempt; so is `tangent = \"approximate\"`.",
+        description: "UMAT: DDSDDE is the derivative of STRESS within 10⁻⁴ of the stiffness, far beyond \
+                      yielding and in unloading too (warning, with the largest error); it is not the \
+                      transpose of it, and symmetric where the sidecar says so. Kinks are exempt; so is \
+                      `tangent = \"approximate\"`.",
         needs: &["routine-is-repeatable"],
         run: ddsdde_matches_differences,
     },
@@ -99,21 +103,26 @@ pub(super) const SHARED: [&str; 3] = [
     "units-are-known",
 ];
 
-/// Increments of a random path, and of each of its straight pieces.
-const N_INCREMENTS: usize = 48;
-const STRAIGHT: usize = 6;
-/// Compression that paths start under, kPa.
-const PRESSURE: f64 = 100.0;
-/// Differences of fluxes between two ways to compute them, relative to those in play.
-const ITERATED: f64 = 1e-8;
-/// Error of a tangent, relative to the largest stiffness.
-const TANGENT: f64 = 1e-4;
-/// Asymmetry, relative to the largest entry.
-const ROUND_OFF: f64 = 1e-9;
-/// Lengths of difference steps, relative to the increment.
-const LENGTHS: [f64; 3] = [1e-3, 1e-5, 1e-7];
+/// Those that mean the same for a routine, too, whose parameters and increments are random or far away. What
+/// they fail of a law they warn of here: public routines are often imprecise, and are of use all the same.
+pub(super) const OF_RESPONSES: [&str; 8] = [
+    "response-is-isotropic",
+    "compression-is-negative",
+    "angles-are-degrees",
+    "plastic-work-is-not-negative",
+    "response-is-continuous",
+    "states-are-carried-on",
+    "plastic-variables-rest",
+    "units-belong-together",
+];
+
+/// Increments of the random part of a path.
+const N_INCREMENTS: usize = 36;
 /// What time increments differ by, to see whether they matter.
 const SLOWER: f64 = 1e3;
+/// Another time at which an increment begins, and number of a point before those of a call.
+const LATER: f64 = 1e5;
+const ELSEWHERE: u64 = 39;
 
 /// Whether a library is a UMAT and none of the contract. Nothing of it runs.
 pub(super) fn is_one(path: &Path) -> bool {
@@ -152,274 +161,44 @@ pub(super) fn foreign(subject: &Subject) -> Foreign {
     }
 }
 
-/// A routine under a hypothesis, with parameters.
-struct Routine {
-    law: Law,
-}
-
-/// A point and an increment.
-#[derive(Clone, Debug)]
-struct Point {
-    gradient: Vec<f64>,
-    gradient_end: Vec<f64>,
-    flux: Vec<f64>,
-    state: Vec<f64>,
-}
-
-/// What a routine makes of it.
-#[derive(Clone, Debug, PartialEq)]
-struct After {
-    flux: Vec<f64>,
-    state: Vec<f64>,
-    tangent: Vec<f64>,
-}
-
-/// An increment that succeeded.
-struct Step {
-    point: Point,
-    after: After,
-    /// Largest entry of DDSDDE at the start of the path.
-    stiffness: f64,
-}
-
-impl Step {
-    fn increment(&self) -> Vec<f64> {
-        let pairs = self.point.gradient_end.iter().zip(&self.point.gradient);
-        pairs.map(|(end, start)| end - start).collect()
-    }
-
-    /// Fluxes in play.
-    fn scale(&self) -> f64 {
-        let moved = self.stiffness * largest(&self.increment());
-        largest(&self.point.flux)
-            .max(largest(&self.after.flux))
-            .max(moved)
-    }
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |most, value| value.abs().max(most))
-}
-
-/// A value that a parameter may have, unless one is set.
-fn value(subject: &Subject, p: &ParameterDescription) -> f64 {
-    let given = subject.settings.iter().find(|(id, _)| *id == p.id);
-    given.map_or_else(|| law::vetting::plausible(p), |(_, value)| *value)
-}
-
-/// The routine under each hypothesis, in an image of its own.
-fn routines(subject: &Subject) -> Result<Vec<Routine>, Verdict> {
-    let library = subject.opener.open_foreign(&foreign(subject), |_| Ok(()));
-    let library = library.map_err(|why| failed(why.to_string()))?;
-    let mut routines = Vec::new();
-    for description in library.laws() {
-        let Some(law) = library.law(&description.id) else {
-            continue;
-        };
-        let values: Vec<f64> = description
-            .parameters
-            .iter()
-            .map(|p| value(subject, p))
-            .collect();
-        for hypothesis in Hypothesis::ALL {
-            if description.formulation(hypothesis).is_none() {
-                continue;
-            }
-            let built = law.build(hypothesis, &values);
-            let law = built
-                .map_err(|why| failed(format!("under {}: {}", hypothesis.name(), why.reason)))?;
-            routines.push(Routine { law });
-        }
-    }
-    Ok(routines)
-}
-
-impl Routine {
-    /// Law, hypothesis and parameters, for messages.
-    fn name(&self) -> String {
-        let declared = self.law.description().parameters.iter();
-        let values = declared.zip(self.law.parameters());
-        let values: Vec<String> = values
-            .map(|(p, value)| format!("{} = {value}", p.id))
-            .collect();
-        format!(
-            "under {} with {}",
-            self.law.hypothesis().name(),
-            values.join(", ")
-        )
-    }
-
-    fn fails(&self, why: impl std::fmt::Display) -> Verdict {
-        failed(format!("{}: {why}", self.name()))
-    }
-
-    fn warns(&self, why: impl std::fmt::Display) -> Verdict {
-        Verdict::Warning(format!("{}: {why}", self.name()))
-    }
-
-    fn is_time_dependent(&self) -> bool {
-        self.law.formulation().time_dependent
-    }
-
-    /// Under plane strain, 33 stays zero.
-    fn is_free(&self, component: usize) -> bool {
-        self.law.hypothesis() != Hypothesis::PlaneStrain || component != 2
-    }
-
-    fn call(&self, point: &Point, operator: Operator, time: f64) -> Result<After, BatchFailure> {
-        let n = self.law.n_components();
-        let rows = Strided::rows(n);
-        let mut after = After {
-            flux: vec![0.0; n],
-            state: vec![0.0; point.state.len()],
-            tangent: vec![0.0; if operator == Operator::None { 0 } else { n * n }],
-        };
-        let start = Start {
-            n_points: 1,
-            gradient: (&point.gradient, rows),
-            gradient_end: (&point.gradient_end, rows),
-            flux: (&point.flux, rows),
-            state: &point.state,
-            time: 0.0,
-            time_increment: time,
-            moment: Moment::default(),
-            sites: &[],
-        };
-        let end = End {
-            flux: (&mut after.flux, rows),
-            state: &mut after.state,
-            operator: &mut after.tangent,
-        };
-        let kept = || self.kept(point, operator, time);
-        // Without it a crash is known all the same.
-        let _ = kept::keep(kept);
-        self.law.integrate(&start, operator, end)?;
-        Ok(after)
-    }
-
-    /// The call, for who looks after a crash.
-    fn kept(&self, point: &Point, operator: Operator, time_increment: f64) -> KeptCall {
-        let request = match operator {
-            Operator::None => raw::PILUM_REQ_FLUX,
-            Operator::Consistent => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT,
-            Operator::Elastic => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-        };
-        let form = Form {
-            time_increment,
-            ..Form::of(request)
-        };
-        let start = PointStart {
-            gradient0: point.gradient.clone(),
-            gradient1: point.gradient_end.clone(),
-            flux0: point.flux.clone(),
-            state0: point.state.clone(),
-        };
-        let names = (
-            self.law.description().id.as_str(),
-            self.law.hypothesis().name(),
-        );
-        KeptCall::new(
-            names,
-            Function::Integrate,
-            form,
-            self.law.parameters(),
-            &[start],
-        )
-    }
-
-    fn update(&self, point: &Point) -> Result<After, BatchFailure> {
-        self.call(point, Operator::Consistent, 1.0)
-    }
-
-    /// A point under pressure before anything has happened, and the largest entry of its DDSDDE.
-    fn origin(&self) -> Result<(Point, f64), Verdict> {
-        let n = self.law.n_components();
-        let normal = if self.law.hypothesis().is_interface() {
-            1
+/// What a check of responses says of a routine: it is not led far if its calls take long, and a failure of
+/// a law is a warning.
+pub(super) fn of_response(check: &Check, subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "speed");
+    let routines = subject.specimens_by_default(1, &mut random)?;
+    if routines.iter().any(|routine| routine.is_led_near) {
+        let why = if subject.near {
+            "it is not led far".to_owned()
         } else {
-            3
+            format!("a call takes longer than {LONG:?}, so that paths are short")
         };
-        let flux: Vec<f64> = (0..n)
-            .map(|i| if i < normal { -PRESSURE } else { 0.0 })
-            .collect();
-        let state = self.law.initial_state(1, (&flux, Strided::rows(n)));
-        let state = state.map_err(|why| self.fails(why.message))?;
-        let point = Point {
-            gradient: vec![0.0; n],
-            gradient_end: vec![0.0; n],
-            flux,
-            state,
-        };
-        let at_rest = self.update(&point).map_err(|why| self.fails(why.message))?;
-        Ok((point, largest(&at_rest.tangent)))
+        return Err(skipped(why));
     }
-
-    /// Leads a point along straight pieces in random directions. What the routine cannot follow starts
-    /// anew; a defect is one of the routine.
-    fn walk(&self, random: &mut Random) -> Result<Vec<Step>, Verdict> {
-        let (origin, stiffness) = self.origin()?;
-        if stiffness <= 0.0 {
-            return Err(self.fails(
-                "DDSDDE of a call without any strain is zero: the routine leaves it unset, and without it there is no \
-                 iteration; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar",
-            ));
-        }
-        let size = PRESSURE / stiffness;
-        let mut steps = Vec::new();
-        let mut point = origin.clone();
-        let mut direction = vec![0.0; point.flux.len()];
-        for increment in 0..N_INCREMENTS {
-            if increment % STRAIGHT == 0 {
-                let length = size * random.logarithmic(0.03, 10.0);
-                for (c, value) in direction.iter_mut().enumerate() {
-                    let part = random.between(-1.0, 1.0);
-                    *value = if self.is_free(c) { length * part } else { 0.0 };
-                }
-            }
-            let ends = point.gradient.iter().zip(&direction);
-            point.gradient_end = ends.map(|(start, part)| start + part).collect();
-            match self.update(&point) {
-                Ok(after) => {
-                    let next = Point {
-                        gradient: point.gradient_end.clone(),
-                        gradient_end: point.gradient_end.clone(),
-                        flux: after.flux.clone(),
-                        state: after.state.clone(),
-                    };
-                    steps.push(Step {
-                        point: std::mem::replace(&mut point, next),
-                        after,
-                        stiffness,
-                    });
-                }
-                Err(failure) => match failure.outcome {
-                    Outcome::CutStep | Outcome::Domain | Outcome::Unsupported => {
-                        point = origin.clone();
-                    }
-                    _ => return Err(self.fails(failure.message)),
-                },
-            }
-        }
-        if steps.is_empty() {
-            return Err(skipped(format!("{}: no increment succeeded", self.name())));
-        }
-        Ok(steps)
-    }
+    (check.run)(subject).map_err(Verdict::milder)
 }
 
-/// Walks of every routine; what is made of each of them.
+/// Walks of every routine, far too; what is made of each of them.
 fn each(
     subject: &Subject,
     name: &str,
-    mut look: impl FnMut(&Routine, &[Step], &mut Random) -> Result<usize, Verdict>,
+    mut look: impl FnMut(&Specimen, &[Step], &mut Random) -> Result<usize, Verdict>,
 ) -> Result<usize, Verdict> {
     let mut random = Random::new(subject.seed, name);
     let mut n = 0;
-    for routine in routines(subject)? {
-        let steps = routine.walk(&mut random)?;
-        n += look(&routine, &steps, &mut random)?;
+    for routine in subject.specimens_by_default(1, &mut random)? {
+        let walk = routine.paths(N_INCREMENTS, &mut random)?;
+        if walk.steps.is_empty() {
+            let why = format!("{}: no increment succeeded: {}", routine.name(), walk.why());
+            return Err(skipped(why));
+        }
+        n += look(&routine, &walk.steps, &mut random)?;
     }
     Ok(n)
+}
+
+/// Starts of steps.
+fn starts(steps: &[Step]) -> Vec<PointStart> {
+    steps.iter().map(|step| step.start.clone()).collect()
 }
 
 fn sidecar_is_read(subject: &Subject) -> Found {
@@ -438,25 +217,76 @@ fn sidecar_is_read(subject: &Subject) -> Found {
     Ok(names.collect::<Vec<_>>().join("; "))
 }
 
+/// Compression of a first call, kPa.
+const PRESSURE: f64 = 100.0;
+
 fn routine_answers(subject: &Subject) -> Found {
-    let routines = routines(subject)?;
+    let mut random = Random::new(subject.seed, "answers");
     let mut all = Vec::new();
-    for routine in &routines {
-        let (_, stiffness) = routine.origin()?;
-        all.push(format!(
-            "{} {stiffness:.3e}",
-            routine.law.hypothesis().name()
-        ));
+    for routine in subject.specimens_by_default(1, &mut random)? {
+        let flux = routine.under_pressure(PRESSURE);
+        let state0 = match routine.initial_state(&flux)? {
+            Ok(state0) => state0,
+            Err(why) => return Err(routine.fails(why)),
+        };
+        let zero = vec![0.0; flux.len()];
+        let start = PointStart {
+            gradient0: zero.clone(),
+            gradient1: zero,
+            flux0: flux,
+            state0,
+        };
+        let answer = routine.call(std::slice::from_ref(&start), UPDATE)?;
+        if !is_success(answer.status) {
+            let why = refusal(answer.status, answer.text().as_deref());
+            return Err(routine.fails_at(&start, why));
+        }
+        let stiffness = largest(&answer.points[0].tangent);
+        if stiffness <= 0.0 {
+            return Err(routine.fails_at(
+                &start,
+                "DDSDDE of a call without any strain is zero: the routine leaves it unset, and without it there is no \
+                 iteration; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar",
+            ));
+        }
+        all.push(format!("{} {stiffness:.3e}", routine.hypothesis.name()));
     }
     Ok(format!("largest entry of DDSDDE: {}", all.join(", ")))
 }
 
 fn routine_stays_inside(subject: &Subject) -> Found {
-    let mut notes = Vec::new();
-    let n = each(subject, "inside", |routine, steps, _| {
-        notes.extend(routine.law.take_notes());
-        Ok(steps.len())
-    })?;
+    let mut random = Random::new(subject.seed, "inside");
+    let (mut n, mut notes) = (0, Vec::new());
+    for routine in subject.specimens_by_default(1, &mut random)? {
+        let near = routine.walk(N_INCREMENTS, &mut random)?;
+        let all = routine.paths(N_INCREMENTS, &mut random)?;
+        // Far away results may be no numbers: who goes there is told then.
+        let is_defect = |status: raw::Status, is_near: bool| match Outcome::from_code(status) {
+            Outcome::CutStep | Outcome::Domain | Outcome::Unsupported => false,
+            Outcome::Numeric => is_near,
+            _ => true,
+        };
+        let near_ones = near.refusals.iter().map(|refused| (refused, true));
+        let mut refused = near_ones.chain(all.refusals.iter().map(|refused| (refused, false)));
+        if let Some(((status, text), _)) =
+            refused.find(|((status, _), is_near)| is_defect(*status, *is_near))
+        {
+            return Err(routine.fails(refusal(*status, Some(text))));
+        }
+        if near.steps.is_empty() && all.steps.is_empty() {
+            let why = format!("{}: no increment succeeded: {}", routine.name(), near.why());
+            return Err(skipped(why));
+        }
+        n += near.steps.len() + all.steps.len();
+        let names = routine.probe.take_overwritten();
+        if !names.is_empty() {
+            notes.push(format!(
+                "the routine overwrites {}, which it is given to read; here that is a copy, and what is \
+                 left there is not used",
+                names.join(", ")
+            ));
+        }
+    }
     match notes.into_iter().next() {
         Some(note) => Err(Verdict::Warning(note)),
         None => Ok(format!("{n} increments")),
@@ -464,64 +294,97 @@ fn routine_stays_inside(subject: &Subject) -> Found {
 }
 
 fn routine_is_repeatable(subject: &Subject) -> Found {
-    let others = routines(subject)?;
-    let n = each(subject, "repeatable", |routine, steps, _| {
+    let mut others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
+    let mut by_element = None;
+    let n = each(subject, "repeatable", |routine, steps, random| {
         let fresh = others
-            .iter()
-            .find(|other| other.law.hypothesis() == routine.law.hypothesis());
-        for step in steps.iter().rev() {
-            for (other, who) in [
-                (Some(routine), "after other calls"),
-                (fresh, "in another image"),
-            ] {
-                let Some(other) = other else { continue };
-                let again = other
-                    .update(&step.point)
-                    .map_err(|why| routine.fails(why.message))?;
-                let [before, after] = [&step.after, &again];
-                let results = [
-                    ("STRESS", &before.flux, &after.flux),
-                    ("STATEV", &before.state, &after.state),
-                    ("DDSDDE", &before.tangent, &after.tangent),
-                ];
-                let other = results
-                    .into_iter()
-                    .find(|(_, before, after)| before != after);
-                if let Some((name, before, after)) = other {
-                    return Err(routine.fails(format!(
-                        "the same call gives another result {who}: {name} {before:?}, then {after:?}, \
-                         at {:?}",
-                        step.point
-                    )));
-                }
-            }
+            .iter_mut()
+            .find(|other| other.hypothesis == routine.hypothesis);
+        // Backwards, so that other calls come before; some with a component that does not move.
+        let mut points = starts(steps);
+        points.extend(routine.points(24, random)?);
+        let expected = routine.call(&points, UPDATE)?.points;
+        let mut back = points.clone();
+        back.reverse();
+        let mut after_others = routine.call(&back, UPDATE)?.points;
+        after_others.reverse();
+        let elsewhere = match fresh {
+            Some(fresh) => fresh.call(&points, UPDATE)?.points,
+            None => expected.clone(),
+        };
+        for (found, who) in [
+            (&after_others, "after other calls"),
+            (&elsewhere, "in another image"),
+        ] {
+            let Some(i) = first_difference(&expected, found) else {
+                continue;
+            };
+            let [before, after] = [&expected[i], &found[i]];
+            let results = [
+                ("STRESS", &before.flux, &after.flux),
+                ("STATEV", &before.state, &after.state),
+                ("DDSDDE", &before.tangent, &after.tangent),
+            ];
+            let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            let other = results
+                .into_iter()
+                .find(|(_, before, after)| bits(before) != bits(after));
+            let what = other.map_or_else(
+                || format!("outcome {}, then {}", before.status, after.status),
+                |(name, before, after)| format!("{name} {before:?}, then {after:?}"),
+            );
+            let why = format!(
+                "the same call gives another result {who}: {what}, at {:?}",
+                points[i]
+            );
+            return Err(routine.fails_at(&points[i], why));
         }
-        Ok(steps.len())
+        let form = Form {
+            first_point: ELSEWHERE,
+            ..routine.form(UPDATE)
+        };
+        let there = routine.probe.integrate(&points, &form)?.points;
+        if let Some(i) = first_difference(&expected, &there) {
+            let why = format!(
+                "with another NOEL STRESS {:?} becomes {:?}, at {:?}",
+                expected[i].flux, there[i].flux, points[i]
+            );
+            by_element = by_element
+                .take()
+                .or_else(|| Some(routine.warns_at(&points[i], why)));
+        }
+        Ok(points.len())
     })?;
-    Ok(format!("{n} increments"))
+    by_element.map_or(Ok(format!("{n} increments")), Err)
 }
 
 fn routine_stays_at_rest(subject: &Subject) -> Found {
     let n = each(subject, "rest", |routine, steps, _| {
-        if routine.is_time_dependent() {
+        if routine.formulation.time_dependent {
             return Ok(0);
         }
-        for step in steps {
-            let still = Point {
-                gradient: step.point.gradient_end.clone(),
-                gradient_end: step.point.gradient_end.clone(),
-                flux: step.after.flux.clone(),
-                state: step.after.state.clone(),
-            };
-            let after = routine
-                .update(&still)
-                .map_err(|why| routine.fails(why.message))?;
-            if differ(&after.flux, &step.after.flux, ITERATED * step.scale()) {
-                return Err(routine.fails(format!(
+        let still: Vec<PointStart> = steps
+            .iter()
+            .map(|step| PointStart {
+                gradient0: step.start.gradient1.clone(),
+                gradient1: step.start.gradient1.clone(),
+                flux0: step.end.flux.clone(),
+                state0: step.end.state.clone(),
+            })
+            .collect();
+        let answer = routine.call(&still, raw::PILUM_REQ_FLUX)?;
+        for ((step, point), end) in steps.iter().zip(&still).zip(&answer.points) {
+            if !is_success(end.status) {
+                let why = refusal(end.status, answer.text().as_deref());
+                return Err(routine.fails_at(point, format!("DSTRAN = 0 is refused: {why}")));
+            }
+            if differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step)) {
+                let why = format!(
                     "DSTRAN = 0 changes STRESS {:?} to {:?}; what the time does is declared by \
                      `time_dependent = true` in the sidecar",
-                    step.after.flux, after.flux
-                )));
+                    step.end.flux, end.flux
+                );
+                return Err(routine.fails_at(point, why));
             }
         }
         Ok(steps.len())
@@ -540,100 +403,127 @@ fn differ(a: &[f64], b: &[f64], bound: f64) -> bool {
 fn time_as_declared(subject: &Subject) -> Found {
     let (mut declared, mut seen) = (false, false);
     let n = each(subject, "time", |routine, steps, _| {
-        declared |= routine.is_time_dependent();
-        for step in steps {
-            let slower = routine.call(&step.point, Operator::None, SLOWER);
-            let Ok(slower) = slower else { continue };
-            let depends = differ(&slower.flux, &step.after.flux, ITERATED * step.scale());
-            seen |= depends;
-            if depends && !routine.is_time_dependent() {
-                return Err(routine.warns(format!(
-                    "with another DTIME STRESS {:?} becomes {:?}: say `time_dependent = true` in the \
-                     sidecar, so that phases and segments without a `time` are told of",
-                    step.after.flux, slower.flux
-                )));
+        let is_declared = routine.formulation.time_dependent;
+        declared |= is_declared;
+        let starts = starts(steps);
+        let slower = routine.lasting(SLOWER, &starts, raw::PILUM_REQ_FLUX)?;
+        let later = Form {
+            time: LATER,
+            ..routine.form(raw::PILUM_REQ_FLUX)
+        };
+        let later = routine.probe.integrate(&starts, &later)?.points;
+        for (ends, what) in [(&slower, "DTIME"), (&later, "TIME")] {
+            for (step, end) in steps.iter().zip(ends) {
+                let depends = is_success(end.status)
+                    && differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
+                seen |= depends;
+                if depends && !is_declared {
+                    return Err(routine.warns_at(
+                        &step.start,
+                        format!(
+                            "with another {what} STRESS {:?} becomes {:?}: say `time_dependent = true` in \
+                             the sidecar, so that phases and segments without a `time` are told of",
+                            step.end.flux, end.flux
+                        ),
+                    ));
+                }
             }
         }
         Ok(steps.len())
     })?;
     if declared && !seen {
-        let why = "`time_dependent = true`, and DTIME changes nothing";
+        let why = "`time_dependent = true`, and DTIME changes nothing, nor does TIME";
         return Err(Verdict::Warning(why.to_owned()));
     }
     Ok(format!("{n} increments"))
 }
 
-/// What differences say of DDSDDE.
-enum Slope {
-    Right,
-    Kink,
-    /// Row, column, DDSDDE, differences.
-    Wrong(usize, usize, f64, f64),
-}
+/// Steps whose tangents are compared with differences, one in so many.
+const COMPARED: usize = 3;
 
 fn ddsdde_matches_differences(subject: &Subject) -> Found {
-    let mut n_kinks = 0;
+    let (mut n_kinks, mut n_wrong) = (0, 0);
+    let mut worst: Option<(f64, Verdict)> = None;
     let n = each(subject, "ddsdde", |routine, steps, _| {
-        let formulation = routine.law.formulation();
-        let n = routine.law.n_components();
+        let formulation = &routine.formulation;
+        let n = routine.probe.n_components();
         let mut compared = 0;
-        for step in steps.iter().step_by(3) {
-            let tangent = &step.after.tangent;
+        for step in steps.iter().step_by(COMPARED) {
+            let tangent = &step.end.tangent;
             let scale = step.stiffness.max(largest(tangent));
             if formulation.symmetric {
                 let entry = |i: usize, j: usize| tangent[i * n + j];
                 let pairs = (0..n * n).map(|k| (k / n, k % n));
-                let worst = pairs.map(|(i, j)| (entry(i, j) - entry(j, i)).abs());
-                let worst = worst.fold(0.0, f64::max);
-                if worst > ROUND_OFF * scale {
-                    return Err(routine.fails(format!(
+                let most = pairs.map(|(i, j)| (entry(i, j) - entry(j, i)).abs());
+                let most = most.fold(0.0, f64::max);
+                if most > ROUND_OFF * scale {
+                    let why = format!(
                         "`symmetric = true`, and DDSDDE is off by {:.1e} of the stiffness, at {:?}",
-                        worst / scale,
-                        step.point
-                    )));
+                        most / scale,
+                        step.start
+                    );
+                    return Err(routine.fails_at(&step.start, why));
                 }
             }
-            let transposed: Vec<f64> = (0..n * n).map(|k| tangent[(k % n) * n + k / n]).collect();
+            let mut transposed = step.clone();
+            transposed.end.tangent = (0..n * n).map(|k| tangent[(k % n) * n + k / n]).collect();
+            let is_right = |step: &Step| -> Result<bool, Verdict> {
+                Ok(matches!(
+                    slope(routine, step, scale)?,
+                    Slope::Right | Slope::Left(..)
+                ))
+            };
+            let by_columns = format!(
+                "the transpose of DDSDDE is the derivative of STRESS, DDSDDE is not: its transpose fits: \
+                 `tangent_order` in the sidecar, at {:?}",
+                step.start
+            );
             if formulation.tangent != Tangent::Consistent {
                 // One that is near the derivative may be off, but not by rows for columns.
-                let is_right =
-                    |tangent: &[f64]| matches!(slope(routine, step, tangent, scale), Slope::Right);
-                if is_right(&transposed) && !is_right(tangent) {
-                    return Err(routine.fails(format!(
-                        "the transpose of DDSDDE is the derivative of STRESS, DDSDDE is not: `tangent_order` in the \
-                         sidecar, at {:?}",
-                        step.point
-                    )));
+                if is_right(&transposed)? && !is_right(step)? {
+                    return Err(routine.fails_at(&step.start, by_columns));
                 }
                 continue;
             }
             compared += 1;
-            match slope(routine, step, tangent, scale) {
-                Slope::Right => {}
+            match slope(routine, step, scale)? {
+                Slope::Right | Slope::Left(..) => {}
                 Slope::Kink => n_kinks += 1,
-                Slope::Wrong(row, column, by_routine, by_differences) => {
-                    let hint = if matches!(slope(routine, step, &transposed, scale), Slope::Right) {
-                        "; its transpose fits: `tangent_order` in the sidecar"
-                    } else {
-                        "; an elastic or otherwise approximate one is declared by `tangent = \
-                         \"approximate\"` in the sidecar"
-                    };
-                    let names = routine.law.hypothesis().components();
-                    return Err(routine.fails(format!(
-                        "DDSDDE({}, {}), {} by {}, is {by_routine:.6e}, differences give \
-                         {by_differences:.6e}: wrong by {:.1e} of the stiffness{hint}, at {:?}",
+                Slope::Wrong {
+                    row,
+                    column,
+                    by_law,
+                    by_differences,
+                } => {
+                    if is_right(&transposed)? {
+                        return Err(routine.fails_at(&step.start, by_columns));
+                    }
+                    n_wrong += 1;
+                    let off = (by_law - by_differences).abs() / scale;
+                    if worst.as_ref().is_some_and(|(most, _)| *most >= off) {
+                        continue;
+                    }
+                    let names = routine.hypothesis.components();
+                    let why = format!(
+                        "DDSDDE({}, {}), {} by {}, is {by_law:.6e}, differences give {by_differences:.6e}: \
+                         wrong by {off:.1e} of the stiffness, the most of all, which a run pays for with iterations. \
+                         An elastic or otherwise approximate one is declared by `tangent = \
+                         \"approximate\"` in the sidecar. At {:?}",
                         row + 1,
                         column + 1,
                         names[row],
                         names[column],
-                        (by_routine - by_differences).abs() / scale,
-                        step.point
-                    )));
+                        step.start
+                    );
+                    worst = Some((off, routine.warns_at(&step.start, why)));
                 }
             }
         }
         Ok(compared)
     })?;
+    if let Some((_, verdict)) = worst {
+        return Err(verdict.led_by(&format!("{n_wrong} of {n} increments: ")));
+    }
     if n == 0 {
         return Err(skipped("the sidecar says `tangent = \"approximate\"`"));
     }
@@ -645,89 +535,47 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
     Ok(details)
 }
 
-/// Compares a tangent with central differences of three lengths.
-fn slope(routine: &Routine, step: &Step, tangent: &[f64], scale: f64) -> Slope {
-    let n = routine.law.n_components();
-    let size = largest(&step.increment());
-    let mut verdict = Slope::Kink;
-    for length in LENGTHS {
-        let (mut error, mut disagreement) = (0.0_f64, 0.0_f64);
-        let mut worst = Slope::Right;
-        for column in (0..n).filter(|&c| routine.is_free(c)) {
-            let moved = |sign: f64| {
-                let mut point = step.point.clone();
-                point.gradient_end[column] += sign * length * size;
-                let by = point.gradient_end[column] - step.point.gradient_end[column];
-                routine
-                    .call(&point, Operator::None, 1.0)
-                    .ok()
-                    .map(|after| (by, after.flux))
-            };
-            let (Some((up, above)), Some((down, below))) = (moved(1.0), moved(-1.0)) else {
-                disagreement = f64::INFINITY;
-                continue;
-            };
-            for row in 0..n {
-                let here = step.after.flux[row];
-                let by_differences = (above[row] - below[row]) / (up - down);
-                let by_routine = tangent[row * n + column];
-                let sides = (above[row] - here) / up - (here - below[row]) / -down;
-                disagreement = disagreement.max(sides.abs());
-                let wrong = (by_differences - by_routine).abs();
-                if wrong > error {
-                    error = wrong;
-                    worst = Slope::Wrong(row, column, by_routine, by_differences);
-                }
-            }
-        }
-        if disagreement.is_finite() && error <= TANGENT * scale {
-            return Slope::Right;
-        }
-        if disagreement <= 0.1 * error {
-            verdict = worst;
-        }
-    }
-    verdict
-}
-
 fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
-    let all = routines(subject)?;
+    let all = subject.specimens_by_default(1, &mut Random::new(subject.seed, "larger"))?;
     let n = each(subject, "plane", |routine, steps, _| {
-        let wanted = match routine.law.hypothesis() {
+        let wanted = match routine.hypothesis {
             Hypothesis::PlaneStrain | Hypothesis::Axisymmetric => Hypothesis::ThreeD,
             Hypothesis::Interface2d => Hypothesis::Interface3d,
             _ => return Ok(0),
         };
-        let Some(larger) = all.iter().find(|other| other.law.hypothesis() == wanted) else {
+        let Some(larger) = all.iter().find(|other| other.hypothesis == wanted) else {
             return Ok(0);
         };
         let longer = |values: &[f64]| {
             let mut longer = values.to_vec();
-            longer.resize(larger.law.n_components(), 0.0);
+            longer.resize(larger.probe.n_components(), 0.0);
             longer
         };
-        for step in steps {
-            let point = Point {
-                gradient: longer(&step.point.gradient),
-                gradient_end: longer(&step.point.gradient_end),
-                flux: longer(&step.point.flux),
-                state: step.point.state.clone(),
-            };
-            let after = larger
-                .update(&point)
-                .map_err(|why| larger.fails(why.message))?;
-            if differ(
-                &after.flux,
-                &longer(&step.after.flux),
-                ITERATED * step.scale(),
-            ) {
-                return Err(routine.fails(format!(
+        let points: Vec<PointStart> = steps
+            .iter()
+            .map(|step| PointStart {
+                gradient0: longer(&step.start.gradient0),
+                gradient1: longer(&step.start.gradient1),
+                flux0: longer(&step.start.flux0),
+                state0: step.start.state0.clone(),
+            })
+            .collect();
+        let answer = larger.call(&points, raw::PILUM_REQ_FLUX)?;
+        for ((step, point), end) in steps.iter().zip(&points).zip(&answer.points) {
+            if !is_success(end.status) {
+                let why = refusal(end.status, answer.text().as_deref());
+                return Err(larger.fails_at(point, why));
+            }
+            let expected = longer(&step.end.flux);
+            if differ(&end.flux, &expected, ITERATED * flux_scale(step)) {
+                let why = format!(
                     "STRESS is {:?}, under {} it is {:?}, at {:?}",
-                    step.after.flux,
+                    step.end.flux,
                     wanted.name(),
-                    after.flux,
-                    step.point
-                )));
+                    end.flux,
+                    step.start
+                );
+                return Err(routine.fails_at(&step.start, why));
             }
         }
         Ok(steps.len())
@@ -742,28 +590,16 @@ fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
 
 fn tangential_directions_are_alike(subject: &Subject) -> Found {
     let n = each(subject, "turned", |routine, steps, random| {
-        if !routine.law.hypothesis().is_interface() {
+        if !routine.hypothesis.is_interface() {
             return Ok(0);
         }
-        // Internal variables with a direction would have to turn as well, so every path starts fresh.
-        let (origin, stiffness) = routine.origin()?;
         let mut compared = 0;
-        for _ in steps {
-            let size = PRESSURE / stiffness * random.logarithmic(0.03, 30.0);
-            let mut point = origin.clone();
-            let mut part = || size * random.between(-1.0, 1.0);
-            point
-                .gradient_end
-                .iter_mut()
-                .for_each(|value| *value = part());
-            let Ok(after) = routine.update(&point) else {
-                continue;
-            };
-            let step = Step {
-                point,
-                after,
-                stiffness,
-            };
+        for _ in steps.iter().take(200) {
+            // Internal variables with a direction would have to turn as well, so every path starts fresh.
+            let origin = routine.origin(random)?;
+            let size = origin.size * random.logarithmic(0.03, 30.0);
+            let mut point = origin.start;
+            point.gradient1 = routine.direction(size, random);
             let angle = random.between(0.5, 2.5);
             let turn = |values: &[f64]| match *values {
                 [n, t, s] => {
@@ -772,27 +608,29 @@ fn tangential_directions_are_alike(subject: &Subject) -> Found {
                 }
                 _ => vec![values[0], -values[1]],
             };
-            let turned = Point {
-                gradient: turn(&step.point.gradient),
-                gradient_end: turn(&step.point.gradient_end),
-                flux: turn(&step.point.flux),
-                state: step.point.state.clone(),
+            let turned = PointStart {
+                gradient0: turn(&point.gradient0),
+                gradient1: turn(&point.gradient1),
+                flux0: turn(&point.flux0),
+                state0: point.state0.clone(),
             };
-            let after = routine
-                .update(&turned)
-                .map_err(|why| routine.fails(why.message))?;
-            if differ(
-                &after.flux,
-                &turn(&step.after.flux),
-                ITERATED * step.scale(),
-            ) {
-                return Err(routine.warns(format!(
-                    "the traction {:?} becomes {:?} where it should be {:?}, at {:?}",
-                    step.after.flux,
-                    after.flux,
-                    turn(&step.after.flux),
-                    step.point
-                )));
+            let ends = routine.call(&[point.clone(), turned], raw::PILUM_REQ_FLUX)?;
+            let [first, second] = ends.points.as_slice() else {
+                continue;
+            };
+            if !(is_success(first.status) && is_success(second.status)) {
+                continue;
+            }
+            let scale = largest(&point.flux0)
+                .max(largest(&first.flux))
+                .max(origin.stiffness * size);
+            let expected = turn(&first.flux);
+            if differ(&second.flux, &expected, ITERATED * scale) {
+                let why = format!(
+                    "the traction {:?} becomes {:?} where it should be {expected:?}, at {point:?}",
+                    first.flux, second.flux
+                );
+                return Err(routine.warns_at(&point, why));
             }
             compared += 1;
         }

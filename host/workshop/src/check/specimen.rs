@@ -1,6 +1,7 @@
 //! Laws with sample parameters, or with those of the author's own driver.
 
 use super::random::Random;
+use super::walk::Origin;
 use super::{Found, Subject, Verdict, failed, refusal};
 use abi::Hypothesis;
 use abi::raw;
@@ -11,10 +12,16 @@ use law::{
     BatchFailure, FormulationDescription, LoadedLaw, Moment, Operator, ParameterDescription,
     PointCall, Request, Site,
 };
+use std::time::{Duration, Instant};
 use text::suggestion;
 
+/// A call of a routine that is longer than this, in the mean of so many, is a slow one.
+pub(super) const LONG: Duration = Duration::from_micros(300);
+const TIMED: u32 = 8;
 /// Draws of parameters until a law must have accepted one.
 const MOST_DRAWS: usize = 500;
+/// The part of an increment's length in time that is next to none.
+pub(super) const INSTANT: f64 = 1e-12;
 
 /// A law under one hypothesis with one set of parameters.
 #[derive(Debug)]
@@ -28,6 +35,8 @@ pub(super) struct Specimen {
     pub(super) course: Option<Vec<PointStart>>,
     /// Length of its increments in time.
     pub(super) time_increment: f64,
+    /// Its paths are short: calls take long, or end the process far away.
+    pub(super) is_led_near: bool,
 }
 
 /// Which function of a law is called.
@@ -84,6 +93,8 @@ pub(crate) fn create_form<'a>(
 /// Which parameters are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Draw {
+    /// Defaults and the middle of usual ranges.
+    Plausible,
     /// The most ordinary ones.
     Ordinary,
     /// Any, but choices stay at their defaults: the other labels may stand for approximations.
@@ -94,6 +105,9 @@ pub(super) enum Draw {
 
 /// A value for a parameter.
 fn draw(p: &ParameterDescription, random: &mut Random, how: Draw) -> f64 {
+    if how == Draw::Plausible {
+        return law::vetting::plausible(p);
+    }
     let is_first = how == Draw::Ordinary;
     if let Some(default) = p.default {
         let unlimited = !p.usual.lower.is_finite() || !p.usual.upper.is_finite();
@@ -183,6 +197,15 @@ impl Subject {
         let mut specimens = Vec::new();
         for law in self.laws()? {
             for (formulation, hypothesis) in hypotheses(&law) {
+                if law.library().foreign().is_some() {
+                    // A routine refuses no parameters, so that random ones would say little.
+                    let draws = [Draw::Plausible].into_iter();
+                    let mut one = self.specimen(&law, &formulation, hypothesis, draws, random)?;
+                    one.is_led_near =
+                        self.near || one.takes_long(&mut Random::new(self.seed, "speed"))?;
+                    specimens.push(one);
+                    continue;
+                }
                 for set in 0..n_sets {
                     let first = if set == 0 { Draw::Ordinary } else { how };
                     let draws = [first].into_iter().chain(std::iter::repeat(how));
@@ -239,6 +262,7 @@ impl Subject {
                     probe,
                     course: None,
                     time_increment: 1.0,
+                    is_led_near: false,
                 }));
             }
             let why = if created.status == raw::PILUM_OK {
@@ -299,6 +323,7 @@ pub(super) fn settings_fit(subject: &Subject) -> Found {
         settings: Vec::new(),
         opener: subject.opener.clone(),
         driver: None,
+        near: false,
     };
     for law in laws {
         for (formulation, hypothesis) in hypotheses(&law) {
@@ -345,6 +370,11 @@ impl Specimen {
     /// A failure of this specimen in a call that can be repeated.
     pub(super) fn fails_at(&self, start: &PointStart, why: impl std::fmt::Display) -> Verdict {
         self.recorded(start, self.fails(why))
+    }
+
+    /// A warning of this specimen in a call that can be repeated.
+    pub(super) fn warns_at(&self, start: &PointStart, why: impl std::fmt::Display) -> Verdict {
+        self.recorded(start, Verdict::Warning(format!("{}: {why}", self.name())))
     }
 
     /// A verdict with the call that it is about.
@@ -433,6 +463,36 @@ impl Specimen {
     /// An ordinary call.
     pub(super) fn call(&self, starts: &[PointStart], request: u32) -> Result<Answer, Verdict> {
         Ok(self.probe.integrate(starts, &self.form(request))?)
+    }
+
+    /// Whether updates that double the flux take longer than they may.
+    fn takes_long(&self, random: &mut Random) -> Result<bool, Verdict> {
+        let Ok(Origin { start, size, .. }) = self.origin(random) else {
+            return Ok(false);
+        };
+        let starts: Vec<PointStart> = (0..TIMED)
+            .map(|_| PointStart {
+                gradient1: self.direction(size, random),
+                ..start.clone()
+            })
+            .collect();
+        let began = Instant::now();
+        self.call(&starts, raw::PILUM_REQ_FLUX)?;
+        Ok(began.elapsed() > LONG * TIMED)
+    }
+
+    /// A call over increments that take so much longer.
+    pub(super) fn lasting(
+        &self,
+        factor: f64,
+        starts: &[PointStart],
+        request: u32,
+    ) -> Result<Vec<PointEnd>, Verdict> {
+        let form = Form {
+            time_increment: factor * self.time_increment,
+            ..self.form(request)
+        };
+        Ok(self.probe.integrate(starts, &form)?.points)
     }
 
     /// What one of the functions makes of the points; nothing if the law lacks it.

@@ -215,10 +215,11 @@ impl Specimen {
             return self.along(course);
         }
         let mut walk = Walk::default();
-        let mut walkers = (0..WALKERS)
+        let n_walkers = if self.is_led_near { 1 } else { WALKERS };
+        let mut walkers = (0..n_walkers)
             .map(|_| self.origin(random))
             .collect::<Result<Vec<_>, _>>()?;
-        let mut moves = vec![Vec::new(); WALKERS];
+        let mut moves = vec![Vec::new(); n_walkers];
         for increment in 0..n_increments {
             if increment % STRAIGHT == 0 {
                 for (one, walker) in moves.iter_mut().zip(&walkers) {
@@ -246,7 +247,7 @@ impl Specimen {
     /// into what the law does.
     pub(super) fn paths(&self, n_increments: usize, random: &mut Random) -> Result<Walk, Verdict> {
         let mut walk = self.walk(n_increments, random)?;
-        if self.course.is_none() {
+        if self.course.is_none() && !self.is_led_near {
             self.lead(&mut walk, LED, random)?;
         }
         Ok(walk)
@@ -396,6 +397,40 @@ impl Specimen {
         Ok(())
     }
 
+    /// Puts increments in the place of every fourth in which one component does not move at all, as it does
+    /// in random ones: what a law keeps of the call before counts there.
+    fn still_in_one(&self, starts: &mut [PointStart], random: &mut Random) -> Result<(), Verdict> {
+        let free: Vec<usize> = (0..self.probe.n_components())
+            .filter(|&c| self.is_free(c))
+            .collect();
+        let every_fourth: Vec<usize> = (0..starts.len()).skip(3).step_by(4).collect();
+        let changed: Vec<PointStart> = every_fourth
+            .iter()
+            .map(|&i| {
+                let mut start = starts[i].clone();
+                let moved = start.gradient1.iter().zip(&start.gradient0);
+                let size = moved.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+                let still = free[random.below(free.len())];
+                for &c in &free {
+                    let by = if c == still {
+                        0.0
+                    } else {
+                        size * random.between(-1.0, 1.0)
+                    };
+                    start.gradient1[c] = start.gradient0[c] + by;
+                }
+                start
+            })
+            .collect();
+        let ends = self.call(&changed, raw::PILUM_REQ_FLUX)?.points;
+        for ((i, start), end) in every_fourth.into_iter().zip(changed).zip(&ends) {
+            if is_success(end.status) {
+                starts[i] = start;
+            }
+        }
+        Ok(())
+    }
+
     /// Starts of steps that succeed, at most so many: the last of a walk, farthest from its beginning,
     /// and as many of points that are led there and back.
     pub(super) fn points(&self, n: usize, random: &mut Random) -> Result<Vec<PointStart>, Verdict> {
@@ -403,7 +438,7 @@ impl Specimen {
         let why = walk.why();
         let mut starts = walk.successes;
         starts.reverse();
-        if self.course.is_none() {
+        if self.course.is_none() && !self.is_led_near {
             let mut led = Walk::default();
             self.lead(&mut led, LED_FOR_POINTS, random)?;
             let far: Vec<PointStart> = (0..(n / 2).min(led.successes.len()))
@@ -411,6 +446,7 @@ impl Specimen {
                 .collect();
             starts.truncate(n - far.len());
             starts.extend(far);
+            self.still_in_one(&mut starts, random)?;
         }
         starts.truncate(n);
         if starts.is_empty() {

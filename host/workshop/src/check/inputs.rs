@@ -1,0 +1,439 @@
+//! Do parameters mean something, and numbers what their units say?
+
+use super::mathematics::{ITERATED, NEEDS, UPDATE, flux_scale, increment, largest};
+use super::random::Random;
+use super::specimen::{Specimen, create_form, is_same, is_success};
+use super::walk::Step;
+use super::{Check, Family, Found, Subject, Verdict, skipped};
+use abi::raw;
+use law::ParameterDescription;
+use law::probe::{Form, PointEnd, PointStart, Probe};
+use std::collections::BTreeMap;
+
+pub(super) const CHECKS: &[Check] = &[
+    Check {
+        id: "parameters-matter",
+        family: Family::Mathematics,
+        description: "Every parameter changes some result (warning, since some may count only where no \
+                      path leads).",
+        needs: NEEDS,
+        run: parameters_matter,
+    },
+    Check {
+        id: "units-belong-together",
+        family: Family::Mathematics,
+        description: "With all numbers in units of force, length or time that are half as large, a law \
+                      says the same in these: no number in it has a unit that no parameter has, as a \
+                      tolerance in kPa has (warning, since a law may have such numbers, as a pressure of \
+                      1 kPa in a logarithm).",
+        needs: NEEDS,
+        run: units_belong_together,
+    },
+];
+
+/// The law with other values, if it accepts them.
+fn with_values(specimen: &Specimen, values: &[f64]) -> Result<Option<Probe>, Verdict> {
+    let form = create_form(&specimen.formulation, specimen.hypothesis, values);
+    let created = specimen.law.probe(&form)?;
+    Ok(created.probe.filter(|_| created.status == raw::PILUM_OK))
+}
+
+/// At most so many starts, evenly.
+fn starts(steps: &[Step], most: usize) -> Vec<&Step> {
+    let every = steps.len().div_ceil(most).max(1);
+    steps.iter().step_by(every).collect()
+}
+
+/// Other values of a parameter: near it, then far, since a limit of iterations counts only if it is low.
+fn others(p: &ParameterDescription, value: f64) -> Vec<f64> {
+    let usual = [p.usual.lower, p.usual.upper];
+    let near = if value == 0.0 {
+        [0.5, 0.1, 1e-3]
+            .map(|part| part * p.usual.upper.min(p.bounds.upper))
+            .to_vec()
+    } else {
+        [1.1, 0.9, 10.0, 0.1].map(|factor| factor * value).to_vec()
+    };
+    let all = near.into_iter().chain(usual).chain([1.0]);
+    all.filter(|other| other.is_finite()).collect()
+}
+
+/// Values of the parameters, and the same with each other label of each choice.
+fn with_each_choice(specimen: &Specimen) -> Vec<Vec<f64>> {
+    let mut all = vec![specimen.values.clone()];
+    for (i, p) in specimen.law.description().parameters.iter().enumerate() {
+        for label in 0..p.choices.len() {
+            let mut values = specimen.values.clone();
+            values[i] = label as f64;
+            if values[i].to_bits() != specimen.values[i].to_bits() {
+                all.push(values);
+            }
+        }
+    }
+    all
+}
+
+fn parameters_matter(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "parameters");
+    // Whether each parameter was tried, and mattered, by law.
+    let mut found: BTreeMap<(String, String), (bool, bool)> = BTreeMap::new();
+    for specimen in subject.specimens_by_default(4, &mut random)? {
+        let steps = specimen.paths(24, &mut random)?.steps;
+        let points: Vec<PointStart> = starts(&steps, 400)
+            .into_iter()
+            .map(|step| step.start.clone())
+            .collect();
+        let fluxes: Vec<Vec<f64>> = [1.0, 30.0, 1000.0]
+            .map(|pressure| specimen.under_pressure(pressure))
+            .to_vec();
+        let results = |probe: &Probe| -> Result<Vec<PointEnd>, Verdict> {
+            let mut ends = probe.integrate(&points, &specimen.form(UPDATE))?.points;
+            let elastic = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC;
+            ends.extend(probe.integrate(&points, &specimen.form(elastic))?.points);
+            // Each by itself: a law may refuse one for all.
+            for flux in &fluxes {
+                let started = probe.init_state(std::slice::from_ref(flux), &Form::of(0))?;
+                ends.extend(started.into_iter().flat_map(|answer| answer.points));
+            }
+            Ok(ends)
+        };
+        let law = specimen.law.description();
+        // Some count with one of the choices alone.
+        for base in with_each_choice(&specimen) {
+            let Some(probe) = with_values(&specimen, &base)? else {
+                continue;
+            };
+            let mut expected = None;
+            for (i, p) in law.parameters.iter().enumerate() {
+                let entry = found.entry((law.id.clone(), p.id.clone())).or_default();
+                if entry.1 || !p.choices.is_empty() || base[i].is_nan() {
+                    continue;
+                }
+                let before = match &expected {
+                    Some(before) => before,
+                    None => &*expected.insert(results(&probe)?),
+                };
+                for other in others(p, base[i]) {
+                    let mut values = base.clone();
+                    values[i] = other;
+                    if other.to_bits() == base[i].to_bits() || !p.bounds.contain(other) {
+                        continue;
+                    }
+                    let Some(probe) = with_values(&specimen, &values)? else {
+                        continue;
+                    };
+                    let ends = results(&probe)?;
+                    entry.0 = true;
+                    entry.1 |= ends.iter().zip(before).any(|(a, b)| !is_same(a, b));
+                    if entry.1 {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    let tried = found.values().filter(|(tried, _)| *tried).count();
+    let idle = found
+        .iter()
+        .filter(|(_, (tried, matters))| *tried && !matters);
+    let idle: Vec<String> = idle
+        .map(|((law, id), _)| format!("`{id}` of `{law}`"))
+        .collect();
+    if !idle.is_empty() {
+        return Err(Verdict::Warning(format!(
+            "no result depends on {}",
+            idle.join(", ")
+        )));
+    }
+    if tried == 0 {
+        return Err(skipped("no parameter can be changed"));
+    }
+    Ok(format!("{tried} parameters"))
+}
+
+/// How numbers grow where the units of force, length and time become smaller.
+#[derive(Clone, Copy)]
+struct Smaller {
+    /// What becomes smaller.
+    what: &'static str,
+    force: f64,
+    length: f64,
+    time: f64,
+}
+
+/// All by powers of two, so that no number is rounded. A smaller unit of length leaves stresses as they
+/// are if that of force goes along.
+const SMALLER: [Smaller; 3] = [
+    Smaller {
+        what: "force",
+        force: 2.0,
+        length: 1.0,
+        time: 1.0,
+    },
+    Smaller {
+        what: "length",
+        force: 4.0,
+        length: 2.0,
+        time: 1.0,
+    },
+    Smaller {
+        what: "time",
+        force: 1.0,
+        length: 1.0,
+        time: 2.0,
+    },
+];
+
+impl Smaller {
+    /// By what a number with this unit is multiplied; `None` where the unit is not known.
+    fn of(&self, unit: &str) -> Option<f64> {
+        let mut factor = 1.0;
+        let mut divides = false;
+        let mut rest = unit;
+        loop {
+            let end = rest.find(['/', '·', '*', ' ']).unwrap_or(rest.len());
+            let (name, power) = match rest[..end].split_once('^') {
+                Some((name, power)) => (name, power.parse::<f64>().ok()?),
+                None => (&rest[..end], 1.0),
+            };
+            let one = match name {
+                "kPa" => self.force / (self.length * self.length),
+                "kN" => self.force,
+                "kJ" => self.force * self.length,
+                "m" | "mm" => self.length,
+                "s" | "h" | "d" => self.time,
+                "deg" | "rad" | "1" | "-" => 1.0,
+                _ => return None,
+            };
+            factor *= one.powf(if divides { -power } else { power });
+            let Some(separator) = rest[end..].chars().next() else {
+                return Some(factor);
+            };
+            // Of a/b/c both are below; of a/b·c the last is not.
+            divides = separator == '/';
+            rest = &rest[end + separator.len_utf8()..];
+        }
+    }
+}
+
+fn units_belong_together(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "units");
+    let (mut n, mut unknown) = (0, 0);
+    for specimen in subject.specimens_by_default(3, &mut random)? {
+        let steps = specimen.paths(24, &mut random)?.steps;
+        for smaller in SMALLER {
+            match in_smaller_units(&specimen, &steps, smaller)? {
+                Some(compared) => n += compared,
+                None => unknown += 1,
+            }
+        }
+    }
+    if n == 0 {
+        return Err(skipped(if unknown > 0 {
+            "there are units that are not known, or none of force, length and time"
+        } else {
+            "no parameters in smaller units are accepted"
+        }));
+    }
+    Ok(format!("{n} increments"))
+}
+
+/// Compares steps with the same in smaller units; nothing where no parameter and no internal variable has
+/// such a unit.
+fn in_smaller_units(
+    specimen: &Specimen,
+    steps: &[Step],
+    smaller: Smaller,
+) -> Result<Option<usize>, Verdict> {
+    let parameters = &specimen.law.description().parameters;
+    let factors: Option<Vec<f64>> = parameters.iter().map(|p| smaller.of(&p.unit)).collect();
+    let variables = specimen.formulation.internal_variables.iter();
+    let of_states: Option<Vec<f64>> = variables.map(|v| smaller.of(&v.unit)).collect();
+    let (Some(factors), Some(of_states)) = (factors, of_states) else {
+        return Ok(None);
+    };
+    // Powers of two are exact.
+    let has_unit = |factor: &f64| factor.log2().abs() > 0.1;
+    let given = factors.iter().zip(&specimen.values);
+    let mut counting = given.filter(|(_, value)| value.abs() > 0.0);
+    if !counting.any(|(factor, _)| has_unit(factor)) && !of_states.iter().any(has_unit) {
+        return Ok(None);
+    }
+    let scaled = times(&specimen.values, &factors);
+    let Some(probe) = with_values(specimen, &scaled)? else {
+        return Ok(Some(0));
+    };
+    let n = specimen.probe.n_components();
+    let is_interface = specimen.hypothesis.is_interface();
+    let scaled = Scaled {
+        specimen,
+        smaller,
+        probe,
+        of_states,
+        of_gradient: vec![if is_interface { smaller.length } else { 1.0 }; n],
+        of_flux: vec![smaller.force / (smaller.length * smaller.length); n],
+    };
+    let chosen = starts(steps, 300);
+    scaled.begins_alike(&chosen)?;
+    scaled.goes_on_alike(&chosen).map(Some)
+}
+
+fn times(values: &[f64], factors: &[f64]) -> Vec<f64> {
+    let pairs = values.iter().zip(factors);
+    pairs.map(|(value, factor)| value * factor).collect()
+}
+
+/// A law in smaller units, and by what each kind of number grows there.
+struct Scaled<'a> {
+    specimen: &'a Specimen,
+    smaller: Smaller,
+    probe: Probe,
+    of_states: Vec<f64>,
+    of_gradient: Vec<f64>,
+    of_flux: Vec<f64>,
+}
+
+impl Scaled<'_> {
+    fn form(&self, request: u32) -> Form {
+        Form {
+            time_increment: self.smaller.time * self.specimen.time_increment,
+            ..self.specimen.form(request)
+        }
+    }
+
+    fn words(&self, what: &str) -> String {
+        format!(
+            "{}: with all numbers in half the unit of {}, {what}: is there a number in the law whose unit \
+             no parameter has?",
+            self.specimen.name(),
+            self.smaller.what
+        )
+    }
+
+    fn id(&self, k: usize) -> &str {
+        &self.specimen.formulation.internal_variables[k].id
+    }
+
+    /// Compares internal variables at first.
+    fn begins_alike(&self, steps: &[&Step]) -> Result<(), Verdict> {
+        for step in steps {
+            let flux = &step.start.flux0;
+            let scaled = [times(flux, &self.of_flux)];
+            let (Ok(before), Some(after)) = (
+                self.specimen.initial_state(flux)?,
+                self.probe.init_state(&scaled, &self.form(0))?,
+            ) else {
+                continue;
+            };
+            let Some(after) = after.points.first().filter(|end| is_success(end.status)) else {
+                continue;
+            };
+            let expected = times(&before, &self.of_states);
+            let off = (0..expected.len()).find(|&k| {
+                let (a, b) = (after.state[k], expected[k]);
+                (a - b).abs() > ITERATED * a.abs().max(b.abs())
+            });
+            if let Some(k) = off {
+                let what = format!(
+                    "`init_state` gives `{}` = {:e}, expected {:e}",
+                    self.id(k),
+                    after.state[k],
+                    expected[k]
+                );
+                let why = format!("{} Compared with flux {flux:?}", self.words(&what));
+                return Err(Verdict::Warning(why));
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares what becomes of increments: how many.
+    fn goes_on_alike(&self, steps: &[&Step]) -> Result<usize, Verdict> {
+        let scaled: Vec<PointStart> = steps
+            .iter()
+            .map(|step| PointStart {
+                gradient0: times(&step.start.gradient0, &self.of_gradient),
+                gradient1: times(&step.start.gradient1, &self.of_gradient),
+                flux0: times(&step.start.flux0, &self.of_flux),
+                state0: times(&step.start.state0, &self.of_states),
+            })
+            .collect();
+        let form = self.form(raw::PILUM_REQ_FLUX);
+        let ends = self.probe.integrate(&scaled, &form)?.points;
+        let mut compared = 0;
+        for ((step, start), end) in steps.iter().zip(&scaled).zip(&ends) {
+            if !is_success(end.status) {
+                continue;
+            }
+            compared += 1;
+            if let Some(what) = self.difference(step, start, end) {
+                let why = format!("{} Compared with {:?}", self.words(&what), step.start);
+                let verdict = Verdict::Warning(why);
+                return Err(self.specimen.recorded(&step.start, verdict));
+            }
+        }
+        Ok(compared)
+    }
+
+    fn difference(&self, step: &Step, start: &PointStart, end: &PointEnd) -> Option<String> {
+        let expected = times(&step.end.flux, &self.of_flux);
+        let bound = ITERATED * flux_scale(step) * self.of_flux[0];
+        let mut pairs = end.flux.iter().zip(&expected);
+        if pairs.any(|(a, b)| (a - b).abs() > bound) {
+            return Some(format!("the flux is {:?}, expected {expected:?}", end.flux));
+        }
+        let expected = times(&step.end.state, &self.of_states);
+        let k = (0..expected.len()).find(|&k| {
+            let (a, b) = (end.state[k], expected[k]);
+            let unit = self.specimen.formulation.internal_variables[k]
+                .unit
+                .as_str();
+            let is_interface = self.specimen.hypothesis.is_interface();
+            let is_gradient = unit == if is_interface { "m" } else { "-" };
+            // What is a small part of an increment is as exact as that.
+            let least = if is_gradient {
+                largest(&increment(start))
+            } else {
+                0.0
+            };
+            let scale = a.abs().max(b.abs()).max(start.state0[k].abs()).max(least);
+            (a - b).abs() > STATE * scale
+        })?;
+        Some(format!(
+            "`{}` is {:e}, expected {:e}",
+            self.id(k),
+            end.state[k],
+            expected[k]
+        ))
+    }
+}
+
+/// Differences of internal variables, relative to what they are.
+const STATE: f64 = 1e-6;
+
+#[cfg(test)]
+mod tests {
+    use super::SMALLER;
+
+    #[test]
+    fn units_scale_as_they_are_written() {
+        let [force, length, time] = SMALLER;
+        for (unit, factors) in [
+            ("kPa", [2.0, 1.0, 1.0]),
+            ("kPa/m", [2.0, 0.5, 1.0]),
+            ("kN/m^3", [2.0, 0.5, 1.0]),
+            ("kPa·s", [2.0, 1.0, 2.0]),
+            ("1/s", [1.0, 1.0, 0.5]),
+            ("m/s^2", [1.0, 2.0, 0.25]),
+            ("m^-1", [1.0, 0.5, 1.0]),
+            ("kJ", [2.0, 8.0, 1.0]),
+            ("deg", [1.0; 3]),
+            ("-", [1.0; 3]),
+        ] {
+            let found = [force, length, time].map(|smaller| smaller.of(unit));
+            assert_eq!(found, factors.map(Some), "{unit}");
+        }
+        assert_eq!(force.of("MPa"), None);
+        assert_eq!(force.of("kPa^x"), None);
+    }
+}
