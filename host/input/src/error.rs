@@ -110,6 +110,22 @@ fn hint(error: &mechanics::Error) -> Option<&'static str> {
                  equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
             )
         }
+        mechanics::Error::NoEquilibrium(failure)
+            if matches!(
+                failure.failure.reason,
+                mechanics::equilibrium::Reason::Singular(Some((
+                    mechanics::equilibrium::Singularity::Limit,
+                    _
+                )))
+            ) =>
+        {
+            Some(
+                "if this is no limit of what is carried, `control = \"creep\"` in [solver] may lead on, where it is \
+                 not set yet: it goes on from singular tangents; results up to the last whole increment in \
+                 equilibrium are written, the last equilibrium itself is `stopped_at` in summary.json; log.jsonl \
+                 lists the iterations",
+            )
+        }
         mechanics::Error::NoEquilibrium(_) => Some(
             "results up to the last whole increment in equilibrium are written, the last \
              equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
