@@ -394,15 +394,15 @@ impl Recorder {
         self.log
             .lines(iterations.iter().enumerate().map(|(number, iteration)| {
                 json!({
-                "event": "iteration",
-                "phase": place.phase,
-                "increment": place.increment,
-                "load_factor": lambda,
-                "iteration": number,
-                "residual": iteration.residual,
-                "correction": iteration.correction,
-                "step_length": iteration.step_length,
-                "viscosity": iteration.viscosity,
+                    "event": "iteration",
+                    "phase": place.phase,
+                    "increment": place.increment,
+                    "load_factor": lambda,
+                    "iteration": number,
+                    "residual": iteration.residual,
+                    "correction": iteration.correction,
+                    "step_length": iteration.step_length,
+                    "viscosity": iteration.viscosity,
                 })
             }))
     }
