@@ -133,7 +133,7 @@ impl Model {
     /// parameters stand for.
     fn identity(&self) -> Result<String, Error> {
         let mut text = format!(
-            "pilum {}\n{:e}\n",
+            "pilum {}\nderivatives by values\n{:e}\n",
             env!("CARGO_PKG_VERSION"),
             self.difference
         );
