@@ -2,7 +2,7 @@
 
 use crate::arrays::{Rows, looked_at};
 use crate::error::{exception, of_batch};
-use crate::state::State;
+use crate::state::{Memory, State};
 use crate::{task, value};
 use abi::Hypothesis;
 use input::material::law_alone;
@@ -55,6 +55,8 @@ pub(crate) struct Law {
     variables: Vec<String>,
     /// Its library is called in processes of their own.
     is_apart: bool,
+    /// It was made for a hypothesis that was named.
+    is_chosen: bool,
     /// Folders that it was looked for in before all others.
     folders: Vec<PathBuf>,
     /// Seconds that a call may take in a process of its own.
@@ -101,6 +103,11 @@ impl Law {
     /// What a file would say of it.
     pub(crate) fn table(&self) -> &toml::Table {
         &self.table
+    }
+
+    /// The hypothesis that it was made for, if that was named.
+    pub(crate) fn chosen_hypothesis(&self) -> Option<Hypothesis> {
+        self.is_chosen.then(|| self.law().hypothesis())
     }
 
     fn law(&self) -> &law::Law {
@@ -186,20 +193,25 @@ impl Law {
         for (key, value) in values.into_iter().flatten() {
             if KEYS.contains(&key.as_str()) {
                 table.insert(key, value);
+            } else if named.contains_key(&key) {
+                let message =
+                    format!("parameter `{key}` is given twice: by its name, and in `parameters`");
+                return Err(exception(py, &input::Error::usage(message), None));
             } else {
                 named.insert(key, value);
             }
         }
         table.insert("parameters".to_owned(), named.into());
         let name = format!("Law(\"{id}\")");
-        let source = Source::new(&name, value::text_of(&table)?);
+        let source = Source::in_memory(&name, value::text_of(&table)?);
         let hypothesis = hypothesis.map(hypothesis_named).transpose()?;
+        let is_chosen = hypothesis.is_some();
         let opener = opener(isolate)?;
         let folders = law_path.unwrap_or_default();
         let threads = task::threads()?;
         let built =
             py.detach(|| threads.install(|| law_alone(&opener, &source, hypothesis, &folders)));
-        let (built, initial) = built.map_err(|error| exception(py, &error, Some(&name)))?;
+        let (built, initial) = built.map_err(|error| of_parameters(py, &error, &name))?;
         for warning in &built.warnings {
             warn(py, warning)?;
         }
@@ -217,6 +229,7 @@ impl Law {
             table,
             variables,
             is_apart,
+            is_chosen,
             folders,
             isolate,
         })
@@ -318,7 +331,8 @@ impl Law {
     /// components), None if `tangent` is None; and the state at the end. `dt` is how long the increment takes.
     ///
     /// The law reads and writes the arrays themselves, without the interpreter's lock. `out` is a state that is
-    /// not needed any more: its memory, and that of what was returned with it, is used again.
+    /// not needed any more: its memory, and that of what was returned with it, is used again, and it is no state from
+    /// then on.
     /// With `copy=False` the state keeps the array of gradients itself, which nobody may write in any more.
     /// `positions`, shape (n, 2), is where the points lie, for routines that ask.
     ///
@@ -357,8 +371,10 @@ impl Law {
         };
         let n_points = from.n_points(py);
         let gradient = Rows::exactly(gradient, "gradient", [n_points, n])?;
-        if from.names != self.variables {
-            return Err(PyValueError::new_err("state: it is one of another law"));
+        if from.names != self.variables || from.n_components(py) != n {
+            return Err(PyValueError::new_err(
+                "state: it is one of another law, or of another hypothesis",
+            ));
         }
         if let (Some(state), Some(out)) = (state, out)
             && state.is(out)
@@ -369,9 +385,7 @@ impl Law {
         }
         let mut end = match out {
             None => State::zeros(py, n_points, n, n_operator, &self.variables),
-            Some(out) => out.get().reused(py, from).ok_or_else(|| {
-                PyValueError::new_err("out: a state of other points, or of another law")
-            })?,
+            Some(out) => reused(py, out.get(), from)?,
         };
         if end.operator.bind(py).len()? != n_points * n_operator {
             end.operator = numpy::PyArray1::zeros(py, n_points * n_operator, false).unbind();
@@ -382,7 +396,16 @@ impl Law {
         }
         end.time = from.time + dt;
         end.increment = from.increment + 1;
-        let sites = self.sites(py, n_points, positions)?;
+        let sites = self.sites(n_points, positions)?;
+        if out.is_some() {
+            let own = [&end.gradient, &end.flux, &end.internal];
+            let mut own = own.into_iter().skip(usize::from(end.is_lent));
+            if own.any(|own| gradient.shares_memory_with(own.bind(py))) {
+                return Err(PyValueError::new_err(
+                    "out: its memory is in use, by `gradient`",
+                ));
+            }
+        }
         {
             let [start_gradient, start_flux, start_internal] = from.read(py)?;
             let busy = |_| PyValueError::new_err("out: its memory is in use");
@@ -393,6 +416,9 @@ impl Law {
             let mut operator: PyReadwriteArray1<'_, f64> =
                 end.operator.bind(py).try_readwrite().map_err(busy)?;
             let rows = Strided::rows(n);
+            if let Some(out) = out {
+                out.get().note(Memory::Spoilt);
+            }
             let start = Start {
                 n_points,
                 gradient: (start_gradient.as_slice()?, rows),
@@ -425,6 +451,9 @@ impl Law {
                 Ok::<_, BatchFailure>(outcome)
             })?;
             let success = outcome.map_err(|failure| of_batch(py, law, &failure))?;
+            if let Some(out) = out {
+                out.get().note(Memory::Given);
+            }
             if let Some((point, why)) = success.unreliable {
                 let id = &law.description().id;
                 warn(py, &format!("law `{id}`, point {point}: inaccurate: {why}"))?;
@@ -493,6 +522,35 @@ impl Law {
         self.law().library().sha256()
     }
 
+    /// What it is made of again: in another process its library is looked for as here.
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let named = value::to_python(py, &toml::Value::Table(self.table.clone()))?;
+        let named = named.cast_into::<PyDict>()?;
+        named.del_item("law")?;
+        // It says which library is meant, and is no key that is given.
+        if !self.folders.is_empty() && !self.table.contains_key("adapter") {
+            named.del_item("sha256")?;
+        }
+        if let Some(hypothesis) = self.chosen_hypothesis() {
+            named.set_item("hypothesis", hypothesis.name())?;
+        }
+        if !self.folders.is_empty() {
+            named.set_item("law_path", &self.folders)?;
+        }
+        if let Some(isolate) = self.isolate {
+            named.set_item("isolate", isolate)?;
+        }
+        ((self.id(),), named).into_pyobject(py)
+    }
+
+    fn __copy__(this: Bound<'_, Self>) -> Bound<'_, Self> {
+        this
+    }
+
+    fn __deepcopy__<'py>(this: Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        this
+    }
+
     fn __repr__(&self) -> String {
         let given = self.built.parameters.iter().filter(|p| !p.by_default);
         let given: Vec<String> = given.map(|p| format!(", {}={}", p.id, p.value)).collect();
@@ -507,18 +565,14 @@ impl Law {
 
 impl Law {
     /// Where points lie, if the law asks.
-    fn sites(
-        &self,
-        _py: Python<'_>,
-        n_points: usize,
-        positions: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Vec<Site>> {
+    fn sites(&self, n_points: usize, positions: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Site>> {
+        let positions = positions.map(|at| Rows::exactly(at, "positions", [n_points, 2]));
+        let positions = positions.transpose()?;
         if !self.law().asks_for_sites() {
             return Ok(Vec::new());
         }
-        let positions = positions.map(|at| Rows::exactly(at, "positions", [n_points, 2]));
         let mut at = vec![0.0; 2 * n_points];
-        if let Some(positions) = positions.transpose()? {
+        if let Some(positions) = positions {
             copied(positions.view()?, &mut at, 2);
         }
         let site = |(number, at): (usize, &[f64])| Site {
@@ -528,6 +582,32 @@ impl Law {
         };
         Ok(at.chunks_exact(2).enumerate().map(site).collect())
     }
+}
+
+/// The exception for what is wrong with a law's values: a parameter has its name for a key.
+fn of_parameters(py: Python<'_>, error: &input::Error, name: &str) -> PyErr {
+    let raised = exception(py, error, Some(name));
+    let key = error.place().and_then(text::InputError::key);
+    let own = key
+        .as_deref()
+        .and_then(|key| key.strip_prefix("parameters."));
+    if let Some(own) = own
+        && let Err(wrong) = raised.value(py).setattr("key", own)
+    {
+        return wrong;
+    }
+    raised
+}
+
+/// The memory of a state once more.
+fn reused(py: Python<'_>, out: &State, from: &State) -> PyResult<State> {
+    if out.memory() == Memory::Given {
+        let message =
+            "out: the state was given as `out` before: give the one that was returned then";
+        return Err(PyValueError::new_err(message));
+    }
+    out.reused(py, from)
+        .ok_or_else(|| PyValueError::new_err("out: a state of other points, or of another law"))
 }
 
 /// What a law says of itself: name, version, parameters with units, bounds and meaning, hypotheses, internal
