@@ -199,13 +199,16 @@ fn weights_are_no_information() {
                 [outcome.interval(p).unwrap().ends, linear].concat()
             })
         };
-        let (plain, weighed) = (of(""), of("weight = 25.0"));
-        for (a, b) in plain.iter().flatten().zip(weighed.iter().flatten()) {
-            let (a, b) = (a.unwrap(), b.unwrap());
-            assert!(
-                (a / b - 1.0).abs() < 1e-5,
-                "{variance}: {plain:?} {weighed:?}"
-            );
+        let plain = of("");
+        for weight in ["25.0", "1e-14"] {
+            let weighed = of(&format!("weight = {weight}"));
+            for (a, b) in plain.iter().flatten().zip(weighed.iter().flatten()) {
+                let (a, b) = (a.unwrap(), b.unwrap());
+                assert!(
+                    (a / b - 1.0).abs() < 1e-5,
+                    "{variance}, {weight}: {plain:?} {weighed:?}"
+                );
+            }
         }
     }
     // Two tests of one strength, one of which counts nine times: (9² + 1)/(9 + 1)² of one's variance, not 1/10.
@@ -255,6 +258,34 @@ fn exact_points_determine_no_more_than_is_computed_exactly() {
         assert!(low < truth && truth < high, "{low} {high}");
         // Known to 1e-9 of the largest value, not to the last bit.
         assert!((high - low) / truth > 1e-10, "{low} {high}");
+    }
+}
+
+/// A column pressed down, computed to a hundredth.
+const ROUGH: &str = "analysis = \"plane_strain\"\nmesh.columns = [{ n = 1, to = 1.0 }]\nmesh.rows = [{ n = 1, to = 1.0 }]\n\
+    mesh.lines = { base = { y = 0.0 }, top = { y = 1.0 } }\nmesh.region = [{ group = \"soil\" }]\n\
+    supports = [{ line = \"base\", fixed = [\"x\", \"y\"] }]\nsolver.force_tolerance = 1e-2\n\
+    [laws.soil]\nlaw = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.0 }\n\
+    [groups.soil]\nformulation = \"solid\"\nlaw = \"soil\"\n\
+    [[phase]]\nname = \"load\"\nincrements = 2\npressure = [{ line = \"top\", value = 100.0 }]\n\
+    [probes]\np = { line = \"base\", quantity = \"reaction_y\" }\nw = { line = \"top\", quantity = \"displacement_y\", scale = -1000.0 }\n";
+
+/// Each test is known to its own exactness: a rough case beside a driver makes nothing of that less known.
+#[test]
+fn a_rough_case_blinds_no_other_test() {
+    let boxes = Boxes::new(0.3);
+    fs::write(boxes.place.path().join("rough.toml"), ROUGH).unwrap();
+    write_points(boxes.place.path(), "rough.csv", &[(2.0, 20.0), (8.0, 80.0)]);
+    let rough = "[[test]]\nname = \"rough\"\ncase = \"rough.toml\"\npredict = true\n[[test.curve]]\nx = \"w\"\ny = \"p\"\n\
+                 noise = 1.0\nmeasured = { file = \"rough.csv\", x = \"x\", y = \"y\" }\n";
+    let free = "shear_stiffness = {}\ncohesion = {}\nfriction_angle = {}";
+    let fitted = || vec![test("one", 100.0, "100", ""), test("two", 200.0, "200", "")];
+    let more = "profiles = false\ndifference = 1e-4";
+    let alone = boxes.fit(free, &fitted(), more);
+    let beside = boxes.fit(free, &[fitted(), vec![rough.to_owned()]].concat(), more);
+    for parameter in 0..3 {
+        let [alone, beside] = [&alone, &beside].map(|o| o.interval(parameter).unwrap().ends);
+        assert_eq!(alone, beside);
     }
 }
 

@@ -95,6 +95,38 @@ fn rates_of_a_law_are_the_derivatives_of_its_curves() {
     println!("largest error {worst:.1e}");
 }
 
+/// A parameter is fitted or said to be unseen, however much more the curves answer to another one: counted in widths of a
+/// range that is far too wide, cohesion moves them by 10⁵ times what the stiffness does.
+#[test]
+fn a_column_beside_a_much_larger_one_is_fitted() {
+    let place = TempDir::new().unwrap();
+    fs::write(place.path().join("driver.toml"), driver(VALUES)).unwrap();
+    let x: Vec<f64> = (0..12).map(|k| 0.04 + 0.08 * f64::from(k)).collect();
+    let there = first_segment(VALUES, "traction_t", &x)
+        .into_iter()
+        .enumerate();
+    let disturbed = there.map(|(k, y)| y + if k % 2 == 0 { 0.1 } else { -0.1 });
+    let points: Vec<(f64, f64)> = x.iter().copied().zip(disturbed).collect();
+    write_points(place.path(), "joint.csv", &points);
+    let text = "starts = 1\nprofiles = false\n[free]\nshear_stiffness = { start = 1.2e5 }\n\
+                cohesion = { start = 2.0, min = 0.0, max = 1e9, scale = \"linear\" }\n\
+                [[test]]\nname = \"joint\"\ndriver = \"driver.toml\"\n[[test.curve]]\nx = \"u_t\"\n\
+                y = \"traction_t\"\nsegment = 1\nnoise = 0.1\nmeasured = { file = \"joint.csv\", x = \"x\", y = \"y\" }\n";
+    let file = place.path().join("calibration.toml");
+    fs::write(&file, text).unwrap();
+    let outcome = run(&file, &[]).unwrap();
+    assert!(outcome.tests[0].is_by_law);
+    for (parameter, truth) in [(0, VALUES[0]), (1, VALUES[2])] {
+        let found = outcome.values[parameter];
+        assert!(
+            (found / truth - 1.0).abs() < 0.05,
+            "{found}: {:?}",
+            outcome.words
+        );
+        assert!(outcome.linear_interval(parameter).is_some());
+    }
+}
+
 /// A stopped calibration leaves its derivatives to the next one, which may count the parameters in another way.
 #[test]
 fn derivatives_that_were_kept_do_not_depend_on_how_parameters_are_counted() {

@@ -1,7 +1,7 @@
 //! What is computed with the values found, beside what was measured.
 
 use super::curve::Curve;
-use super::fit::{Group, Stage, Wish, blind, known_to};
+use super::fit::{Group, Stage, Wish, known_to};
 use super::misfit;
 use super::model::{Model, Test};
 use super::profile::Side;
@@ -101,7 +101,7 @@ pub(super) fn fitted(
         };
         let gradients = model.gradients(number, counted, &of)?;
         let test = &model.tests[number];
-        let known = known(model, test, (errors, &of, &gradients), scatter);
+        let known = known(model, number, (errors, &of, &gradients), scatter);
         let noise = test.curves.iter().flat_map(|curve| &curve.deviations);
         let of_known = |(known, noise): (&Known, &f64)| match known {
             Known::Variance(variance) if scatter.quantile.is_finite() => {
@@ -148,11 +148,12 @@ pub(super) fn fitted(
 /// What is known of the computed values of a test, curve by curve, since their units differ.
 fn known(
     model: &Model,
-    test: &Test,
+    number: usize,
     (errors, of, gradients): (&Errors, &[usize], &[Option<Vec<f64>>]),
     scatter: Scatter,
 ) -> Vec<Known> {
-    let blind = blind(model);
+    let test = &model.tests[number];
+    let blind = model.blind_in(&[number]);
     let mut first = 0;
     let of_curve = |curve: &Curve| {
         let own = first..first + curve.points.len();
@@ -237,7 +238,7 @@ fn scatter(
         }
     }
     let degrees = n.saturating_sub(errors.n_determined());
-    let [floor, _] = known_to(model, &all);
+    let floor = known_to(model, &all).floor;
     Ok(Scatter {
         variance: (sum / degrees.max(1) as f64).max(floor),
         quantile: two_sided(wish.confidence, Some(degrees)),

@@ -39,7 +39,6 @@ impl Model {
             parameters: Vec::new(),
             tests: Vec::new(),
             difference: STEP_OF_DRIVERS,
-            exactness: EXACTNESS_OF_DRIVERS,
             stop: stop.clone(),
             kept: Kept::default(),
             first_failure: None,
@@ -55,9 +54,10 @@ impl Model {
         let claims = claims(calibration, &laws)?;
         for (number, (input, subject)) in calibration.file.test.iter().zip(subjects).enumerate() {
             let subject = with_fixed(calibration, (number, subject), &claims)?;
+            let mut exactness = EXACTNESS_OF_DRIVERS;
             if let Subject::Case(case) = &subject {
                 let tolerance = case.file.solver.force_tolerance;
-                model.exactness = model.exactness.max(tolerance);
+                exactness = exactness.max(tolerance);
                 model.difference = model.difference.max(tolerance.sqrt().clamp(1e-3, 0.03));
             }
             let curves = curves(calibration, input, &subject)?;
@@ -67,6 +67,7 @@ impl Model {
                 curves,
                 subject,
                 targets: Vec::new(),
+                exactness,
                 is_by_law: false,
                 at_start: Vec::new(),
             });
