@@ -261,6 +261,82 @@ fn exact_points_determine_no_more_than_is_computed_exactly() {
     }
 }
 
+/// A parameter on its bound has no error: a prediction with it says that it takes the bound for known.
+#[test]
+fn a_bound_that_a_prediction_takes_for_known_is_said() {
+    let boxes = Boxes::new(0.3);
+    let tests = [
+        test("fitted", 100.0, "100", ""),
+        test("other", 200.0, "200", "predict = true"),
+        test("start", 200.0, "200_start", "predict = true"),
+    ];
+    let free = "shear_stiffness = {}\nfriction_angle = { start = 20.0, max = 25.0 }";
+    let outcome = boxes.fit(free, &tests, "profiles = false");
+    let says_of = |test: &str| {
+        let bound = "depends on `friction_angle`, which ended on a bound";
+        let mut words = outcome.words.iter();
+        words.any(|word| word.starts_with(&format!("{test}:")) && word.contains(bound))
+    };
+    // The elastic stage does not depend on it.
+    assert!(
+        says_of("other") && !says_of("start"),
+        "{:#?}",
+        outcome.words
+    );
+    let tests = &tests[..2];
+    let free = "shear_stiffness = {}\nfriction_angle = {}";
+    does_not_say(
+        &boxes.fit(free, tests, "profiles = false"),
+        "ended on a bound",
+    );
+}
+
+/// Two names of one parameter with `laws`: what a driver stands for says which of them it has.
+#[test]
+fn two_names_with_laws_are_parted_by_what_a_driver_stands_for() {
+    let boxes = Boxes::new(0.3);
+    let free = "upper = { parameter = \"shear_stiffness\", laws = [\"sand\"] }\n\
+                lower = { parameter = \"shear_stiffness\", laws = [\"clay\"] }";
+    let tests = |of: [&str; 2]| {
+        [
+            test("sand", 100.0, "100", of[0]),
+            test("clay", 200.0, "200", of[1]),
+        ]
+        .concat()
+    };
+    let fit = |of: [&str; 2]| {
+        let file = boxes.place.path().join("calibration.toml");
+        let text = format!(
+            "starts = 1\nprofiles = false\n[free]\n{free}\n{}",
+            tests(of)
+        );
+        fs::write(&file, text).unwrap();
+        run(&file, &[])
+    };
+    let refused = fit(["", ""]).unwrap_err();
+    assert!(
+        refused.to_string().contains("has two names in test `sand`"),
+        "{refused}"
+    );
+    assert!(refused.help().unwrap().contains("stands_for"));
+    let outcome = fit(["stands_for = \"sand\"", "stands_for = \"clay\""]).unwrap();
+    for value in &outcome.values {
+        assert!((value / 1e5 - 1.0).abs() < 0.02, "{:?}", outcome.values);
+    }
+    // Each curve moves its own: 24 columns of one, then of the other.
+    let jacobian = &outcome.stages[0].jacobian;
+    let norm = |first: usize, parameter: usize| jacobian.view((first, parameter), (24, 1)).norm();
+    assert!(norm(0, 0) > 1.0 && norm(0, 1) < 1e-12 && norm(24, 0) < 1e-12 && norm(24, 1) > 1.0);
+    let unknown = fit(["stands_for = \"sant\"", "stands_for = \"clay\""]).unwrap_err();
+    assert!(
+        unknown
+            .to_string()
+            .contains("no name belongs to the law `sant`"),
+        "{unknown}"
+    );
+    assert!(unknown.help().unwrap().contains("sand"));
+}
+
 /// A column pressed down, computed to a hundredth.
 const ROUGH: &str = "analysis = \"plane_strain\"\nmesh.columns = [{ n = 1, to = 1.0 }]\nmesh.rows = [{ n = 1, to = 1.0 }]\n\
     mesh.lines = { base = { y = 0.0 }, top = { y = 1.0 } }\nmesh.region = [{ group = \"soil\" }]\n\
