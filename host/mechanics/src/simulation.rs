@@ -42,8 +42,11 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 /// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
-/// be halved so often, and what else leads where short steps fail.
+/// be halved so often.
 const PATIENCE: f64 = 0.2;
+/// The same for creep under `control = "auto"`: after two cuts. With one, `chamber_oriented` finds an equilibrium in which its
+/// shaft slides all along, as its closed form wants it; creep leads it to another one.
+const SHORT: f64 = 0.3;
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
 /// Share of the method's own limit of iterations up to which a step counts as easy, so that the
@@ -516,7 +519,8 @@ impl Simulation {
                     let follows = settings.control == Control::ArcLength
                         && phase.course.history.latest().is_some();
                     let is_small = step < smallest.max(PATIENCE / n as f64);
-                    let turn = is_small.then(|| lead.turn(&failure)).flatten();
+                    let is_short = step < smallest.max(SHORT / n as f64);
+                    let turn = is_short.then(|| lead.turn(&failure)).flatten();
                     if failure.defect().is_some() {
                         return Err(self.cannot_go_on(phase, place, start, failure));
                     } else if follows && is_small {
