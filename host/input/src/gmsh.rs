@@ -73,13 +73,16 @@ pub(crate) fn mesh(
         None => Cow::Owned(file::read_mesh(&path).map_err(unreadable)?),
     };
     let is_of_arrays = input.content.is_some();
-    let wrong = |fault: String| match is_of_arrays {
-        true => Error::usage(format!("the mesh: {fault}")),
-        false => unreadable(io::Error::new(io::ErrorKind::InvalidData, fault)),
+    let wrong = |fault: String| {
+        if is_of_arrays {
+            return Error::usage(format!("the mesh: {fault}"));
+        }
+        unreadable(io::Error::new(io::ErrorKind::InvalidData, fault))
     };
-    let contents = match is_of_arrays {
-        true => Contents::read_arrays(&bytes),
-        false => Contents::read(&bytes),
+    let contents = if is_of_arrays {
+        Contents::read_arrays(&bytes)
+    } else {
+        Contents::read(&bytes)
     };
     let contents = contents.map_err(wrong)?;
     let wanted = wanted(source, file, scale, &contents, &path)?;

@@ -60,7 +60,10 @@ pub(crate) fn of_batch(py: Python<'_>, law: &law::Law, failure: &BatchFailure) -
         attributes.set_item("cause", reason)?;
         attributes.set_item("factor", failure.factor)
     };
-    let message = format!("law `{id}`, point {}: {name}: {reason}", failure.point);
+    let message = format!(
+        "law `{id}`, point {} (from 0): {name}: {reason}",
+        failure.point
+    );
     fill()
         .and_then(|()| make(py, "LawError", &message, &attributes))
         .unwrap_or_else(|wrong| wrong)

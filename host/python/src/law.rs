@@ -9,7 +9,7 @@ use input::material::law_alone;
 use law::{
     BatchFailure, BuiltLaw, End, Moment, Opener, Operator, SearchPath, Site, Start, Strided,
 };
-use numpy::{PyArrayMethods, PyReadwriteArray1};
+use numpy::{PyArray2, PyArrayMethods, PyReadwriteArray1};
 use pyo3::exceptions::{PyMemoryError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -383,29 +383,10 @@ impl Law {
                 "out: the increment starts from this state; give one that is not needed any more";
             return Err(PyValueError::new_err(message));
         }
-        let mut end = match out {
-            None => State::zeros(py, n_points, n, n_operator, &self.variables),
-            Some(out) => reused(py, out.get(), from)?,
-        };
-        if end.operator.bind(py).len()? != n_points * n_operator {
-            end.operator = numpy::PyArray1::zeros(py, n_points * n_operator, false).unbind();
-        }
-        if let Some(array) = gradient.array().filter(|_| !copy) {
-            end.gradient = array.unbind();
-            end.is_lent = true;
-        }
+        let mut end = self.memory_for(py, from, (&gradient, copy), out, n_operator)?;
         end.time = from.time + dt;
         end.increment = from.increment + 1;
         let sites = self.sites(n_points, positions)?;
-        if out.is_some() {
-            let own = [&end.gradient, &end.flux, &end.internal];
-            let mut own = own.into_iter().skip(usize::from(end.is_lent));
-            if own.any(|own| gradient.shares_memory_with(own.bind(py))) {
-                return Err(PyValueError::new_err(
-                    "out: its memory is in use, by `gradient`",
-                ));
-            }
-        }
         {
             let [start_gradient, start_flux, start_internal] = from.read(py)?;
             let busy = |_| PyValueError::new_err("out: its memory is in use");
@@ -456,7 +437,10 @@ impl Law {
             }
             if let Some((point, why)) = success.unreliable {
                 let id = &law.description().id;
-                warn(py, &format!("law `{id}`, point {point}: inaccurate: {why}"))?;
+                warn(
+                    py,
+                    &format!("law `{id}`, point {point} (from 0): inaccurate: {why}"),
+                )?;
             }
         }
         let tangents = if n_operator == 0 {
@@ -564,6 +548,37 @@ impl Law {
 }
 
 impl Law {
+    /// The state at the end of an increment, before it has values: in the memory of `out`, with the array of gradients
+    /// itself where that is not copied.
+    fn memory_for<'py>(
+        &self,
+        py: Python<'py>,
+        from: &State,
+        (gradient, copy): (&Rows<'py>, bool),
+        out: Option<&Bound<'py, State>>,
+        n_operator: usize,
+    ) -> PyResult<State> {
+        let (n_points, n) = (from.n_points(py), from.n_components(py));
+        let mut end = match out {
+            None => State::zeros(py, n_points, n, n_operator, &self.variables),
+            Some(out) => reused(py, out.get(), from)?,
+        };
+        if end.operator.bind(py).len()? != n_points * n_operator {
+            end.operator = numpy::PyArray1::zeros(py, n_points * n_operator, false).unbind();
+        }
+        if let Some(array) = gradient.array().filter(|_| !copy) {
+            end.gradient = array.unbind();
+            end.is_lent = true;
+        }
+        let is_shared = |own: &Py<PyArray2<f64>>| gradient.shares_memory_with(own.bind(py));
+        let is_own = !end.is_lent && is_shared(&end.gradient);
+        if out.is_some() && (is_own || is_shared(&end.flux) || is_shared(&end.internal)) {
+            let message = "out: its memory is in use, by `gradient`";
+            return Err(PyValueError::new_err(message));
+        }
+        Ok(end)
+    }
+
     /// Where points lie, if the law asks.
     fn sites(&self, n_points: usize, positions: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Site>> {
         let positions = positions.map(|at| Rows::exactly(at, "positions", [n_points, 2]));

@@ -106,16 +106,16 @@ impl Posed {
     /// It does not.
     pub(crate) fn check_laws(&self, laws: &Laws) -> Result<(), Error> {
         for (name, made_for) in &self.chosen {
-            let own = laws.keys().filter(|(law, _)| law == name);
-            for (_, taken_in) in own.filter(|(_, taken_in)| *taken_in != made_for.name()) {
-                let message = format!(
-                    "law `{name}` was made for the hypothesis `{}`, and the case takes it in `{taken_in}`",
-                    made_for.name()
-                );
-                let hint =
-                    format!("`hypothesis=\"{taken_in}\"`, or a dictionary instead of the law");
-                return Err(Error::usage(message).with_hint(&hint));
-            }
+            let mut own = laws.keys().filter(|(law, _)| law == name);
+            let Some((_, taken_in)) = own.find(|(_, taken_in)| *taken_in != made_for.name()) else {
+                continue;
+            };
+            let message = format!(
+                "law `{name}` was made for the hypothesis `{}`, and the case takes it in `{taken_in}`",
+                made_for.name()
+            );
+            let hint = format!("`hypothesis=\"{taken_in}\"`, or a dictionary instead of the law");
+            return Err(Error::usage(message).with_hint(&hint));
         }
         Ok(())
     }

@@ -58,6 +58,7 @@ pub(crate) struct SimulationState {
 
 #[pymethods]
 impl SimulationState {
+    #[expect(clippy::unused_self, reason = "of an object, in Python")]
     fn __reduce__(&self) -> PyResult<()> {
         Err(PyTypeError::new_err(
             "a state of a simulation cannot be pickled; `pilum.run` keeps checkpoints, and `resume=True` goes on from them",
@@ -72,9 +73,10 @@ impl SimulationState {
             ..
         } = self;
         let part = reached - *increment as f64;
-        let part = match part > 0.0 {
-            true => format!(" and {part:.4} of the next, which could not be finished"),
-            false => String::new(),
+        let part = if part > 0.0 {
+            format!(" and {part:.4} of the next, which could not be finished")
+        } else {
+            String::new()
         };
         format!("<pilum.SimulationState: phase {phase} (from 0), increment {increment}{part}>")
     }
@@ -469,6 +471,7 @@ impl Simulation {
         self.copy(py)
     }
 
+    #[expect(clippy::unused_self, reason = "of an object, in Python")]
     fn __reduce__(&self) -> PyResult<()> {
         Err(PyTypeError::new_err(
             "a simulation cannot be pickled: its laws are at work in this process; pickle its Problem, and start it there",

@@ -107,7 +107,9 @@ impl Model {
         let values = self.values(counted);
         let weighed = |(&parameter, mut column): (&usize, Vec<f64>)| {
             let slope = self.parameters[parameter].slope(values[parameter]);
-            column.iter_mut().for_each(|d| *d *= slope);
+            for derivative in &mut column {
+                *derivative *= slope;
+            }
             let of_curves = of_test.of_curves(&column);
             of_curves
                 .flat_map(|(curve, own)| curve.weighed(own))
