@@ -264,9 +264,9 @@ fn creep_depends_on_no_unit_mirror_or_numbering() {
     }
 }
 
-/// Where short steps of the load find no equilibrium, creep leads by itself: from there on, and only there.
+/// Where steps of the load find no equilibrium, creep leads by itself: from there on, and only there.
 #[test]
-fn creep_leads_where_short_steps_of_the_load_fail() {
+fn creep_leads_where_steps_of_the_load_fail() {
     let [auto, load] = ["auto", "load"].map(|control| run(&punch(OWN, control)));
     let crept_from = |results: &Finished| {
         let phases = results.summary()["phases"].as_array().unwrap().clone();
@@ -282,7 +282,7 @@ fn creep_leads_where_short_steps_of_the_load_fail() {
         load.in_phase("load", "stress")
     );
     let warnings = &auto.observer.warnings;
-    let says = |warning: &&String| warning.contains("`lift`, increment 1: short steps of the load");
+    let says = |warning: &&String| warning.contains("`lift`, increment 1: steps of the load");
     assert_eq!(warnings.iter().filter(says).count(), 1, "{warnings:?}");
     let end = |results: &Finished| results.in_phase("lift", "head")[0];
     assert_close("head", end(&auto), end(&load), 0.05, end(&load));

@@ -85,7 +85,7 @@ pub enum Warning {
     TookOver(String, TakeOver),
     /// A law could not be asked that; this is what it says.
     Unasked(String, String),
-    /// Short steps of the load found no equilibrium: creep leads from here to the end of the phase.
+    /// Steps of the load found no equilibrium: creep leads from here on.
     Creeps(Place),
     /// The path of equilibrium was followed, from one load factor, between two others.
     FollowedPath {
@@ -192,9 +192,9 @@ impl fmt::Display for Warning {
             ),
             Self::Creeps(place) => write!(
                 f,
-                "{place}: short steps of the load found no equilibrium; from here to the end of the phase creep leads \
-                 to the next one; others may lie near: hold the results against those of `control = \"creep\"` \
-                 from the start, and of other increments"
+                "{place}: steps of the load found no equilibrium; from here on creep leads to the next one; others may \
+                 lie near: hold the results against those of `control = \"creep\"` from the start, and of other \
+                 increments"
             ),
             Self::FollowedPath {
                 place,
