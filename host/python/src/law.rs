@@ -1,16 +1,18 @@
 //! A law with its parameters, called for arrays of points.
 
+mod batch;
+pub(crate) mod found;
+
 use crate::arrays::{Rows, looked_at};
 use crate::error::{exception, of_batch};
 use crate::state::{Memory, State};
 use crate::{task, value};
 use abi::Hypothesis;
+use batch::{copied, has_room};
 use input::material::law_alone;
-use law::{
-    BatchFailure, BuiltLaw, End, Moment, Opener, Operator, SearchPath, Site, Start, Strided,
-};
-use numpy::{PyArray2, PyArrayMethods, PyReadwriteArray1};
-use pyo3::exceptions::{PyMemoryError, PyUserWarning, PyValueError};
+use law::{BatchFailure, BuiltLaw, End, Moment, Opener, Operator, Start, Strided};
+use numpy::{PyArrayMethods, PyReadwriteArray1};
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::ffi::CString;
@@ -141,30 +143,6 @@ impl Law {
             }
         }
         Ok(internal)
-    }
-}
-
-/// Whether there is memory for so many points with so many values.
-///
-/// # Errors
-/// `MemoryError` if not.
-fn has_room(n_points: usize, n_values: usize) -> PyResult<()> {
-    let all = n_points.saturating_mul(n_values);
-    Vec::<f64>::new()
-        .try_reserve_exact(all)
-        .map_err(|_| PyMemoryError::new_err(format!("points: no memory for {n_points} of them")))
-}
-
-/// Copies values point by point.
-fn copied((from, place): (&[f64], Strided), to: &mut [f64], n: usize) {
-    if (place.offset, place.point, place.component) == (0, n, 1) {
-        to.copy_from_slice(&from[..to.len()]);
-        return;
-    }
-    for (point, values) in to.chunks_exact_mut(n.max(1)).enumerate() {
-        for (c, value) in values.iter_mut().enumerate() {
-            *value = from[place.offset + point * place.point + c * place.component];
-        }
     }
 }
 
@@ -547,58 +525,6 @@ impl Law {
     }
 }
 
-impl Law {
-    /// The state at the end of an increment, before it has values: in the memory of `out`, with the array of gradients
-    /// itself where that is not copied.
-    fn memory_for<'py>(
-        &self,
-        py: Python<'py>,
-        from: &State,
-        (gradient, copy): (&Rows<'py>, bool),
-        out: Option<&Bound<'py, State>>,
-        n_operator: usize,
-    ) -> PyResult<State> {
-        let (n_points, n) = (from.n_points(py), from.n_components(py));
-        let mut end = match out {
-            None => State::zeros(py, n_points, n, n_operator, &self.variables),
-            Some(out) => reused(py, out.get(), from)?,
-        };
-        if end.operator.bind(py).len()? != n_points * n_operator {
-            end.operator = numpy::PyArray1::zeros(py, n_points * n_operator, false).unbind();
-        }
-        if let Some(array) = gradient.array().filter(|_| !copy) {
-            end.gradient = array.unbind();
-            end.is_lent = true;
-        }
-        let is_shared = |own: &Py<PyArray2<f64>>| gradient.shares_memory_with(own.bind(py));
-        let is_own = !end.is_lent && is_shared(&end.gradient);
-        if out.is_some() && (is_own || is_shared(&end.flux) || is_shared(&end.internal)) {
-            let message = "out: its memory is in use, by `gradient`";
-            return Err(PyValueError::new_err(message));
-        }
-        Ok(end)
-    }
-
-    /// Where points lie, if the law asks.
-    fn sites(&self, n_points: usize, positions: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Site>> {
-        let positions = positions.map(|at| Rows::exactly(at, "positions", [n_points, 2]));
-        let positions = positions.transpose()?;
-        if !self.law().asks_for_sites() {
-            return Ok(Vec::new());
-        }
-        let mut at = vec![0.0; 2 * n_points];
-        if let Some(positions) = positions {
-            copied(positions.view()?, &mut at, 2);
-        }
-        let site = |(number, at): (usize, &[f64])| Site {
-            position: [at[0], at[1]],
-            element: number as u32 + 1,
-            ..Site::default()
-        };
-        Ok(at.chunks_exact(2).enumerate().map(site).collect())
-    }
-}
-
 /// The exception for what is wrong with a law's values: a parameter has its name for a key.
 fn of_parameters(py: Python<'_>, error: &input::Error, name: &str) -> PyErr {
     let raised = exception(py, error, Some(name));
@@ -612,45 +538,4 @@ fn of_parameters(py: Python<'_>, error: &input::Error, name: &str) -> PyErr {
         return wrong;
     }
     raised
-}
-
-/// The memory of a state once more.
-fn reused(py: Python<'_>, out: &State, from: &State) -> PyResult<State> {
-    if out.memory() == Memory::Given {
-        let message =
-            "out: the state was given as `out` before: give the one that was returned then";
-        return Err(PyValueError::new_err(message));
-    }
-    out.reused(py, from)
-        .ok_or_else(|| PyValueError::new_err("out: a state of other points, or of another law"))
-}
-
-/// What a law says of itself: name, version, parameters with units, bounds and meaning, hypotheses, internal
-/// variables.
-#[pyfunction]
-#[pyo3(signature = (id, /, *, law_path=None))]
-pub(crate) fn describe(
-    py: Python<'_>,
-    id: &str,
-    law_path: Option<Vec<PathBuf>>,
-) -> PyResult<Py<PyAny>> {
-    let opener = opener(None)?;
-    let folders = law_path.unwrap_or_default();
-    let found = py.detach(|| SearchPath::of(&opener, &folders).law(id));
-    let found = found.map_err(|error| exception(py, &error.into(), None))?;
-    let text = serde_json::to_string(found.description());
-    let text = text.map_err(|error| PyValueError::new_err(error.to_string()))?;
-    Ok(py.import("json")?.call_method1("loads", (text,))?.unbind())
-}
-
-/// Ids of all laws that are found, with their libraries. Nothing of them is executed.
-#[pyfunction]
-#[pyo3(signature = (*, law_path=None))]
-pub(crate) fn laws(py: Python<'_>, law_path: Option<Vec<PathBuf>>) -> PyResult<Bound<'_, PyDict>> {
-    let found = SearchPath::new(&law_path.unwrap_or_default()).installed();
-    let all = PyDict::new(py);
-    for (id, library) in found {
-        all.set_item(id, library)?;
-    }
-    Ok(all)
 }
