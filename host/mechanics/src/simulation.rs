@@ -7,6 +7,7 @@ mod creeping;
 mod history;
 mod loads;
 mod method;
+mod neighbour;
 mod path;
 mod phase;
 mod record;
@@ -17,6 +18,7 @@ mod ties;
 mod warning;
 mod watch;
 
+pub use neighbour::Neighbour;
 pub use record::PhaseRecord;
 pub use state::State;
 pub use warning::Warning;
@@ -500,7 +502,10 @@ impl Simulation {
                         phase.record.relaxed += 1;
                         // The phase's end says how many there were.
                         if phase.record.relaxed == 1 {
-                            watch.warning(&Warning::Relaxed(place.clone()));
+                            let by_creep = (lead.control != Control::Creep)
+                                .then(|| self.neighbour(phase, &success, [start, end]))
+                                .flatten();
+                            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
                         }
                     }
                     phase.course.creeps = lead.goes_on(&settings, success.iterations.len());
