@@ -34,7 +34,7 @@ use crate::model::Model;
 use crate::problem::{Axis, Material, Problem};
 use crate::settings::{Control, Method, Settings};
 use beyond::Beyond;
-use creeping::{Lead, Turn};
+use creeping::Lead;
 use history::History;
 use law::{Moment, Stop, custody};
 use path::PathEnd;
@@ -480,13 +480,16 @@ impl Simulation {
             place.increment as f64 / n as f64
         };
         let mut done = Progress::default();
-        let mut lead = Lead::new(&settings, phase.course.creeps);
+        let mut lead = Lead::new(&settings);
         while phase.course.lambda < target {
             if phase.course.lambda >= phase.course.loads.leg[1] {
                 self.turn(place, phase)?;
             }
             let target = target.min(phase.course.loads.leg[1]);
-            let (start, step) = (phase.course.lambda, phase.course.step);
+            let (start, mut step) = (phase.course.lambda, phase.course.step);
+            if lead.creeps() {
+                step = step.min(creeping::LONGEST / n as f64);
+            }
             // A remainder that is hardly longer than the step is taken at once.
             let end = if target - start <= 1.0001 * step {
                 target
@@ -508,7 +511,7 @@ impl Simulation {
                             watch.warning(&Warning::Relaxed(place.clone(), by_creep));
                         }
                     }
-                    phase.course.creeps = lead.goes_on(&settings, success.iterations.len());
+                    lead.goes_on();
                     // A motion takes many iterations, and steps of any length.
                     if success.was_motion || success.iterations.len() as f64 <= easy {
                         phase.course.step = (REGROWTH * step).min(1.0 / n as f64);
@@ -527,7 +530,7 @@ impl Simulation {
                     let follows = settings.control == Control::ArcLength
                         && phase.course.history.latest().is_some();
                     let is_small = step < smallest.max(PATIENCE / n as f64);
-                    let turn = lead.turn(&failure, step < smallest);
+                    let turns = lead.turns(&failure, step < smallest);
                     if failure.defect().is_some() {
                         return Err(self.cannot_go_on(phase, place, start, failure));
                     } else if follows && is_small {
@@ -536,8 +539,7 @@ impl Simulation {
                         if let PathEnd::Stopped(failure, highest) = end {
                             return Err(self.cannot_go_on(phase, place, highest, *failure));
                         }
-                    } else if turn == Some(Turn::ToCreep) {
-                        phase.course.step = 1.0 / n as f64;
+                    } else if turns && lead.creeps() {
                         if phase.record.crept_from.is_none() {
                             phase.record.crept_from = Some(place.increment);
                             watch.warning(&Warning::Creeps(place.clone()));

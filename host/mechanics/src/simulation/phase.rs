@@ -89,7 +89,6 @@ impl Simulation {
             increment: 0,
             lambda: 0.0,
             step: 1.0 / increments as f64,
-            creeps: false,
             history: History::default(),
             domain: None,
             has_matrix: false,
