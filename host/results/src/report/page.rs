@@ -9,10 +9,11 @@ use super::pile::Pile;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use super::short::display;
+use crate::mesh_error::OfPhase;
 use crate::record::{entries, list, text};
 use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -235,6 +236,7 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         }),
         warnings => run.warnings(),
         ends => ends(run),
+        mesh_error => mesh_error(&summary["mesh_error"]),
         pictures => pictures(run),
         resistances => resistances(&summary["pile"]),
         groups => list(&summary["groups"]).map(group).collect::<Vec<_>>(),
@@ -327,6 +329,13 @@ fn ends(run: &Run) -> Template {
         .map(|end| format!("{}, increment {}", end.phase, end.increment))
         .collect();
     context! { phases, probes }
+}
+
+/// The error of the mesh at the end of each phase, in words.
+fn mesh_error(of_phases: &Value) -> Vec<String> {
+    let of_phase = |found: &Value| OfPhase::deserialize(found).ok();
+    let found = list(of_phases).filter_map(of_phase);
+    found.map(|found| found.words()).collect()
 }
 
 /// Criteria of a pile's resistance: name, load or why there is none. Empty without a pile.

@@ -2,7 +2,8 @@
 //! the finest.
 //!
 //! With an error that falls as h^p, h = 1/n, three runs tell p and the error of the finest, whatever their n:
-//! runs in between may be missing.
+//! runs in between may be missing. An error below the difference of the two finest is not claimed: over a gap it
+//! would rest on the order alone.
 
 use super::super::trial::Trial;
 
@@ -76,9 +77,9 @@ impl Levels {
     }
 }
 
-/// Part of the difference of two runs that is left as the error of the finer one.
+/// The error of the finer of two runs, in parts of their difference; at least all of it.
 fn left([coarse, fine]: [f64; 2], order: f64) -> f64 {
-    1.0 / ((fine / coarse).powf(order) - 1.0)
+    f64::max(1.0 / ((fine / coarse).powf(order) - 1.0), 1.0)
 }
 
 /// The order that the differences of three runs, coarse to middle and middle to fine, show within the bounds;
@@ -130,18 +131,24 @@ mod tests {
     }
 
     #[test]
-    fn the_error_of_the_finest_is_found_whatever_is_missing_between() {
-        for (order, divisions) in [
+    fn the_error_of_the_finest_is_found_and_over_a_gap_it_is_the_difference() {
+        let runs: [(f64, &[f64]); 4] = [
             (1.0, &[4.0, 8.0, 16.0]),
             (0.5, &[4.0, 8.0, 16.0]),
-            (0.5, &[4.0, 8.0, 128.0]),
             (0.7, &[4.0, 64.0, 128.0]),
-        ] {
+            (0.5, &[4.0, 8.0, 16.0, 128.0]),
+        ];
+        for (order, divisions) in runs {
             let runs = levels(order, divisions);
-            let scale = 1.0 - divisions[2].powf(-order);
-            let expected = divisions[2].powf(-order) / scale;
+            let [.., next, finest] = divisions else {
+                panic!()
+            };
+            let error = |n: f64| n.powf(-order) / (1.0 - finest.powf(-order));
+            let difference = error(*next) - error(*finest);
             let found = runs.error().unwrap();
+            let expected = error(*finest).max(difference);
             assert_relative_eq!(found, expected, max_relative = 1e-9);
+            assert_eq!(difference > error(*finest), divisions.len() == 4);
         }
     }
 
