@@ -273,6 +273,14 @@ fn refuses_accuracies_that_are_none() {
                 &[("analysis", "accuracy = ^\"high\"\nanalysis")],
                 &["`accuracy`: found the text \"high\", expected a number"],
             ),
+            (
+                "the mesh as a part of nothing",
+                &[("analysis", "accuracy_with_mesh = ^true\nanalysis")],
+                &[
+                    "`accuracy_with_mesh` counts the error of the mesh as part of `accuracy`, and there is none",
+                    "`accuracy = 0.02`",
+                ],
+            ),
         ],
     );
 }
@@ -351,12 +359,8 @@ fn softening(first: &str) -> String {
 /// what the summary says of it.
 fn refused(least_time: &'static str) -> Option<(Place, Outcome, serde_json::Value)> {
     let place = troubled::place(least_time)?;
-    let outcome = place.run_case(softening("accuracy = 1e-5"));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
-    assert_eq!(summary["status"], "done");
-    Some((place, outcome, summary["accuracy"].clone()))
+    let (outcome, chosen) = studied(&place, softening("accuracy = 1e-5"));
+    Some((place, outcome, chosen))
 }
 
 #[test]
@@ -444,4 +448,93 @@ fn an_accuracy_that_too_few_trials_tell_is_not_known() {
     };
     let outcome = place.run_case(softening("accuracy = 1e-5"));
     assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+}
+
+/// The file after its study, with its summary.
+fn studied(place: &Place, text: String) -> (Outcome, serde_json::Value) {
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    (outcome, summary["accuracy"].clone())
+}
+
+#[test]
+fn an_accuracy_with_the_mesh_is_reached_on_a_finer_one() {
+    let place = Place::new();
+    let asked = "accuracy = 0.1\naccuracy_with_mesh = true\nanalysis";
+    let (outcome, chosen) = studied(&place, edited(HARDENING).replacen("analysis", asked, 1));
+    assert_eq!(chosen["verdict"], "reached", "{}", outcome.stderr);
+    let reached = chosen["reached"].as_f64().unwrap();
+    let parts = [&chosen["without_mesh"], &chosen["mesh"]["error"]];
+    let sum: f64 = parts.iter().map(|part| part.as_f64().unwrap()).sum();
+    assert!(reached <= 0.1 && (sum - reached).abs() < 1e-12, "{chosen}");
+    assert!(
+        chosen["mesh"]["divided_by"].as_u64().unwrap() > 1,
+        "{chosen}"
+    );
+    let n = chosen["increments"][1][1].as_u64().unwrap() as usize;
+    let run = history(&place, "out", n);
+
+    // Independent of the study: sixteen times as many elements each way, but across the layer, in 128
+    // increments.
+    let mut fine = edited(HARDENING);
+    for (from, to) in [
+        ("{ n = 1, to = 1.0 }", "{ n = 16, to = 1.0 }"),
+        ("{ n = 1, to = 2.0 }", "{ n = 16, to = 2.0 }"),
+        ("rows = [{ n = 2", "rows = [{ n = 32"),
+        ("increments = 8", "increments = 128"),
+    ] {
+        assert!(fine.contains(from), "{from}");
+        fine = fine.replacen(from, to, 1);
+    }
+    assert_eq!(place.run_case(&fine).code, Some(DONE));
+    let fine = history(&place, "out", 128);
+    assert_eq!(place.run_case(edited(HARDENING)).code, Some(DONE));
+    let file = history(&place, "out", 8);
+    let error = |rows: &[Row], probe: &str| {
+        let every = fine.len() / rows.len();
+        let exact: Vec<f64> = fine.iter().map(|row| number(row, probe)).collect();
+        let largest = exact.iter().copied().map(f64::abs).fold(0.0, f64::max);
+        let errors = rows.iter().zip(exact.chunks(every));
+        let errors = errors.map(|(row, exact)| (number(row, probe) - exact[every - 1]).abs());
+        errors.fold(0.0, f64::max) / largest
+    };
+    for probe in ["settlement", "tau"] {
+        assert!(error(&run, probe) <= 0.1, "{probe}: {}", error(&run, probe));
+    }
+    // The file's own mesh does not do.
+    assert!(error(&file, "tau") > 0.1, "{}", error(&file, "tau"));
+}
+
+#[test]
+fn the_error_of_a_mesh_that_no_finer_one_tells_is_not_known() {
+    let place = Place::new();
+    // The middle of an element is a point of the law, and none of four smaller ones.
+    let probe = "[probes]\nmiddle = { group = \"soil\", quantity = \"stress_22\", x = [0.499, 0.501], \
+                 y = [0.249, 0.251] }";
+    let text = edited(&[
+        (
+            "analysis",
+            "accuracy = 0.1\naccuracy_with_mesh = true\nanalysis",
+        ),
+        ("[probes]", probe),
+    ]);
+    let (outcome, chosen) = studied(&place, text);
+    assert_eq!(chosen["verdict"], "not known", "{}", outcome.stderr);
+    assert!(
+        chosen["mesh"]["error"].is_null() && chosen["reached"].is_null(),
+        "{chosen}"
+    );
+    assert!(chosen["without_mesh"].as_f64().unwrap() <= 0.05, "{chosen}");
+    assert!(
+        outcome.says("error of the mesh: none, there is no finer mesh to tell it; mesh / 2 failed")
+    );
+    let failed = chosen["failed"].as_array().unwrap();
+    assert!(
+        failed
+            .iter()
+            .any(|f| f["setting"].as_str().unwrap().contains("mesh / 2")),
+        "{chosen}"
+    );
 }

@@ -10,6 +10,7 @@
 //! The true error is integrated here, with shape functions and a Gauss rule of this file, from the
 //! displacements of the nodes and the closed form.
 
+use crate::setup::{Results, elastic, run};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
@@ -240,4 +241,47 @@ fn it_is_the_error_of_a_thick_cylinder() {
             assert!((0.5..2.0).contains(effectivity), "{found:?}");
         }
     }
+}
+
+/// Uniform strains in each of two groups, which differ: recovered by group there is no error.
+#[test]
+fn a_jump_between_groups_is_no_error() {
+    let text = format!(
+        r#"
+analysis = "plane_strain"
+mesh.columns = [{{ n = 3, to = 1.0 }}]
+mesh.rows = [{{ n = 3, to = 1.0 }}, {{ n = 3, to = 2.0 }}]
+mesh.region = [{{ group = "soft" }}, {{ group = "stiff", y = [1.0, 2.0] }}]
+mesh.lines = {{ bottom = {{ y = 0.0 }}, top = {{ y = 2.0 }}, left = {{ x = 0.0 }}, right = {{ x = 1.0 }} }}
+[laws]
+{}{}
+[groups]
+soft = {{ formulation = "solid", law = "soft" }}
+stiff = {{ formulation = "solid", law = "stiff" }}
+[[supports]]
+line = "bottom"
+fixed = ["y"]
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[supports]]
+line = "right"
+fixed = ["x"]
+[[phase]]
+name = "press"
+increments = 1
+pressure = [{{ line = "top", value = 100.0 }}]
+[output]
+mesh_error = true
+"#,
+        elastic("soft", 1e4, 0.3),
+        elastic("stiff", 1e6, 0.2)
+    );
+    let summary = run(&text).summary();
+    let of_phase = &summary["mesh_error"][0];
+    assert!(of_phase["strains"].as_f64().unwrap() < 1e-9, "{of_phase}");
+    assert_eq!(of_phase["groups"][1]["linear"], true);
+    // Not asked for, it is not there.
+    let summary = run(&text.replacen("mesh_error = true", "", 1)).summary();
+    assert!(summary["mesh_error"].is_null());
 }

@@ -184,6 +184,10 @@ pub struct CaseFile {
     #[serde(default, deserialize_with = "accuracy")]
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
     pub accuracy: Option<Spanned<f64>>,
+    /// Whether the error of the mesh counts as part of `accuracy`: the mesh is then refined as well.
+    #[serde(default)]
+    #[schemars(with = "Option<bool>")]
+    pub accuracy_with_mesh: Option<Spanned<bool>>,
     /// The settings that such a study chose.
     #[serde(skip)]
     pub chosen: Option<Chosen>,

@@ -9,6 +9,10 @@ pub struct Chosen {
     pub asked: f64,
     /// Relative error estimated; none where too few runs came to their end.
     pub reached: Option<f64>,
+    /// What increments and tolerance have of it.
+    pub without_mesh: Option<f64>,
+    /// What the mesh has of it, where it counts.
+    pub mesh: Option<ChosenMesh>,
     /// It is known to be at most what was asked for.
     pub is_reached: bool,
     /// Whether it is.
@@ -29,6 +33,19 @@ pub struct Chosen {
     pub runs: usize,
     /// Those of them that did not come to their end.
     pub failed: Vec<FailedTrial>,
+}
+
+/// The mesh that such a study chose.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChosenMesh {
+    /// Sides of the file's elements are divided by this.
+    pub divided_by: usize,
+    /// Relative error estimated; none where no finer mesh tells it.
+    pub error: Option<f64>,
+    /// By how much the two finest meshes differ.
+    pub difference: Option<f64>,
+    /// How the error was estimated, or why it was not.
+    pub estimate: String,
 }
 
 /// Whether an error that was asked for is reached.

@@ -2,11 +2,13 @@
 //!
 //! Increments are doubled from a quarter of the file's on until the estimated error of the finest
 //! run is below the target; of the runs made, the coarsest that is good enough is chosen, and where
-//! none is, the finest that came to its end. The error of the mesh is not part of it. Every run is a
+//! none is, the finest that came to its end. With `accuracy_with_mesh` half of the target is for that, and
+//! the rest for the mesh, which is refined until its error is below it. Every run is a
 //! row of `accuracy.csv` as soon as it is done, and kept, so that a study that is stopped goes on from
 //! there.
 
 mod levels;
+mod mesh;
 mod search;
 mod table;
 mod words;
@@ -26,6 +28,8 @@ use search::Search;
 use std::path::Path;
 use table::Table;
 
+/// Share of the target for increments and tolerance where the mesh has the rest.
+const WITHOUT_MESH: f64 = 0.5;
 /// What it is called where it is said what is being done.
 const STUDY: &str = "accuracy";
 
@@ -84,19 +88,35 @@ pub fn reach_until(
     }
     let kept = Kept::begin(folder, &identity_of(case)?, resume)?;
     let scratch = Scratch::new(folder, stop)?.keeping(kept);
+    let asked = *accuracy.get_ref();
+    let with_mesh = case.file.accuracy_with_mesh.as_ref();
+    let with_mesh = with_mesh.is_some_and(|with| *with.get_ref());
     let mut search = Search {
         case,
         scratch: &scratch,
-        asked: *accuracy.get_ref(),
+        asked: if with_mesh {
+            WITHOUT_MESH * asked
+        } else {
+            asked
+        },
         runs: 0,
         table: Table::begin(folder)?,
         failed: Vec::new(),
         say,
     };
     let (settings, found) = search.best()?;
-    let (settings, tolerance_error) = search.loosened(settings, &found)?;
-    let reached = found.error.map(|error| error + tolerance_error);
-    let verdict = Verdict::of(reached, search.asked);
+    // What a looser tolerance does on one mesh says little about a finer one.
+    let (settings, without_mesh, mesh) = if with_mesh {
+        let most = asked - found.error.unwrap_or_default();
+        let (settings, mesh) = mesh::refine(&mut search, settings, most)?;
+        (settings, found.error, Some(mesh))
+    } else {
+        let (settings, more) = search.loosened(settings, &found)?;
+        (settings, found.error.map(|error| error + more), None)
+    };
+    let of_mesh = mesh.as_ref().map_or(Some(0.0), |mesh| mesh.error);
+    let reached = without_mesh.zip(of_mesh).map(|(a, b)| a + b);
+    let verdict = Verdict::of(reached, asked);
     let mut chosen = settings.apply(case)?;
     let phases = chosen.file.phases.iter();
     let increments = phases.map(|phase| {
@@ -104,8 +124,10 @@ pub fn reach_until(
         (name, *phase.increments.get_ref())
     });
     chosen.file.chosen = Some(Chosen {
-        asked: search.asked,
+        asked,
         reached,
+        without_mesh,
+        mesh,
         is_reached: verdict == Verdict::Reached,
         verdict,
         difference: found.difference,

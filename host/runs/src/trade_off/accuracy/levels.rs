@@ -49,6 +49,15 @@ impl Levels {
         Some(next.rows.difference(&finest.rows, &scale))
     }
 
+    /// Estimated relative error of the finest; of only two runs as if it fell with this order.
+    pub(super) fn error_of_order(&self, order: f64) -> Option<f64> {
+        let [.., (b, _), (c, _)] = self.runs.as_slice() else {
+            return None;
+        };
+        let of_two = || Some(self.difference()? * left([*b, *c], order));
+        self.error().or_else(of_two)
+    }
+
     /// Estimated relative error of the finest; none where there are fewer than three.
     pub(super) fn error(&self) -> Option<f64> {
         let [.., (a, coarse), (b, middle), (c, fine)] = self.runs.as_slice() else {
@@ -61,9 +70,13 @@ impl Levels {
         Some(differences[1] * left([*b, *c], order))
     }
 
-    /// The coarsest with at most this error, else the finest; with its error, as far as that can be told.
-    pub(super) fn take(mut self, error: f64) -> Option<(f64, Trial, Option<f64>)> {
-        let of_finest = self.error();
+    /// The coarsest with at most this error, else the finest; with its error, as far as that can be told. The
+    /// finest has the error `of_finest`.
+    pub(super) fn take(
+        mut self,
+        of_finest: Option<f64>,
+        error: f64,
+    ) -> Option<(f64, Trial, Option<f64>)> {
         let (_, finest) = self.finest()?;
         let scale = finest.rows.largest();
         let errors: Vec<Option<f64>> = (self.runs.iter())
@@ -168,20 +181,22 @@ mod tests {
         let runs = levels(1.0, &[4.0, 8.0]);
         assert_relative_eq!(runs.difference().unwrap(), 0.125 / 0.875);
         assert_eq!(runs.error(), None);
-        let (n, _, error) = runs.take(0.5).unwrap();
+        assert_relative_eq!(runs.error_of_order(1.0).unwrap(), 0.125 / 0.875);
+        let (n, _, error) = runs.take(None, 0.5).unwrap();
         assert_eq!((n.to_bits(), error), (8.0_f64.to_bits(), None));
     }
 
     #[test]
     fn the_coarsest_that_is_good_enough_is_taken() {
-        let (n, _, error) = levels(1.0, &[4.0, 8.0, 16.0, 32.0]).take(0.14).unwrap();
+        let runs = || levels(1.0, &[4.0, 8.0, 16.0, 32.0]);
+        let (n, _, error) = runs().take(runs().error(), 0.14).unwrap();
         assert_relative_eq!(n, 8.0);
         assert_relative_eq!(
             error.unwrap(),
             0.125 / (1.0 - 1.0 / 32.0),
             max_relative = 1e-9
         );
-        let (n, ..) = levels(1.0, &[4.0, 8.0, 16.0, 32.0]).take(0.01).unwrap();
+        let (n, ..) = runs().take(runs().error(), 0.01).unwrap();
         assert_relative_eq!(n, 32.0);
     }
 }

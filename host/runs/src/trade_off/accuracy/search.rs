@@ -154,7 +154,7 @@ impl Search<'_> {
     }
 
     /// Says what is run next, and with the seconds that it and all others may take.
-    fn begin(&mut self, settings: &Settings, left: Option<[f64; 2]>) {
+    pub(super) fn begin(&mut self, settings: &Settings, left: Option<[f64; 2]>) {
         self.runs += 1;
         let doing = format!("{STUDY}: run {}, {}", self.runs, settings.label());
         (self.say)(&match left {
@@ -215,11 +215,12 @@ impl Search<'_> {
         let (finest_factor, finest) = levels.finest()?;
         let scale = finest.rows.largest();
         let difference = levels.difference();
-        let estimate = match (levels.next(), levels.error()) {
+        let of_finest = levels.error();
+        let estimate = match (levels.next(), of_finest) {
             (Some((next, _)), Some(_)) => words::estimate([*next, *finest_factor], ORDERS[1]),
             _ => words::no_estimate(levels.len()),
         };
-        let (factor, trial, error) = levels.take(SHARES[0] * self.asked)?;
+        let (factor, trial, error) = levels.take(of_finest, SHARES[0] * self.asked)?;
         Some(Found {
             factor,
             error,
