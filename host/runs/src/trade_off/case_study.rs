@@ -5,13 +5,14 @@ use super::pace::{Pace, in_words};
 use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
 use super::study::{Done, Measurement, Reference, Row, Study};
-use super::trial::{SOLVER_CHOICES, Scratch, Settings, Timing, Trial, repetitions};
+use super::trial::{BY_FORCE, SOLVER_CHOICES, Scratch, Settings, Timing, Trial, repetitions};
 use crate::Error;
 use crate::run::begin;
 use input::Case;
 use law::BuiltLaw;
 use mechanics::equilibrium::Reuse;
 use mechanics::problem::{Formulation, Integration};
+use mechanics::settings::Convergence as Counted;
 use std::time::Duration;
 
 /// Seconds of a run above which a study is shorter, so that it ends while somebody waits.
@@ -235,6 +236,16 @@ fn settings_on_this_mesh(
         if with != *file {
             let settings = Settings {
                 solver: Some(choice),
+                ..default.clone()
+            };
+            add("solver", settings);
+        }
+    }
+    if file.convergence != Counted::Force {
+        for &tolerance in plan.loose_tolerances {
+            let settings = Settings {
+                tolerance: Some(tolerance),
+                solver: Some(&BY_FORCE),
                 ..default.clone()
             };
             add("solver", settings);

@@ -73,6 +73,9 @@ fn settings(chosen: &Chosen) -> String {
         (None, None, None) => format!("{asked}; a single run came to its end"),
     };
     let mesh = chosen.mesh.as_ref().map(|mesh| match mesh.error {
+        Some(error) if mesh.divided_by == 1 => {
+            format!("; the file's mesh, its error {error:.1e}")
+        }
         Some(error) => format!("; mesh / {}, its error {error:.1e}", mesh.divided_by),
         None => format!("; error of the mesh: {}", mesh.estimate),
     });
