@@ -84,7 +84,9 @@ impl Basis {
             }
             let left = dot(&column, &column).sqrt();
             if left > DEPENDENT * size {
-                column.iter_mut().for_each(|value| *value /= left);
+                for value in &mut column {
+                    *value /= left;
+                }
                 basis.r[term][term] = left;
                 basis.columns.push((term, column));
             }

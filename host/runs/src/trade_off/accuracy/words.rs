@@ -2,6 +2,7 @@
 
 use super::STUDY;
 use input::chosen::{Chosen, FailedTrial, Verdict};
+use std::fmt::Write;
 
 /// A trial came to no end.
 pub(super) fn failed(run: usize, failed: &FailedTrial) -> String {
@@ -94,7 +95,8 @@ fn settings(chosen: &Chosen) -> String {
     text.truncate(text.trim_end().len());
     if !chosen.failed.is_empty() {
         let failed: Vec<&str> = chosen.failed.iter().map(|f| f.setting.as_str()).collect();
-        text += &format!("; failed ({STUDY}.csv has why): {}", failed.join("; "));
+        let failed = failed.join("; ");
+        let _ = write!(text, "; failed ({STUDY}.csv has why): {failed}");
     }
     text
 }
