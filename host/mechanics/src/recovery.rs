@@ -30,6 +30,12 @@ const LEAST_POINTS: usize = 12;
 /// they see one side only.
 const ONE_SIDED: f64 = 0.6;
 
+/// Smaller strains (root of the mean square) are nothing but round-off.
+const UNSTRAINED: f64 = 1e-12;
+
+/// ∫ |ε* − ε|² dV, ∫ |ε|² dV, ∫ dV.
+type Sums = [f64; 3];
+
 /// Strain: 11, 22, 33, γ12.
 type Strain = [f64; 4];
 
@@ -39,8 +45,8 @@ pub struct MeshError {
     /// By group; none where it is not estimated: of interfaces and layers, of what is not there, of a
     /// few elements.
     groups: Vec<Option<GroupError>>,
-    /// Sums over all of them: ∫ |ε* − ε|² dV, ∫ |ε|² dV.
-    all: [f64; 2],
+    /// Over all of them.
+    all: Sums,
 }
 
 /// Of one group.
@@ -48,8 +54,8 @@ pub struct MeshError {
 struct GroupError {
     /// ∫ |ε* − ε|² dV of every element.
     elements: Vec<f64>,
-    /// Sums over all elements: of the same, and ∫ |ε|² dV.
-    all: [f64; 2],
+    /// Over all of them.
+    all: Sums,
 }
 
 impl MeshError {
@@ -74,7 +80,7 @@ impl MeshError {
             .iter()
             .flatten()
             .map(|group| group.all)
-            .fold([0.0; 2], add);
+            .fold([0.0; 3], add);
         Self { groups, all }
     }
 
@@ -95,13 +101,14 @@ impl MeshError {
     }
 }
 
-/// Of squares; what is fitted has about the strains and the error together.
-fn ratio([error, strains]: [f64; 2]) -> Option<f64> {
-    (strains > 0.0).then(|| (error / (strains + error)).sqrt())
+/// Of sums; what is fitted has about the strains and the error together.
+fn ratio([error, strains, volume]: Sums) -> Option<f64> {
+    let is_strained = strains > UNSTRAINED * UNSTRAINED * volume;
+    is_strained.then(|| (error / (strains + error)).sqrt())
 }
 
-fn add([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
-    [a + c, b + d]
+fn add(a: Sums, b: Sums) -> Sums {
+    [0, 1, 2].map(|i| a[i] + b[i])
 }
 
 /// ε : ε.
@@ -148,7 +155,7 @@ impl View<'_> {
             .flatten()
             .collect();
         let patches = Patches::of(self.kinematics, &best);
-        let of_pieces: Vec<Vec<[f64; 2]>> = pieces
+        let of_pieces: Vec<Vec<Sums>> = pieces
             .into_par_iter()
             .map(|piece| {
                 let fine = self.strains(piece.clone(), Points::All)?;
@@ -159,16 +166,16 @@ impl View<'_> {
                         let of = |point: &Point| {
                             let smooth = mean(&fits, point.at);
                             let off = [0, 1, 2, 3].map(|c| smooth[c] - point.strain[c]);
-                            [square(off), square(point.strain)].map(|square| square * point.weight)
+                            [square(off), square(point.strain), 1.0].map(|of| of * point.weight)
                         };
-                        points.iter().map(of).fold([0.0; 2], add)
+                        points.iter().map(of).fold([0.0; 3], add)
                     })
                     .collect())
             })
             .collect::<Result<_, _>>()?;
         let mut found = GroupError {
             elements: Vec::with_capacity(n),
-            all: [0.0; 2],
+            all: [0.0; 3],
         };
         for of_element in of_pieces.into_iter().flatten() {
             found.elements.push(of_element[0]);

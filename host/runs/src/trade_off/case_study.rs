@@ -366,7 +366,7 @@ impl Cases<'_> {
         let times = if settings.solver.is_some() {
             of_solver
         } else {
-            of_others * settings.increments.max(1.0)
+            of_others * settings.increments.max(1.0) * settings.division as f64
         };
         Timing::Within(Duration::from_secs_f64(times * self.unit))
     }
