@@ -3,6 +3,7 @@
 
 mod beyond;
 mod complete;
+mod creeping;
 mod history;
 mod loads;
 mod method;
@@ -22,7 +23,7 @@ pub use warning::Warning;
 pub use watch::{Increment, Part, Watch, When};
 
 use crate::assembly::Tie;
-use crate::equilibrium::{Clock, Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
+use crate::equilibrium::{Clock, Guess, Newton, Reason, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
 use crate::ground::{Acting, Loading};
 use crate::group::Group;
@@ -31,6 +32,7 @@ use crate::model::Model;
 use crate::problem::{Axis, Material, Problem};
 use crate::settings::{Control, Method, Settings};
 use beyond::Beyond;
+use creeping::{Lead, Turn};
 use history::History;
 use law::{Moment, Stop, custody};
 use path::PathEnd;
@@ -42,6 +44,9 @@ use std::ops::ControlFlow;
 /// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
 /// be halved so often.
 const PATIENCE: f64 = 0.2;
+/// The same for creep under `control = "auto"`: after two cuts. With one, `chamber_oriented` finds an equilibrium in which its
+/// shaft slides all along, as its closed form wants it; creep leads it to another one.
+const SHORT: f64 = 0.3;
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
 /// Share of the method's own limit of iterations up to which a step counts as easy, so that the
@@ -423,7 +428,7 @@ impl Simulation {
         let looked_at = watch.looks_at(when, &self.groups);
         let lambda = phase.course.lambda;
         self.complete(phase, looked_at.as_ref())
-            .map_err(|reason| no_equilibrium(&place, lambda, n, reason.into(), None))?;
+            .map_err(|reason| self.incomplete(phase, &place, lambda, reason))?;
         let restored = custody::restore().map_err(|why| Error::Process {
             place: place.clone(),
             why,
@@ -471,9 +476,10 @@ impl Simulation {
             place.increment as f64 / n as f64
         };
         let mut done = Progress::default();
+        let mut lead = Lead::new(&settings, &phase.record);
         while phase.course.lambda < target {
             if phase.course.lambda >= phase.course.loads.leg[1] {
-                self.turn(place, n, phase)?;
+                self.turn(place, phase)?;
             }
             let target = target.min(phase.course.loads.leg[1]);
             let (start, step) = (phase.course.lambda, phase.course.step);
@@ -485,7 +491,7 @@ impl Simulation {
             };
             let length = end - start;
             let guess = phase.course.history.guess(length);
-            let attempt = self.attempt(phase, [start, end], guess);
+            let attempt = self.attempt(phase, lead.control, [start, end], guess);
             match self.without_leap(attempt, phase, length) {
                 Ok(success) => {
                     if success.relaxed {
@@ -512,16 +518,25 @@ impl Simulation {
                     go_on(watch.cut_back(place, end, step, &failure.reason))?;
                     let follows = settings.control == Control::ArcLength
                         && phase.course.history.latest().is_some();
+                    let is_small = step < smallest.max(PATIENCE / n as f64);
+                    let is_short = step < smallest.max(SHORT / n as f64);
+                    let turn = is_short.then(|| lead.turn(&failure)).flatten();
                     if failure.defect().is_some() {
-                        return Err(self.cannot_go_on(place, start, n, failure));
-                    } else if follows && step < smallest.max(PATIENCE / n as f64) {
+                        return Err(self.cannot_go_on(phase, place, start, failure));
+                    } else if follows && is_small {
                         let goal = [n as f64, target];
                         let end = self.follow_path(place, goal, phase, watch, &mut done)?;
                         if let PathEnd::Stopped(failure, highest) = end {
-                            return Err(self.cannot_go_on(place, highest, n, *failure));
+                            return Err(self.cannot_go_on(phase, place, highest, *failure));
+                        }
+                    } else if turn == Some(Turn::ToCreep) {
+                        phase.course.step = 1.0 / n as f64;
+                        if phase.record.crept_from.is_none() {
+                            phase.record.crept_from = Some(place.increment);
+                            watch.warning(&Warning::Creeps(place.clone()));
                         }
                     } else if step < smallest {
-                        return Err(self.cannot_go_on(place, start, n, failure));
+                        return Err(self.cannot_go_on(phase, place, start, failure));
                     }
                 }
             }
@@ -530,10 +545,10 @@ impl Simulation {
     }
 
     /// Goes on to the next leg of the phase's course, from a complete state.
-    fn turn(&mut self, place: &Place, n: usize, phase: &mut UnderWay) -> Result<(), Error> {
+    fn turn(&mut self, place: &Place, phase: &mut UnderWay) -> Result<(), Error> {
         let lambda = phase.course.lambda;
         self.complete(phase, None)
-            .map_err(|reason| no_equilibrium(place, lambda, n, reason.into(), None))?;
+            .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
         if self.next_leg(phase.number, &mut phase.course)
             && let Some(domain) = &mut phase.equations.domain
         {
@@ -594,7 +609,13 @@ impl Simulation {
     }
 
     /// The error of a phase that ends at load factor λ.
-    fn cannot_go_on(&self, place: &Place, lambda: f64, n: usize, failure: StepFailure) -> Error {
+    fn cannot_go_on(
+        &self,
+        phase: &UnderWay,
+        place: &Place,
+        lambda: f64,
+        failure: StepFailure,
+    ) -> Error {
         if let Some(defect) = failure.defect() {
             return Error::Law {
                 place: place.clone(),
@@ -615,7 +636,35 @@ impl Simulation {
             };
         }
         let runaway = failure.runaway.map(|runaway| self.runaway_at(runaway));
-        no_equilibrium(place, lambda, n, failure, runaway)
+        Error::NoEquilibrium(Box::new(NoEquilibrium {
+            runaway,
+            ..self.stopped_at(phase, place, lambda, failure)
+        }))
+    }
+
+    /// No equilibrium of a phase beyond load factor λ.
+    fn stopped_at(
+        &self,
+        phase: &UnderWay,
+        place: &Place,
+        lambda: f64,
+        failure: StepFailure,
+    ) -> NoEquilibrium {
+        let of = self.problem.phases[phase.number].increments;
+        NoEquilibrium {
+            place: place.clone(),
+            reached: lambda * of as f64,
+            of,
+            control: Lead::new(&self.problem.settings, &phase.record).control,
+            failure,
+            runaway: None,
+        }
+    }
+
+    /// The same where a step is found not to be complete.
+    fn incomplete(&self, phase: &UnderWay, place: &Place, lambda: f64, reason: Reason) -> Error {
+        let none = self.stopped_at(phase, place, lambda, reason.into());
+        Error::NoEquilibrium(Box::new(none))
     }
 
     /// Where a displacement ran away.
@@ -642,10 +691,14 @@ impl Simulation {
     fn attempt(
         &mut self,
         phase: &mut UnderWay,
+        control: Control,
         [from, to]: [f64; 2],
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
-        let settings = self.settings();
+        let settings = Settings {
+            control,
+            ..self.settings()
+        };
         let clock = self.clock(phase.number);
         let equations = &mut phase.equations;
         let mut newton = Newton::new(
@@ -673,20 +726,4 @@ fn go_on(flow: ControlFlow<()>) -> Result<(), Error> {
 fn stopped(place: &Place) -> Error {
     let place = place.clone();
     Error::Stopped { place }
-}
-
-fn no_equilibrium(
-    place: &Place,
-    lambda: f64,
-    n: usize,
-    failure: StepFailure,
-    runaway: Option<RunawayAt>,
-) -> Error {
-    Error::NoEquilibrium(Box::new(NoEquilibrium {
-        place: place.clone(),
-        reached: lambda * n as f64,
-        of: n,
-        failure,
-        runaway,
-    }))
 }

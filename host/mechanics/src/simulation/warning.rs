@@ -85,6 +85,8 @@ pub enum Warning {
     TookOver(String, TakeOver),
     /// A law could not be asked that; this is what it says.
     Unasked(String, String),
+    /// Short steps of the load found no equilibrium: creep leads from here to the end of the phase.
+    Creeps(Place),
     /// The path of equilibrium was followed, from one load factor, between two others.
     FollowedPath {
         /// The increment.
@@ -187,6 +189,12 @@ impl fmt::Display for Warning {
                 f,
                 "phase `{phase}`: {reason}\n  over a nil increment, so that what the law makes of the \
                  stresses it finds comes in the first increment, unannounced"
+            ),
+            Self::Creeps(place) => write!(
+                f,
+                "{place}: short steps of the load found no equilibrium; from here to the end of the phase creep leads \
+                 to the next one; others may lie near: hold the results against those of `control = \"creep\"` \
+                 from the start, and of other increments"
             ),
             Self::FollowedPath {
                 place,

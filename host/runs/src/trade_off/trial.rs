@@ -57,6 +57,7 @@ pub(super) const SOLVER_CHOICES: &[SolverChoice] = &[
     choice("equations", "sparse", |s| s.equations = Equations::Sparse),
     choice("line_search", "true", |s| s.line_search = true),
     choice("line_search", "false", |s| s.line_search = false),
+    choice("control", "auto", |s| s.control = Control::Auto),
     choice("control", "load", |s| s.control = Control::Load),
     choice("control", "creep", |s| s.control = Control::Creep),
     choice("convergence", "both", |s| {
