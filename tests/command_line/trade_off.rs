@@ -380,6 +380,8 @@ fn finer_trials_that_fail_leave_the_best_one_with_its_error() {
     );
     assert!(outcome.says("run 4 failed: phase `push`"), "{said}");
     assert_eq!(chosen["verdict"], "not reached");
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains("accuracy 0.00001 not reached, error "));
     assert_eq!(chosen["is_reached"], false);
     assert_eq!(chosen["increments"][1][1], 8);
     let failed = chosen["failed"].as_array().unwrap();

@@ -269,12 +269,22 @@ fn facts(summary: &Value) -> Vec<String> {
     let count = |value: &Value, what: &str| value.as_u64().map(|n| format!("{n} {what}"));
     facts.extend(count(&summary["mesh"]["nodes"], "nodes"));
     facts.extend(count(&summary["mesh"]["elements"], "elements"));
+    facts.extend(accuracy(&summary["accuracy"]));
     facts.extend(seconds(&summary["seconds"]["total"]).map(|seconds| format!("{seconds} s")));
     match text(&summary["program"]) {
         "" => (),
         program => facts.push(program.to_owned()),
     }
     facts
+}
+
+/// Whether an accuracy that was asked for is reached.
+fn accuracy(chosen: &Value) -> Option<String> {
+    let (asked, verdict) = (chosen["asked"].as_f64()?, text(&chosen["verdict"]));
+    let estimated = chosen["reached"].as_f64();
+    let estimated = estimated.map(|error| format!(", error {error:.1e} estimated"));
+    let estimated = estimated.unwrap_or_default();
+    Some(format!("accuracy {asked} {verdict}{estimated}"))
 }
 
 /// Pictures in the folder that the page does not draw itself, such as figures of cuts: names and

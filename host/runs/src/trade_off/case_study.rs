@@ -16,7 +16,7 @@ use mechanics::settings::Convergence as Counted;
 use std::time::Duration;
 
 /// Seconds of a run above which a study is shorter, so that it ends while somebody waits.
-const LONG: f64 = 0.3;
+pub(super) const LONG: f64 = 0.3;
 /// A probe that the finest runs disagree about by more is nothing but round-off.
 const MEANINGLESS: f64 = 0.5;
 

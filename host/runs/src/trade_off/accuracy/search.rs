@@ -1,6 +1,6 @@
 //! The search for increments, a scheme of the laws and a tolerance that are good enough.
 
-use super::super::case_study::law_schemes;
+use super::super::case_study::{LONG, law_schemes};
 use super::super::driver_study::in_one_line;
 use super::super::pace::in_words;
 use super::super::scheme::Scheme;
@@ -57,7 +57,7 @@ pub(super) struct Search<'a> {
 
 impl Search<'_> {
     /// The file's scheme, if it is good enough: looking for a better one costs more runs than it saves. Else
-    /// of the others the cheapest that is.
+    /// of the others the cheapest that is, unless runs are long.
     ///
     /// # Errors
     /// No run came to its end; the study was stopped.
@@ -67,7 +67,11 @@ impl Search<'_> {
         let plain = Settings::default();
         let found = self.with(&plain, FACTORS[FACTORS.len() - 1], None)?;
         let mut best = (plain, found);
+        let as_in_file = best.1.trial.seconds / best.1.factor;
         let schemes: Vec<(String, Scheme)> = if good(&best.1) {
+            Vec::new()
+        } else if as_in_file > LONG {
+            (self.say)(&words::no_schemes(as_in_file));
             Vec::new()
         } else {
             (self.say)(&format!("{STUDY}: which schemes of the laws there are"));

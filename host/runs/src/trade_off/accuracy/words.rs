@@ -1,5 +1,6 @@
 //! What a study for an accuracy says.
 
+use super::super::pace::in_words;
 use super::STUDY;
 use input::chosen::{Chosen, FailedTrial, Verdict};
 use std::fmt::Write;
@@ -7,6 +8,12 @@ use std::fmt::Write;
 /// A trial came to no end.
 pub(super) fn failed(run: usize, failed: &FailedTrial) -> String {
     format!("{STUDY}: run {run} failed: {}", failed.reason)
+}
+
+/// Schemes are not looked for: a run takes so many seconds.
+pub(super) fn no_schemes(seconds: f64) -> String {
+    let takes = in_words(seconds);
+    format!("{STUDY}: a run takes {takes}, so the schemes of the laws are left as they are")
 }
 
 /// How an error was estimated from the two finest of at least three runs.
