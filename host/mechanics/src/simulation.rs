@@ -7,6 +7,7 @@ mod creeping;
 mod history;
 mod loads;
 mod method;
+mod neighbour;
 mod path;
 mod phase;
 mod record;
@@ -17,6 +18,7 @@ mod ties;
 mod warning;
 mod watch;
 
+pub use neighbour::Neighbour;
 pub use record::PhaseRecord;
 pub use state::State;
 pub use warning::Warning;
@@ -44,9 +46,6 @@ use std::ops::ControlFlow;
 /// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
 /// be halved so often.
 const PATIENCE: f64 = 0.2;
-/// The same for creep under `control = "auto"`: after two cuts. With one, `chamber_oriented` finds an equilibrium in which its
-/// shaft slides all along, as its closed form wants it; creep leads it to another one.
-const SHORT: f64 = 0.3;
 /// Fastest growth of steps after a cut-back.
 const REGROWTH: f64 = 2.0;
 /// Share of the method's own limit of iterations up to which a step counts as easy, so that the
@@ -476,7 +475,7 @@ impl Simulation {
             place.increment as f64 / n as f64
         };
         let mut done = Progress::default();
-        let mut lead = Lead::new(&settings, &phase.record);
+        let mut lead = Lead::new(&settings, phase.course.creeps);
         while phase.course.lambda < target {
             if phase.course.lambda >= phase.course.loads.leg[1] {
                 self.turn(place, phase)?;
@@ -498,9 +497,13 @@ impl Simulation {
                         phase.record.relaxed += 1;
                         // The phase's end says how many there were.
                         if phase.record.relaxed == 1 {
-                            watch.warning(&Warning::Relaxed(place.clone()));
+                            let by_creep = (lead.control != Control::Creep)
+                                .then(|| self.neighbour(phase, &success, [start, end]))
+                                .flatten();
+                            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
                         }
                     }
+                    phase.course.creeps = lead.goes_on(&settings, success.iterations.len());
                     // A motion takes many iterations, and steps of any length.
                     if success.was_motion || success.iterations.len() as f64 <= easy {
                         phase.course.step = (REGROWTH * step).min(1.0 / n as f64);
@@ -519,8 +522,7 @@ impl Simulation {
                     let follows = settings.control == Control::ArcLength
                         && phase.course.history.latest().is_some();
                     let is_small = step < smallest.max(PATIENCE / n as f64);
-                    let is_short = step < smallest.max(SHORT / n as f64);
-                    let turn = is_short.then(|| lead.turn(&failure)).flatten();
+                    let turn = lead.turn(&failure, step < smallest);
                     if failure.defect().is_some() {
                         return Err(self.cannot_go_on(phase, place, start, failure));
                     } else if follows && is_small {
@@ -655,7 +657,11 @@ impl Simulation {
             place: place.clone(),
             reached: lambda * of as f64,
             of,
-            control: Lead::new(&self.problem.settings, &phase.record).control,
+            control: if phase.record.crept_from.is_some() {
+                Control::Creep
+            } else {
+                self.problem.settings.control
+            },
             failure,
             runaway: None,
         }
