@@ -242,6 +242,11 @@ impl Simulation {
         })
     }
 
+    /// Whether a phase has begun: its loads and laws are in force, even if no increment of it is done.
+    pub fn is_on_its_way(&self) -> bool {
+        self.under_way.is_some() || self.done > 0
+    }
+
     /// The time of a phase that is under way.
     fn clock(&self, phase: usize) -> Clock {
         Clock {
