@@ -5,13 +5,13 @@ mod beyond;
 mod complete;
 mod history;
 mod loads;
-mod method;
 mod path;
 mod phase;
 mod record;
 mod start;
 mod state;
 mod statics;
+mod tangents;
 mod ties;
 mod warning;
 mod watch;
@@ -283,13 +283,9 @@ impl Simulation {
         self.settings().method
     }
 
-    /// The settings, with the method that suits the laws of the present phase.
+    /// The settings that the iterations are asked for.
     fn settings(&self) -> Settings {
-        let given = self.problem.settings;
-        Settings {
-            method: method::resolved(given.method, &self.groups),
-            ..given.in_force()
-        }
+        self.problem.settings.in_force()
     }
 
     /// Goes on to the end of the last phase.
@@ -488,6 +484,8 @@ impl Simulation {
             let attempt = self.attempt(phase, [start, end], guess);
             match self.without_leap(attempt, phase, length) {
                 Ok(success) => {
+                    let period = (self.clock(phase.number), [start, end]);
+                    self.look_after(&success, period, watch);
                     if success.relaxed {
                         phase.record.relaxed += 1;
                         // The phase's end says how many there were.
@@ -505,6 +503,10 @@ impl Simulation {
                 Err(failure) => {
                     go_on(watch.iterations(place, end, &failure.iterations))?;
                     done.iterations += failure.iterations.len();
+                    let period = (self.clock(phase.number), [start, end]);
+                    if self.look_after_failure(&failure, period, watch) {
+                        continue;
+                    }
                     phase.record.cut_backs += 1;
                     let factor = failure.factor().unwrap_or(CUT[1]).clamp(CUT[0], CUT[1]);
                     let step = factor * length;

@@ -2,8 +2,7 @@
 
 use crate::equilibrium::Open;
 use crate::error::Place;
-use crate::group::{Parted, TakeOver};
-use crate::settings::Method;
+use crate::group::{Deviation, Parted, TakeOver};
 use law::TimeDependence;
 use std::fmt;
 
@@ -14,14 +13,16 @@ pub enum Warning {
     Note(String),
     /// A phase starts out of balance, by this share of the forces in play.
     OutOfBalance(String, f64),
-    /// Another method than was asked for iterates, since the tangents of a law are approximate.
-    OtherMethod {
+    /// The tangents of a law are differences, since it calls its own approximate.
+    Approximate(String),
+    /// Tangents are differences from now on, since those of the law are not the derivatives of its stresses.
+    NoDerivative {
+        /// The group.
+        group: String,
         /// The law.
         law: String,
-        /// The method that iterates.
-        method: Method,
-        /// The one that was asked for.
-        asked: Method,
+        /// By how much.
+        deviation: Deviation,
     },
     /// A law depends on the time, and a phase says none.
     NoTime {
@@ -99,7 +100,7 @@ pub enum Warning {
 impl Warning {
     /// Whether it is enough to say this once, however often it comes.
     pub fn is_said_once(&self) -> bool {
-        matches!(self, Self::OtherMethod { .. })
+        matches!(self, Self::Approximate(_))
     }
 }
 
@@ -117,11 +118,25 @@ impl fmt::Display for Warning {
                     format!("{:.2}", 100.0 * share)
                 }
             ),
-            Self::OtherMethod { law, method, asked } => write!(
+            Self::Approximate(law) => write!(
                 f,
-                "the tangents of law `{law}` are approximate: method `{}` stands for `{}`",
-                method.name(),
-                asked.name()
+                "the tangents of law `{law}` are approximate: they are made by differences of its \
+                 stresses instead"
+            ),
+            Self::NoDerivative {
+                group,
+                law,
+                deviation:
+                    Deviation {
+                        points: [off, of],
+                        largest,
+                    },
+            } => write!(
+                f,
+                "group `{group}`: the tangents of law `{law}` are not the derivatives of its stresses, \
+                 by up to {:.1} % at {off} of {of} points that were looked at: from here on they are \
+                 made by differences (`tangents` in [solver] says otherwise)",
+                100.0 * largest
             ),
             Self::NoTime { phase, law, by } => write!(
                 f,

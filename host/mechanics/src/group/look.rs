@@ -1,0 +1,155 @@
+//! Whether a law's tangents are the derivatives of its stresses: a few points, held against differences of
+//! the law's own answers about the increment that they went through last.
+//!
+//! Where both sides and two sizes of differences agree, the stress has a derivative, and the tangent has to
+//! be it. At a kink, or where the answers are noise, they do not, and nothing is said of the tangent.
+
+use super::Group;
+use super::differences::Reason;
+use law::Operator;
+use serde::{Deserialize, Serialize};
+
+/// Sizes of the differences, relative to the increment of the gradients.
+const SIZES: [f64; 2] = [1e-2, 1e-3];
+/// A tangent is off by more than this share of its largest entry, and by so many times what the slopes
+/// differ among themselves.
+const OFF: f64 = 5e-3;
+const BEYOND: f64 = 4.0;
+/// Points that move most, and others that move, each as many.
+const POINTS: usize = 6;
+const MOVES: f64 = 1e-2;
+/// So many points at least, and this share of those where the stress has a derivative, make a law's tangents
+/// wrong.
+const SEVERAL: usize = 2;
+const SHARE: f64 = 0.3;
+/// After so many looks at which they were, or were right without a break, none is taken any more.
+const TWICE: u8 = 2;
+const OFTEN: u8 = 3;
+
+/// How far tangents are from the derivatives of the stresses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Deviation {
+    /// Points where they are off, and those at which stresses have derivatives.
+    pub points: [usize; 2],
+    /// Largest difference, relative to the largest entry of a point.
+    pub largest: f64,
+}
+
+impl Group {
+    /// Looks at the tangents of the law, if it is not known yet what they are worth. Says so when they have
+    /// turned out not to be derivatives: from then on they are differences. After a step that `failed` one
+    /// look is enough.
+    pub fn look(&mut self, period: (f64, f64), failed: bool) -> Option<Deviation> {
+        let is_known = self.tangents_are_constant
+            || !self.is_active
+            || self.origin.differences.is_some()
+            || self.origin.right >= OFTEN;
+        if is_known {
+            return None;
+        }
+        let found = self.deviation(period);
+        let Deviation {
+            points: [off, of], ..
+        } = found;
+        if off < SEVERAL || (off as f64) < SHARE * of as f64 {
+            if of > 0 && !failed {
+                self.origin.right += 1;
+            }
+            return None;
+        }
+        self.origin.right = 0;
+        self.origin.wrong += 1;
+        if !failed && self.origin.wrong < TWICE {
+            return None;
+        }
+        self.origin.differences = Some(Reason::Noticed(found));
+        Some(found)
+    }
+
+    /// How far the law's tangents are off at some points that move.
+    fn deviation(&self, period: (f64, f64)) -> Deviation {
+        let mut all = Deviation::default();
+        for point in self.moving_points() {
+            let Some(off) = self.off(point, period) else {
+                continue;
+            };
+            all.points[1] += 1;
+            if off > OFF {
+                all.points[0] += 1;
+                all.largest = all.largest.max(off);
+            }
+        }
+        all
+    }
+
+    /// Points that move most, and some of the others that move.
+    fn moving_points(&self) -> Vec<usize> {
+        let n = self.law.built.law.n_components();
+        let gradient = self.gradient();
+        let points = gradient.committed.chunks_exact(n);
+        let points = points.zip(gradient.trial.chunks_exact(n)).enumerate();
+        let mut moving: Vec<(f64, usize)> = points
+            .map(|(point, (start, end))| {
+                let moved = start.iter().zip(end).map(|(a, b)| (b - a).abs());
+                (moved.fold(0.0, f64::max), point)
+            })
+            .filter(|(moved, _)| moved.is_finite() && *moved > 0.0)
+            .collect();
+        moving.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let least = moving.first().map_or(0.0, |(most, _)| MOVES * most);
+        let n_moving = moving
+            .iter()
+            .take_while(|(moved, _)| *moved >= least)
+            .count();
+        let others = (POINTS.min(n_moving)..n_moving)
+            .step_by((n_moving.saturating_sub(POINTS)).div_ceil(POINTS).max(1));
+        let chosen = (0..POINTS.min(n_moving)).chain(others);
+        chosen.map(|number| moving[number].1).collect()
+    }
+
+    /// How far the law's tangent is off at a point, relative to its largest entry; `None` where the stress
+    /// has no derivative that could be told, or the law fails.
+    fn off(&self, point: usize, period: (f64, f64)) -> Option<f64> {
+        let n = self.law.built.law.n_components();
+        let gradient = self.gradient();
+        let of = n * point..n * (point + 1);
+        let (start, end) = (&gradient.committed[of.clone()], &gradient.trial[of]);
+        let (here, matrix) = self.answer(point, end, Operator::Consistent, period)?;
+        let moved = start.iter().zip(end).map(|(a, b)| (b - a).abs());
+        let reach = moved.fold(0.0, f64::max);
+        let largest = matrix.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        if largest <= 0.0 {
+            return None;
+        }
+        let mut worst = 0.0_f64;
+        let mut is_smooth = true;
+        for column in 0..n {
+            let at = |h: f64| {
+                let mut moved = end.to_vec();
+                moved[column] += h;
+                let apart = moved[column] - end[column];
+                Some((self.answer(point, &moved, Operator::None, period)?.0, apart))
+            };
+            let slopes = SIZES.map(|size| Some([at(size * reach)?, at(-size * reach)?]));
+            let [Some(wide), Some(narrow)] = slopes else {
+                return None;
+            };
+            let (mut off, mut spread) = (0.0_f64, 0.0_f64);
+            for row in 0..n {
+                let slope = |(flux, apart): &(Vec<f64>, f64)| (flux[row] - here[row]) / apart;
+                let middle = |[a, b]: &[(Vec<f64>, f64); 2]| 0.5 * (slope(a) + slope(b));
+                let [wide_middle, narrow_middle] = [&wide, &narrow].map(middle);
+                off = off.max((narrow_middle - matrix[row * n + column]).abs() / largest);
+                let sides = (slope(&narrow[0]) - slope(&narrow[1])).abs();
+                let sizes = (wide_middle - narrow_middle).abs();
+                spread = spread.max(sides.max(sizes) / largest);
+            }
+            if off > OFF && off > BEYOND * spread {
+                worst = worst.max(off);
+            } else if spread > OFF {
+                is_smooth = false;
+            }
+        }
+        (is_smooth || worst > OFF).then_some(worst)
+    }
+}
