@@ -14,7 +14,7 @@ mod varying;
 mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
-pub use look::Deviation;
+pub use look::{Deviation, Notice, Went};
 pub use tangent::Fault;
 
 use crate::element::Kinematics;

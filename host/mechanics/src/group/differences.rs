@@ -5,7 +5,7 @@
 //! the path that it is on, however its update is integrated. Where nothing moves the law's own tangent
 //! stands.
 
-use super::{Deviation, Field, Group};
+use super::{Field, Group};
 use crate::settings::Tangents;
 use law::{BatchFailure, BatchSuccess, End, Operator, Strided, Tangent};
 use serde::{Deserialize, Serialize};
@@ -22,18 +22,18 @@ const DIRECTION: [f64; 4] = [1.0, -0.6, 0.35, 0.8];
 const RIGHT: f64 = 1e-3;
 
 /// Why a group's tangents are differences.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
     /// The settings ask for it.
     Asked,
     /// The law says that its tangents are approximate, or that it has none.
     Declared,
     /// They were found not to be the derivatives of the stresses.
-    Noticed(Deviation),
+    Noticed,
 }
 
 /// Where a group's tangents come from, and what is known of those of its law.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     /// They are differences, for this reason.
     pub(super) differences: Option<Reason>,
@@ -51,14 +51,12 @@ impl Group {
     /// Takes up what the settings say of tangents, and what the law does.
     pub fn take_tangents(&mut self, wanted: Tangents, follows_derivative: bool) {
         let declared = self.law.built.law.formulation().tangent != Tangent::Consistent;
-        let noticed = self
-            .origin
-            .differences
-            .filter(|r| matches!(r, Reason::Noticed(_)));
+        let noticed = self.origin.differences;
+        let noticed = noticed.filter(|reason| *reason == Reason::Noticed);
         self.origin.differences = match wanted {
             _ if self.tangents_are_constant => None,
-            Tangents::Law => None,
             Tangents::Differences => Some(Reason::Asked),
+            Tangents::Law => None,
             Tangents::Auto if !follows_derivative => None,
             Tangents::Auto if declared => Some(Reason::Declared),
             Tangents::Auto => noticed,

@@ -5,9 +5,8 @@
 //! be it. At a kink, or where the answers are noise, they do not, and nothing is said of the tangent.
 
 use super::Group;
-use super::differences::Reason;
+use super::differences::{Origin, Reason};
 use law::Operator;
-use serde::{Deserialize, Serialize};
 
 /// Sizes of the differences, relative to the increment of the gradients.
 const SIZES: [f64; 2] = [1e-2, 1e-3];
@@ -27,7 +26,7 @@ const TWICE: u8 = 2;
 const OFTEN: u8 = 3;
 
 /// How far tangents are from the derivatives of the stresses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
     /// Points where they are off, and those at which stresses have derivatives.
     pub points: [usize; 2],
@@ -35,35 +34,63 @@ pub struct Deviation {
     pub largest: f64,
 }
 
+/// How a step went whose tangents are looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Went {
+    /// It took more iterations than consistent tangents mostly need.
+    Slowly,
+    /// It took so many that differences would have cost less.
+    Badly,
+    /// It found no equilibrium.
+    Wrong,
+}
+
+/// What has come out about a law's tangents.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Notice {
+    /// How far they are off.
+    pub deviation: Deviation,
+    /// From now on tangents are differences.
+    pub by_differences: bool,
+}
+
 impl Group {
-    /// Looks at the tangents of the law, if it is not known yet what they are worth. Says so when they have
-    /// turned out not to be derivatives: from then on they are differences. After a step that `failed` one
-    /// look is enough.
-    pub fn look(&mut self, period: (f64, f64), failed: bool) -> Option<Deviation> {
+    /// Looks at the tangents of the law after a step, if it is not known yet what they are worth. Says so
+    /// when they have turned out not to be derivatives, and again when differences take their place.
+    pub fn look(&mut self, period: (f64, f64), went: Went) -> Option<Notice> {
+        let Origin {
+            differences,
+            right,
+            wrong,
+        } = self.origin;
+        let is_noticed = wrong >= TWICE;
         let is_known = self.tangents_are_constant
             || !self.is_active
-            || self.origin.differences.is_some()
-            || self.origin.right >= OFTEN;
+            || differences.is_some()
+            || right >= OFTEN
+            || is_noticed && went == Went::Slowly;
         if is_known {
             return None;
         }
-        let found = self.deviation(period);
-        let Deviation {
-            points: [off, of], ..
-        } = found;
+        let deviation = self.deviation(period);
+        let [off, of] = deviation.points;
         if off < SEVERAL || (off as f64) < SHARE * of as f64 {
-            if of > 0 && !failed {
+            if of > 0 && went != Went::Wrong && !is_noticed {
                 self.origin.right += 1;
             }
             return None;
         }
         self.origin.right = 0;
-        self.origin.wrong += 1;
-        if !failed && self.origin.wrong < TWICE {
-            return None;
+        self.origin.wrong = wrong.saturating_add(1);
+        let is_again = self.origin.wrong >= TWICE;
+        let by_differences = went == Went::Wrong || went == Went::Badly && is_again;
+        if by_differences {
+            self.origin.differences = Some(Reason::Noticed);
         }
-        self.origin.differences = Some(Reason::Noticed(found));
-        Some(found)
+        (by_differences || is_again).then_some(Notice {
+            deviation,
+            by_differences,
+        })
     }
 
     /// How far the law's tangents are off at some points that move.

@@ -3,11 +3,13 @@
 
 use super::{Simulation, Warning, Watch};
 use crate::equilibrium::{Clock, StepFailure, StepSuccess};
-use crate::group::MadeBy;
+use crate::group::{MadeBy, Went};
 use crate::settings::Tangents;
 
-/// Iterations from which on a step is more than Newton's method should take.
+/// More iterations than consistent tangents mostly need; and so many that differences, with ten evaluations
+/// for each of the few iterations that they take, cost less.
 const MANY: usize = 6;
+const TOO_MANY: usize = 12;
 
 impl Simulation {
     /// Tells the groups of a phase where their tangents come from, and who watches, what is not from the
@@ -31,12 +33,15 @@ impl Simulation {
         (clock, lambda): (Clock, [f64; 2]),
         watch: &mut dyn Watch,
     ) {
-        let was_hard =
-            success.iterations.len() > MANY || success.tolerated > 0.0 || success.relaxed;
-        // What was committed on the way is not where the step began.
-        if was_hard && !success.was_motion {
-            self.look_at_tangents((clock, lambda), false, watch);
-        }
+        let went = match success.iterations.len() {
+            // What was committed on the way is not where the step began.
+            _ if success.was_motion => return,
+            _ if success.tolerated > 0.0 || success.relaxed => Went::Badly,
+            n if n > TOO_MANY => Went::Badly,
+            n if n > MANY => Went::Slowly,
+            _ => return,
+        };
+        self.look_at_tangents((clock, lambda), went, watch);
     }
 
     /// The same after a step that failed; says whether it is worth another attempt.
@@ -48,13 +53,13 @@ impl Simulation {
     ) -> bool {
         !failure.is_stop()
             && failure.defect().is_none()
-            && self.look_at_tangents(period, true, watch)
+            && self.look_at_tangents(period, Went::Wrong, watch)
     }
 
     fn look_at_tangents(
         &mut self,
         (clock, [from, to]): (Clock, [f64; 2]),
-        failed: bool,
+        went: Went,
         watch: &mut dyn Watch,
     ) -> bool {
         let settings = self.problem.settings;
@@ -64,15 +69,15 @@ impl Simulation {
         let period = (clock.at(from), clock.at(to) - clock.at(from));
         let mut is_new = false;
         for group in &mut self.groups {
-            let Some(deviation) = group.look(period, failed) else {
+            let Some(notice) = group.look(period, went) else {
                 continue;
             };
-            is_new = true;
+            is_new |= notice.by_differences;
             let law = group.law.built.law.description().id.clone();
             watch.warning(&Warning::NoDerivative {
                 group: group.name.clone(),
                 law,
-                deviation,
+                notice,
             });
         }
         is_new

@@ -2,7 +2,7 @@
 
 use crate::equilibrium::Open;
 use crate::error::Place;
-use crate::group::{Deviation, Parted, TakeOver};
+use crate::group::{Notice, Parted, TakeOver};
 use law::TimeDependence;
 use std::fmt;
 
@@ -15,14 +15,14 @@ pub enum Warning {
     OutOfBalance(String, f64),
     /// The tangents of a law are differences, since it calls its own approximate.
     Approximate(String),
-    /// Tangents are differences from now on, since those of the law are not the derivatives of its stresses.
+    /// The tangents of a law are not the derivatives of its stresses.
     NoDerivative {
         /// The group.
         group: String,
         /// The law.
         law: String,
-        /// By how much.
-        deviation: Deviation,
+        /// By how much, and what follows.
+        notice: Notice,
     },
     /// A law depends on the time, and a phase says none.
     NoTime {
@@ -123,20 +123,19 @@ impl fmt::Display for Warning {
                 "the tangents of law `{law}` are approximate: they are made by differences of its \
                  stresses instead"
             ),
-            Self::NoDerivative {
-                group,
-                law,
-                deviation:
-                    Deviation {
-                        points: [off, of],
-                        largest,
-                    },
-            } => write!(
+            Self::NoDerivative { group, law, notice } => write!(
                 f,
                 "group `{group}`: the tangents of law `{law}` are not the derivatives of its stresses, \
-                 by up to {:.1} % at {off} of {of} points that were looked at: from here on they are \
-                 made by differences (`tangents` in [solver] says otherwise)",
-                100.0 * largest
+                 by up to {:.1} % at {} of {} points that were looked at: {}",
+                100.0 * notice.deviation.largest,
+                notice.deviation.points[0],
+                notice.deviation.points[1],
+                if notice.by_differences {
+                    "from here on they are made by differences"
+                } else {
+                    "they are kept as long as steps take few iterations with them, and made by \
+                     differences otherwise"
+                }
             ),
             Self::NoTime { phase, law, by } => write!(
                 f,
