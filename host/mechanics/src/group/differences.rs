@@ -83,6 +83,7 @@ impl Group {
             && self.origin.differences.is_some()
             && let Some(sizes) = self.sizes()
         {
+            self.count(2 * sizes.len(), Operator::None);
             let wrong = self.wrong(&sizes, period, tangents);
             self.differentiate(&sizes, &wrong, period, tangents);
         }
@@ -90,7 +91,7 @@ impl Group {
     }
 
     /// Points whose own tangent is not what differences in one direction make it.
-    fn wrong(&mut self, sizes: &[f64], period: (f64, f64), tangents: &[f64]) -> Vec<bool> {
+    pub(super) fn wrong(&self, sizes: &[f64], period: (f64, f64), tangents: &[f64]) -> Vec<bool> {
         let n = self.law.built.law.n_components();
         let end = self.gradient().trial.clone();
         let all = vec![true; sizes.len()];
@@ -102,7 +103,6 @@ impl Group {
             }
             self.fluxes_at(&moved, &all, period)
         });
-        self.count(2 * sizes.len(), Operator::None);
         let fluxes = ahead.chunks_exact(n).zip(behind.chunks_exact(n));
         let points = fluxes.zip(tangents.chunks_exact(n * n)).zip(sizes);
         let is_wrong = |(((ahead, behind), matrix), size): (((&[f64], &[f64]), &[f64]), &f64)| {
@@ -119,7 +119,7 @@ impl Group {
     }
 
     /// Size of the differences at every point; `None` where nothing moves.
-    fn sizes(&self) -> Option<Vec<f64>> {
+    pub(super) fn sizes(&self) -> Option<Vec<f64>> {
         let n = self.law.built.law.n_components();
         let Field { committed, trial } = self.gradient();
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);

@@ -1,12 +1,13 @@
-//! Whether a law's tangents are the derivatives of its stresses: a few points, held against differences of
-//! the law's own answers about the increment that they went through last.
+//! Whether a law's tangents are the derivatives of its stresses: all points are tried in one direction, and a
+//! few of those where they do not fit are held against differences of the law's own answers about the
+//! increment that they went through last.
 //!
 //! Where both sides and two sizes of differences agree, the stress has a derivative, and the tangent has to
 //! be it. At a kink, or where the answers are noise, they do not, and nothing is said of the tangent.
 
 use super::Group;
 use super::differences::{Origin, Reason};
-use law::Operator;
+use law::{End, Operator, Strided};
 
 /// Sizes of the differences, relative to the increment of the gradients.
 const SIZES: [f64; 2] = [1e-2, 1e-3];
@@ -14,16 +15,16 @@ const SIZES: [f64; 2] = [1e-2, 1e-3];
 /// differ among themselves.
 const OFF: f64 = 5e-3;
 const BEYOND: f64 = 4.0;
-/// Points that move most, and others that move, each as many.
+/// Points that move most, and others, each as many, out of those that are suspected.
 const POINTS: usize = 6;
-const MOVES: f64 = 1e-2;
 /// So many points at least, and this share of those where the stress has a derivative, make a law's tangents
 /// wrong.
 const SEVERAL: usize = 2;
 const SHARE: f64 = 0.3;
-/// After so many looks at which they were, or were right without a break, none is taken any more.
+/// After so many looks at which they were wrong, or were right without a break, none is taken any more of
+/// steps that come to equilibrium.
 const TWICE: u8 = 2;
-const OFTEN: u8 = 3;
+const OFTEN: u8 = 8;
 
 /// How far tangents are from the derivatives of the stresses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,7 +68,7 @@ impl Group {
         let is_known = self.tangents_are_constant
             || !self.is_active
             || differences.is_some()
-            || right >= OFTEN
+            || right >= OFTEN && went != Went::Wrong
             || is_noticed && went == Went::Slowly;
         if is_known {
             return None;
@@ -75,7 +76,7 @@ impl Group {
         let deviation = self.deviation(period);
         let [off, of] = deviation.points;
         if off < SEVERAL || (off as f64) < SHARE * of as f64 {
-            if of > 0 && went != Went::Wrong && !is_noticed {
+            if went != Went::Wrong && !is_noticed {
                 self.origin.right += 1;
             }
             return None;
@@ -93,10 +94,11 @@ impl Group {
         })
     }
 
-    /// How far the law's tangents are off at some points that move.
+    /// How far the law's tangents are off at some of the points where they are not what the stresses do in
+    /// one direction.
     fn deviation(&self, period: (f64, f64)) -> Deviation {
         let mut all = Deviation::default();
-        for point in self.moving_points() {
+        for point in self.suspects(period).unwrap_or_default() {
             let Some(off) = self.off(point, period) else {
                 continue;
             };
@@ -109,13 +111,28 @@ impl Group {
         all
     }
 
-    /// Points that move most, and some of the others that move.
-    fn moving_points(&self) -> Vec<usize> {
+    /// Points whose tangents are not what the stresses do in one direction: those that move most, and some
+    /// of the others. `None` where nothing can be said.
+    fn suspects(&self, period: (f64, f64)) -> Option<Vec<usize>> {
         let n = self.law.built.law.n_components();
         let gradient = self.gradient();
+        if gradient.trial.len() != gradient.committed.len() {
+            return None;
+        }
+        let sizes = self.sizes()?;
+        let mut tangents = vec![0.0; sizes.len() * n * n];
+        let end = End {
+            flux: (&mut vec![0.0; sizes.len() * n], Strided::rows(n)),
+            state: &mut vec![0.0; self.internal.committed.len()],
+            operator: &mut tangents,
+        };
+        let at = (&gradient.trial[..], None);
+        self.carry(at, Operator::Consistent, period, end).ok()?;
+        let wrong = self.wrong(&sizes, period, &tangents);
         let points = gradient.committed.chunks_exact(n);
         let points = points.zip(gradient.trial.chunks_exact(n)).enumerate();
         let mut moving: Vec<(f64, usize)> = points
+            .filter(|(point, _)| wrong[*point])
             .map(|(point, (start, end))| {
                 let moved = start.iter().zip(end).map(|(a, b)| (b - a).abs());
                 (moved.fold(0.0, f64::max), point)
@@ -123,15 +140,10 @@ impl Group {
             .filter(|(moved, _)| moved.is_finite() && *moved > 0.0)
             .collect();
         moving.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let least = moving.first().map_or(0.0, |(most, _)| MOVES * most);
-        let n_moving = moving
-            .iter()
-            .take_while(|(moved, _)| *moved >= least)
-            .count();
-        let others = (POINTS.min(n_moving)..n_moving)
-            .step_by((n_moving.saturating_sub(POINTS)).div_ceil(POINTS).max(1));
-        let chosen = (0..POINTS.min(n_moving)).chain(others);
-        chosen.map(|number| moving[number].1).collect()
+        let first = POINTS.min(moving.len());
+        let apart = (moving.len() - first).div_ceil(POINTS).max(1);
+        let chosen = (0..first).chain((first..moving.len()).step_by(apart));
+        Some(chosen.map(|number| moving[number].1).collect())
     }
 
     /// How far the law's tangent is off at a point, relative to its largest entry; `None` where the stress
