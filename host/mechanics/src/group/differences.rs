@@ -103,19 +103,19 @@ impl Group {
             }
             self.fluxes_at(&moved, &all, period)
         });
-        let fluxes = ahead.chunks_exact(n).zip(behind.chunks_exact(n));
-        let points = fluxes.zip(tangents.chunks_exact(n * n)).zip(sizes);
-        let is_wrong = |(((ahead, behind), matrix), size): (((&[f64], &[f64]), &[f64]), &f64)| {
+        let is_wrong = |point: usize| {
+            let matrix = &tangents[point * n * n..][..n * n];
             let largest = matrix.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let off = |i: usize| {
                 let row = matrix[i * n..][..n].iter().zip(DIRECTION);
                 let expected: f64 = row.map(|(c, d)| c * d).sum();
-                ((ahead[i] - behind[i]) / (2.0 * size) - expected).abs()
+                let apart = 2.0 * sizes[point];
+                ((ahead[n * point + i] - behind[n * point + i]) / apart - expected).abs()
             };
             // Nor is it right where the law fails nearby.
             !(0..n).all(|i| off(i) <= RIGHT * largest)
         };
-        points.map(is_wrong).collect()
+        (0..sizes.len()).map(is_wrong).collect()
     }
 
     /// Size of the differences at every point; `None` where nothing moves.

@@ -55,6 +55,26 @@ pub struct Notice {
     pub by_differences: bool,
 }
 
+impl std::fmt::Display for Notice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Deviation {
+            points: [off, of],
+            largest,
+        } = self.deviation;
+        write!(
+            f,
+            "by up to {:.1} % at {off} of {of} points that were looked at: ",
+            100.0 * largest
+        )?;
+        f.write_str(if self.by_differences {
+            "from here on they are made by differences"
+        } else {
+            "they are kept as long as steps take few iterations with them, and made by differences \
+             otherwise"
+        })
+    }
+}
+
 impl Group {
     /// Looks at the tangents of the law after a step, if it is not known yet what they are worth. Says so
     /// when they have turned out not to be derivatives, and again when differences take their place.
