@@ -53,7 +53,8 @@ for name, operator in (("none", None), ("consistent", "consistent")):
     spare = law.integrate(end, start, tangent=operator)[2]
 
     def call():
-        law.integrate(end, start, tangent=operator, out=spare, copy=False)
+        global spare
+        spare = law.integrate(end, start, tangent=operator, out=spare, copy=False)[2]
 
     median, least = (1e9 * seconds / N_POINTS for seconds in cpu_seconds(call))
     print(f"mepi/plastic\t{name}\t{median:.2f}\t{least:.2f}")

@@ -199,13 +199,16 @@ fn weights_are_no_information() {
                 [outcome.interval(p).unwrap().ends, linear].concat()
             })
         };
-        let (plain, weighed) = (of(""), of("weight = 25.0"));
-        for (a, b) in plain.iter().flatten().zip(weighed.iter().flatten()) {
-            let (a, b) = (a.unwrap(), b.unwrap());
-            assert!(
-                (a / b - 1.0).abs() < 1e-5,
-                "{variance}: {plain:?} {weighed:?}"
-            );
+        let plain = of("");
+        for weight in ["25.0", "1e-14"] {
+            let weighed = of(&format!("weight = {weight}"));
+            for (a, b) in plain.iter().flatten().zip(weighed.iter().flatten()) {
+                let (a, b) = (a.unwrap(), b.unwrap());
+                assert!(
+                    (a / b - 1.0).abs() < 1e-5,
+                    "{variance}, {weight}: {plain:?} {weighed:?}"
+                );
+            }
         }
     }
     // Two tests of one strength, one of which counts nine times: (9² + 1)/(9 + 1)² of one's variance, not 1/10.
@@ -255,6 +258,110 @@ fn exact_points_determine_no_more_than_is_computed_exactly() {
         assert!(low < truth && truth < high, "{low} {high}");
         // Known to 1e-9 of the largest value, not to the last bit.
         assert!((high - low) / truth > 1e-10, "{low} {high}");
+    }
+}
+
+/// A parameter on its bound has no error: a prediction with it says that it takes the bound for known.
+#[test]
+fn a_bound_that_a_prediction_takes_for_known_is_said() {
+    let boxes = Boxes::new(0.3);
+    let tests = [
+        test("fitted", 100.0, "100", ""),
+        test("other", 200.0, "200", "predict = true"),
+        test("start", 200.0, "200_start", "predict = true"),
+    ];
+    let free = "shear_stiffness = {}\nfriction_angle = { start = 20.0, max = 25.0 }";
+    let outcome = boxes.fit(free, &tests, "profiles = false");
+    let says_of = |test: &str| {
+        let bound = "depends on `friction_angle`, which ended on a bound";
+        let mut words = outcome.words.iter();
+        words.any(|word| word.starts_with(&format!("{test}:")) && word.contains(bound))
+    };
+    // The elastic stage does not depend on it.
+    assert!(
+        says_of("other") && !says_of("start"),
+        "{:#?}",
+        outcome.words
+    );
+    let tests = &tests[..2];
+    let free = "shear_stiffness = {}\nfriction_angle = {}";
+    does_not_say(
+        &boxes.fit(free, tests, "profiles = false"),
+        "ended on a bound",
+    );
+}
+
+/// Two names of one parameter with `laws`: what a driver stands for says which of them it has.
+#[test]
+fn two_names_with_laws_are_parted_by_what_a_driver_stands_for() {
+    let boxes = Boxes::new(0.3);
+    let free = "upper = { parameter = \"shear_stiffness\", laws = [\"sand\"] }\n\
+                lower = { parameter = \"shear_stiffness\", laws = [\"clay\"] }";
+    let tests = |of: [&str; 2]| {
+        [
+            test("sand", 100.0, "100", of[0]),
+            test("clay", 200.0, "200", of[1]),
+        ]
+        .concat()
+    };
+    let fit = |of: [&str; 2]| {
+        let file = boxes.place.path().join("calibration.toml");
+        let text = format!(
+            "starts = 1\nprofiles = false\n[free]\n{free}\n{}",
+            tests(of)
+        );
+        fs::write(&file, text).unwrap();
+        run(&file, &[])
+    };
+    let refused = fit(["", ""]).unwrap_err();
+    assert!(
+        refused.to_string().contains("has two names in test `sand`"),
+        "{refused}"
+    );
+    assert!(refused.help().unwrap().contains("stands_for"));
+    let outcome = fit(["stands_for = \"sand\"", "stands_for = \"clay\""]).unwrap();
+    for value in &outcome.values {
+        assert!((value / 1e5 - 1.0).abs() < 0.02, "{:?}", outcome.values);
+    }
+    // Each curve moves its own: 24 columns of one, then of the other.
+    let jacobian = &outcome.stages[0].jacobian;
+    let norm = |first: usize, parameter: usize| jacobian.view((first, parameter), (24, 1)).norm();
+    assert!(norm(0, 0) > 1.0 && norm(0, 1) < 1e-12 && norm(24, 0) < 1e-12 && norm(24, 1) > 1.0);
+    let unknown = fit(["stands_for = \"sant\"", "stands_for = \"clay\""]).unwrap_err();
+    assert!(
+        unknown
+            .to_string()
+            .contains("no name belongs to the law `sant`"),
+        "{unknown}"
+    );
+    assert!(unknown.help().unwrap().contains("sand"));
+}
+
+/// A column pressed down, computed to a hundredth.
+const ROUGH: &str = "analysis = \"plane_strain\"\nmesh.columns = [{ n = 1, to = 1.0 }]\nmesh.rows = [{ n = 1, to = 1.0 }]\n\
+    mesh.lines = { base = { y = 0.0 }, top = { y = 1.0 } }\nmesh.region = [{ group = \"soil\" }]\n\
+    supports = [{ line = \"base\", fixed = [\"x\", \"y\"] }]\nsolver.force_tolerance = 1e-2\n\
+    [laws.soil]\nlaw = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.0 }\n\
+    [groups.soil]\nformulation = \"solid\"\nlaw = \"soil\"\n\
+    [[phase]]\nname = \"load\"\nincrements = 2\npressure = [{ line = \"top\", value = 100.0 }]\n\
+    [probes]\np = { line = \"base\", quantity = \"reaction_y\" }\nw = { line = \"top\", quantity = \"displacement_y\", scale = -1000.0 }\n";
+
+/// Each test is known to its own exactness: a rough case beside a driver makes nothing of that less known.
+#[test]
+fn a_rough_case_blinds_no_other_test() {
+    let boxes = Boxes::new(0.3);
+    fs::write(boxes.place.path().join("rough.toml"), ROUGH).unwrap();
+    write_points(boxes.place.path(), "rough.csv", &[(2.0, 20.0), (8.0, 80.0)]);
+    let rough = "[[test]]\nname = \"rough\"\ncase = \"rough.toml\"\npredict = true\n[[test.curve]]\nx = \"w\"\ny = \"p\"\n\
+                 noise = 1.0\nmeasured = { file = \"rough.csv\", x = \"x\", y = \"y\" }\n";
+    let free = "shear_stiffness = {}\ncohesion = {}\nfriction_angle = {}";
+    let fitted = || vec![test("one", 100.0, "100", ""), test("two", 200.0, "200", "")];
+    let more = "profiles = false\ndifference = 1e-4";
+    let alone = boxes.fit(free, &fitted(), more);
+    let beside = boxes.fit(free, &[fitted(), vec![rough.to_owned()]].concat(), more);
+    for parameter in 0..3 {
+        let [alone, beside] = [&alone, &beside].map(|o| o.interval(parameter).unwrap().ends);
+        assert_eq!(alone, beside);
     }
 }
 

@@ -29,18 +29,28 @@ use text::Source;
 
 /// Carries out a calibration file in memory.
 fn run(file: &Path, settings: &[&str]) -> Result<Outcome, Error> {
+    let folder = TempDir::new().unwrap();
+    run_in(file, settings, folder.path(), law::Stop::never())
+}
+
+/// The same, with what it keeps in a folder, until it is stopped.
+fn run_in(
+    file: &Path,
+    settings: &[&str],
+    folder: &Path,
+    stop: law::Stop,
+) -> Result<Outcome, Error> {
     let settings: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
     let calibration = Calibration::load_with(file, &settings)?.remove(0);
-    let folder = TempDir::new().unwrap();
     let options = Options {
         variant: None,
         settings,
         out: None,
-        stop: law::Stop::never(),
+        stop,
         opener: law::Opener::default(),
         anew: false,
     };
-    calibrate(&calibration, folder.path(), &options, &mut |_| ())
+    calibrate(&calibration, folder, &options, &mut |_| ())
 }
 
 /// Two columns that a driver computes, at places along the first.

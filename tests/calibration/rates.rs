@@ -1,8 +1,9 @@
 //! Derivatives from the rates that a law gives.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::{computed, run, write_points};
+use crate::{computed, run, run_in, write_points};
 use std::fs;
+use std::path::Path;
 use tempfile::TempDir;
 
 /// A joint with dilatancy at constant stiffness, sheared into slip, unloaded in shear by a led traction:
@@ -92,6 +93,84 @@ fn rates_of_a_law_are_the_derivatives_of_its_curves() {
         }
     }
     println!("largest error {worst:.1e}");
+}
+
+/// A parameter is fitted or said to be unseen, however much more the curves answer to another one: counted in widths of a
+/// range that is far too wide, cohesion moves them by 10⁵ times what the stiffness does.
+#[test]
+fn a_column_beside_a_much_larger_one_is_fitted() {
+    let place = TempDir::new().unwrap();
+    fs::write(place.path().join("driver.toml"), driver(VALUES)).unwrap();
+    let x: Vec<f64> = (0..12).map(|k| 0.04 + 0.08 * f64::from(k)).collect();
+    let there = first_segment(VALUES, "traction_t", &x)
+        .into_iter()
+        .enumerate();
+    let disturbed = there.map(|(k, y)| y + if k % 2 == 0 { 0.1 } else { -0.1 });
+    let points: Vec<(f64, f64)> = x.iter().copied().zip(disturbed).collect();
+    write_points(place.path(), "joint.csv", &points);
+    let text = "starts = 1\nprofiles = false\n[free]\nshear_stiffness = { start = 1.2e5 }\n\
+                cohesion = { start = 2.0, min = 0.0, max = 1e9, scale = \"linear\" }\n\
+                [[test]]\nname = \"joint\"\ndriver = \"driver.toml\"\n[[test.curve]]\nx = \"u_t\"\n\
+                y = \"traction_t\"\nsegment = 1\nnoise = 0.1\nmeasured = { file = \"joint.csv\", x = \"x\", y = \"y\" }\n";
+    let file = place.path().join("calibration.toml");
+    fs::write(&file, text).unwrap();
+    let outcome = run(&file, &[]).unwrap();
+    assert!(outcome.tests[0].is_by_law);
+    for (parameter, truth) in [(0, VALUES[0]), (1, VALUES[2])] {
+        let found = outcome.values[parameter];
+        assert!(
+            (found / truth - 1.0).abs() < 0.05,
+            "{found}: {:?}",
+            outcome.words
+        );
+        assert!(outcome.linear_interval(parameter).is_some());
+    }
+}
+
+/// A stopped calibration leaves its derivatives to the next one, which may count the parameters in another way.
+#[test]
+fn derivatives_that_were_kept_do_not_depend_on_how_parameters_are_counted() {
+    let place = TempDir::new().unwrap();
+    fs::write(place.path().join("driver.toml"), driver(VALUES)).unwrap();
+    let x: Vec<f64> = (0..12).map(|k| 0.04 + 0.08 * f64::from(k)).collect();
+    let there = first_segment(VALUES, "traction_t", &x).into_iter();
+    let points: Vec<(f64, f64)> = x.iter().copied().zip(there.map(|y| 1.1 * y)).collect();
+    write_points(place.path(), "joint.csv", &points);
+    let file = place.path().join("calibration.toml");
+    let text = |free: &str| {
+        format!(
+            "starts = 1\nprofiles = false\n[free]\n{free}\n[[test]]\nname = \"joint\"\ndriver = \"driver.toml\"\n\
+             [[test.curve]]\nx = \"u_t\"\ny = \"traction_t\"\nsegment = 1\nnoise = 1.0\n\
+             measured = {{ file = \"joint.csv\", x = \"x\", y = \"y\" }}\n"
+        )
+    };
+    // Powers of two: the start is counted, and found again, to the last bit.
+    let free = |end: f64| {
+        format!(
+            "shear_stiffness = {{ start = 65536.0, min = 32768.0, max = {end:?}, scale = \"linear\" }}"
+        )
+    };
+    let [fresh, stopped] = ["fresh", "stopped"].map(|name| place.path().join(name));
+    let kept = stopped.join("computations.jsonl");
+    let first_derivatives = {
+        let kept = kept.clone();
+        move || fs::read_to_string(&kept).is_ok_and(|text| text.contains("\"by\":[0]"))
+    };
+    fs::write(&file, text(&free(98_304.0))).unwrap();
+    let stop = law::Stop::asked_by(first_derivatives, |_| ());
+    let ended = run_in(&file, &[], &stopped, stop).unwrap_err();
+    assert!(ended.kind() == input::Kind::Stopped, "{ended}");
+    fs::write(&file, text(&free(557_056.0))).unwrap();
+    let way = |folder: &Path| {
+        let outcome = run_in(&file, &[], folder, law::Stop::never()).unwrap();
+        let stage = &outcome.stages[0];
+        let steps = stage.landings[0].iterations;
+        (steps, stage.best.clone(), outcome.computations)
+    };
+    // As if it had never been counted in another way.
+    let expected = way(&fresh);
+    assert!(expected.0 > 1, "{expected:?}");
+    assert_eq!(way(&stopped), expected);
 }
 
 /// A column along the first segment.

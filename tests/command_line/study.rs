@@ -514,6 +514,41 @@ fn a_run_that_is_done_outlives_its_library() {
     assert_eq!(kept, history);
 }
 
+/// One library beside another: a run that was planned, and not carried out before the library was built once more, is
+/// not put beside those of the earlier one.
+#[test]
+fn a_planned_run_is_refused_beside_runs_of_an_earlier_library() {
+    let place = place(STUDY);
+    let name = format!("{DLL_PREFIX}coulomb_joint{DLL_SUFFIX}");
+    let ours = std::env::current_exe().unwrap().with_file_name(&name);
+    let library = std::fs::read(ours).unwrap();
+    let build = |more: &[u8]| {
+        place.write(&format!("laws/{name}"), [library.as_slice(), more].concat());
+    };
+    build(b"");
+    place.write("case.toml", format!("law_path = [\"laws\"]\n{CASE}"));
+    done(&study(&place, &["--run", "1"]));
+    done(&study(&place, &["--run", "3"]));
+    build(b"\0");
+    for more in [&["--run", "2"][..], &["--run", "3", "--anew"]] {
+        let refused = study(&place, more);
+        assert_eq!(refused.code, Some(BAD_INPUT), "{}", refused.stderr);
+        let says = "out/00001: it holds a run of another case, with other values, libraries";
+        assert!(refused.says(says), "{}", refused.stderr);
+    }
+    let status = column(&table(&place), "status").join(" ");
+    assert_eq!(status, "done planned done planned planned planned");
+    // With the earlier one the study goes on; one whose runs are all of the other is of that.
+    build(b"");
+    done(&study(&place, &["--run", "2"]));
+    done(&study(&place, &["--anew", "--plan"]));
+    done(&study(&place, &["--run", "1"]));
+    build(b"\0");
+    done(&study(&place, &["--run", "1", "--anew"]));
+    done(&study(&place, &["--run", "2"]));
+    done(&study(&place, &[]));
+}
+
 /// A law that crashes the process is a row like any other.
 #[test]
 fn a_law_that_crashes_is_a_row_and_the_others_go_on() {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import multiprocessing
 import threading
@@ -174,6 +175,8 @@ def test_what_is_handed_out_cannot_be_spoilt() -> None:
     for array in (tractions, tangents, state.flux, state.gradient, state.internal):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
+        with pytest.raises(ValueError, match="WRITEABLE"):
+            array.setflags(write=True)
     # Nothing was copied on the way out.
     assert np.shares_memory(tractions, state.flux)
 
@@ -190,6 +193,51 @@ def test_memory_is_used_again() -> None:
         law.integrate(slips(100), state, out=state)
     with pytest.raises(ValueError, match="out: a state of other points"):
         law.integrate(slips(100), start, out=law.initial(3, flux=[-100.0, 0.0]))
+
+
+def test_a_state_that_was_given_as_out_is_none_any_more() -> None:
+    law = pilum.Law("coulomb_joint", **COULOMB)
+    start = law.initial(3, flux=[-100.0, 0.0])
+    _, _, old = law.integrate(slips(3), start)
+    _, _, state = law.integrate(2.0 * slips(3), start, out=old)
+    for use in (
+        lambda: old.flux,
+        lambda: old.gradient,
+        lambda: old["plastic_slip"],
+        lambda: law.integrate(slips(3), old),
+        lambda: law.integrate(slips(3), start, out=old),
+    ):
+        with pytest.raises(ValueError, match="given as `out`"):
+            use()
+    assert "none any more" in repr(old) and state.flux.shape == (3, 2)
+    # An increment that comes to no end spoils it, and it may serve another one.
+    _, _, spare = law.integrate(slips(3), start)
+    with pytest.raises(pilum.LawError):
+        law.integrate(np.full((3, 2), np.nan), start, out=spare)
+    with pytest.raises(ValueError, match="came to no end"):
+        law.integrate(slips(3), spare)
+    law.integrate(slips(3), start, out=spare)
+    # What was handed out of it is no start of an increment into it.
+    _, _, spare = law.integrate(slips(3), start)
+    with pytest.raises(ValueError, match="its memory is in use"):
+        law.integrate(spare.gradient, start, out=spare)
+
+
+def test_laws_and_states_travel_between_processes() -> None:
+    import pickle
+
+    law = pilum.Law("mepi", **TABLE_4)
+    start = law.initial(4, flux=[-100.0, 0.0])
+    tractions, _, state = law.integrate(slips(4), start)
+    other, kept = pickle.loads(pickle.dumps((law, state)))
+    assert (other.id, other.hypothesis, other.parameters) == (law.id, law.hypothesis, law.parameters)
+    assert (kept.time, kept.increment) == (state.time, state.increment)
+    np.testing.assert_array_equal(kept.flux, tractions)
+    np.testing.assert_array_equal(other.integrate(2 * slips(4), kept)[0], law.integrate(2 * slips(4), state)[0])
+    elastic = pilum.Law("elastic", hypothesis="3d", parameters={"young_modulus": 1e4}, poisson_ratio=0.3)
+    again = pickle.loads(pickle.dumps(elastic))
+    assert again.hypothesis == "3d" and again.parameters == elastic.parameters
+    assert copy.copy(law) is law and copy.deepcopy(law) is law
 
 
 def test_the_lock_is_released() -> None:
@@ -294,6 +342,7 @@ def test_a_shear_zone_and_initial_variables() -> None:
         (lambda: pilum.Law("elastic", young_modulus=1.0, poisson_ratio=0.3), "several hypotheses"),
         (lambda: pilum.Law("mepi", hypothesis="3d", **TABLE_4), "is made for interface_2d"),
         (lambda: pilum.Law("coulomb_joint", **COULOMB, initial={"slip": 1.0}), "no internal variable `slip`"),
+        (lambda: pilum.Law("mepi", parameters=TABLE_4, k_n=2.0), "`k_n` is given twice"),
         (lambda: pilum.Law("elastic", adapter="umat", library="none.so"), "there is no file"),
     ],
 )
@@ -308,7 +357,7 @@ def test_hints_are_attributes() -> None:
     with pytest.raises(pilum.InputError) as caught:
         pilum.Law("mepi", **{**TABLE_4, "mu_c": 1.0})
     assert "mu_c0" in str(caught.value.hint)
-    assert str(caught.value.text).startswith("mu_c")
+    assert str(caught.value.text).startswith("mu_c") and caught.value.key == "mu_c"
     with pytest.raises(pilum.LawError, match="no library with law `mepy`") as missing:
         pilum.Law("mepy")
     assert "mepi" in str(missing.value.hint)
@@ -323,7 +372,7 @@ def test_a_law_that_cannot_follow_says_where() -> None:
     with pytest.raises(pilum.LawError) as caught:
         law.integrate(jumps, law.initial(10, flux=[-100.0, 0.0]))
     error = caught.value
-    assert (error.law, error.point) == ("mepi", 7)
+    assert (error.law, error.point) == ("mepi", 7) and "point 7 (from 0)" in str(error)
     assert error.outcome in {"argument", "domain", "numeric"} and error.cause
 
 
@@ -334,7 +383,11 @@ def test_shapes_are_checked() -> None:
         (np.zeros((4, 3)), r"found shape \(4, 3\), expected \(n, 2\)"),
         (np.zeros((5, 2)), "found 5 rows, expected 4"),
         (np.zeros((2, 2, 2)), "expected an array of shape"),
-        ([["a", "b"]], "gradient"),
+        ([["a", "b"]], "gradient: found an array of <U1, expected numbers"),
+        ([["1", "2"]] * 4, "gradient: found an array of <U1, expected numbers"),
+        ([[None, 1.0]] * 4, "gradient: found an array of object, expected numbers"),
+        (np.zeros((4, 2), dtype=complex), "gradient: found an array of complex128"),
+        (np.ma.masked_equal([[0.0, 1.0]] * 4, 1.0), "gradient: some values of the array are masked"),
     ]:
         with pytest.raises(ValueError, match=says):
             law.integrate(wrong, start)
@@ -342,6 +395,15 @@ def test_shapes_are_checked() -> None:
         law.integrate(slips(4), start, dt=-1.0)
     with pytest.raises(ValueError, match="tangent"):
         law.integrate(slips(4), start, tangent="secant")
+    for wrong in (np.zeros((4, 3)), np.zeros((3, 2))):
+        with pytest.raises(ValueError, match="positions: found"):
+            law.integrate(slips(4), start, positions=wrong)
+    assert law.integrate(np.ma.masked_equal(slips(4), -1.0), start)[0].shape == (4, 2)
+    plane, whole = (
+        pilum.Law("elastic", hypothesis=kind, young_modulus=1e4, poisson_ratio=0.3) for kind in ("plane_strain", "3d")
+    )
+    with pytest.raises(ValueError, match="of another hypothesis"):
+        whole.integrate(np.zeros((2, 6)), plane.initial(2))
     other = pilum.Law("mepi", **TABLE_4)
     with pytest.raises(ValueError, match="one of another law"):
         law.integrate(slips(4), other.initial(4, flux=[-100.0, 0.0]))
@@ -440,10 +502,12 @@ def test_a_start_whose_memory_is_written_to_is_refused() -> None:
     first, other = law.initial(n), law.initial(n)
     seen: list[str] = []
 
+    held = [first]
+
     def onto_first() -> None:
         for _ in range(5):
             try:
-                law.integrate(strain, other, out=first)
+                held[0] = law.integrate(strain, other, out=held[0])[2]
             except ValueError as error:
                 seen.append(str(error))
 
@@ -451,8 +515,8 @@ def test_a_start_whose_memory_is_written_to_is_refused() -> None:
     thread.start()
     while thread.is_alive():
         try:
-            law.integrate(strain[:n], first, tangent=None)
+            law.integrate(strain[:n], held[0], tangent=None)
         except ValueError as error:
             seen.append(str(error))
     thread.join()
-    assert all("in use" in message for message in seen), seen
+    assert all("in use" in message or "given as `out`" in message for message in seen), seen

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import os
+import pickle
 import signal
 import threading
 import time
@@ -199,7 +200,7 @@ def test_another_problem_takes_no_state() -> None:
     simulation.step()
     state = simulation.state()
     assert state is not None
-    with pytest.raises(pilum.InputError, match="not that of this mesh"):
+    with pytest.raises(pilum.InputError, match="another mesh"):
         pilum.Problem(CHAMBER).start().go_to(state)
 
 
@@ -241,7 +242,17 @@ def test_ctrl_c_leaves_a_simulation_that_goes_on() -> None:
         (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0, 0, 0, 0]]}), r"expected whole numbers of shape \(m, 8\)"),
         (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0.0] * 6]}), "expected whole numbers"),
         (lambda: pilum.Mesh([[0.0, 0.0]], {'a"': [[0] * 6]}), "neither quotes"),
+        (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[-3] * 6]}), "node -3 is none of 0 to 0"),
+        (lambda: pilum.Mesh([["0", "1"]], {}), "nodes: found an array of <U1, expected numbers"),
+        (lambda: pilum.Mesh(np.ma.masked_less([[0.0, -1.0]], 0.0), {}), "nodes: some values of the array are masked"),
+        (lambda: pilum.Mesh([[0.0, 1.0], [0.0]], {}), "nodes: "),
         (lambda: pilum.Mesh.grid([0.0], [0.0, 1.0]), "two values that rise"),
+        (lambda: pilum.Mesh.grid(["a", "b"], [0.0, 1.0]), "x: found an array of <U1, expected numbers"),
+        (lambda: pilum.Mesh.grid([0.0, math.inf], [0.0, 1.0]), "two values that rise"),
+        (lambda: pilum.Mesh.grid([0.0, 1.0], [0.0, 1.0], lambda x, y: None), r"`group` gives None at \(0.5, 0.5\)"),
+        (lambda: slice_mesh().name_line("odd", lambda x, y: [True, False]), "expected true or false for each"),
+        (lambda: slice_mesh().name_line("odd", lambda x, y: x), "`where` gives float64 of shape"),
+        (lambda: slice_mesh().name_line("odd", 1.0), "expected a condition, a function"),
         (lambda: slice_mesh().name_line("none", lambda x, y: x > 9.0), "no such edge"),
         (lambda: pilum.Problem(CHAMBER, slice_mesh()), "goes with a case that is a dictionary"),
     ],
@@ -275,3 +286,154 @@ def test_a_law_that_crashes_says_where(tmp_path: Path) -> None:
     assert (error.group, error.law) == ("shaft", "fixture")
     assert error.element == 1 and error.point is not None and error.position is not None
     assert "signal 6" in str(error.cause) or "crashed" in str(error.cause), error.cause
+
+
+def block() -> tuple[dict, pilum.Mesh]:
+    """A block on a joint with friction, which is pressed, and pulled harder than it holds: 100 tan 30° of 80 kN/m."""
+    mesh = pilum.Mesh.grid([0.0, 1.0], [0.0, 0.5, 1.0])
+    for name, y in (("bottom", 0.0), ("joint", 0.5), ("top", 1.0)):
+        mesh.name_line(name, lambda _x, at, y=y: at == y)
+    case = dict(
+        analysis="plane_strain",
+        laws=dict(
+            block=dict(law="elastic", parameters=dict(young_modulus=1e7, poisson_ratio=0.2)),
+            joint=pilum.Law("coulomb_joint", **{**JOINT, "normal_stiffness": 1e6, "shear_stiffness": 5e5}),
+        ),
+        groups=dict(
+            ground=dict(formulation="solid", law="block"),
+            joint=dict(formulation="zero_thickness", line="joint", law="joint"),
+        ),
+        supports=[dict(line="bottom", fixed=["x", "y"])],
+        phase=[
+            dict(name="press", increments=1, pressure=[dict(line="top", value=100.0)]),
+            dict(name="pull", increments=10, force=[dict(line="top", x=80.0)]),
+        ],
+    )
+    return case, mesh
+
+
+def test_after_an_increment_that_fails_the_state_says_where_it_is() -> None:
+    simulation = pilum.Problem(*block()).start()
+    whole = None
+    with pytest.raises(pilum.NoEquilibriumError) as caught:
+        for told in simulation:
+            whole = simulation.state()
+            assert whole is not None and whole.reached == whole.increment == told["increment"]
+            assert "next" not in repr(whole)
+    assert whole is not None
+    state = simulation.state()
+    assert state is not None and state.increment == whole.increment == caught.value.increment - 1
+    # The last state in equilibrium is within the increment, and both say so: 57.7 of 80 kN/m at the latest.
+    assert state.increment < state.reached == pytest.approx(caught.value.reached, rel=1e-9)
+    assert simulation.time == pytest.approx(1.0 + state.reached / 10.0, rel=1e-12)
+    part = f"{state.reached - state.increment:.4f}"
+    assert f"increment {state.increment} and {part} of the next" in repr(state)
+    simulation.go_to(whole)
+    again = simulation.state()
+    assert again is not None and again.reached == whole.increment
+
+
+def test_a_first_increment_that_fails_leaves_nothing_to_copy() -> None:
+    case, mesh = block()
+    case["phase"][1].update(increments=1)
+    simulation = pilum.Problem(case, mesh).start()
+    with pytest.raises(pilum.NoEquilibriumError):
+        simulation.run()
+    assert simulation.state() is None
+    with pytest.raises(pilum.InputError, match="no state that a copy could go on from"):
+        simulation.copy()
+
+
+def test_a_state_goes_to_the_same_problem_alone() -> None:
+    simulation = pilum.Problem(slice_case(), slice_mesh()).start()
+    simulation.step()
+    simulation.step()
+    state = simulation.state()
+    assert state is not None
+    softer, wider, faster, longer = slice_case(), slice_case(), slice_case(), slice_case()
+    softer["laws"]["sand"]["parameters"]["young_modulus"] = 4e4
+    wider["supports"][1]["fixed"] = ["r"]
+    faster["phase"][0]["displacement"] = [dict(line="head", z=-3e-3)]
+    longer["phase"].append(dict(name="on", increments=5, displacement=[dict(line="head", z=-3e-3)]))
+    moved = slice_mesh()
+    moved.nodes[:, 0] *= 1.0 + 1e-9
+    for case, mesh, says in [
+        (softer, slice_mesh(), "another group `ground`: another law, other parameters"),
+        (wider, slice_mesh(), "other supports"),
+        (faster, slice_mesh(), "another phase `push`"),
+        (slice_case(), moved, "another mesh"),
+    ]:
+        with pytest.raises(pilum.InputError, match=says):
+            pilum.Problem(case, mesh).start().go_to(state)
+    # What comes after it may differ, and how it is sought.
+    other = pilum.Problem({**longer, "solver": dict(max_iterations=50)}, slice_mesh()).start()
+    other.go_to(state)
+    np.testing.assert_allclose(pushed(other)[:8], pushed(simulation), rtol=1e-9)
+
+
+def test_rows_of_results_are_those_of_the_mesh() -> None:
+    """A node that no cell has, in the midst, is left out: what stands behind it says which row it was."""
+    mesh = slice_mesh()
+    at = 7
+    nodes = np.insert(mesh.nodes, at, [0.4, 0.1], axis=0)
+    moved = {
+        kind: {name: [part + (part >= at) for part in parts] for name, parts in getattr(mesh, kind).items()}
+        for kind in ("groups", "lines")
+    }
+    plain = pilum.Problem(slice_case(), mesh).start()
+    assert plain.mesh_rows.tolist() == list(range(len(mesh.nodes)))
+    with pytest.warns(pilum.PilumWarning, match="1 node belongs to no triangle or quad"):
+        simulation = pilum.Problem(slice_case(), pilum.Mesh(nodes, **moved)).start()
+    rows = simulation.mesh_rows
+    assert at not in rows and len(rows) == len(nodes) - 1
+    np.testing.assert_array_equal(nodes[rows], simulation.nodes)
+    simulation.step()
+    plain.step()
+    of_mesh = np.full(nodes.shape, np.nan)
+    of_mesh[rows] = simulation.displacements
+    np.testing.assert_allclose(np.delete(of_mesh, at, axis=0), plain.displacements, rtol=1e-9, atol=1e-15)
+    # Both sides of an interface are nodes of their own.
+    case, mesh = block()
+    rows = pilum.Problem(case, mesh).start().mesh_rows
+    assert rows[: len(mesh.nodes)].tolist() == list(range(len(mesh.nodes)))
+    assert rows[len(mesh.nodes) :].tolist() == [-1] * 3
+
+
+def test_a_simulation_is_not_pickled_and_its_problem_is() -> None:
+    problem = pickle.loads(pickle.dumps(pilum.Problem(slice_case(), slice_mesh())))
+    simulation = problem.start()
+    simulation.step()
+    with pytest.raises(TypeError, match="a simulation cannot be pickled: its laws are at work.*pickle its Problem"):
+        pickle.dumps(simulation)
+    with pytest.raises(TypeError, match="a state of a simulation cannot be pickled"):
+        pickle.dumps(simulation.state())
+    mesh = slice_mesh()
+    again = pickle.loads(pickle.dumps(mesh))
+    np.testing.assert_array_equal(again.nodes, mesh.nodes)
+    assert list(again.lines) == list(mesh.lines) and list(again.groups) == list(mesh.groups)
+
+
+def test_a_mesh_of_arrays_is_counted_as_arrays_are() -> None:
+    mesh = slice_mesh()
+    mesh.nodes[3, 0] = -1.0
+    with pytest.raises(pilum.InputError, match=r"the mesh: node 3 \(from 0\) is at x = -1, across the axis"):
+        pilum.Problem(slice_case(), mesh).start()
+    mesh = slice_mesh()
+    mesh.groups["ground"][0][1, 4] = mesh.groups["ground"][0][1, 0]
+    with pytest.raises(pilum.InputError, match=r"the mesh: cell 1 \(from 0\) of `ground` has the node \d+ \(from 0\) twice"):
+        pilum.Problem(slice_case(), mesh).start()
+    mesh = slice_mesh()
+    mesh.groups["ground"][0] = np.vstack([mesh.groups["ground"][0], mesh.groups["ground"][0][:1]])
+    with pytest.raises(pilum.InputError, match=r"cell 0 \(from 0\) of `ground` and cell 3 \(from 0\) of `ground` have the same"):
+        pilum.Problem(slice_case(), mesh).start()
+
+
+def test_a_law_of_another_hypothesis_is_refused(here: Path) -> None:
+    case = slice_case()
+    case["laws"]["sand"] = pilum.Law("elastic", hypothesis="plane_strain", young_modulus=5e4, poisson_ratio=0.3)
+    problem = pilum.Problem(case, slice_mesh())
+    for take in (problem.start, problem.run):
+        with pytest.raises(pilum.InputError, match="`sand` was made for the hypothesis `plane_strain`.*`axisymmetric`"):
+            take()
+    case["laws"]["sand"] = pilum.Law("elastic", hypothesis="axisymmetric", young_modulus=5e4, poisson_ratio=0.3)
+    assert pilum.Problem(case, slice_mesh()).start().step() is not None

@@ -23,6 +23,14 @@ CHAMBER = pilum.cases() / "chamber_mesh1"
 SHORT = {"phase.loading.increments": 10}
 SOIL = dict(law="elastic", parameters=dict(young_modulus=1e4, poisson_ratio=0.3))
 
+# Soil that flows in time.
+SLOW = dict(
+    law="mohr_coulomb",
+    parameters=dict(
+        young_modulus=1e4, poisson_ratio=0.3, cohesion=50.0, friction_angle=30.0, dilatancy_angle=0.0, relaxation_time=1.0
+    ),
+)
+
 # A column of soil on its base, loaded from above.
 COLUMN = dict(
     analysis="plane_strain",
@@ -256,7 +264,32 @@ def test_mistakes_in_dictionaries_show_what_was_written(here: Path, change: dict
     with pytest.raises(pilum.InputError, match=says) as caught:
         pilum.run({**COLUMN, **change}, results="none")
     assert caught.value.file is None and caught.value.text
+    key = caught.value.key
+    assert key is not None and f"\n  in: {key}\n" in str(caught.value)
     assert not (here / "none").exists()
+
+
+def test_mistakes_in_settings_have_their_key(here: Path) -> None:
+    for case in (COLUMN, CHAMBER):
+        phase = "load" if case is COLUMN else "loading"
+        with pytest.raises(pilum.InputError, match="unknown key `incremens`") as caught:
+            pilum.run(case, set={f"phase.{phase}.incremens": 3}, results="none")
+        error = caught.value
+        assert (error.file, error.line, error.key) == (None, None, f"phase.{phase}.incremens")
+        assert "--set" not in str(error)
+    broken = {**COLUMN, "phase": [{**COLUMN["phase"][0], "pressure": [dict(line="top", valeu=1.0)]}]}
+    with pytest.raises(pilum.InputError) as caught:
+        pilum.run(broken, results="none")
+    assert caught.value.key == "phase.load.pressure.1.valeu"
+
+
+def test_warnings_name_keys_of_what_nobody_wrote_as_a_file(here: Path) -> None:
+    """A law that depends on time in a phase without one."""
+    slow = {**COLUMN, "laws": {"soil": SLOW}}
+    with pytest.warns(pilum.PilumWarning) as caught:
+        pilum.run(slow)
+    messages = [str(warning.message) for warning in caught]
+    assert any(message.startswith("`phase.load.name`: ") for message in messages), messages
 
 
 def test_values_of_no_file_are_refused() -> None:
@@ -264,6 +297,29 @@ def test_values_of_no_file_are_refused() -> None:
         pilum.run({**COLUMN, "analysis": object()})
     with pytest.raises(pilum.InputError, match="said to the Problem"):
         pilum.run(pilum.Problem(COLUMN), variant="a")
+
+
+def test_checkpoints_are_some_time_after_one_another(here: Path) -> None:
+    for wrong in (-1.0, float("nan")):
+        with pytest.raises(pilum.InputError, match="checkpoints: expected the seconds between them, or None"):
+            pilum.run(COLUMN, checkpoints=wrong)
+    assert pilum.run(COLUMN, checkpoints=None).status == "done"
+
+
+def test_results_travel_between_processes(here: Path) -> None:
+    import pickle
+
+    results = pilum.run(COLUMN, set={"output.fields": "phases"})
+    early = pickle.loads(pickle.dumps(results))
+    history = results.history
+    late = pickle.loads(pickle.dumps(results))
+    for again in (early, late):
+        assert again.folder == results.folder and again.status == "done"
+        np.testing.assert_array_equal(again.history["w"], history["w"])
+    table = pickle.loads(pickle.dumps(history))
+    assert isinstance(table, pilum.Table) and table.names == history.names and len(table) == len(history)
+    field = pickle.loads(pickle.dumps(results.fields[-1]))
+    np.testing.assert_array_equal(field["displacement"], results.fields[-1]["displacement"])
 
 
 def test_no_equilibrium_says_where(here: Path) -> None:

@@ -177,6 +177,7 @@ pub(crate) fn study(folder: &std::path::Path) {
         is_grid: true,
         texts: String::new(),
         identity: String::new(),
+        files: std::collections::BTreeMap::new(),
         parameters: vec![
             parameter("phi", "laws.a.phi"),
             parameter("law", "laws.a.law"),

@@ -168,6 +168,10 @@ pub struct TestInput {
     /// The variant of that file.
     #[schemars(with = "Option<String>")]
     pub variant: Option<Spanned<String>>,
+    /// Drivers: the table under `[laws]` of cases that its law is the one of. Names with `laws` belong to it if that is
+    /// among them; to every driver with such a parameter, if left out.
+    #[schemars(with = "Option<String>")]
+    pub stands_for: Option<Spanned<String>>,
     /// The test is predicted with what the others give, not fitted.
     #[serde(default)]
     pub predict: bool,

@@ -1,6 +1,8 @@
 //! What can go wrong from a file to a result, by who has to act; the program's exit code follows.
 
 use law::Stopped;
+use mechanics::NoEquilibrium;
+use mechanics::equilibrium::{Iterations, Reason, Singularity};
 use text::{InputError, add_hint};
 use thiserror::Error;
 
@@ -76,66 +78,51 @@ impl From<point::Error> for Error {
 
 impl From<mechanics::Error> for Error {
     fn from(error: mechanics::Error) -> Self {
-        let hint = hint(&error).map(str::to_owned);
+        let hint = hint(&error);
         let error = Box::new(error);
         Self::Simulation { error, hint }
     }
 }
 
 /// What the user could do about an error of a simulation, whatever it is of.
-fn hint(error: &mechanics::Error) -> Option<&'static str> {
-    match error {
+fn hint(error: &mechanics::Error) -> Option<String> {
+    let hint = match error {
         mechanics::Error::CannotStart(failure)
             if failure.failure.outcome == abi::status::Outcome::CutStep =>
         {
-            Some("a law must accept a zero increment when its phase begins")
+            "a law must accept a zero increment when its phase begins"
         }
-        mechanics::Error::Singular { .. } => Some("a part of the model is not supported"),
-        mechanics::Error::NoEquilibrium(failure)
-            if matches!(
-                failure.failure.reason,
-                mechanics::equilibrium::Reason::Unmet(
-                    mechanics::equilibrium::Iterations::Newton(
-                        _,
-                        Some(mechanics::equilibrium::Motion::Relaxation)
-                    ),
-                    _
-                )
-            ) =>
-        {
-            Some(
-                "`control = \"creep\"` in [solver] follows the motion to the next equilibrium as a path, and may get \
-                 on; `convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, \
-                 where displacements drift; results up to the last whole increment in equilibrium are written, the last \
-                 equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
-            )
-        }
-        mechanics::Error::NoEquilibrium(failure)
-            if matches!(
-                failure.failure.reason,
-                mechanics::equilibrium::Reason::Singular(Some((
-                    mechanics::equilibrium::Singularity::Limit,
-                    _
-                )))
-            ) =>
-        {
-            Some(
-                "if this is no limit of what is carried, `control = \"creep\"` in [solver] may lead on, where it is \
-                 not set yet: it goes on from singular tangents; results up to the last whole increment in \
-                 equilibrium are written, the last equilibrium itself is `stopped_at` in summary.json; log.jsonl \
-                 lists the iterations",
-            )
-        }
-        mechanics::Error::NoEquilibrium(_) => Some(
-            "results up to the last whole increment in equilibrium are written, the last \
-             equilibrium itself is `stopped_at` in summary.json; log.jsonl lists the iterations",
-        ),
-        mechanics::Error::Interrupted { .. } => Some("go on with --resume"),
+        mechanics::Error::Singular { .. } => "a part of the model is not supported",
+        mechanics::Error::NoEquilibrium(none) => return Some(after_no_equilibrium(none)),
+        mechanics::Error::Interrupted { .. } => "go on with --resume",
         mechanics::Error::Stopped { .. } => {
-            Some("the last equilibrium is `stopped_at` in summary.json; go on with --resume")
+            "the last equilibrium is `stopped_at` in summary.json; go on with --resume"
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+/// What may lead on where no equilibrium was found and was not tried yet, and what is written of the run.
+fn after_no_equilibrium(none: &NoEquilibrium) -> String {
+    let creep = none.control.relaxes().then_some(
+        "`control = \"creep\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on",
+    );
+    let ways = match &none.failure.reason {
+        Reason::Unmet(Iterations::Newton(_, Some(_)), _) => vec![
+            creep.unwrap_or("other increments may lead on"),
+            "`convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, where \
+             displacements drift",
+        ],
+        Reason::Singular(Some((Singularity::Limit, _))) => creep.into_iter().collect(),
+        _ => Vec::new(),
+    };
+    let written = "results up to the last whole increment in equilibrium are written, the last equilibrium itself is \
+                   `stopped_at` in summary.json; log.jsonl lists the iterations";
+    ways.into_iter()
+        .chain([written])
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 /// Who has to act.

@@ -9,6 +9,7 @@ mod kind;
 use crate::Error;
 use crate::case::CaseFile;
 use crate::mesh::MeshFile;
+use assemble::Assembled;
 use contents::Contents;
 use indexmap::IndexMap;
 use law::hexadecimal_sha256;
@@ -71,10 +72,25 @@ pub(crate) fn mesh(
         Some(content) => Cow::Borrowed(&content[..]),
         None => Cow::Owned(file::read_mesh(&path).map_err(unreadable)?),
     };
-    let wrong = |fault: String| unreadable(io::Error::new(io::ErrorKind::InvalidData, fault));
-    let contents = Contents::read(&bytes).map_err(wrong)?;
+    let is_of_arrays = input.content.is_some();
+    let wrong = |fault: String| {
+        if is_of_arrays {
+            return Error::usage(format!("the mesh: {fault}"));
+        }
+        unreadable(io::Error::new(io::ErrorKind::InvalidData, fault))
+    };
+    let contents = if is_of_arrays {
+        Contents::read_arrays(&bytes)
+    } else {
+        Contents::read(&bytes)
+    };
+    let contents = contents.map_err(wrong)?;
     let wanted = wanted(source, file, scale, &contents, &path)?;
-    let (mut mesh, notes) = assemble::assemble(&contents, &wanted).map_err(wrong)?;
+    let Assembled {
+        mut mesh,
+        kept,
+        notes,
+    } = assemble::assemble(&contents, &wanted).map_err(wrong)?;
     for _ in 0..input.divisions {
         mesh = mesh.refined();
     }
@@ -82,6 +98,7 @@ pub(crate) fn mesh(
     let notes = notes.into_iter().map(|note| format!("{name}: {note}"));
     let file = MeshFile {
         notes: notes.collect(),
+        kept,
         sha256: hexadecimal_sha256(&bytes),
         path: name,
     };
@@ -110,7 +127,7 @@ pub fn whole(bytes: &[u8]) -> Result<Mesh, String> {
         analysis: Analysis::PlaneStrain,
         scale: 1.0,
     };
-    assemble::assemble(&contents, &wanted).map(|(mesh, _)| mesh)
+    assemble::assemble(&contents, &wanted).map(|assembled| assembled.mesh)
 }
 
 /// What the case takes from the file, which must be there.

@@ -27,6 +27,9 @@ pub struct MeshFile {
     pub sha256: String,
     /// What the user should know of it.
     pub notes: Vec<String>,
+    /// Of the mesh's first nodes the place in the file, from 0: of all that elements of the case have. Those that
+    /// divisions and interfaces make come behind them.
+    pub kept: Vec<usize>,
 }
 
 /// The mesh of a case.

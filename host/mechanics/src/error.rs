@@ -4,6 +4,7 @@ use crate::equilibrium::StepFailure;
 use crate::group::PointFailure;
 use crate::model::BuildError;
 use crate::problem::{Axis, Refusal};
+use crate::settings::Control;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -71,6 +72,8 @@ pub struct NoEquilibrium {
     pub reached: f64,
     /// Increments of the phase.
     pub of: usize,
+    /// What led its steps at last.
+    pub control: Control,
     /// The last attempt: reason, both criteria with residuals, the point that failed.
     pub failure: StepFailure,
     /// The displacement that ran away, if one did.
@@ -153,6 +156,7 @@ impl fmt::Display for NoEquilibrium {
             of,
             failure,
             runaway,
+            ..
         } = self;
         write!(
             f,

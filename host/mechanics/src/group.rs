@@ -3,6 +3,7 @@
 //! An increment starts from the committed state; every iteration computes the trial state anew
 //! from it, so a failed increment leaves nothing behind.
 
+mod aside;
 mod carry;
 mod differences;
 mod layer;
@@ -20,6 +21,7 @@ pub use tangent::Fault;
 use crate::element::Kinematics;
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
+pub use aside::Aside;
 use law::Law;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
 use layer::Layer;

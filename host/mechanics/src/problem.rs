@@ -5,11 +5,13 @@ pub(crate) mod check;
 pub(crate) mod constraints;
 mod ground;
 mod held;
+mod likeness;
 pub(crate) mod plausible;
 mod refusal;
 pub(crate) mod tension;
 
 pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
+pub use likeness::{Likeness, Unlike};
 pub use refusal::{Cause, Item, JointFault, Key, Refusal};
 
 use crate::mesh::Mesh;

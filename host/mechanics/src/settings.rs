@@ -112,7 +112,7 @@ impl Default for Settings {
             line_search: true,
             equations: Equations::Auto,
             relaxation: true,
-            control: Control::Load,
+            control: Control::Auto,
         }
     }
 }
@@ -195,8 +195,11 @@ pub enum Convergence {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Control {
-    /// The load factor, increment by increment.
+    /// The load factor, increment by increment; where two steps within an increment find no equilibrium,
+    /// creep, unless `relaxation` is off.
     #[default]
+    Auto,
+    /// The load factor alone: a phase ends where it leads no further.
     Load,
     /// The load factor; where it leads no further, the arc length of the path of equilibrium, on
     /// which the load may fall and rise again.
@@ -204,6 +207,13 @@ pub enum Control {
     /// The load factor; where Newton iterations stand still, the path of a body that creeps to its next
     /// equilibrium, committed step by step.
     Creep,
+}
+
+impl Control {
+    /// Whether a standstill is left by viscous relaxation.
+    pub fn relaxes(self) -> bool {
+        matches!(self, Self::Auto | Self::Load)
+    }
 }
 
 /// How the equations of a phase are set up.

@@ -3,8 +3,10 @@
 
 mod beyond;
 mod complete;
+mod creeping;
 mod history;
 mod loads;
+mod neighbour;
 mod path;
 mod phase;
 mod record;
@@ -16,13 +18,14 @@ mod ties;
 mod warning;
 mod watch;
 
+pub use neighbour::Neighbour;
 pub use record::PhaseRecord;
 pub use state::State;
 pub use warning::Warning;
 pub use watch::{Increment, Part, Watch, When};
 
 use crate::assembly::Tie;
-use crate::equilibrium::{Clock, Guess, Newton, Reuse, Runaway, StepFailure, StepSuccess};
+use crate::equilibrium::{Clock, Guess, Newton, Reason, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
 use crate::ground::{Acting, Loading};
 use crate::group::Group;
@@ -31,6 +34,7 @@ use crate::model::Model;
 use crate::problem::{Axis, Material, Problem};
 use crate::settings::{Control, Method, Settings};
 use beyond::Beyond;
+use creeping::{Lead, Turn};
 use history::History;
 use law::{Moment, Stop, custody};
 use path::PathEnd;
@@ -238,6 +242,11 @@ impl Simulation {
         })
     }
 
+    /// Whether a phase has begun: its loads and laws are in force, even if no increment of it is done.
+    pub fn is_on_its_way(&self) -> bool {
+        self.under_way.is_some() || self.done > 0
+    }
+
     /// The time of a phase that is under way.
     fn clock(&self, phase: usize) -> Clock {
         Clock {
@@ -419,7 +428,7 @@ impl Simulation {
         let looked_at = watch.looks_at(when, &self.groups);
         let lambda = phase.course.lambda;
         self.complete(phase, looked_at.as_ref())
-            .map_err(|reason| no_equilibrium(&place, lambda, n, reason.into(), None))?;
+            .map_err(|reason| self.incomplete(phase, &place, lambda, reason))?;
         let restored = custody::restore().map_err(|why| Error::Process {
             place: place.clone(),
             why,
@@ -467,9 +476,10 @@ impl Simulation {
             place.increment as f64 / n as f64
         };
         let mut done = Progress::default();
+        let mut lead = Lead::new(&settings, phase.course.creeps);
         while phase.course.lambda < target {
             if phase.course.lambda >= phase.course.loads.leg[1] {
-                self.turn(place, n, phase)?;
+                self.turn(place, phase)?;
             }
             let target = target.min(phase.course.loads.leg[1]);
             let (start, step) = (phase.course.lambda, phase.course.step);
@@ -481,7 +491,7 @@ impl Simulation {
             };
             let length = end - start;
             let guess = phase.course.history.guess(length);
-            let attempt = self.attempt(phase, [start, end], guess);
+            let attempt = self.attempt(phase, lead.control, [start, end], guess);
             match self.without_leap(attempt, phase, length) {
                 Ok(success) => {
                     let period = (self.clock(phase.number), [start, end]);
@@ -490,9 +500,13 @@ impl Simulation {
                         phase.record.relaxed += 1;
                         // The phase's end says how many there were.
                         if phase.record.relaxed == 1 {
-                            watch.warning(&Warning::Relaxed(place.clone()));
+                            let by_creep = (lead.control != Control::Creep)
+                                .then(|| self.neighbour(phase, &success, [start, end]))
+                                .flatten();
+                            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
                         }
                     }
+                    phase.course.creeps = lead.goes_on(&settings, success.iterations.len());
                     // A motion takes many iterations, and steps of any length.
                     if success.was_motion || success.iterations.len() as f64 <= easy {
                         phase.course.step = (REGROWTH * step).min(1.0 / n as f64);
@@ -514,16 +528,24 @@ impl Simulation {
                     go_on(watch.cut_back(place, end, step, &failure.reason))?;
                     let follows = settings.control == Control::ArcLength
                         && phase.course.history.latest().is_some();
+                    let is_small = step < smallest.max(PATIENCE / n as f64);
+                    let turn = lead.turn(&failure, step < smallest);
                     if failure.defect().is_some() {
-                        return Err(self.cannot_go_on(place, start, n, failure));
-                    } else if follows && step < smallest.max(PATIENCE / n as f64) {
+                        return Err(self.cannot_go_on(phase, place, start, failure));
+                    } else if follows && is_small {
                         let goal = [n as f64, target];
                         let end = self.follow_path(place, goal, phase, watch, &mut done)?;
                         if let PathEnd::Stopped(failure, highest) = end {
-                            return Err(self.cannot_go_on(place, highest, n, *failure));
+                            return Err(self.cannot_go_on(phase, place, highest, *failure));
+                        }
+                    } else if turn == Some(Turn::ToCreep) {
+                        phase.course.step = 1.0 / n as f64;
+                        if phase.record.crept_from.is_none() {
+                            phase.record.crept_from = Some(place.increment);
+                            watch.warning(&Warning::Creeps(place.clone()));
                         }
                     } else if step < smallest {
-                        return Err(self.cannot_go_on(place, start, n, failure));
+                        return Err(self.cannot_go_on(phase, place, start, failure));
                     }
                 }
             }
@@ -532,10 +554,10 @@ impl Simulation {
     }
 
     /// Goes on to the next leg of the phase's course, from a complete state.
-    fn turn(&mut self, place: &Place, n: usize, phase: &mut UnderWay) -> Result<(), Error> {
+    fn turn(&mut self, place: &Place, phase: &mut UnderWay) -> Result<(), Error> {
         let lambda = phase.course.lambda;
         self.complete(phase, None)
-            .map_err(|reason| no_equilibrium(place, lambda, n, reason.into(), None))?;
+            .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
         if self.next_leg(phase.number, &mut phase.course)
             && let Some(domain) = &mut phase.equations.domain
         {
@@ -596,7 +618,13 @@ impl Simulation {
     }
 
     /// The error of a phase that ends at load factor λ.
-    fn cannot_go_on(&self, place: &Place, lambda: f64, n: usize, failure: StepFailure) -> Error {
+    fn cannot_go_on(
+        &self,
+        phase: &UnderWay,
+        place: &Place,
+        lambda: f64,
+        failure: StepFailure,
+    ) -> Error {
         if let Some(defect) = failure.defect() {
             return Error::Law {
                 place: place.clone(),
@@ -617,7 +645,39 @@ impl Simulation {
             };
         }
         let runaway = failure.runaway.map(|runaway| self.runaway_at(runaway));
-        no_equilibrium(place, lambda, n, failure, runaway)
+        Error::NoEquilibrium(Box::new(NoEquilibrium {
+            runaway,
+            ..self.stopped_at(phase, place, lambda, failure)
+        }))
+    }
+
+    /// No equilibrium of a phase beyond load factor λ.
+    fn stopped_at(
+        &self,
+        phase: &UnderWay,
+        place: &Place,
+        lambda: f64,
+        failure: StepFailure,
+    ) -> NoEquilibrium {
+        let of = self.problem.phases[phase.number].increments;
+        NoEquilibrium {
+            place: place.clone(),
+            reached: lambda * of as f64,
+            of,
+            control: if phase.record.crept_from.is_some() {
+                Control::Creep
+            } else {
+                self.problem.settings.control
+            },
+            failure,
+            runaway: None,
+        }
+    }
+
+    /// The same where a step is found not to be complete.
+    fn incomplete(&self, phase: &UnderWay, place: &Place, lambda: f64, reason: Reason) -> Error {
+        let none = self.stopped_at(phase, place, lambda, reason.into());
+        Error::NoEquilibrium(Box::new(none))
     }
 
     /// Where a displacement ran away.
@@ -644,10 +704,14 @@ impl Simulation {
     fn attempt(
         &mut self,
         phase: &mut UnderWay,
+        control: Control,
         [from, to]: [f64; 2],
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
-        let settings = self.settings();
+        let settings = Settings {
+            control,
+            ..self.settings()
+        };
         let clock = self.clock(phase.number);
         let equations = &mut phase.equations;
         let mut newton = Newton::new(
@@ -675,20 +739,4 @@ fn go_on(flow: ControlFlow<()>) -> Result<(), Error> {
 fn stopped(place: &Place) -> Error {
     let place = place.clone();
     Error::Stopped { place }
-}
-
-fn no_equilibrium(
-    place: &Place,
-    lambda: f64,
-    n: usize,
-    failure: StepFailure,
-    runaway: Option<RunawayAt>,
-) -> Error {
-    Error::NoEquilibrium(Box::new(NoEquilibrium {
-        place: place.clone(),
-        reached: lambda * n as f64,
-        of: n,
-        failure,
-        runaway,
-    }))
 }

@@ -53,11 +53,13 @@ class Error(Exception):
     cause: str | None = None
     """Why, in the words of the law, or of the iterations."""
     file: str | None = None
-    """The file that is wrong; None where it was a dictionary."""
+    """The file that is wrong; None where it was a dictionary, or `set`."""
     line: int | None = None
     """The line of it, from 1."""
     column: int | None = None
     """The column of it, from 1."""
+    key: str | None = None
+    """Of a dictionary, or of `set`: the key that is wrong, as `set` has it; entries of lists by their `name`, or from 1."""
     text: str | None = None
     """What stands there."""
 
@@ -74,6 +76,8 @@ class Error(Exception):
         lines = [self.message]
         if self.file is not None:
             lines[0] = f"{self.file}:{self.line}:{self.column}: {self.message}"
+        if self.key and not (self.text or "").startswith(self.key):
+            lines.append(f"  in: {self.key}")
         if self.text:
             lines.append(f"  at: {self.text}")
         if self.hint:

@@ -38,7 +38,7 @@ class Mesh:
         groups: Mapping[str, Any],
         lines: Mapping[str, Any] | None = None,
     ) -> None:
-        self.nodes: NDArray[np.float64] = np.asarray(nodes, dtype=np.float64)
+        self.nodes: NDArray[np.float64] = _numbers("nodes", nodes)
         if self.nodes.ndim != 2 or self.nodes.shape[1] not in (2, 3):
             raise InputError(f"nodes: found shape {self.nodes.shape}, expected (n, 2)")
         self.groups = {name: self._cells(name, cells, _SOLIDS) for name, cells in groups.items()}
@@ -52,7 +52,7 @@ class Mesh:
             parts = [cells]
         found = []
         for part in parts:
-            array = np.asarray(part)
+            array = _array(f"`{name}`", part)
             if array.ndim == 1 and 1 in kinds:
                 array = array.reshape(-1, 1)
             if array.ndim != 2 or array.shape[1] not in kinds or array.dtype.kind not in "iu":
@@ -62,9 +62,8 @@ class Mesh:
                     f"shape {wanted}"
                 )
             if array.size and not (0 <= array.min() and array.max() < len(self.nodes)):
-                raise InputError(
-                    f"`{name}`: node {array.max()} is none of 0 to {len(self.nodes) - 1}"
-                )
+                node = array.min() if array.min() < 0 else array.max()
+                raise InputError(f"`{name}`: node {node} is none of 0 to {len(self.nodes) - 1}")
             found.append(array.astype(np.int64))
         return found
 
@@ -79,9 +78,10 @@ class Mesh:
 
         `group` is the name of all cells, or gives it by the coordinates of a cell's middle.
         """
-        across, up = (np.asarray(values, dtype=np.float64) for values in (x, y))
+        across, up = _numbers("x", x), _numbers("y", y)
         for values in (across, up):
-            if values.ndim != 1 or len(values) < 2 or not np.all(np.diff(values) > 0):
+            rises = values.ndim == 1 and len(values) > 1 and np.all(np.diff(values) > 0)
+            if not (rises and np.all(np.isfinite(values))):
                 raise InputError("a grid needs two values that rise in x, and two in y")
         fine = [np.insert(v, range(1, len(v)), (v[1:] + v[:-1]) / 2) for v in (across, up)]
         n, m = len(fine[0]), len(fine[1])
@@ -97,6 +97,9 @@ class Mesh:
             return cls(nodes, {group: cells})
         middles = nodes[cells[:, :4]].mean(axis=1)
         names = [group(*middle) for middle in middles]
+        for middle, name in zip(middles, names):
+            if not isinstance(name, str):
+                raise InputError(f"`group` gives {name!r} at {tuple(middle.tolist())}, expected a name")
         chosen = {name: np.array([other == name for other in names]) for name in names}
         return cls(nodes, {name: cells[mask] for name, mask in chosen.items()})
 
@@ -137,8 +140,10 @@ class Mesh:
     def name_line(self, name: str, where: Callable[[Any, Any], Any]) -> None:
         """Names a line after the edges all of whose three nodes fulfil a condition on their coordinates.
 
-        `mesh.name_line("top", lambda x, y: y == 1.0)`; `where` takes arrays.
+        `mesh.name_line("top", lambda x, y: y == 1.0)`; `where` takes arrays, and gives as many of true and false.
         """
+        if not callable(where):
+            raise InputError(f"line `{name}`: expected a condition, a function of x and y")
         found = [
             part[:, _EDGES[part.shape[1]]].reshape(-1, 3)
             for parts in self.groups.values()
@@ -146,7 +151,16 @@ class Mesh:
         ]
         edges = np.concatenate(found) if found else np.empty((0, 3), dtype=np.int64)
         at = self.nodes[edges]
-        chosen = edges[np.all(where(at[..., 0], at[..., 1]), axis=1)]
+        fulfilled = np.asarray(where(at[..., 0], at[..., 1]))
+        if fulfilled.ndim == 0:
+            fulfilled = np.broadcast_to(fulfilled, edges.shape)
+        if fulfilled.shape != edges.shape or fulfilled.dtype.kind != "b":
+            raise InputError(
+                f"line `{name}`: `where` gives {fulfilled.dtype} of shape {fulfilled.shape} of coordinates of shape "
+                f"{edges.shape}, expected true or false for each",
+                hint="conditions on arrays go together with & and |, each in parentheses",
+            )
+        chosen = edges[np.all(fulfilled, axis=1)]
         if not len(chosen):
             raise InputError(f"line `{name}`: there is no such edge")
         _, first = np.unique(chosen[:, 2], return_index=True)
@@ -185,6 +199,24 @@ class Mesh:
         groups = ", ".join(f"{name} ({_count(parts)})" for name, parts in self.groups.items())
         lines = ", ".join(f"{name} ({_count(parts)})" for name, parts in self.lines.items())
         return f"<pilum.Mesh: {len(self.nodes)} nodes; groups {groups}; lines {lines}>"
+
+
+def _array(name: str, values: Any) -> NDArray[Any]:
+    """An array; what is masked is no value."""
+    if np.ma.is_masked(values):
+        raise InputError(f"{name}: some values of the array are masked", hint="`filled` gives them some")
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def _numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Numbers; texts and objects are none, though NumPy makes some of them."""
+    array = _array(name, values)
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"{name}: found an array of {array.dtype}, expected numbers")
+    return array.astype(np.float64)
 
 
 def _dimension(n_nodes: int) -> int:

@@ -4,7 +4,7 @@ use law::Strided;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyMemoryView};
 
 /// An array of points, one a row, that is read where it lies: in rows or in columns.
 pub(crate) struct Rows<'py> {
@@ -18,17 +18,12 @@ impl<'py> Rows<'py> {
     /// # Errors
     /// `ValueError` that names the argument.
     pub(crate) fn of(written: &Bound<'py, PyAny>, name: &str, n_columns: usize) -> PyResult<Self> {
-        let py = written.py();
+        refuse_masked(written, name)?;
         let direct = written.cast::<PyArray2<f64>>().ok();
         let array = if let Some(array) = direct.filter(|array| array.is_contiguous()) {
             array.clone()
         } else {
-            let numpy = py.import("numpy")?;
-            let options = PyDict::new(py);
-            options.set_item("dtype", "float64")?;
-            let array = numpy.call_method("ascontiguousarray", (written,), Some(&options));
-            let array = array
-                .map_err(|error| PyValueError::new_err(format!("{name}: {}", error.value(py))))?;
+            let array = as_numbers(written, name)?;
             let of_one = array.getattr("ndim")?.extract::<usize>()? == 1;
             let array = if of_one {
                 array.call_method1("reshape", (1, -1))?
@@ -78,6 +73,11 @@ impl<'py> Rows<'py> {
         array.is_c_contiguous().then(|| array.clone())
     }
 
+    /// Whether its values stand in the memory of another array.
+    pub(crate) fn shares_memory_with(&self, other: &Bound<'py, PyArray2<f64>>) -> bool {
+        share_memory(&self.array, other)
+    }
+
     /// Number of points.
     pub(crate) fn n_rows(&self) -> usize {
         self.array.shape()[0]
@@ -106,16 +106,57 @@ impl<'py> Rows<'py> {
     }
 }
 
-/// The same memory as an array that nobody can write in.
+/// Refuses an array some of whose values are masked: what stands behind the mask is no value.
+fn refuse_masked(written: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
+    if !written.hasattr("mask")? {
+        return Ok(());
+    }
+    let numpy = written.py().import("numpy")?.getattr("ma")?;
+    if numpy.call_method1("is_masked", (written,))?.is_truthy()? {
+        let message =
+            format!("{name}: some values of the array are masked; `filled` gives them some");
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(())
+}
+
+/// What is no array of float64 as one, row by row. Texts, dates and objects are no numbers, though NumPy makes some of
+/// them.
+fn as_numbers<'py>(written: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    let py = written.py();
+    let numpy = py.import("numpy")?;
+    let wrong = |error: PyErr| PyValueError::new_err(format!("{name}: {}", error.value(py)));
+    let array = numpy.call_method1("asarray", (written,)).map_err(wrong)?;
+    let dtype = array.getattr("dtype")?;
+    let kind: String = dtype.getattr("kind")?.extract()?;
+    if !"biuf".contains(&kind) {
+        let message = format!("{name}: found an array of {dtype}, expected numbers");
+        return Err(PyValueError::new_err(message));
+    }
+    let options = PyDict::new(py);
+    options.set_item("dtype", "float64")?;
+    let array = numpy.call_method("ascontiguousarray", (array,), Some(&options));
+    array.map_err(wrong)
+}
+
+/// The same memory as an array that nobody can write in, nor allow to be written in.
 ///
 /// # Errors
 /// Those of NumPy.
 pub(crate) fn looked_at<'py>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let view = array.call_method0("view")?;
-    let options = PyDict::new(array.py());
-    options.set_item("write", false)?;
-    view.call_method("setflags", (), Some(&options))?;
-    Ok(view)
+    let memory = PyMemoryView::from(array)?.call_method0("toreadonly")?;
+    let numpy = array.py().import("numpy")?;
+    numpy.call_method1("asarray", (memory,))
+}
+
+/// Whether the values of two arrays stand in one memory. What is handed out of an array is no view of it for NumPy.
+pub(crate) fn share_memory(a: &Bound<'_, PyArray2<f64>>, b: &Bound<'_, PyArray2<f64>>) -> bool {
+    let range = |array: &Bound<'_, PyArray2<f64>>| {
+        let start = array.data() as usize;
+        start..start + array.len() * size_of::<f64>()
+    };
+    let (a, b) = (range(a), range(b));
+    a.start < b.end && b.start < a.end
 }
 
 /// An array of rows.

@@ -60,7 +60,10 @@ pub(crate) fn of_batch(py: Python<'_>, law: &law::Law, failure: &BatchFailure) -
         attributes.set_item("cause", reason)?;
         attributes.set_item("factor", failure.factor)
     };
-    let message = format!("law `{id}`, point {}: {name}: {reason}", failure.point);
+    let message = format!(
+        "law `{id}`, point {} (from 0): {name}: {reason}",
+        failure.point
+    );
     fill()
         .and_then(|()| make(py, "LawError", &message, &attributes))
         .unwrap_or_else(|wrong| wrong)
@@ -104,7 +107,7 @@ fn fill(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResul
     }
 }
 
-/// File, line, column and the line itself.
+/// File, line and column, of what stands in no file the key; and the line itself.
 fn place_in_file(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResult<()> {
     let Some(place) = error.place() else {
         return Ok(());
@@ -119,8 +122,10 @@ fn place_in_file(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -
     if let Some(label) = label {
         to.set_item("cause", label)?;
     }
-    // Lines of a text that was made of a dictionary tell its user nothing.
-    if Some(file) != written {
+    // Lines of a text that was made of a dictionary, or of settings, tell its user nothing.
+    if place.setting().is_some() || Some(file) == written {
+        to.set_item("key", place.key())?;
+    } else {
         to.set_item("file", file)?;
         to.set_item("line", line)?;
         to.set_item("column", column)?;

@@ -1,16 +1,18 @@
 //! A law with its parameters, called for arrays of points.
 
+mod batch;
+pub(crate) mod found;
+
 use crate::arrays::{Rows, looked_at};
 use crate::error::{exception, of_batch};
-use crate::state::State;
+use crate::state::{Memory, State};
 use crate::{task, value};
 use abi::Hypothesis;
+use batch::{copied, has_room};
 use input::material::law_alone;
-use law::{
-    BatchFailure, BuiltLaw, End, Moment, Opener, Operator, SearchPath, Site, Start, Strided,
-};
+use law::{BatchFailure, BuiltLaw, End, Moment, Opener, Operator, Start, Strided};
 use numpy::{PyArrayMethods, PyReadwriteArray1};
-use pyo3::exceptions::{PyMemoryError, PyUserWarning, PyValueError};
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::ffi::CString;
@@ -55,6 +57,8 @@ pub(crate) struct Law {
     variables: Vec<String>,
     /// Its library is called in processes of their own.
     is_apart: bool,
+    /// It was made for a hypothesis that was named.
+    is_chosen: bool,
     /// Folders that it was looked for in before all others.
     folders: Vec<PathBuf>,
     /// Seconds that a call may take in a process of its own.
@@ -103,6 +107,11 @@ impl Law {
         &self.table
     }
 
+    /// The hypothesis that it was made for, if that was named.
+    pub(crate) fn chosen_hypothesis(&self) -> Option<Hypothesis> {
+        self.is_chosen.then(|| self.law().hypothesis())
+    }
+
     fn law(&self) -> &law::Law {
         &self.built.law
     }
@@ -137,30 +146,6 @@ impl Law {
     }
 }
 
-/// Whether there is memory for so many points with so many values.
-///
-/// # Errors
-/// `MemoryError` if not.
-fn has_room(n_points: usize, n_values: usize) -> PyResult<()> {
-    let all = n_points.saturating_mul(n_values);
-    Vec::<f64>::new()
-        .try_reserve_exact(all)
-        .map_err(|_| PyMemoryError::new_err(format!("points: no memory for {n_points} of them")))
-}
-
-/// Copies values point by point.
-fn copied((from, place): (&[f64], Strided), to: &mut [f64], n: usize) {
-    if (place.offset, place.point, place.component) == (0, n, 1) {
-        to.copy_from_slice(&from[..to.len()]);
-        return;
-    }
-    for (point, values) in to.chunks_exact_mut(n.max(1)).enumerate() {
-        for (c, value) in values.iter_mut().enumerate() {
-            *value = from[place.offset + point * place.point + c * place.component];
-        }
-    }
-}
-
 #[pymethods]
 impl Law {
     #[new]
@@ -186,20 +171,25 @@ impl Law {
         for (key, value) in values.into_iter().flatten() {
             if KEYS.contains(&key.as_str()) {
                 table.insert(key, value);
+            } else if named.contains_key(&key) {
+                let message =
+                    format!("parameter `{key}` is given twice: by its name, and in `parameters`");
+                return Err(exception(py, &input::Error::usage(message), None));
             } else {
                 named.insert(key, value);
             }
         }
         table.insert("parameters".to_owned(), named.into());
         let name = format!("Law(\"{id}\")");
-        let source = Source::new(&name, value::text_of(&table)?);
+        let source = Source::in_memory(&name, value::text_of(&table)?);
         let hypothesis = hypothesis.map(hypothesis_named).transpose()?;
+        let is_chosen = hypothesis.is_some();
         let opener = opener(isolate)?;
         let folders = law_path.unwrap_or_default();
         let threads = task::threads()?;
         let built =
             py.detach(|| threads.install(|| law_alone(&opener, &source, hypothesis, &folders)));
-        let (built, initial) = built.map_err(|error| exception(py, &error, Some(&name)))?;
+        let (built, initial) = built.map_err(|error| of_parameters(py, &error, &name))?;
         for warning in &built.warnings {
             warn(py, warning)?;
         }
@@ -217,6 +207,7 @@ impl Law {
             table,
             variables,
             is_apart,
+            is_chosen,
             folders,
             isolate,
         })
@@ -318,7 +309,8 @@ impl Law {
     /// components), None if `tangent` is None; and the state at the end. `dt` is how long the increment takes.
     ///
     /// The law reads and writes the arrays themselves, without the interpreter's lock. `out` is a state that is
-    /// not needed any more: its memory, and that of what was returned with it, is used again.
+    /// not needed any more: its memory, and that of what was returned with it, is used again, and it is no state from
+    /// then on.
     /// With `copy=False` the state keeps the array of gradients itself, which nobody may write in any more.
     /// `positions`, shape (n, 2), is where the points lie, for routines that ask.
     ///
@@ -357,8 +349,10 @@ impl Law {
         };
         let n_points = from.n_points(py);
         let gradient = Rows::exactly(gradient, "gradient", [n_points, n])?;
-        if from.names != self.variables {
-            return Err(PyValueError::new_err("state: it is one of another law"));
+        if from.names != self.variables || from.n_components(py) != n {
+            return Err(PyValueError::new_err(
+                "state: it is one of another law, or of another hypothesis",
+            ));
         }
         if let (Some(state), Some(out)) = (state, out)
             && state.is(out)
@@ -367,22 +361,10 @@ impl Law {
                 "out: the increment starts from this state; give one that is not needed any more";
             return Err(PyValueError::new_err(message));
         }
-        let mut end = match out {
-            None => State::zeros(py, n_points, n, n_operator, &self.variables),
-            Some(out) => out.get().reused(py, from).ok_or_else(|| {
-                PyValueError::new_err("out: a state of other points, or of another law")
-            })?,
-        };
-        if end.operator.bind(py).len()? != n_points * n_operator {
-            end.operator = numpy::PyArray1::zeros(py, n_points * n_operator, false).unbind();
-        }
-        if let Some(array) = gradient.array().filter(|_| !copy) {
-            end.gradient = array.unbind();
-            end.is_lent = true;
-        }
+        let mut end = self.memory_for(py, from, (&gradient, copy), out, n_operator)?;
         end.time = from.time + dt;
         end.increment = from.increment + 1;
-        let sites = self.sites(py, n_points, positions)?;
+        let sites = self.sites(n_points, positions)?;
         {
             let [start_gradient, start_flux, start_internal] = from.read(py)?;
             let busy = |_| PyValueError::new_err("out: its memory is in use");
@@ -393,6 +375,9 @@ impl Law {
             let mut operator: PyReadwriteArray1<'_, f64> =
                 end.operator.bind(py).try_readwrite().map_err(busy)?;
             let rows = Strided::rows(n);
+            if let Some(out) = out {
+                out.get().note(Memory::Spoilt);
+            }
             let start = Start {
                 n_points,
                 gradient: (start_gradient.as_slice()?, rows),
@@ -425,9 +410,15 @@ impl Law {
                 Ok::<_, BatchFailure>(outcome)
             })?;
             let success = outcome.map_err(|failure| of_batch(py, law, &failure))?;
+            if let Some(out) = out {
+                out.get().note(Memory::Given);
+            }
             if let Some((point, why)) = success.unreliable {
                 let id = &law.description().id;
-                warn(py, &format!("law `{id}`, point {point}: inaccurate: {why}"))?;
+                warn(
+                    py,
+                    &format!("law `{id}`, point {point} (from 0): inaccurate: {why}"),
+                )?;
             }
         }
         let tangents = if n_operator == 0 {
@@ -493,6 +484,35 @@ impl Law {
         self.law().library().sha256()
     }
 
+    /// What it is made of again: in another process its library is looked for as here.
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let named = value::to_python(py, &toml::Value::Table(self.table.clone()))?;
+        let named = named.cast_into::<PyDict>()?;
+        named.del_item("law")?;
+        // It says which library is meant, and is no key that is given.
+        if !self.folders.is_empty() && !self.table.contains_key("adapter") {
+            named.del_item("sha256")?;
+        }
+        if let Some(hypothesis) = self.chosen_hypothesis() {
+            named.set_item("hypothesis", hypothesis.name())?;
+        }
+        if !self.folders.is_empty() {
+            named.set_item("law_path", &self.folders)?;
+        }
+        if let Some(isolate) = self.isolate {
+            named.set_item("isolate", isolate)?;
+        }
+        ((self.id(),), named).into_pyobject(py)
+    }
+
+    fn __copy__(this: Bound<'_, Self>) -> Bound<'_, Self> {
+        this
+    }
+
+    fn __deepcopy__<'py>(this: Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        this
+    }
+
     fn __repr__(&self) -> String {
         let given = self.built.parameters.iter().filter(|p| !p.by_default);
         let given: Vec<String> = given.map(|p| format!(", {}={}", p.id, p.value)).collect();
@@ -505,57 +525,17 @@ impl Law {
     }
 }
 
-impl Law {
-    /// Where points lie, if the law asks.
-    fn sites(
-        &self,
-        _py: Python<'_>,
-        n_points: usize,
-        positions: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Vec<Site>> {
-        if !self.law().asks_for_sites() {
-            return Ok(Vec::new());
-        }
-        let positions = positions.map(|at| Rows::exactly(at, "positions", [n_points, 2]));
-        let mut at = vec![0.0; 2 * n_points];
-        if let Some(positions) = positions.transpose()? {
-            copied(positions.view()?, &mut at, 2);
-        }
-        let site = |(number, at): (usize, &[f64])| Site {
-            position: [at[0], at[1]],
-            element: number as u32 + 1,
-            ..Site::default()
-        };
-        Ok(at.chunks_exact(2).enumerate().map(site).collect())
+/// The exception for what is wrong with a law's values: a parameter has its name for a key.
+fn of_parameters(py: Python<'_>, error: &input::Error, name: &str) -> PyErr {
+    let raised = exception(py, error, Some(name));
+    let key = error.place().and_then(text::InputError::key);
+    let own = key
+        .as_deref()
+        .and_then(|key| key.strip_prefix("parameters."));
+    if let Some(own) = own
+        && let Err(wrong) = raised.value(py).setattr("key", own)
+    {
+        return wrong;
     }
-}
-
-/// What a law says of itself: name, version, parameters with units, bounds and meaning, hypotheses, internal
-/// variables.
-#[pyfunction]
-#[pyo3(signature = (id, /, *, law_path=None))]
-pub(crate) fn describe(
-    py: Python<'_>,
-    id: &str,
-    law_path: Option<Vec<PathBuf>>,
-) -> PyResult<Py<PyAny>> {
-    let opener = opener(None)?;
-    let folders = law_path.unwrap_or_default();
-    let found = py.detach(|| SearchPath::of(&opener, &folders).law(id));
-    let found = found.map_err(|error| exception(py, &error.into(), None))?;
-    let text = serde_json::to_string(found.description());
-    let text = text.map_err(|error| PyValueError::new_err(error.to_string()))?;
-    Ok(py.import("json")?.call_method1("loads", (text,))?.unbind())
-}
-
-/// Ids of all laws that are found, with their libraries. Nothing of them is executed.
-#[pyfunction]
-#[pyo3(signature = (*, law_path=None))]
-pub(crate) fn laws(py: Python<'_>, law_path: Option<Vec<PathBuf>>) -> PyResult<Bound<'_, PyDict>> {
-    let found = SearchPath::new(&law_path.unwrap_or_default()).installed();
-    let all = PyDict::new(py);
-    for (id, library) in found {
-        all.set_item(id, library)?;
-    }
-    Ok(all)
+    raised
 }

@@ -31,8 +31,9 @@ fn _pilum(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<state::State>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<simulation::SimulationState>()?;
-    module.add_function(wrap_pyfunction!(law::describe, module)?)?;
-    module.add_function(wrap_pyfunction!(law::laws, module)?)?;
+    module.add_function(wrap_pyfunction!(state::state_of, module)?)?;
+    module.add_function(wrap_pyfunction!(law::found::describe, module)?)?;
+    module.add_function(wrap_pyfunction!(law::found::laws, module)?)?;
     module.add_function(wrap_pyfunction!(point::point, module)?)?;
     module.add_function(wrap_pyfunction!(run::run, module)?)?;
     module.add_function(wrap_pyfunction!(arrow::stream, module)?)?;

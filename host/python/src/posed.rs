@@ -1,7 +1,9 @@
 //! Cases and drivers as Python names them: a file, or a dictionary with the keys of one.
 
-use crate::law::opener;
+use crate::law::{Law, opener};
 use crate::value;
+use abi::Hypothesis;
+use input::build::Laws;
 use input::{Case, Driver, Error};
 use law::Opener;
 use pyo3::prelude::*;
@@ -21,6 +23,8 @@ pub(crate) struct Posed {
     mesh: Option<Arc<[u8]>>,
     settings: Vec<String>,
     variant: Option<String>,
+    /// Laws that were made for a hypothesis, by their names in the case.
+    chosen: Vec<(String, Hypothesis)>,
     pub(crate) opener: Opener,
 }
 
@@ -44,6 +48,7 @@ impl Posed {
             (Some(source.extract()?), None)
         };
         Ok(Self {
+            chosen: chosen(source)?,
             path,
             text,
             name,
@@ -61,11 +66,11 @@ impl Posed {
 
     fn source(&self) -> Result<Source, Error> {
         let source = match (&self.text, &self.path) {
-            (Some(text), _) => Source::new(&self.name, text.as_str()),
+            (Some(text), _) => Source::in_memory(&self.name, text.as_str()),
             (None, Some(path)) if path.is_dir() => Source::read(&path.join("case.toml"))?,
             (None, path) => Source::read(path.as_deref().unwrap_or("".as_ref()))?,
         };
-        Ok(source.with_settings(&self.settings))
+        Ok(source.with_settings_in_memory(&self.settings))
     }
 
     /// The case, or its variants.
@@ -84,6 +89,37 @@ impl Posed {
         Ok(cases)
     }
 
+    /// Checks that a case takes laws that were made for a hypothesis in that one.
+    ///
+    /// # Errors
+    /// As [`Case::pose`]; it does not.
+    pub(crate) fn check_laws_of(&self, case: &Case) -> Result<(), Error> {
+        if self.chosen.is_empty() {
+            return Ok(());
+        }
+        self.check_laws(&case.pose()?.laws)
+    }
+
+    /// The same of laws that were built for a case.
+    ///
+    /// # Errors
+    /// It does not.
+    pub(crate) fn check_laws(&self, laws: &Laws) -> Result<(), Error> {
+        for (name, made_for) in &self.chosen {
+            let mut own = laws.keys().filter(|(law, _)| law == name);
+            let Some((_, taken_in)) = own.find(|(_, taken_in)| *taken_in != made_for.name()) else {
+                continue;
+            };
+            let message = format!(
+                "law `{name}` was made for the hypothesis `{}`, and the case takes it in `{taken_in}`",
+                made_for.name()
+            );
+            let hint = format!("`hypothesis=\"{taken_in}\"`, or a dictionary instead of the law");
+            return Err(Error::usage(message).with_hint(&hint));
+        }
+        Ok(())
+    }
+
     /// The driver, or its variants.
     ///
     /// # Errors
@@ -94,4 +130,26 @@ impl Posed {
         keep(&mut drivers, self.variant.as_deref(), name)?;
         Ok(drivers)
     }
+}
+
+/// The laws of a dictionary that were made for a hypothesis which was named.
+fn chosen(source: &Bound<'_, PyAny>) -> PyResult<Vec<(String, Hypothesis)>> {
+    let mut chosen = Vec::new();
+    let Ok(case) = source.cast::<PyDict>() else {
+        return Ok(chosen);
+    };
+    let Some(laws) = case.get_item("laws")? else {
+        return Ok(chosen);
+    };
+    let Ok(laws) = laws.cast_into::<PyDict>() else {
+        return Ok(chosen);
+    };
+    for (name, law) in laws {
+        if let Ok(law) = law.cast::<Law>()
+            && let Some(hypothesis) = law.get().chosen_hypothesis()
+        {
+            chosen.push((name.str()?.to_string(), hypothesis));
+        }
+    }
+    Ok(chosen)
 }

@@ -78,9 +78,14 @@ pub(crate) fn run(
 ) -> PyResult<Vec<(Option<String>, PathBuf)>> {
     let is_one = variant.is_some();
     let posed = Posed::of(source, name, mesh, settings, variant, isolate)?;
+    let checkpoints = checkpoints.map(Duration::try_from_secs_f64).transpose();
+    let checkpoints = checkpoints.map_err(|_| {
+        let message = "checkpoints: expected the seconds between them, or None for none";
+        exception(py, &Error::usage(message), None)
+    })?;
     let options = Options {
         resume,
-        checkpoints: checkpoints.and_then(|every| Duration::try_from_secs_f64(every).ok()),
+        checkpoints,
         reports: true,
         ..Options::default()
     };
@@ -88,6 +93,9 @@ pub(crate) fn run(
         py,
         |caller| -> Result<_, Error> {
             let cases = posed.cases()?;
+            cases
+                .iter()
+                .try_for_each(|case| posed.check_laws_of(case))?;
             run_all(&cases, is_one, results.as_deref(), options, caller)
         },
         |py, event| match (event, &watch) {

@@ -8,13 +8,14 @@ use crate::task::{Caller, carry_out};
 use input::{Case, Error};
 use law::Stop;
 use mechanics::group::Group;
+use mechanics::problem::Likeness;
 use mechanics::simulation::{Increment, Warning};
 use mechanics::{State, Watch};
 use numpy::PyArray1;
-use pyo3::exceptions::{PyKeyError, PyRuntimeError};
+use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 /// A problem on its way through its phases, in memory: nothing is written.
 ///
@@ -27,6 +28,10 @@ pub(crate) struct Simulation {
 
 struct Inner {
     simulation: mechanics::Simulation,
+    /// Of the first nodes the place in the mesh that the case names; `None` of a grid.
+    kept: Option<Arc<[usize]>>,
+    /// What states of it depend on, once one was taken.
+    likeness: Option<Arc<Likeness>>,
     /// The last increment of the last phase is done. The simulation is not led beyond it: a state could not be taken
     /// of it any more.
     is_done: bool,
@@ -34,25 +39,46 @@ struct Inner {
     written: Option<String>,
 }
 
-/// A state of a simulation after a whole increment, for `Simulation.go_to`.
+/// A state of a simulation, for `Simulation.go_to`: after a whole increment, or, where one could not be finished, the last
+/// one in equilibrium on its way.
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct SimulationState {
     state: State<'static>,
+    likeness: Arc<Likeness>,
     /// Number of the phase, from 0.
     #[pyo3(get)]
     phase: usize,
     /// Whole increments of it that are done.
     #[pyo3(get)]
     increment: usize,
+    /// How far the phase came, in increments: more than `increment` by the part of one that could not be finished.
+    #[pyo3(get)]
+    reached: f64,
 }
 
 #[pymethods]
 impl SimulationState {
+    #[expect(clippy::unused_self, reason = "of an object, in Python")]
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "a state of a simulation cannot be pickled; `pilum.run` keeps checkpoints, and `resume=True` goes on from them",
+        ))
+    }
+
     fn __repr__(&self) -> String {
         let Self {
-            phase, increment, ..
+            phase,
+            increment,
+            reached,
+            ..
         } = self;
-        format!("<pilum.SimulationState: phase {phase} (from 0), increment {increment}>")
+        let part = reached - *increment as f64;
+        let part = if part > 0.0 {
+            format!(" and {part:.4} of the next, which could not be finished")
+        } else {
+            String::new()
+        };
+        format!("<pilum.SimulationState: phase {phase} (from 0), increment {increment}{part}>")
     }
 }
 
@@ -120,6 +146,14 @@ impl Simulation {
 }
 
 impl Inner {
+    fn likeness(&mut self) -> Arc<Likeness> {
+        let problem = self.simulation.problem();
+        let likeness = self
+            .likeness
+            .get_or_insert_with(|| Arc::new(problem.likeness()));
+        Arc::clone(likeness)
+    }
+
     fn group(&self, name: &str) -> PyResult<&Group> {
         let mut groups = self.simulation.groups().iter();
         groups.find(|group| group.name == name).ok_or_else(|| {
@@ -162,21 +196,26 @@ impl Simulation {
                     let message = "the case has several variants: name one with `variant`";
                     return Err(Error::usage(message));
                 };
-                let posed = case.pose()?;
-                let simulation = mechanics::Simulation::new(posed.problem);
+                let ready = case.pose()?;
+                posed.check_laws(&ready.laws)?;
+                let simulation = mechanics::Simulation::new(ready.problem);
                 let simulation = simulation.map_err(|error| case.place(error))?;
-                let of_laws = posed.laws.values().flat_map(|law| law.warnings.iter());
-                let all = of_laws.chain(simulation.warnings()).chain(&posed.notes);
+                let of_laws = ready.laws.values().flat_map(|law| law.warnings.iter());
+                let all = of_laws.chain(simulation.warnings()).chain(&ready.notes);
                 all.for_each(|warning| caller.tell(warning.clone()));
-                Ok((simulation, case))
+                let kept = ready.mesh_file.map(|file| file.kept.into());
+                Ok((simulation, kept, case))
             },
             |py, warning| warn(py, &warning),
         )?;
         let written = posed.written().map(str::to_owned);
-        let (simulation, case) = made.map_err(|error| exception(py, &error, written.as_deref()))?;
+        let (simulation, kept, case) =
+            made.map_err(|error| exception(py, &error, written.as_deref()))?;
         Ok(Self {
             inner: Mutex::new(Inner {
                 simulation,
+                kept,
+                likeness: None,
                 is_done: false,
                 case,
                 written,
@@ -188,7 +227,8 @@ impl Simulation {
     ///
     /// Returns a dictionary with `phase`, `increment` (from 1), `of`, `time`, `iterations` and `unreliable` (why a
     /// law calls a result inaccurate, or None); None after the last. After an exception the state is the last one
-    /// in equilibrium; `go_to` leads back to another.
+    /// in equilibrium, which may lie within the increment: `state().reached` says where. `go_to` leads back to another;
+    /// to that of the last whole increment if it was taken before.
     fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let done = self.advance(py)?;
         done.map(|increment| told(py, &increment)).transpose()
@@ -237,6 +277,19 @@ impl Simulation {
         let inner = self.inner()?;
         let nodes = inner.simulation.problem().mesh.nodes.as_flattened();
         Ok(of_rows(py, nodes, 2)?.into_any())
+    }
+
+    /// Of every row of `nodes` the row in the `nodes` of the mesh, of a file the place of the node there, from 0; -1 of
+    /// those that interfaces and divisions have made. Nodes that no element of the case has are left out of all results.
+    #[getter]
+    fn mesh_rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let inner = self.inner()?;
+        let n = inner.simulation.problem().mesh.nodes.len();
+        let row = |number: usize| match &inner.kept {
+            None => number as i64,
+            Some(kept) => kept.get(number).map_or(-1, |row| *row as i64),
+        };
+        Ok(PyArray1::from_iter(py, (0..n).map(row)))
     }
 
     /// Displacements of the nodes, m, shape (n, 2), counted since the last reset.
@@ -329,18 +382,36 @@ impl Simulation {
         Ok(all)
     }
 
-    /// The state after the last whole increment, to go back to; None before the first one.
+    /// The present state, to go back to; None before the end of the first increment. It is that after the last whole
+    /// increment, but after an exception the last one in equilibrium.
     fn state(&self) -> PyResult<Option<SimulationState>> {
-        let state = self.inner()?.simulation.state();
-        Ok(state.map(|state| SimulationState {
+        let mut inner = self.inner()?;
+        let Some(state) = inner.simulation.state() else {
+            return Ok(None);
+        };
+        let n = inner.simulation.problem().phases[state.phase].increments;
+        let increment = state.increment();
+        // Round-off is no part of an increment.
+        let reached = state.part_of_phase() * n as f64;
+        let is_whole = (reached - increment as f64).abs() < 1e-9 * n as f64;
+        Ok(Some(SimulationState {
             phase: state.phase,
-            increment: state.increment(),
+            increment,
+            reached: if is_whole { increment as f64 } else { reached },
+            likeness: inner.likeness(),
             state,
         }))
     }
 
-    /// Goes back, or on, to a state of a simulation of the same problem.
+    /// Goes back, or on, to a state of a simulation of the same problem. It may differ in later phases, and in how
+    /// equilibrium is sought; a state on another mesh, of other parameters or of other phases up to its own is refused
+    /// with InputError.
     fn go_to(&self, py: Python<'_>, state: &SimulationState) -> PyResult<()> {
+        let own = self.inner()?.likeness();
+        if let Some(unlike) = own.unlike(&state.likeness, state.phase) {
+            let message = format!("the state is one of a simulation with {unlike}");
+            return Err(exception(py, &Error::usage(message), None));
+        }
         let to = state.state.clone();
         self.working(py, |simulation, _| simulation.go_to(to))?;
         let mut inner = self.inner()?;
@@ -358,11 +429,19 @@ impl Simulation {
             is_done,
             case,
             written,
+            likeness,
+            kept,
         } = &mut *inner;
         let copied = carry_out(
             py,
             |_: &Caller<()>| {
                 let state = simulation.state();
+                if state.is_none() && simulation.is_on_its_way() {
+                    return Err(mechanics::Error::OtherState(
+                        "the first increment of the phase was not finished: there is no state that a copy could go on from"
+                            .to_owned(),
+                    ));
+                }
                 let mut copy = mechanics::Simulation::new(simulation.problem().clone())?;
                 if let Some(state) = state {
                     copy.go_to(state)?;
@@ -375,6 +454,8 @@ impl Simulation {
         Ok(Self {
             inner: Mutex::new(Inner {
                 simulation: copy,
+                kept: kept.clone(),
+                likeness: likeness.clone(),
                 is_done: *is_done,
                 case: case.clone(),
                 written: written.clone(),
@@ -388,6 +469,13 @@ impl Simulation {
 
     fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> PyResult<Self> {
         self.copy(py)
+    }
+
+    #[expect(clippy::unused_self, reason = "of an object, in Python")]
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "a simulation cannot be pickled: its laws are at work in this process; pickle its Problem, and start it there",
+        ))
     }
 
     fn __iter__(this: Bound<'_, Self>) -> Bound<'_, Self> {

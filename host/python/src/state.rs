@@ -4,6 +4,8 @@ use crate::arrays::looked_at;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Points of a law: the gradients and fluxes that they have reached, their internal variables, and the time.
 ///
@@ -25,6 +27,20 @@ pub(crate) struct State {
     pub(crate) increment: u32,
     /// Ids of the internal variables.
     pub(crate) names: Vec<String>,
+    /// What has become of its memory: see [`Memory`].
+    pub(crate) memory: AtomicU8,
+}
+
+/// What has become of the memory of a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Memory {
+    /// It has the state's values.
+    Own,
+    /// An increment that came to no end has written in it.
+    Spoilt,
+    /// It is that of another state now.
+    Given,
 }
 
 #[pymethods]
@@ -32,18 +48,21 @@ impl State {
     /// Jumps (m) or strains (shear strains γ = 2ε) that the points have reached, shape (n, components).
     #[getter]
     fn gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.refuse_given()?;
         looked_at(self.gradient.bind(py).as_any())
     }
 
     /// Tractions or stresses (kPa, tension positive), shape (n, components).
     #[getter]
     fn flux<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.refuse_given()?;
         looked_at(self.flux.bind(py).as_any())
     }
 
     /// Internal variables, shape (n, variables), in the order of `Law.variables`.
     #[getter]
     fn internal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.refuse_given()?;
         looked_at(self.internal.bind(py).as_any())
     }
 
@@ -80,7 +99,26 @@ impl State {
         self.n_points(py)
     }
 
+    /// Its arrays, time and variables: what another process makes one of.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        self.refuse_given()?;
+        let copied = |array: &Py<PyArray2<f64>>| array.bind(py).call_method0("copy");
+        let values = (
+            copied(&self.gradient)?,
+            copied(&self.flux)?,
+            copied(&self.internal)?,
+            self.time,
+            self.increment,
+            self.names.clone(),
+        );
+        let make = py.import("pilum._pilum")?.getattr("state_of")?;
+        (make, values).into_pyobject(py)
+    }
+
     fn __repr__(&self, py: Python<'_>) -> String {
+        if self.memory() != Memory::Own {
+            return "<pilum.State: given as `out`, it is none any more>".to_owned();
+        }
         format!(
             "<pilum.State: {} points, increment {}, time {:?}>",
             self.n_points(py),
@@ -90,12 +128,80 @@ impl State {
     }
 }
 
+/// A state of its values, as [`State::__reduce__`] names them.
+#[pyfunction]
+pub(crate) fn state_of(
+    gradient: Py<PyArray2<f64>>,
+    flux: Py<PyArray2<f64>>,
+    internal: Py<PyArray2<f64>>,
+    time: f64,
+    increment: u32,
+    names: Vec<String>,
+) -> PyResult<State> {
+    let of_both = Python::attach(|py| {
+        let rows = |array: &Py<PyArray2<f64>>| array.bind(py).shape()[0];
+        let columns = |array: &Py<PyArray2<f64>>| array.bind(py).shape()[1];
+        rows(&gradient) == rows(&flux)
+            && rows(&internal) == rows(&flux)
+            && columns(&gradient) == columns(&flux)
+            && columns(&internal) == names.len()
+    });
+    if !of_both {
+        return Err(PyValueError::new_err("these are no arrays of one state"));
+    }
+    let operator = Python::attach(|py| PyArray1::zeros(py, 0, false).unbind());
+    Ok(State {
+        gradient,
+        is_lent: false,
+        flux,
+        internal,
+        operator,
+        time,
+        increment,
+        names,
+        memory: AtomicU8::new(Memory::Own as u8),
+    })
+}
+
 impl State {
+    /// What has become of its memory.
+    pub(crate) fn memory(&self) -> Memory {
+        match self.memory.load(Ordering::Relaxed) {
+            0 => Memory::Own,
+            1 => Memory::Spoilt,
+            _ => Memory::Given,
+        }
+    }
+
+    /// Notes what has become of its memory.
+    pub(crate) fn note(&self, memory: Memory) {
+        self.memory.store(memory as u8, Ordering::Relaxed);
+    }
+
+    /// Number of components of gradients and fluxes.
+    pub(crate) fn n_components(&self, py: Python<'_>) -> usize {
+        self.flux.bind(py).shape()[1]
+    }
+
+    /// Refuses a state that has no values any more.
+    fn refuse_given(&self) -> PyResult<()> {
+        match self.memory() {
+            Memory::Own => Ok(()),
+            Memory::Spoilt => Err(PyValueError::new_err(
+                "the state was given as `out` of an increment that came to no end: it has no values any more",
+            )),
+            Memory::Given => Err(PyValueError::new_err(
+                "the state was given as `out`: its memory is that of the state which was returned",
+            )),
+        }
+    }
+
     /// Gradients, fluxes and internal variables, to be read.
     ///
     /// # Errors
-    /// `ValueError` if another thread writes in them.
+    /// `ValueError` if another thread writes in them, or they are no values of it any more.
     pub(crate) fn read<'py>(&self, py: Python<'py>) -> PyResult<[PyReadonlyArray2<'py, f64>; 3]> {
+        self.refuse_given()?;
         let read = |array: &Py<PyArray2<f64>>| {
             let busy = |_| PyValueError::new_err("state: its memory is in use");
             array.bind(py).try_readonly().map_err(busy)
@@ -130,6 +236,7 @@ impl State {
             time: 0.0,
             increment: 0,
             names: names.to_vec(),
+            memory: AtomicU8::new(Memory::Own as u8),
         }
     }
 
@@ -146,7 +253,8 @@ impl State {
         } else {
             self.gradient.clone_ref(py)
         };
-        fits.then_some(Self {
+        let is_its_own = self.memory() != Memory::Given;
+        (fits && is_its_own).then_some(Self {
             gradient,
             is_lent: false,
             flux: self.flux.clone_ref(py),
@@ -155,6 +263,7 @@ impl State {
             time: like.time,
             increment: like.increment,
             names: like.names.clone(),
+            memory: AtomicU8::new(Memory::Own as u8),
         })
     }
 }

@@ -105,3 +105,28 @@ pub(crate) fn settings(written: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<Stri
     let settings = table.iter().map(|(key, value)| format!("{key}={value}"));
     Ok(settings.collect())
 }
+
+/// A value of a file as one of Python.
+///
+/// # Errors
+/// Those of Python.
+pub(crate) fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match value {
+        Value::String(text) => text.into_pyobject(py)?.into_any(),
+        Value::Integer(number) => number.into_pyobject(py)?.into_any(),
+        Value::Float(number) => number.into_pyobject(py)?.into_any(),
+        Value::Boolean(value) => value.into_pyobject(py)?.to_owned().into_any(),
+        Value::Datetime(time) => time.to_string().into_pyobject(py)?.into_any(),
+        Value::Array(values) => {
+            let values: PyResult<Vec<_>> = values.iter().map(|v| to_python(py, v)).collect();
+            values?.into_pyobject(py)?.into_any()
+        }
+        Value::Table(table) => {
+            let all = PyDict::new(py);
+            for (key, value) in table {
+                all.set_item(key, to_python(py, value)?)?;
+            }
+            all.into_any()
+        }
+    })
+}

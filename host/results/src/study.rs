@@ -10,6 +10,7 @@ pub use history::History;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -43,6 +44,10 @@ pub struct Record {
     pub texts: String,
     /// What all runs depend on: these texts and the libraries.
     pub identity: String,
+    /// The libraries and meshes that the runs were planned with: by the name of each the sums of what is in it, of
+    /// which there are several where a parameter chooses one.
+    #[serde(default)]
+    pub files: BTreeMap<String, BTreeSet<String>>,
     /// What varies.
     pub parameters: Vec<ParameterRecord>,
     /// What counts.
@@ -333,6 +338,17 @@ pub fn is_study(folder: &Path) -> bool {
 }
 
 impl Record {
+    /// The first of these files that was another one when the study was planned, by its name. One that was not
+    /// there then is none.
+    pub fn changed(&self, files: impl Iterator<Item = (String, String)>) -> Option<String> {
+        let is_other = |(name, sum): &(String, String)| {
+            let planned = self.files.get(name);
+            planned.is_some_and(|planned| !planned.contains(sum))
+        };
+        let mut files = files;
+        files.find(is_other).map(|(name, _)| name)
+    }
+
     /// Reads the record of the study in a folder.
     ///
     /// # Errors
@@ -447,6 +463,7 @@ mod tests {
             is_grid: true,
             texts: String::new(),
             identity: String::new(),
+            files: BTreeMap::new(),
             parameters: vec![ParameterRecord {
                 name: "phi".to_owned(),
                 keys: vec!["laws.a.parameters.phi".to_owned()],

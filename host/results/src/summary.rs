@@ -264,6 +264,7 @@ impl Summary {
                     "cut_backs": p.cut_backs,
                     "unreliable_steps": p.unreliable,
                     "relaxed_steps": p.relaxed,
+                    "crept_from": p.crept_from,
                     "tolerated_steps": p.tolerated,
                     "tolerated_residual": p.tolerated_residual,
                     "tolerated_force": p.tolerated_force,

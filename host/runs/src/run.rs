@@ -209,15 +209,17 @@ impl Ready<'_> {
         &self.identity
     }
 
-    /// The files that the case names, by what is in them: libraries with their sidecars, and the mesh.
-    pub fn libraries(&self) -> impl Iterator<Item = String> {
+    /// The files that the case names, each with the sum of what is in it: libraries with their sidecars by their law,
+    /// and the mesh.
+    pub fn files(&self) -> impl Iterator<Item = (String, String)> {
         let libraries = self.posed.laws.values().map(|built| {
             let library = built.law.library();
             let sidecar = library.sidecar_sha256().unwrap_or_default();
-            format!("{} {sidecar}\n", library.sha256())
+            let name = format!("the library of law `{}`", built.law.description().id);
+            (name, format!("{} {sidecar}", library.sha256()))
         });
         let mesh = self.posed.mesh_file.iter();
-        libraries.chain(mesh.map(|mesh| format!("{}\n", mesh.sha256)))
+        libraries.chain(mesh.map(|mesh| ("the mesh".to_owned(), mesh.sha256.clone())))
     }
 
     /// The problem alone.

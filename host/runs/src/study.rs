@@ -14,7 +14,7 @@ pub use carry_out::{Event, Jobs, carry_out};
 pub use one::{Once, follow, mend, run_one, stop_of_worker};
 
 use crate::Error;
-use crate::run::ready;
+use crate::run::{Ready, ready};
 use input::study::{Method, Parameter, Spread};
 use input::{Case, Study};
 use law::{Opener, hexadecimal_sha256};
@@ -22,7 +22,7 @@ use mechanics::Simulation;
 use results::study::{
     ParameterRecord, Record, Row, State, forget_run, identity_of_run, is_study, standing,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -120,7 +120,13 @@ impl Plan {
         let case = self.case(first)?;
         let placed = |error: Error| self.study.placed(error, first);
         let of_first = ready(&case).map_err(placed)?;
-        let mut libraries: BTreeSet<String> = of_first.libraries().collect();
+        let mut files: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        let mut note = |ready: &Ready<'_>| {
+            for (name, sum) in ready.files() {
+                files.entry(name).or_default().insert(sum);
+            }
+        };
+        note(&of_first);
         let problem = of_first.into_problem();
         let phases: Vec<String> = problem
             .phases
@@ -148,7 +154,7 @@ impl Plan {
                 let values = with(&value);
                 let case = self.case(&values)?;
                 let checked = ready(&case).and_then(|ready| {
-                    libraries.extend(ready.libraries());
+                    note(&ready);
                     let simulation = Simulation::new(ready.into_problem());
                     let simulation = simulation.map_err(|error| case.place(error))?;
                     case.wanted(&simulation).map(|_| ())
@@ -161,7 +167,8 @@ impl Plan {
         }
         let texts = self.texts(&case);
         let mut identity = texts.clone();
-        identity.extend(libraries);
+        let sums: BTreeSet<&String> = files.values().flatten().collect();
+        identity.extend(sums.into_iter().flat_map(|sum| [sum, "\n"]));
         let title = match self.study.file.title.as_str() {
             "" => self.study.name(),
             title => title.to_owned(),
@@ -173,6 +180,7 @@ impl Plan {
             is_grid: self.study.file.method == Method::Grid,
             texts,
             identity: hexadecimal_sha256(identity.as_bytes()),
+            files,
             parameters: self.study.parameters.iter().map(described).collect(),
             outputs,
         })
@@ -199,21 +207,28 @@ impl Plan {
     /// # Errors
     /// Runs of another study in the folder; files that cannot be written.
     pub fn prepare(&self, record: &Record, anew: bool) -> Result<Vec<Row>, Error> {
-        let indices = 1..=self.rows.len();
         if anew {
-            for index in indices.clone() {
+            for index in 1..=self.rows.len() {
                 forget_run(&self.folder.join(folder_of_run(index)))?;
             }
-        } else {
-            let is_same = is_study(&self.folder)
-                && Record::read(&self.folder).is_ok_and(|old| old.identity == record.identity);
-            if !is_same {
-                indices
-                    .clone()
-                    .try_for_each(|index| self.check_run(index))?;
-            }
+            return self.write(record);
         }
-        let rows: Vec<Row> = indices.map(|index| self.row(index)).collect();
+        self.prepare_beside(record, None)
+    }
+
+    /// The same with what was done of the runs, but for one that is begun anew.
+    fn prepare_beside(&self, record: &Record, anew: Option<usize>) -> Result<Vec<Row>, Error> {
+        let is_same = is_study(&self.folder)
+            && Record::read(&self.folder).is_ok_and(|old| old.identity == record.identity);
+        if !is_same {
+            let mut others = (1..=self.rows.len()).filter(|index| Some(*index) != anew);
+            others.try_for_each(|index| self.check_run(index))?;
+        }
+        self.write(record)
+    }
+
+    fn write(&self, record: &Record) -> Result<Vec<Row>, Error> {
+        let rows: Vec<Row> = (1..=self.rows.len()).map(|index| self.row(index)).collect();
         record.write(&self.folder)?;
         record.write_table(&self.folder, &rows)?;
         Ok(rows)
@@ -251,7 +266,16 @@ impl Plan {
 fn other_run(folder: &Path) -> Error {
     Error::usage(format!(
         "{}: it holds a run of another case, with other values, libraries or another version of the program: \
-         --out names another folder, --anew carries out all runs anew",
+         --out names another folder, --anew without --run carries out all runs anew",
+        folder.display()
+    ))
+}
+
+/// What is said where the runs of one study would be of two libraries, or of two meshes.
+fn other_file(folder: &Path, name: &str) -> Error {
+    Error::usage(format!(
+        "{}: {name} is another one than the runs of this study were planned with: --out names another folder, --anew \
+         without --run carries out all runs anew",
         folder.display()
     ))
 }

@@ -183,6 +183,52 @@ pub fn key(name: &str) -> String {
     toml::Value::from(name).to_string()
 }
 
+/// The keys that lead to a byte of a text, as a setting has them: to the value or the key that stands there, else to the
+/// table whose header does. `None` if there is none, or the text is no TOML.
+pub(crate) fn key_at(text: &str, at: usize) -> Option<String> {
+    let table = DeTable::parse(text).ok()?;
+    path_in(table.get_ref(), at).map(|(_, path)| path)
+}
+
+/// The same of a setting: its whole key at least.
+pub(crate) fn key_in_setting(text: &str, at: usize) -> Option<String> {
+    let equals = equals_sign(text)?;
+    key_at(text, at.max(equals + 1)).or_else(|| Some(text[..equals].trim().to_owned()))
+}
+
+/// The deepest key or value in a table that a byte lies in: how deep, and the keys that lead there.
+fn path_in(table: &DeTable<'_>, at: usize) -> Option<(usize, String)> {
+    let entries = table.iter().filter_map(|(name, value)| {
+        let path = key(name.get_ref());
+        let own = is_in(&name.span(), at).then(|| (0, path.clone()));
+        path_at(value, &path, at).or(own)
+    });
+    entries.max()
+}
+
+/// The same in a value that these keys lead to.
+fn path_at(value: &Spanned<DeValue<'_>>, path: &str, at: usize) -> Option<(usize, String)> {
+    let below = match value.get_ref() {
+        DeValue::Table(table) => {
+            path_in(table, at).map(|(depth, rest)| (depth, format!("{path}.{rest}")))
+        }
+        DeValue::Array(entries) => {
+            let entries = entries.iter().enumerate().filter_map(|(number, entry)| {
+                let part = name(entry).map_or_else(|| (number + 1).to_string(), |name| key(&name));
+                path_at(entry, &format!("{path}.{part}"), at)
+            });
+            entries.max()
+        }
+        _ => None,
+    };
+    let own = || is_in(&value.span(), at).then(|| (0, path.to_owned()));
+    below.map(|(depth, path)| (depth + 1, path)).or_else(own)
+}
+
+fn is_in(span: &Range<usize>, at: usize) -> bool {
+    (span.start..=span.end).contains(&at)
+}
+
 /// The entry of an array that a key stands for: its position from 1, or its name.
 fn position(mut names: impl ExactSizeIterator<Item = Option<String>>, key: &str) -> Option<usize> {
     match key.parse::<usize>() {
@@ -432,6 +478,32 @@ mod tests {
         ] {
             assert_eq!(with(FILE, &[setting]).unwrap_err(), says, "{setting}");
         }
+    }
+
+    #[test]
+    fn values_in_memory_have_their_keys_as_places() {
+        let file = "a = 1\n[table]\nb = [1, 22]\n[[phase]]\nname = \"one\"\nn = 1\n[[phase]]\nn = { x = 2 }\n";
+        let source = Source::in_memory("case", file);
+        let settings = ["table.c=3".to_owned(), "phase.one.\"a b\"=4".to_owned()];
+        let source = source.with_settings_in_memory(&settings);
+        let place = |text: &str| {
+            let at = source.text().find(text).unwrap();
+            source.place(&(at..at + 1))
+        };
+        assert_eq!(place("a = 1"), "`a`");
+        assert_eq!(place("b = "), "`table.b`");
+        assert_eq!(place("22"), "`table.b.2`");
+        assert_eq!(place("n = 1"), "`phase.one.n`");
+        assert_eq!(place("2 }"), "`phase.2.n.x`");
+        assert_eq!(place("3"), "`table.c`");
+        assert_eq!(place("4"), "`phase.one.\"a b\"`");
+        let at = source.text().find("table.c").unwrap();
+        let error = source.error(at + 8..at + 9, "no");
+        assert_eq!(error.key().as_deref(), Some("table.c"));
+        // A file has lines, whatever its settings are.
+        let source = Source::new("case", file).with_settings_in_memory(&settings);
+        assert_eq!(source.place(&(0..1)), "case:1:1");
+        assert_eq!(source.place(&(at..at + 1)), "`table.c`");
     }
 
     #[test]

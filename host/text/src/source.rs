@@ -1,5 +1,6 @@
 //! A text that a user wrote, and errors with their place in it.
 
+use crate::setting::{key_at, key_in_setting};
 use crate::{Error, file};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,10 @@ pub struct Source {
     files: Vec<(usize, PathBuf)>,
     /// How many of these are settings.
     n_settings: usize,
+    /// It was made of values in memory: nobody has written its lines, and places in it are keys.
+    is_in_memory: bool,
+    /// The same of the settings.
+    has_settings_in_memory: bool,
 }
 
 /// What a setting of the command line is called where a file has its name.
@@ -46,6 +51,25 @@ impl Source {
             path,
             text: text.into(),
             n_settings: 0,
+            is_in_memory: false,
+            has_settings_in_memory: false,
+        }
+    }
+
+    /// Takes a text that was made of values in memory, under this name.
+    pub fn in_memory(name: &str, text: impl Into<Arc<str>>) -> Self {
+        Self {
+            is_in_memory: true,
+            ..Self::new(name, text)
+        }
+    }
+
+    /// This file with settings behind it that were values in memory.
+    #[must_use]
+    pub fn with_settings_in_memory(self, settings: &[String]) -> Self {
+        Self {
+            has_settings_in_memory: true,
+            ..self.with_settings(settings)
         }
     }
 
@@ -64,6 +88,7 @@ impl Source {
             text: text.into(),
             files,
             n_settings: self.n_settings + settings.len(),
+            ..self
         }
     }
 
@@ -80,6 +105,7 @@ impl Source {
             text: format!("{}\n{}", base.text, self.text).into(),
             files: base.files.iter().cloned().chain(own).collect(),
             n_settings: self.n_settings,
+            ..*self
         }
     }
 
@@ -150,9 +176,18 @@ impl Source {
         }
     }
 
-    /// File, line and column (from 1) of the start of a span.
+    /// File, line and column (from 1) of the start of a span; the key where it was a value in memory.
     pub fn place(&self, span: &Range<usize>) -> String {
         let (path, start, text) = self.file(span.start);
+        let is_setting = path == Path::new(SETTING);
+        let key = match is_setting {
+            true if self.has_settings_in_memory => key_in_setting(text, span.start - start),
+            false if self.is_in_memory && path == self.path => key_at(text, span.start - start),
+            _ => None,
+        };
+        if let Some(key) = key {
+            return format!("`{key}`");
+        }
         let before = &text[..(span.start - start).min(text.len())];
         let line = before.matches('\n').count() + 1;
         let column = before
@@ -257,6 +292,15 @@ impl InputError {
             ),
             text,
             label: self.label.as_deref(),
+        }
+    }
+
+    /// Its place as a setting would name it: the keys that lead there, dots between them, entries of lists by their
+    /// `name` or their position from 1. `None` where no key is.
+    pub fn key(&self) -> Option<String> {
+        match self.setting() {
+            Some((setting, at)) => key_in_setting(setting, at),
+            None => key_at(&self.text, self.span.start),
         }
     }
 

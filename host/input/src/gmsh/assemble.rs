@@ -28,6 +28,15 @@ struct Side {
     owners: [Option<(usize, usize)>; 2],
 }
 
+/// The mesh of a case, of a file.
+pub(super) struct Assembled {
+    pub(super) mesh: Mesh,
+    /// Of each of its nodes the place in the file, from 0.
+    pub(super) kept: Vec<usize>,
+    /// What the user should know.
+    pub(super) notes: Vec<String>,
+}
+
 /// A mesh in the making.
 struct Assembly<'a> {
     contents: &'a Contents<'a>,
@@ -41,14 +50,11 @@ struct Assembly<'a> {
     notes: Vec<String>,
 }
 
-/// The mesh, and notes for the user.
+/// The mesh of a case.
 ///
 /// # Errors
 /// What is wrong with the file, and where.
-pub(super) fn assemble(
-    contents: &Contents<'_>,
-    wanted: &Wanted<'_>,
-) -> Result<(Mesh, Vec<String>), Fault> {
+pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<Assembled, Fault> {
     let mut assembly = Assembly {
         contents,
         wanted,
@@ -73,7 +79,13 @@ pub(super) fn assemble(
     assembly.lines(&mut mesh, &number, &sides)?;
     assembly.note_lines();
     assembly.note_cracks(&mesh);
-    Ok((mesh, assembly.notes))
+    let mut kept: Vec<usize> = number.into_keys().collect();
+    kept.sort_unstable();
+    Ok(Assembled {
+        mesh,
+        kept,
+        notes: assembly.notes,
+    })
 }
 
 impl Assembly<'_> {
@@ -113,10 +125,8 @@ impl Assembly<'_> {
                 if other_group != group {
                     return self.in_two_groups(element, [other_group, group]);
                 }
-                let message = format!(
-                    "elements {} and {} have the same nodes",
-                    other.number, element.number
-                );
+                let both = contents.two_elements(other, element);
+                let message = format!("{both} have the same nodes");
                 return self.fault(element, &message);
             }
             self.taken.push((element, nodes, group));
@@ -132,8 +142,8 @@ impl Assembly<'_> {
         };
         let [first, second] = groups.map(name);
         let message = format!(
-            "element {} is in two groups of the case, `{first}` and `{second}`",
-            element.number
+            "{} is in two groups of the case, `{first}` and `{second}`",
+            self.contents.element(element)
         );
         self.fault(element, &message)
     }
@@ -222,22 +232,22 @@ impl Assembly<'_> {
             let wrong = |message: String| Err(contents.cursor.fault(node.place, &message));
             if [x, y, z].iter().any(|at| at.abs() > FARTHEST) {
                 return wrong(format!(
-                    "node {} is at ({x:e}, {y:e}), expected at most {FARTHEST:e} m",
-                    node.number
+                    "{} is at ({x:e}, {y:e}), expected at most {FARTHEST:e} m",
+                    contents.node(node.number)
                 ));
             }
             if z.abs() > nothing {
                 return wrong(format!(
-                    "node {} is at z = {z}: the mesh does not lie in the plane of x and y (in \
+                    "{} is at z = {z}: the mesh does not lie in the plane of x and y (in \
                      axisymmetry x is the radius, y the axis)",
-                    node.number
+                    contents.node(node.number)
                 ));
             }
             if wanted.analysis == Analysis::Axisymmetric {
                 if x < -nothing {
                     return wrong(format!(
-                        "node {} is at x = {x}, across the axis; x is the radius, 0 on the axis",
-                        node.number
+                        "{} is at x = {x}, across the axis; x is the radius, 0 on the axis",
+                        contents.node(node.number)
                     ));
                 }
                 // Round-off of Gmsh; what is on the axis is told by 0.
@@ -276,27 +286,27 @@ impl Assembly<'_> {
                     continue;
                 };
                 let first = side.owners[0].map_or(number, |(first, _)| first);
-                let other = self.taken[first].0.number;
+                let other = self.taken[first].0;
+                let both = || self.contents.two_elements(other, element);
                 if side.ends == [b, a] && side.owners[1].is_none() {
                     side.owners[1] = owner;
                 } else if side.ends == [b, a] {
                     let message = format!(
-                        "element {} is the third one on a side of element {other}",
-                        element.number
+                        "{} is the third one on a side of {}",
+                        self.contents.element(element),
+                        self.contents.element(other)
                     );
                     return self.fault(element, &message);
                 } else if side.ends == [a, b] {
                     let message = format!(
-                        "elements {other} and {} lie on each other: both are on the same side of \
-                         an edge",
-                        element.number
+                        "{} lie on each other: both are on the same side of an edge",
+                        both()
                     );
                     return self.fault(element, &message);
                 } else {
                     let message = format!(
-                        "elements {other} and {} have the middle of a side in common, but not its \
-                         ends",
-                        element.number
+                        "{} have the middle of a side in common, but not its ends",
+                        both()
                     );
                     return self.fault(element, &message);
                 }
@@ -307,9 +317,9 @@ impl Assembly<'_> {
                 let owner = side.owners[0].map_or(0, |(owner, _)| owner);
                 let element = self.taken[owner].0;
                 let message = format!(
-                    "the middle of a side of element {} is a corner of another element: the mesh \
+                    "the middle of a side of {} is a corner of another element: the mesh \
                      does not fit together there",
-                    element.number
+                    self.contents.element(element)
                 );
                 return self.fault(element, &message);
             }
@@ -367,9 +377,8 @@ impl Assembly<'_> {
                     let is_outside = self.is_outside[nodes[2]];
                     if self.wanted.lines.contains(name.as_str()) && !is_outside {
                         let message = format!(
-                            "element {} of the physical curve `{name}` is no side of an element of \
-                             the case's groups",
-                            element.number
+                            "{} of the physical curve `{name}` is no side of an element of the case's groups",
+                            self.contents.element(element)
                         );
                         return self.fault(element, &message);
                     }

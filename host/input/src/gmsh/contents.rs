@@ -64,7 +64,20 @@ impl<'a> Contents<'a> {
     /// # Errors
     /// What is wrong with it, and where.
     pub(super) fn read(bytes: &'a [u8]) -> Result<Self, Fault> {
+        Self::read_by(Cursor::new(bytes))
+    }
+
+    /// Reads what arrays were written as.
+    ///
+    /// # Errors
+    /// What is wrong with them, by their rows.
+    pub(super) fn read_arrays(bytes: &'a [u8]) -> Result<Self, Fault> {
         let mut cursor = Cursor::new(bytes);
+        cursor.is_of_arrays = true;
+        Self::read_by(cursor)
+    }
+
+    fn read_by(mut cursor: Cursor<'a>) -> Result<Self, Fault> {
         let first = cursor.section();
         if !matches!(&first, Ok(Some(name)) if name == "MeshFormat") {
             let message = "a mesh file of Gmsh begins with `$MeshFormat`, this one does not";
@@ -133,6 +146,36 @@ impl<'a> Contents<'a> {
         Ok(contents)
     }
 
+    /// A node as those who made the mesh count it.
+    pub(super) fn node(&self, number: u64) -> String {
+        if self.cursor.is_of_arrays {
+            return format!("node {} (from 0)", number.saturating_sub(1));
+        }
+        format!("node {number}")
+    }
+
+    /// An element as those who made the mesh count it: of arrays by its row in its group.
+    pub(super) fn element(&self, element: &Element) -> String {
+        if !self.cursor.is_of_arrays {
+            return format!("element {}", element.number);
+        }
+        let of_group = self
+            .elements
+            .iter()
+            .filter(|e| Self::set_of(e) == Self::set_of(element));
+        let row = of_group.take_while(|e| e.number != element.number).count();
+        let name = self.groups_of(element).next().unwrap_or_default();
+        format!("cell {row} (from 0) of `{name}`")
+    }
+
+    /// Two of them.
+    pub(super) fn two_elements(&self, a: &Element, b: &Element) -> String {
+        if self.cursor.is_of_arrays {
+            return format!("{} and {}", self.element(a), self.element(b));
+        }
+        format!("elements {} and {}", a.number, b.number)
+    }
+
     /// Names of an element's physical groups: that of one without a name is its number.
     pub(super) fn groups_of(&self, element: &Element) -> impl Iterator<Item = String> {
         let dimension = element.kind.dimension();
@@ -158,13 +201,18 @@ impl<'a> Contents<'a> {
             let number = element.nodes[at];
             let Some(&node) = self.numbers.get(&number) else {
                 let message = format!(
-                    "element {} has the node {number}, which is not among the nodes",
-                    element.number
+                    "{} has the {}, which is not among the nodes",
+                    self.element(element),
+                    self.node(number)
                 );
                 return Err(self.cursor.fault(element.place, &message));
             };
             if nodes[..at].contains(&node) {
-                let message = format!("element {} has the node {number} twice", element.number);
+                let message = format!(
+                    "{} has the {} twice",
+                    self.element(element),
+                    self.node(number)
+                );
                 return Err(self.cursor.fault(element.place, &message));
             }
             nodes[at] = node;
@@ -315,7 +363,7 @@ impl Reader<'_> {
             return Err(contents.cursor.fault(place, &message));
         }
         if let Some(wrong) = at.iter().find(|at| !at.is_finite()) {
-            let message = format!("a coordinate of node {number} is {wrong}");
+            let message = format!("a coordinate of {} is {wrong}", contents.node(number));
             return Err(contents.cursor.fault(place, &message));
         }
         contents.nodes.push(Node { number, at, place });

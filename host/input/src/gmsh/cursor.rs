@@ -29,6 +29,8 @@ pub(super) struct Cursor<'a> {
     counted: Cell<(usize, usize)>,
     /// Where sections begin, with their names.
     sections: Vec<(usize, String)>,
+    /// The bytes were made of arrays: nobody has written them, and rows count from 0.
+    pub(super) is_of_arrays: bool,
 }
 
 impl<'a> Cursor<'a> {
@@ -39,6 +41,7 @@ impl<'a> Cursor<'a> {
             encoding: Encoding::Text,
             counted: Cell::new((0, 1)),
             sections: Vec::new(),
+            is_of_arrays: false,
         }
     }
 
@@ -51,8 +54,12 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// What is wrong at a byte: with the line, or in a binary file the section and the byte.
+    /// What is wrong at a byte: with the line, or in a binary file the section and the byte; alone where the bytes
+    /// were made of arrays.
     pub(super) fn fault(&self, at: usize, message: &str) -> Fault {
+        if self.is_of_arrays {
+            return message.to_owned();
+        }
         if self.encoding == Encoding::Text {
             let (from, mut line) = match self.counted.get() {
                 counted if counted.0 <= at => counted,

@@ -293,7 +293,8 @@ fn wanting(groups: &[&'static str], lines: &[&'static str]) -> Wanted<'static> {
 }
 
 fn read(bytes: &[u8], wanted: &Wanted<'_>) -> Result<(Mesh, Vec<String>), String> {
-    assemble::assemble(&Contents::read(bytes)?, wanted)
+    let assembled = assemble::assemble(&Contents::read(bytes)?, wanted)?;
+    Ok((assembled.mesh, assembled.notes))
 }
 
 fn all() -> Wanted<'static> {

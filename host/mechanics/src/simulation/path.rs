@@ -68,7 +68,7 @@ impl Simulation {
                     contraction: None,
                     was_motion: false,
                 };
-                let onto = self.attempt(phase, [from, target], Some(guess));
+                let onto = self.attempt(phase, Control::ArcLength, [from, target], Some(guess));
                 step = onto.map(|success| (success, target));
             }
             match step {
@@ -218,9 +218,8 @@ impl Simulation {
     ) -> Result<(), Error> {
         let lambda = phase.course.lambda;
         let looked_at = watch.looks_at(When::Step, &self.groups);
-        let n = self.problem.phases[phase.number].increments;
         self.complete(phase, looked_at.as_ref())
-            .map_err(|reason| super::no_equilibrium(place, lambda, n, reason.into(), None))?;
+            .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
         go_on(watch.step(place, lambda, iterations, &self.snapshot()))
     }
 }

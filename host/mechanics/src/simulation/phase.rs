@@ -89,6 +89,7 @@ impl Simulation {
             increment: 0,
             lambda: 0.0,
             step: 1.0 / increments as f64,
+            creeps: false,
             history: History::default(),
             domain: None,
             has_matrix: false,
@@ -270,19 +271,7 @@ impl Simulation {
                 None,
             ),
         };
-        let all_symmetric = groups
-            .iter()
-            .filter(|group| group.is_active)
-            .all(|group| group.is_linear() && group.is_symmetric());
-        let symmetric = domain.is_none() && all_symmetric;
-        let own_lines = system.lines(&lines);
-        let own_lines = Some(own_lines.as_slice());
-        let solver = match &domain {
-            Some(domain) => {
-                LinearSolver::with_block(&system.pattern, own_lines, domain.block(&system))?
-            }
-            None => LinearSolver::new(&system.pattern, symmetric, own_lines)?,
-        };
+        let solver = self.solver(&system, domain.as_ref())?;
         self.reuse
             .announce(solver.bytes(), "factorising the equations");
         let mut unknowns = system.free().to_vec();
@@ -339,6 +328,22 @@ impl Simulation {
             ];
         }
         Ok((equations, loads))
+    }
+
+    /// A solver for these equations.
+    pub(super) fn solver(
+        &self,
+        system: &System,
+        domain: Option<&LinearDomain>,
+    ) -> Result<LinearSolver, Singular> {
+        let lines = system.lines(&mesh_lines(&self.problem.mesh.nodes));
+        let lines = Some(lines.as_slice());
+        if let Some(domain) = domain {
+            return LinearSolver::with_block(&system.pattern, lines, domain.block(system));
+        }
+        let mut active = self.groups.iter().filter(|group| group.is_active);
+        let is_symmetric = active.all(|group| group.is_linear() && group.is_symmetric());
+        LinearSolver::new(&system.pattern, is_symmetric, lines)
     }
 
     /// Internal less external forces at the start of a phase where nothing holds them (after a

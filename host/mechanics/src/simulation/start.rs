@@ -159,7 +159,7 @@ impl Simulation {
     /// at the first increment.
     fn ask_law(&mut self, group: usize, number: usize, watch: &mut dyn Watch) -> Result<(), Error> {
         let phase = &self.problem.phases[number];
-        let (name, n) = (phase.name.clone(), phase.increments);
+        let name = phase.name.clone();
         match self.groups[group].take_over() {
             Ok(None) => Ok(()),
             Ok(Some(change)) => {
@@ -187,12 +187,15 @@ impl Simulation {
                     return Err(Error::CannotStart(Box::new(point)));
                 }
                 let failure = StepFailure::from(point);
-                if failure.defect().is_some() {
-                    let place = Place {
-                        phase: name,
-                        increment: 1,
-                    };
-                    return Err(self.cannot_go_on(&place, 0.0, n, failure));
+                if let Some(defect) = failure.defect() {
+                    return Err(Error::Law {
+                        place: Place {
+                            phase: name,
+                            increment: 1,
+                        },
+                        failure: Box::new(defect.clone()),
+                        however_small: false,
+                    });
                 }
                 watch.warning(&Warning::Unasked(name, failure.reason.to_string()));
                 Ok(())

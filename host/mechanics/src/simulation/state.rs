@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// State of a simulation after a whole increment. Copies are independent of each other.
+/// State of a simulation after a whole increment, or where one could not be finished. Copies are independent of each other.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct State<'s> {
     /// Number of the phase, from 0.
@@ -39,6 +39,8 @@ pub(super) struct PhaseCourse {
     pub(super) lambda: f64,
     /// Length of the next step.
     pub(super) step: f64,
+    /// Creep leads it, though the load would have to.
+    pub(super) creeps: bool,
     /// The last steps.
     pub(super) history: History,
     /// Where the linear domain stands.
@@ -63,6 +65,12 @@ impl State<'_> {
         self.course.increment
     }
 
+    /// How much of the phase is done, 0 to 1. After an increment that could not be finished it is more than that of the
+    /// whole ones: the state is the last one in equilibrium.
+    pub fn part_of_phase(&self) -> f64 {
+        self.course.lambda
+    }
+
     /// A copy that borrows nothing from the simulation.
     pub fn into_owned(self) -> State<'static> {
         State {
@@ -85,7 +93,8 @@ impl State<'_> {
 }
 
 impl Simulation {
-    /// The state after the last whole increment; `None` before the first one.
+    /// The present state, from the end of the first increment on: after the last whole increment, or the last one in
+    /// equilibrium on the way through one that could not be finished. `None` before.
     pub fn state(&mut self) -> Option<State<'static>> {
         self.note_course();
         let state = self.borrowed_state().map(State::into_owned);

@@ -1,5 +1,6 @@
 //! What a simulation should tell those who started it.
 
+use super::Neighbour;
 use crate::equilibrium::Open;
 use crate::error::Place;
 use crate::group::{Notice, Parted, TakeOver};
@@ -42,8 +43,9 @@ pub enum Warning {
         /// What is left.
         left: f64,
     },
-    /// Viscous relaxation led to the equilibrium of this increment, the first one of its phase.
-    Relaxed(Place),
+    /// A motion led to the equilibrium of this increment, the first one of its phase; where creep leads, if
+    /// that was relaxation.
+    Relaxed(Place, Option<Neighbour>),
     /// It did so in so many steps of a phase.
     RelaxedOften(String, usize),
     /// Residuals were tolerated in so many steps of a phase.
@@ -86,6 +88,8 @@ pub enum Warning {
     TookOver(String, TakeOver),
     /// A law could not be asked that; this is what it says.
     Unasked(String, String),
+    /// Steps of the load found no equilibrium: creep leads from here on.
+    Creeps(Place),
     /// The path of equilibrium was followed, from one load factor, between two others.
     FollowedPath {
         /// The increment.
@@ -140,13 +144,32 @@ impl fmt::Display for Warning {
                 "phase `{phase}`: `force_tolerance` {tolerance:.1e} is below round-off: a residual of \
                  {left:.1e} is left, which is the last bit of the displacements"
             ),
-            Self::Relaxed(place) => write!(
-                f,
-                "{place}: Newton iterations came to a standstill; viscous relaxation led to the next \
-                 equilibrium; others may lie near, and which one is found depends on the course of \
-                 the relaxation: run it with other increments, or with another `control` (`load`, `creep`), and \
-                 hold the results against each other"
-            ),
+            Self::Relaxed(place, by_creep) => {
+                write!(
+                    f,
+                    "{place}: Newton iterations came to a standstill; viscous relaxation led to the next \
+                     equilibrium; others may lie near, and which one is found depends on the course of \
+                     the relaxation"
+                )?;
+                match by_creep {
+                    Some(Neighbour::Apart {
+                        displacements,
+                        forces,
+                    }) => write!(
+                        f,
+                        ": creep leads the same step to one that is {:.1e} of its displacements and {:.1e} of \
+                         its changes of forces away",
+                        displacements, forces
+                    )?,
+                    Some(Neighbour::None) => write!(f, ": creep leads the same step to none")?,
+                    None => {}
+                }
+                write!(
+                    f,
+                    "; run it with other increments, or with another `control` (`load`, `creep`), and \
+                     hold the results against each other"
+                )
+            }
             Self::RelaxedOften(phase, steps) => write!(
                 f,
                 "phase `{phase}`: viscous relaxation led to the next equilibrium in {steps} steps in all"
@@ -191,6 +214,12 @@ impl fmt::Display for Warning {
                 f,
                 "phase `{phase}`: {reason}\n  over a nil increment, so that what the law makes of the \
                  stresses it finds comes in the first increment, unannounced"
+            ),
+            Self::Creeps(place) => write!(
+                f,
+                "{place}: steps of the load found no equilibrium; from here on creep leads to the next one; others may \
+                 lie near: hold the results against those of `control = \"creep\"` from the start, and of other \
+                 increments"
             ),
             Self::FollowedPath {
                 place,

@@ -1,9 +1,10 @@
 //! What each parameter does to a number: its means at several levels of the parameter, over all values
 //! of the others.
 //!
-//! The values of a parameter are its levels if there are few; else its runs, in the order of their
-//! values, are divided into levels of as many runs each. The main effect of a level is the mean of the
-//! number over its runs. The share of the variance that the levels explain is
+//! The values of a parameter are its levels if there are few, and in a grid without holes however many there are: there
+//! the others have the same values at each of them. Else its runs, in the order of their values, are divided into levels
+//! of about as many runs each; runs of one value are of one level. The main effect of a level is the mean of the number
+//! over its runs. The share of the variance that the levels explain is
 //!
 //! - in a grid without holes, where the others have the same values at every level, the sum of squares between
 //!   levels over the whole one, η²;
@@ -66,17 +67,34 @@ pub fn effects(parameters: &[Vec<f64>], numbers: &[Option<f64>], is_grid: bool) 
     effects
 }
 
+/// Runs in levels of about as many each: a value belongs to the level in which the middle of its runs lies.
+fn levels_of<'r>(runs: &'r [(f64, f64)], by_value: &[&[(f64, f64)]]) -> Vec<&'r [(f64, f64)]> {
+    let n = runs.len();
+    let k = ((n as f64).sqrt().round() as usize).clamp(2, 10);
+    let (mut levels, mut first, mut end, mut last) = (Vec::new(), 0, 0, 0);
+    for of_value in by_value {
+        let level = (2 * end + of_value.len()) * k / (2 * n);
+        if level > last {
+            levels.push(&runs[first..end]);
+            (first, last) = (end, level);
+        }
+        end += of_value.len();
+    }
+    levels.push(&runs[first..]);
+    levels.retain(|level| !level.is_empty());
+    levels
+}
+
 /// Of runs in the order of the parameter's values.
 fn effect(parameter: usize, runs: &[(f64, f64)], is_grid: bool) -> Effect {
     let n = runs.len();
     let by_value: Vec<&[(f64, f64)]> = runs
         .chunk_by(|a, b| a.0.to_bits() == b.0.to_bits())
         .collect();
-    let groups = if by_value.len() <= FEW {
+    let groups = if is_grid || by_value.len() <= FEW {
         by_value
     } else {
-        let k = ((n as f64).sqrt().round() as usize).clamp(2, 10);
-        (0..k).map(|i| &runs[i * n / k..(i + 1) * n / k]).collect()
+        levels_of(runs, &by_value)
     };
     let mean = |runs: &[(f64, f64)], of: fn(&(f64, f64)) -> f64| {
         runs.iter().map(of).sum::<f64>() / runs.len() as f64
@@ -184,6 +202,41 @@ mod tests {
         // Within: 3 · 5 + 2 = 17. Whole: Σ(x + z)² − 15 · 2.8² = 148 − 117.6 = 30.4.
         let share = 1.0 - 14.0 / 11.0 * 17.0 / 30.4;
         assert!((found[0].share.unwrap() - share).abs() < 1e-12, "{found:?}");
+    }
+
+    /// y = a on {0 … 19} × {0 … 14}: b does nothing, whatever the number of values, and a everything.
+    #[test]
+    fn a_large_grid_has_a_level_for_every_value() {
+        let (mut a, mut b, mut y) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..20 {
+            for j in 0..15 {
+                a.push(f64::from(i));
+                b.push(f64::from(j));
+                y.push(Some(f64::from(i)));
+            }
+        }
+        let of = |found: &[Effect], parameter: usize| {
+            let of = found.iter().find(|e| e.parameter == parameter).unwrap();
+            (of.levels.clone(), of.share.unwrap(), of.range())
+        };
+        let found = effects(&[a.clone(), b.clone()], &y, true);
+        let (levels, share, _) = of(&found, 0);
+        assert!((share - 1.0).abs() < 1e-12, "{share}");
+        assert_eq!(levels.len(), 20);
+        assert!(levels.iter().all(|level| level.runs == 15));
+        let (levels, share, range) = of(&found, 1);
+        assert_eq!(levels.len(), 15);
+        assert!(share.abs() < 1e-12 && range < 1e-12, "{share} {range}");
+        // With a hole it is no grid; the runs of one value stay in one level still.
+        y[0] = None;
+        let found = effects(&[a, b], &y, true);
+        let (levels, share, _) = of(&found, 1);
+        assert_eq!(levels.iter().map(|level| level.runs).sum::<usize>(), 299);
+        assert!(
+            levels.iter().all(|level| level.runs % 20 % 19 == 0),
+            "{levels:?}"
+        );
+        assert!(share < 0.01, "{share}");
     }
 
     #[test]

@@ -102,9 +102,14 @@ impl Model {
             self.kept.keep(key, columns.clone())?;
             columns
         };
-        // What is kept does not depend on noise and weights.
+        // What is kept depends neither on noise and weights, nor on how parameters are counted.
         let of_test = &self.tests[test];
-        let weighed = |column: Vec<f64>| {
+        let values = self.values(counted);
+        let weighed = |(&parameter, mut column): (&usize, Vec<f64>)| {
+            let slope = self.parameters[parameter].slope(values[parameter]);
+            for derivative in &mut column {
+                *derivative *= slope;
+            }
             let of_curves = of_test.of_curves(&column);
             of_curves
                 .flat_map(|(curve, own)| curve.weighed(own))
@@ -112,12 +117,13 @@ impl Model {
         };
         let weighed = columns
             .ok()
-            .map(|all| all.into_iter().map(weighed).collect());
+            .map(|all| parameters.iter().zip(all).map(weighed).collect());
         self.tests[test].is_by_law = weighed.is_some();
         Ok(weighed)
     }
 
-    /// Derivatives of what a test computes at its measured points, followed through its driver.
+    /// Derivatives of what a test computes at its measured points by the values of parameters, followed through its
+    /// driver.
     fn followed(
         &self,
         test: usize,
@@ -156,12 +162,11 @@ impl Model {
                 && let Some(of_rows) = of_own.next()
             {
                 column.clear();
-                let slope = self.parameters[parameter].slope(values[parameter]);
                 for curve in &self.tests[test].curves {
                     let Ok(derivatives) = curve.derivatives(&rows, &of_rows) else {
                         return None;
                     };
-                    column.extend(derivatives.into_iter().map(|d| slope * d));
+                    column.extend(derivatives);
                 }
             }
             columns.push(column);

@@ -240,11 +240,13 @@ pub(super) fn fit(
         .collect();
     let bounds: Vec<[f64; 2]> = parameters.iter().map(Parameter::counted_bounds).collect();
     let ranges: Vec<[f64; 2]> = parameters.iter().map(Parameter::counted_range).collect();
+    let exactness = model.exactness_of(&group.tests);
+    let Exactness { derivatives, .. } = known_to(model, group);
     let settings = Settings {
-        reduction: 0.1 * model.exactness,
-        step: (1e-2 * model.exactness.sqrt()).max(1e-9),
-        gradient: model.exactness.sqrt().min(1e-3),
-        blind: blind(model),
+        reduction: 0.1 * exactness,
+        step: (1e-2 * exactness.sqrt()).max(1e-9),
+        gradient: exactness.sqrt().min(1e-3),
+        least: derivatives,
         iterations: ITERATIONS,
         longest: LONGEST,
     };
@@ -300,10 +302,9 @@ pub(super) fn fit(
     };
     // What nothing answers to keeps the value that was given, wherever the search happened to start.
     let norms: Vec<f64> = best.jacobian.column_iter().map(|c| c.norm()).collect();
-    let largest = norms.iter().fold(0.0, |m: f64, norm| m.max(*norm));
     let mut kept = best.u.clone();
     for (place, norm) in norms.iter().enumerate() {
-        if *norm <= settings.blind * largest {
+        if *norm <= settings.least {
             kept[place] = landings[0].from[place];
         }
     }
@@ -396,33 +397,37 @@ pub(super) fn fit(
     Ok(Some(stage))
 }
 
-/// What moves the residuals by less than their differences are known to is not seen.
-pub(super) fn blind(model: &Model) -> f64 {
-    (model.exactness / model.difference).max(1e-6)
+/// What the tests of a group are known to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Exactness {
+    /// Square of what residuals without weights are known to, in the mean.
+    pub(super) floor: f64,
+    /// What the norm of a column of derivatives is known to, with weights.
+    derivatives: f64,
 }
 
-/// Square of what residuals without weights are known to, in the mean, and the norm of what is measured: of
-/// the largest value of each curve over its noise, with weights.
-pub(super) fn known_to(model: &Model, group: &Group) -> [f64; 2] {
+/// Each test is known to its own exactness, relative to the largest measured value of a curve.
+pub(super) fn known_to(model: &Model, group: &Group) -> Exactness {
     let (mut n, mut squares, mut weighed) = (0, 0.0, 0.0);
-    for curve in group
-        .tests
-        .iter()
-        .flat_map(|&test| &model.tests[test].curves)
-    {
-        let largest = curve.largest();
-        n += curve.points.len();
-        let of_curve: f64 = curve.deviations.iter().map(|d| (largest / d).powi(2)).sum();
-        squares += of_curve;
-        weighed += curve.weight * of_curve;
+    for &test in &group.tests {
+        let (exactness, blind) = (model.tests[test].exactness, model.blind_in(&[test]));
+        for curve in &model.tests[test].curves {
+            let largest = curve.largest();
+            n += curve.points.len();
+            let of_curve: f64 = curve.deviations.iter().map(|d| (largest / d).powi(2)).sum();
+            squares += exactness.powi(2) * of_curve;
+            weighed += curve.weight * blind.powi(2) * of_curve;
+        }
     }
-    let mean = squares / n.max(1) as f64;
-    [model.exactness.powi(2) * mean, weighed.sqrt()]
+    Exactness {
+        floor: squares / n.max(1) as f64,
+        derivatives: weighed.sqrt(),
+    }
 }
 
 /// What residuals and derivatives say of the best place.
 fn known(model: &Model, group: &Group, best: &Minimum, bounds: &[[f64; 2]], wish: Wish) -> Stage {
-    let blind = blind(model);
+    let blind = model.blind_in(&group.tests);
     let n = best.u.len();
     let weights: Vec<f64> = group
         .tests
@@ -432,12 +437,18 @@ fn known(model: &Model, group: &Group, best: &Minimum, bounds: &[[f64; 2]], wish
         .collect();
     let squares = best.residuals.iter().zip(&weights).map(|(r, w)| r * r / w);
     let plain_sum: f64 = squares.sum();
-    let [floor, signal] = known_to(model, group);
+    let Exactness { floor, derivatives } = known_to(model, group);
     let variance_of = |degrees: usize| match wish.variance {
         Variance::Estimated => (plain_sum / degrees.max(1) as f64).max(floor),
         Variance::Given => 1.0,
     };
-    let may_move = free(&best.u, &best.jacobian, &best.residuals, bounds, blind);
+    let may_move = free(
+        &best.u,
+        &best.jacobian,
+        &best.residuals,
+        bounds,
+        derivatives,
+    );
     let answers: Vec<f64> = best
         .jacobian
         .column_iter()
@@ -447,7 +458,10 @@ fn known(model: &Model, group: &Group, best: &Minimum, bounds: &[[f64; 2]], wish
     let is_seen = |place: usize| {
         let [low, high] = model.parameters[group.parameters[place]].counted_range();
         let range = high - low;
-        answers[place] * range > 1e-3 * noise && answers[place] > blind * signal
+        // The noise is that of residuals without weights.
+        let column = best.jacobian.column(place);
+        let plain: f64 = column.iter().zip(&weights).map(|(d, w)| d * d / w).sum();
+        plain.sqrt() * range > 1e-3 * noise && answers[place] > derivatives
     };
     let seen: Vec<bool> = (0..n).map(is_seen).collect();
     let moving: Vec<usize> = may_move.iter().copied().filter(|&i| seen[i]).collect();
@@ -519,7 +533,7 @@ impl Stage {
                 most = most.max(self.answers[place]);
             }
         }
-        let little = SAME_OF_ERROR * self.variance.sqrt();
+        let little = SAME_OF_ERROR * (self.variance * self.covariance.mean_growth()).sqrt();
         !is_open
             || rest.norm() <= little.max(SAME * most) && (a_sum - b_sum).abs() <= little * little
     }

@@ -1,7 +1,7 @@
 //! What is computed with the values found, beside what was measured.
 
 use super::curve::Curve;
-use super::fit::{Group, Stage, Wish, blind, known_to};
+use super::fit::{Group, Stage, Wish, known_to};
 use super::misfit;
 use super::model::{Model, Test};
 use super::profile::Side;
@@ -100,8 +100,10 @@ pub(super) fn fitted(
             return Err(Error::usage(message));
         };
         let gradients = model.gradients(number, counted, &of)?;
+        let held = on_bounds(model, stages, number);
+        let by_held = model.gradients(number, counted, &held)?;
         let test = &model.tests[number];
-        let known = known(model, test, (errors, &of, &gradients), scatter);
+        let known = known(model, number, (errors, &of, &gradients), scatter);
         let noise = test.curves.iter().flat_map(|curve| &curve.deviations);
         let of_known = |(known, noise): (&Known, &f64)| match known {
             Known::Variance(variance) if scatter.quantile.is_finite() => {
@@ -118,6 +120,8 @@ pub(super) fn fitted(
             (&of, &gradients),
             &deviations,
         ));
+        said.others
+            .extend(on_a_bound(model, test, (&held, &by_held), &deviations));
         let values = test.of_curves(&computed).zip(test.of_curves(&deviations));
         let mut curves = Vec::new();
         for (place, ((curve, computed), (_, deviations))) in values.enumerate() {
@@ -148,11 +152,12 @@ pub(super) fn fitted(
 /// What is known of the computed values of a test, curve by curve, since their units differ.
 fn known(
     model: &Model,
-    test: &Test,
+    number: usize,
     (errors, of, gradients): (&Errors, &[usize], &[Option<Vec<f64>>]),
     scatter: Scatter,
 ) -> Vec<Known> {
-    let blind = blind(model);
+    let test = &model.tests[number];
+    let blind = model.blind_in(&[number]);
     let mut first = 0;
     let of_curve = |curve: &Curve| {
         let own = first..first + curve.points.len();
@@ -237,7 +242,7 @@ fn scatter(
         }
     }
     let degrees = n.saturating_sub(errors.n_determined());
-    let [floor, _] = known_to(model, &all);
+    let floor = known_to(model, &all).floor;
     Ok(Scatter {
         variance: (sum / degrees.max(1) as f64).max(floor),
         quantile: two_sided(wish.confidence, Some(degrees)),
@@ -308,6 +313,45 @@ fn without_limit(
         format!(
             "{}: what is computed depends on {}, which has an interval without an end: the interval of prediction, from \
              the covariance alone, is too narrow",
+            test.name,
+            names.join(" and ")
+        )
+    })
+}
+
+/// Parameters that ended on a bound, where a test is predicted.
+fn on_bounds(model: &Model, stages: &[Stage], test: usize) -> Vec<usize> {
+    let is_on_bound = |parameter: &usize| {
+        let mut last = stages.iter().rev().filter_map(|stage| {
+            let mut own = stage.group.parameters.iter();
+            let place = own.position(|p| p == parameter)?;
+            Some(stage.on_bound[place] != [false, false])
+        });
+        last.next().unwrap_or(false)
+    };
+    let all = (0..model.parameters.len()).filter(|_| model.tests[test].is_predicted);
+    all.filter(is_on_bound).collect()
+}
+
+/// Parameters on a bound that a prediction depends on: they have no error, and are taken as known.
+fn on_a_bound(
+    model: &Model,
+    test: &Test,
+    (held, gradients): (&[usize], &[Option<Vec<f64>>]),
+    deviations: &[Option<f64>],
+) -> Option<String> {
+    let counts = |(&parameter, gradient): (&usize, &Option<Vec<f64>>)| {
+        let [low, high] = model.parameters[parameter].counted_range();
+        let gradient = gradient.as_ref()?;
+        let mut pairs = gradient.iter().zip(deviations);
+        let does = pairs.any(|(g, d)| d.is_some_and(|d| (g * (high - low)).abs() > COUNTS * d));
+        does.then(|| format!("`{}`", model.parameters[parameter].name))
+    };
+    let names: Vec<String> = held.iter().zip(gradients).filter_map(counts).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: what is computed depends on {}, which ended on a bound: the interval of prediction takes the bound for a \
+             value that is known, and may be too narrow",
             test.name,
             names.join(" and ")
         )

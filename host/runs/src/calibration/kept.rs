@@ -17,7 +17,7 @@ use text::write::begin;
 /// Name of the file in the folder of a calibration.
 pub(super) const FILE_NAME: &str = "computations.jsonl";
 
-/// What was computed of a test: values at its measured points, or their derivatives by some parameters.
+/// What was computed of a test: values at its measured points, or their derivatives by the values of some parameters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(super) struct Key {
     pub(super) test: usize,

@@ -42,9 +42,8 @@ pub(super) struct Settings {
     pub(super) step: f64,
     /// Cosine of the angle between residuals and every column below which they count as orthogonal.
     pub(super) gradient: f64,
-    /// Norm of a column, over the largest, below which it is nothing but what derivatives are not known to:
-    /// its variable is left alone.
-    pub(super) blind: f64,
+    /// Norm of a column up to which it is nothing but what derivatives are not known to: its variable is left alone.
+    pub(super) least: f64,
     /// Most iterations.
     pub(super) iterations: usize,
     /// Longest change of a variable in a step: what is linear near a start says nothing of a plateau far away.
@@ -58,7 +57,7 @@ impl Default for Settings {
             reduction: 1e-22,
             step: 1e-12,
             gradient: 1e-12,
-            blind: 0.0,
+            least: 0.0,
             iterations: 200,
             longest: f64::INFINITY,
         }
@@ -139,7 +138,7 @@ pub(super) fn minimise<P: Problem>(
     let mut end = End::Exhausted;
     while iterations < settings.iterations {
         let sum = residuals.norm_squared();
-        let free = free(&u, &jacobian, &residuals, bounds, settings.blind);
+        let free = free(&u, &jacobian, &residuals, bounds, settings.least);
         for (scale, column) in scale.iter_mut().zip(jacobian.column_iter()) {
             *scale = scale.max(column.norm());
         }
@@ -229,17 +228,14 @@ pub(super) fn free(
     jacobian: &DMatrix<f64>,
     residuals: &DVector<f64>,
     bounds: &[[f64; 2]],
-    blind: f64,
+    least: f64,
 ) -> Vec<usize> {
-    let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-    let largest = norms
-        .iter()
-        .fold(0.0_f64, |largest, norm| largest.max(*norm));
     let may_move = |&i: &usize| {
-        let gradient = jacobian.column(i).dot(residuals);
+        let column = jacobian.column(i);
+        let gradient = column.dot(residuals);
         let [lower, upper] = bounds[i];
         let is_out = u[i] <= lower && gradient > 0.0 || u[i] >= upper && gradient < 0.0;
-        lower < upper && !is_out && norms[i] > blind * largest
+        lower < upper && !is_out && column.norm() > least
     };
     (0..u.len()).filter(may_move).collect()
 }

@@ -20,8 +20,6 @@ pub(super) struct Model {
     pub(super) tests: Vec<Test>,
     /// Step of differences, as the search counts.
     pub(super) difference: f64,
-    /// What computed values are known to, relative.
-    pub(super) exactness: f64,
     pub(super) stop: Stop,
     /// What was computed.
     pub(super) kept: Kept,
@@ -42,6 +40,8 @@ pub(super) struct Test {
     /// What the law's parameters are called that the free ones stand for: number, table of laws (none of a
     /// driver), id.
     pub(super) targets: Vec<(usize, Option<String>, String)>,
+    /// What its computed values are known to, relative.
+    pub(super) exactness: f64,
     /// Whether its derivatives last came from the rates of its law.
     pub(super) is_by_law: bool,
     /// What its curves are at the measured points with the starting values.
@@ -109,6 +109,18 @@ impl Model {
         pairs.map(|(p, u)| p.value(*u)).collect()
     }
 
+    /// What the values of some tests are known to, relative: of the one that is known worst.
+    pub(super) fn exactness_of(&self, tests: &[usize]) -> f64 {
+        let all = tests.iter().map(|&test| self.tests[test].exactness);
+        all.fold(0.0, f64::max)
+    }
+
+    /// What moves the values of some tests by less than this, relative to the largest, is not seen: their differences
+    /// are known to no more.
+    pub(super) fn blind_in(&self, tests: &[usize]) -> f64 {
+        (self.exactness_of(tests) / self.difference).max(1e-6)
+    }
+
     /// What is kept under this: of a test, with the values of those parameters that have a say in it.
     pub(super) fn key(&self, test: usize, counted: &[f64], by: Vec<usize>) -> Key {
         let values = self.values(counted).into_iter().enumerate();
@@ -133,7 +145,7 @@ impl Model {
     /// parameters stand for.
     fn identity(&self) -> Result<String, Error> {
         let mut text = format!(
-            "pilum {}\n{:e}\n",
+            "pilum {}\nderivatives by values\n{:e}\n",
             env!("CARGO_PKG_VERSION"),
             self.difference
         );

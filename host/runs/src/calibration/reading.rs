@@ -39,7 +39,6 @@ impl Model {
             parameters: Vec::new(),
             tests: Vec::new(),
             difference: STEP_OF_DRIVERS,
-            exactness: EXACTNESS_OF_DRIVERS,
             stop: stop.clone(),
             kept: Kept::default(),
             first_failure: None,
@@ -55,9 +54,10 @@ impl Model {
         let claims = claims(calibration, &laws)?;
         for (number, (input, subject)) in calibration.file.test.iter().zip(subjects).enumerate() {
             let subject = with_fixed(calibration, (number, subject), &claims)?;
+            let mut exactness = EXACTNESS_OF_DRIVERS;
             if let Subject::Case(case) = &subject {
                 let tolerance = case.file.solver.force_tolerance;
-                model.exactness = model.exactness.max(tolerance);
+                exactness = exactness.max(tolerance);
                 model.difference = model.difference.max(tolerance.sqrt().clamp(1e-3, 0.03));
             }
             let curves = curves(calibration, input, &subject)?;
@@ -67,6 +67,7 @@ impl Model {
                 curves,
                 subject,
                 targets: Vec::new(),
+                exactness,
                 is_by_law: false,
                 at_start: Vec::new(),
             });
@@ -281,6 +282,7 @@ fn claims<'a>(
     laws: &'a [Vec<Known>],
 ) -> Result<Vec<Claim<'a>>, Error> {
     let file = &calibration.file;
+    check_stands_for(calibration)?;
     let fixed = file.fixed.iter().enumerate();
     let fixed =
         fixed.map(|(i, (name, input))| (By::Fixed(i), Wanted::of_fixed(name, input.get_ref())));
@@ -290,7 +292,8 @@ fn claims<'a>(
     for (by, wanted) in fixed.chain(free) {
         let mut own: Vec<Claim<'a>> = Vec::new();
         for (test, known) in laws.iter().enumerate() {
-            for law in wanted.of(calibration, known)? {
+            let stands_for = file.test[test].stands_for.as_ref();
+            for law in wanted.of(calibration, known, stands_for)? {
                 let id = wanted.id.get_ref();
                 let Some(number) = law.description.parameters.iter().position(|p| p.id == *id)
                 else {
@@ -332,6 +335,34 @@ fn claims<'a>(
     Ok(kept)
 }
 
+/// What drivers stand for is a table that some name belongs to.
+fn check_stands_for(calibration: &Calibration) -> Result<(), Error> {
+    let file = &calibration.file;
+    let free = file.free.values().map(|input| &input.get_ref().laws);
+    let fixed = file.fixed.values().map(|input| &input.get_ref().laws);
+    let tables: Vec<&str> = free
+        .chain(fixed)
+        .flatten()
+        .map(|table| table.get_ref().as_str())
+        .collect();
+    for test in &file.test {
+        let Some(table) = &test.stands_for else {
+            continue;
+        };
+        let error = |message: String| calibration.source.error(table.span(), message);
+        if test.driver.is_none() {
+            let message = "`stands_for` belongs to a driver: laws of a case have their tables";
+            return Err(error(message.to_owned()).into());
+        }
+        if !tables.contains(&table.get_ref().as_str()) {
+            let message = format!("no name belongs to the law `{}`", table.get_ref());
+            let hint = suggestion(table.get_ref(), tables);
+            return Err(error(message).hint(hint).into());
+        }
+    }
+    Ok(())
+}
+
 /// The error of two names for one value.
 fn twice(calibration: &Calibration, first: &Claim<'_>, second: &Claim<'_>, test: &str) -> Error {
     let table = |claim: &Claim<'_>| match claim.by {
@@ -350,7 +381,8 @@ fn twice(calibration: &Calibration, first: &Claim<'_>, second: &Claim<'_>, test:
         b.1
     );
     let hint = if second.law.table.is_none() && !second.wanted.laws.is_empty() {
-        "a name belongs to drivers, too; one without `laws` to drivers alone, and goes before others there"
+        "a name belongs to drivers, too; `stands_for` of the test says of which law its driver is. One without `laws` \
+         belongs to drivers alone, and goes before others there"
     } else {
         "a value is looked for or fixed, once"
     };
@@ -461,11 +493,17 @@ impl<'a> Wanted<'a> {
         self,
         calibration: &Calibration,
         known: &'k [Known],
+        stands_for: Option<&Spanned<String>>,
     ) -> Result<Vec<&'k Known>, Error> {
         let has = |law: &&Known| law.parameter(self.id.get_ref()).is_some();
         let is_case = known.iter().any(|law| law.table.is_some());
         if !is_case {
-            return Ok(known.iter().filter(has).collect());
+            let is_another = stands_for.is_some_and(|table| {
+                let mut laws = self.laws.iter();
+                !self.laws.is_empty() && !laws.any(|law| law.get_ref() == table.get_ref())
+            });
+            let own = known.iter().filter(|_| !is_another);
+            return Ok(own.filter(has).collect());
         }
         let named = |law: &&Known| {
             let table = law.table.as_deref();

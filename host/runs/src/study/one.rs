@@ -1,9 +1,9 @@
 //! One run of a study, in a process of its own.
 
-use super::{Plan, folder_of_run, is_wanted, other_run};
+use super::{Plan, folder_of_run, is_wanted, other_file, other_run};
 use crate::run::{Observer, Options, ready};
 use crate::{Error, ending, supervision, trade_off};
-use input::Kind;
+use input::{Case, Kind};
 use law::Stop;
 use mechanics::equilibrium::Reuse;
 use results::study::{
@@ -96,7 +96,7 @@ pub fn run_one(
         let _table = wait_for_table(&plan.folder)?;
         // Whoever had it until now may have made the plan.
         if !is_planned(plan, &case)? {
-            plan.prepare(&record, false)?;
+            plan.prepare_beside(&record, once.anew.then_some(index))?;
         }
     }
     let folder = plan.folder.join(folder_of_run(index));
@@ -126,6 +126,10 @@ pub fn run_one(
         let earlier = identity_of_run(&folder).filter(|identity| !identity.is_empty());
         if earlier.is_some_and(|earlier| earlier != ready.identity()) {
             return Err(other_run(&folder));
+        }
+        // Since the study was begun, or by another process in this moment.
+        if let Some(name) = Record::read(&plan.folder)?.changed(ready.files()) {
+            return Err(other_file(&plan.folder, &name));
         }
         if !is_wanted(&before, true) {
             return Ok(false);
@@ -199,9 +203,15 @@ pub fn mend(folder: &Path, error: &Error) -> Result<bool, Error> {
     Ok(end_run(folder, &standing_after(Some(error)))?)
 }
 
-/// Whether the table of runs is there, and of these texts.
-fn is_planned(plan: &Plan, case: &input::Case) -> Result<bool, Error> {
-    Ok(is_study(&plan.folder) && Record::read(&plan.folder)?.texts == plan.texts(case))
+/// Whether the table of runs is there, of these texts, and of the files that the case names as they are now.
+fn is_planned(plan: &Plan, case: &Case) -> Result<bool, Error> {
+    if !is_study(&plan.folder) {
+        return Ok(false);
+    }
+    let record = Record::read(&plan.folder)?;
+    // What is wrong with a run's case is for its own row.
+    let is_other = || ready(case).is_ok_and(|ready| record.changed(ready.files()).is_some());
+    Ok(record.texts == plan.texts(case) && !is_other())
 }
 
 /// Takes the table of runs, as soon as no other process has it.

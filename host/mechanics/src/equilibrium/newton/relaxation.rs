@@ -22,7 +22,7 @@ use super::Newton;
 use super::failure::{Iterations, Reason, StepFailure};
 use super::outcome::Iteration;
 use super::residual::{Balance, Task};
-use crate::settings::{Control, Settings};
+use crate::settings::Settings;
 use law::Operator;
 
 /// α at first. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
@@ -85,7 +85,7 @@ impl Relaxation {
         // Methods that keep their matrix are slow without having come to an end. Arc-length control
         // has a way of its own to leave a branch.
         let is_wanted =
-            settings.relaxation && settings.control == Control::Load && settings.method.is_newton();
+            settings.relaxation && settings.control.relaxes() && settings.method.is_newton();
         Self {
             course: if is_wanted {
                 Course::Ready

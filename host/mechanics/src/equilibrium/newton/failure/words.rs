@@ -66,8 +66,8 @@ impl fmt::Display for Reason {
                     }
                     Some((Singularity::Limit, lambda)) => write!(
                         f,
-                        ", the elastic one is not: a limit state (a collapse load or a mechanism) \
-                         beyond load factor {lambda:.3e} of the phase"
+                        ", the elastic one is not: no tangent leads beyond load factor {lambda:.3e} of the phase (a \
+                         collapse load, a mechanism, or laws that are singular short of one)"
                     ),
                     Some((Singularity::Unknown, _)) | None => Ok(()),
                 }

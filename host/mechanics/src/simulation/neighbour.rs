@@ -1,0 +1,100 @@
+//! How far from each other two ways lead that a step may take: where relaxation has found an equilibrium, creep
+//! may find another one.
+
+use super::phase::PhaseEquations;
+use super::{Simulation, UnderWay};
+use crate::assembly::fold;
+use crate::equilibrium::{Costs, Matrix, Newton, StepSuccess, norm};
+use crate::group::{Aside, Group};
+use crate::settings::{Control, Settings};
+
+/// Where creep leads in a step that relaxation led to equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Neighbour {
+    /// Elsewhere, by these shares of what the step changes (2-norms): of its displacement increments, and of the
+    /// changes of the forces that the groups under iteration exert on the nodes.
+    Apart {
+        /// Of the displacement increments.
+        displacements: f64,
+        /// Of the changes of forces.
+        forces: f64,
+    },
+    /// To no equilibrium.
+    None,
+}
+
+impl Simulation {
+    /// Where creep leads over a step that ended in `success`, whose trial state is left as it is. `None` if the
+    /// equations for it could not be set up, or it was stopped.
+    pub(super) fn neighbour(
+        &mut self,
+        phase: &UnderWay,
+        success: &StepSuccess,
+        [from, to]: [f64; 2],
+    ) -> Option<Neighbour> {
+        let equations = &phase.equations;
+        let mut solver = self
+            .solver(&equations.system, equations.domain.as_ref())
+            .ok()?;
+        let before = self.forces(equations, Group::add_carried);
+        let here = self.forces(equations, Group::add_trial_forces);
+        let aside: Vec<Aside> = self.groups.iter_mut().map(Group::put_aside).collect();
+        let settings = Settings {
+            control: Control::Creep,
+            ..self.settings()
+        };
+        let mut matrix = Matrix::resumed(equations.matrix.largest());
+        let mut costs = Costs::default();
+        let clock = self.clock(phase.number);
+        let crept = Newton::new(
+            (&equations.system, &equations.places),
+            equations.domain.as_ref(),
+            (&mut solver, &mut matrix),
+            &mut self.groups,
+            &settings,
+            &mut costs,
+        )
+        .stopped_by(&self.stop)
+        .step(&phase.course.loads, [from, to], clock, None);
+        let neighbour = match crept {
+            Ok(crept) => {
+                let there = self.forces(equations, Group::add_trial_forces);
+                Some(Neighbour::Apart {
+                    displacements: apart(&crept.increment, &success.increment, None),
+                    forces: apart(&there, &here, Some(&before)),
+                })
+            }
+            Err(failure) => (!failure.is_stop()).then_some(Neighbour::None),
+        };
+        for (group, aside) in self.groups.iter_mut().zip(aside) {
+            group.take_back(aside);
+        }
+        neighbour
+    }
+
+    /// Forces of the groups that iterate, by degree of freedom.
+    fn forces(
+        &mut self,
+        equations: &PhaseEquations,
+        add: impl Fn(&mut Group, &mut [f64]),
+    ) -> Vec<f64> {
+        let mut forces = vec![0.0; self.displacement.len()];
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            if equations.system.includes(number) {
+                add(group, &mut forces);
+            }
+        }
+        fold(&self.tied, &mut forces);
+        forces
+    }
+}
+
+/// ‖a − b‖ / ‖b − start‖.
+fn apart(a: &[f64], b: &[f64], start: Option<&[f64]>) -> f64 {
+    let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    let change: Vec<f64> = match start {
+        Some(start) => b.iter().zip(start).map(|(b, start)| b - start).collect(),
+        None => b.to_vec(),
+    };
+    norm(&difference) / norm(&change).max(f64::MIN_POSITIVE)
+}
