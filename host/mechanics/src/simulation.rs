@@ -6,7 +6,6 @@ mod complete;
 mod creeping;
 mod history;
 mod loads;
-mod method;
 mod neighbour;
 mod path;
 mod phase;
@@ -14,6 +13,7 @@ mod record;
 mod start;
 mod state;
 mod statics;
+mod tangents;
 mod ties;
 mod warning;
 mod watch;
@@ -292,13 +292,9 @@ impl Simulation {
         self.settings().method
     }
 
-    /// The settings, with the method that suits the laws of the present phase.
+    /// The settings that the iterations are asked for.
     fn settings(&self) -> Settings {
-        let given = self.problem.settings;
-        Settings {
-            method: method::resolved(given.method, &self.groups),
-            ..given.in_force()
-        }
+        self.problem.settings.in_force()
     }
 
     /// Goes on to the end of the last phase.
@@ -501,6 +497,8 @@ impl Simulation {
             let attempt = self.attempt(phase, lead.control, [start, end], guess);
             match self.without_leap(attempt, phase, length) {
                 Ok(success) => {
+                    let period = (self.clock(phase.number), [start, end]);
+                    self.look_after(&success, period, watch);
                     if success.relaxed {
                         phase.record.relaxed += 1;
                         // The phase's end says how many there were.
@@ -522,6 +520,10 @@ impl Simulation {
                 Err(failure) => {
                     go_on(watch.iterations(place, end, &failure.iterations))?;
                     done.iterations += failure.iterations.len();
+                    let period = (self.clock(phase.number), [start, end]);
+                    if self.look_after_failure(&failure, period, watch) {
+                        continue;
+                    }
                     phase.record.cut_backs += 1;
                     let factor = failure.factor().unwrap_or(CUT[1]).clamp(CUT[0], CUT[1]);
                     let step = factor * length;

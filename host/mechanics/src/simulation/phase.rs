@@ -2,7 +2,7 @@
 
 use super::history::History;
 use super::state::PhaseCourse;
-use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch, method};
+use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
 use crate::assembly::{Bodies, Places, System, fold};
 use crate::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
 use crate::error::Error;
@@ -133,9 +133,7 @@ impl Simulation {
         course: PhaseCourse,
         watch: &mut dyn Watch,
     ) {
-        if let Some(other) = method::other(self.problem.settings.method, &self.groups) {
-            watch.warning(&other);
-        }
+        self.choose_tangents(watch);
         let phase = &self.problem.phases[number];
         let active = self.groups.iter().filter(|group| group.is_active);
         let mut dependent =
