@@ -4,10 +4,9 @@
 //! the laws it has built, up to [`MOST_LAWS`] sets of parameters, and finds them by the bits of the
 //! values, without a lock. Beyond that a law is built in every call.
 
-use crate::point::{Answer, Carried, Point};
 use abi::access::{Message, id, panic_text, within_bounds};
 use abi::export::Exported;
-use abi::{Failure, Hypothesis, Parameter, Parameters, Tangent, raw};
+use abi::{Failure, Hypothesis, Parameter, Parameters, raw};
 use std::ffi::CStr;
 use std::fmt;
 use std::io::Write as _;
@@ -58,8 +57,9 @@ struct Built<L> {
     poisoned: AtomicBool,
 }
 
-impl<L: Carried> Built<L> {
+impl<L: Exported> Built<L> {
     /// From the first values in declared order; the rest take their defaults.
+    #[cold]
     fn new(given: &[f64]) -> Self {
         let table = <L::Parameters as Parameters>::TABLE;
         let law = complete(table, given).and_then(|values| {
@@ -76,12 +76,13 @@ impl<L: Carried> Built<L> {
         }
     }
 
-    fn carry(&self, point: &Point, tangent: Tangent) -> Result<Answer, Trouble<'_>> {
+    #[inline]
+    fn carry<A>(&self, work: impl FnOnce(&L) -> Result<A, Failure>) -> Result<A, Trouble<'_>> {
         let law = self.law.as_ref().map_err(|why| Trouble::Refused(why))?;
         if self.poisoned.load(Ordering::Relaxed) {
             return Err(Trouble::Panicked);
         }
-        catch_unwind(AssertUnwindSafe(|| law.carry(point, tangent)))
+        catch_unwind(AssertUnwindSafe(|| work(law)))
             .map_err(|_| {
                 self.poisoned.store(true, Ordering::Relaxed);
                 Trouble::Panicked
@@ -148,7 +149,7 @@ struct Kept<L> {
     next: *mut Self,
 }
 
-impl<L: Carried> Laws<L> {
+impl<L: Exported> Laws<L> {
     /// None yet.
     ///
     /// # Panics
@@ -166,29 +167,29 @@ impl<L: Carried> Laws<L> {
 
     /// Carries a point with the law of these parameters, the first values in declared order.
     /// `tell` hears what is in the way of an answer.
-    pub(crate) fn carry(
+    #[inline]
+    pub(crate) fn carry<A>(
         &self,
         given: &[f64],
-        point: &Point,
-        tangent: Tangent,
+        work: impl FnOnce(&L) -> Result<A, Failure>,
         tell: impl FnOnce(Trouble<'_>),
-    ) -> Option<Answer> {
+    ) -> Option<A> {
         let bucket = &self.buckets[hash(given) % N_BUCKETS];
         let head = bucket.load(Ordering::Acquire);
         let outcome = if let Some(built) = find(head, given) {
-            built.carry(point, tangent)
+            built.carry(work)
         } else if self.n.fetch_add(1, Ordering::Relaxed) < MOST_LAWS {
-            keep(bucket, head, given).carry(point, tangent)
+            keep(bucket, head, given).carry(work)
         } else {
             self.n.fetch_sub(1, Ordering::Relaxed);
             let built = Built::<L>::new(given);
-            return built.carry(point, tangent).map_err(tell).ok();
+            return built.carry(work).map_err(tell).ok();
         };
         outcome.map_err(tell).ok()
     }
 }
 
-impl<L: Carried> Default for Laws<L> {
+impl<L: Exported> Default for Laws<L> {
     fn default() -> Self {
         Self::new()
     }
@@ -215,7 +216,9 @@ fn find<'a, L>(mut at: *const Kept<L>, given: &[f64]) -> Option<&'a Built<L>> {
 }
 
 /// Builds a law and puts it at the head of the list. Two threads may keep the same one twice.
-fn keep<'a, L: Carried>(
+#[cold]
+#[inline(never)]
+fn keep<'a, L: Exported>(
     bucket: &AtomicPtr<Kept<L>>,
     mut head: *mut Kept<L>,
     given: &[f64],
