@@ -114,11 +114,11 @@ pub unsafe fn integrate<L: Carried<N>, const N: usize, const P: usize>(
     };
     // SAFETY: passed on to the caller.
     match unsafe { prepared::<L, N>(data) } {
-        Ok((request, axes)) => {
+        Ok(request) => {
             // SAFETY: passed on to the caller; no array that is needed is null.
             unsafe {
                 let given = given::<L, P>(settings, data.s1.material_properties);
-                let work = |law: &L| carry(law, data, request, &axes);
+                let work = move |law: &L| carry(law, data, request);
                 let mut factor = 0.25;
                 let answer = laws.carry(&given, work, |trouble| {
                     factor = trouble.factor();
@@ -144,7 +144,7 @@ pub unsafe fn integrate<L: Carried<N>, const N: usize, const P: usize>(
     }
 }
 
-/// What is asked for, and the axes that the law wants.
+/// What is asked for.
 ///
 /// # Errors
 /// Why the call cannot be answered.
@@ -152,9 +152,7 @@ pub unsafe fn integrate<L: Carried<N>, const N: usize, const P: usize>(
 /// # Safety
 /// As [`integrate`].
 #[inline]
-unsafe fn prepared<L: Exported, const N: usize>(
-    data: &Data,
-) -> Result<(Request, Axes), &'static str> {
+unsafe fn prepared<L: Exported, const N: usize>(data: &Data) -> Result<Request, &'static str> {
     let (n_states, s0, s1) = (L::STATE.len(), &data.s0, &data.s1);
     // SAFETY: `K` is null or has one value at least.
     let request = unsafe { data.k.as_ref() }.map_or(Ok(Request::NONE), |k| Request::decoded(*k))?;
@@ -168,16 +166,21 @@ unsafe fn prepared<L: Exported, const N: usize>(
     if missing {
         return Err("an array that is needed is null");
     }
-    if !has_axes::<L>() {
-        return Ok((request, Axes(None)));
+    // SAFETY: no array that is needed is null.
+    if has_axes::<L>() && !unsafe { angle::<L>(data) }.is_finite() {
+        return Err("LayerAngle is not finite");
     }
+    Ok(request)
+}
+
+/// The layer's angle.
+///
+/// # Safety
+/// The law is in axes of its layer, and there are material properties.
+#[inline]
+unsafe fn angle<L: Exported>(data: &Data) -> f64 {
     // SAFETY: as many as there are names, of which the angle is the last.
-    let angle = unsafe { *s1.material_properties.add(n_properties::<L>() - 1) };
-    if angle.is_finite() {
-        Ok((request, Axes::at(angle)))
-    } else {
-        Err("LayerAngle is not finite")
-    }
+    unsafe { *data.s1.material_properties.add(n_properties::<L>() - 1) }
 }
 
 /// All parameters in declared order. Of the properties those of the end of the increment: some
@@ -191,15 +194,20 @@ unsafe fn given<L: Exported, const P: usize>(
     properties: *const f64,
 ) -> [f64; P] {
     let table = <L::Parameters as Parameters>::TABLE;
-    let mut next = 0;
-    std::array::from_fn(|v| {
-        if has_default(&table[v]) {
-            return settings.value(v);
-        }
-        next += 1;
-        // SAFETY: see above.
-        unsafe { *properties.add(next - 1) }
-    })
+    let (mut values, mut properties) = ([0.0; P], properties);
+    for (v, value) in values.iter_mut().enumerate() {
+        *value = if has_default(&table[v]) {
+            settings.value(v)
+        } else {
+            // SAFETY: see above.
+            unsafe {
+                let property = *properties;
+                properties = properties.add(1);
+                property
+            }
+        };
+    }
+    values
 }
 
 /// Tells why, in the room that the caller has for it.
@@ -239,9 +247,14 @@ unsafe fn carry<L: Carried<N>, const N: usize>(
     law: &L,
     data: &Data,
     request: Request,
-    axes: &Axes,
 ) -> Result<Option<&'static str>, Failure> {
     let (s0, s1) = (&data.s0, &data.s1);
+    let axes = if has_axes::<L>() {
+        // SAFETY: the law is in axes of its layer, the properties are not null.
+        Axes::at(unsafe { angle::<L>(data) })
+    } else {
+        Axes(None)
+    };
     let mut unused;
     // SAFETY: `N` components.
     let point = unsafe {
