@@ -176,16 +176,46 @@ impl<L: Exported> Laws<L> {
     ) -> Option<A> {
         let bucket = &self.buckets[hash(given) % N_BUCKETS];
         let head = bucket.load(Ordering::Acquire);
-        let outcome = if let Some(built) = find(head, given) {
-            built.carry(work)
-        } else if self.n.fetch_add(1, Ordering::Relaxed) < MOST_LAWS {
-            keep(bucket, head, given).carry(work)
+        let made;
+        let built = if let Some(built) = find(head, given) {
+            built
+        } else if let Some(built) = self.keep(bucket, head, given) {
+            built
         } else {
-            self.n.fetch_sub(1, Ordering::Relaxed);
-            let built = Built::<L>::new(given);
-            return built.carry(work).map_err(tell).ok();
+            made = Box::new(Built::<L>::new(given));
+            &*made
         };
-        outcome.map_err(tell).ok()
+        built.carry(work).map_err(tell).ok()
+    }
+
+    /// Builds a law and puts it at the head of the list, unless there are too many. Two threads may keep
+    /// the same one twice.
+    #[cold]
+    #[inline(never)]
+    fn keep<'a>(
+        &self,
+        bucket: &AtomicPtr<Kept<L>>,
+        mut head: *mut Kept<L>,
+        given: &[f64],
+    ) -> Option<&'a Built<L>> {
+        if self.n.fetch_add(1, Ordering::Relaxed) >= MOST_LAWS {
+            self.n.fetch_sub(1, Ordering::Relaxed);
+            return None;
+        }
+        let kept = Box::into_raw(Box::new(Kept {
+            key: given.iter().map(|v| v.to_bits()).collect(),
+            built: Built::new(given),
+            next: head,
+        }));
+        while let Err(now) =
+            bucket.compare_exchange_weak(head, kept, Ordering::AcqRel, Ordering::Acquire)
+        {
+            head = now;
+            // SAFETY: nobody else knows it yet.
+            unsafe { (*kept).next = head };
+        }
+        // SAFETY: made above, never freed.
+        Some(unsafe { &(*kept).built })
     }
 }
 
@@ -218,30 +248,6 @@ fn find<'a, L>(mut at: *const Kept<L>, given: &[f64]) -> Option<&'a Built<L>> {
         at = kept.next;
     }
     None
-}
-
-/// Builds a law and puts it at the head of the list. Two threads may keep the same one twice.
-#[cold]
-#[inline(never)]
-fn keep<'a, L: Exported>(
-    bucket: &AtomicPtr<Kept<L>>,
-    mut head: *mut Kept<L>,
-    given: &[f64],
-) -> &'a Built<L> {
-    let kept = Box::into_raw(Box::new(Kept {
-        key: given.iter().map(|v| v.to_bits()).collect(),
-        built: Built::new(given),
-        next: head,
-    }));
-    while let Err(now) =
-        bucket.compare_exchange_weak(head, kept, Ordering::AcqRel, Ordering::Acquire)
-    {
-        head = now;
-        // SAFETY: nobody else knows it yet.
-        unsafe { (*kept).next = head };
-    }
-    // SAFETY: made above, never freed.
-    unsafe { &(*kept).built }
 }
 
 /// Says something on the standard error stream, the only channel of a program that takes no

@@ -100,7 +100,8 @@ pub trait Carried<const N: usize>: Exported {
 }
 
 impl<L: ContinuumLaw, const N: usize> Carried<N> for Continuum<L> {
-    #[inline]
+    #[expect(clippy::inline_always, reason = "a request that is a constant must reach the update")]
+    #[inline(always)]
     fn carry(&self, point: &Point<N>, tangent: Tangent) -> Result<Answer<N>, Failure> {
         let law = self.law();
         let solid = SolidPoint {
@@ -123,7 +124,8 @@ impl<L: ContinuumLaw, const N: usize> Carried<N> for Continuum<L> {
 }
 
 impl<L: InterfaceLaw> Carried<2> for Interface<L> {
-    #[inline]
+    #[expect(clippy::inline_always, reason = "a request that is a constant must reach the update")]
+    #[inline(always)]
     fn carry(&self, point: &Point<2>, tangent: Tangent) -> Result<Answer<2>, Failure> {
         let law = self.law();
         let interface = InterfacePoint {
