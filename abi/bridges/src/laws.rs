@@ -76,6 +76,13 @@ impl<L: Exported> Built<L> {
         }
     }
 
+    /// The same in a place of its own, as it may be large.
+    #[cold]
+    #[inline(never)]
+    fn boxed(given: &[f64]) -> Box<Self> {
+        Box::new(Self::new(given))
+    }
+
     #[inline]
     fn carry<A>(&self, work: impl FnOnce(&L) -> Result<A, Failure>) -> Result<A, Trouble<'_>> {
         let law = self.law.as_ref().map_err(|why| Trouble::Refused(why))?;
@@ -182,7 +189,7 @@ impl<L: Exported> Laws<L> {
         } else if let Some(built) = self.keep(bucket, head, given) {
             built
         } else {
-            made = Box::new(Built::<L>::new(given));
+            made = Built::boxed(given);
             &*made
         };
         built.carry(work).map_err(tell).ok()

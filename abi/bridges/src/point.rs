@@ -7,7 +7,7 @@ use abi::{
 };
 
 /// One point as another program gives it.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Point<const N: usize> {
     /// Gradient at the start.
     pub(crate) gradient: [f64; N],
@@ -100,7 +100,10 @@ pub trait Carried<const N: usize>: Exported {
 }
 
 impl<L: ContinuumLaw, const N: usize> Carried<N> for Continuum<L> {
-    #[expect(clippy::inline_always, reason = "a request that is a constant must reach the update")]
+    #[expect(
+        clippy::inline_always,
+        reason = "a request that is a constant must reach the update"
+    )]
     #[inline(always)]
     fn carry(&self, point: &Point<N>, tangent: Tangent) -> Result<Answer<N>, Failure> {
         let law = self.law();
@@ -124,7 +127,10 @@ impl<L: ContinuumLaw, const N: usize> Carried<N> for Continuum<L> {
 }
 
 impl<L: InterfaceLaw> Carried<2> for Interface<L> {
-    #[expect(clippy::inline_always, reason = "a request that is a constant must reach the update")]
+    #[expect(
+        clippy::inline_always,
+        reason = "a request that is a constant must reach the update"
+    )]
     #[inline(always)]
     fn carry(&self, point: &Point<2>, tangent: Tangent) -> Result<Answer<2>, Failure> {
         let law = self.law();

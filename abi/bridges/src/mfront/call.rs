@@ -114,11 +114,11 @@ pub unsafe fn integrate<L: Carried<N>, const N: usize, const P: usize>(
     };
     // SAFETY: passed on to the caller.
     match unsafe { prepared::<L, N>(data) } {
-        Ok(request) => {
+        Ok(start) => {
             // SAFETY: passed on to the caller; no array that is needed is null.
             unsafe {
                 let given = given::<L, P>(settings, data.s1.material_properties);
-                let work = move |law: &L| carry(law, data, request);
+                let work = move |law: &L| carry(law, data, start);
                 let mut factor = 0.25;
                 let answer = laws.carry(&given, work, |trouble| {
                     factor = trouble.factor();
@@ -144,7 +144,16 @@ pub unsafe fn integrate<L: Carried<N>, const N: usize, const P: usize>(
     }
 }
 
-/// What is asked for.
+/// What a call begins with, in Kelvin–Mandel components.
+#[derive(Clone, Copy)]
+struct Start<const N: usize> {
+    request: Request,
+    begin: [f64; N],
+    end: [f64; N],
+    forces: [f64; N],
+}
+
+/// What is asked for, and from where.
 ///
 /// # Errors
 /// Why the call cannot be answered.
@@ -152,25 +161,35 @@ pub unsafe fn integrate<L: Carried<N>, const N: usize, const P: usize>(
 /// # Safety
 /// As [`integrate`].
 #[inline]
-unsafe fn prepared<L: Exported, const N: usize>(data: &Data) -> Result<Request, &'static str> {
+unsafe fn prepared<L: Exported, const N: usize>(data: &Data) -> Result<Start<N>, &'static str> {
+    const MISSING: &str = "an array that is needed is null";
     let (n_states, s0, s1) = (L::STATE.len(), &data.s0, &data.s1);
     // SAFETY: `K` is null or has one value at least.
     let request = unsafe { data.k.as_ref() }.map_or(Ok(Request::NONE), |k| Request::decoded(*k))?;
-    let missing = s0.gradients.is_null()
-        || s1.gradients.is_null()
-        || s0.thermodynamic_forces.is_null()
-        || s1.thermodynamic_forces.is_null()
+    // One pointer after the other: as pairs they would be read before the caller's writing of them is done.
+    // SAFETY: null or `N` components.
+    let row = |p: *const f64| unsafe { p.cast::<[f64; N]>().as_ref() }.copied();
+    let begin = row(s0.gradients).ok_or(MISSING)?;
+    let end = row(s1.gradients).ok_or(MISSING)?;
+    let forces = row(s0.thermodynamic_forces).ok_or(MISSING)?;
+    let missing = s1.thermodynamic_forces.is_null()
         || (n_states > 0 && s0.internal_state_variables.is_null())
         || (n_states > 0 && s1.internal_state_variables.is_null())
         || (n_properties::<L>() > 0 && s1.material_properties.is_null());
     if missing {
-        return Err("an array that is needed is null");
+        return Err(MISSING);
     }
     // SAFETY: no array that is needed is null.
     if has_axes::<L>() && !unsafe { angle::<L>(data) }.is_finite() {
         return Err("LayerAngle is not finite");
     }
-    Ok(request)
+    let end = if request.prediction { begin } else { end };
+    Ok(Start {
+        request,
+        begin,
+        end,
+        forces,
+    })
 }
 
 /// The layer's angle.
@@ -246,7 +265,7 @@ unsafe fn give_up(data: &Data, factor: f64) -> c_int {
 unsafe fn carry<L: Carried<N>, const N: usize>(
     law: &L,
     data: &Data,
-    request: Request,
+    start: Start<N>,
 ) -> Result<Option<&'static str>, Failure> {
     let (s0, s1) = (&data.s0, &data.s1);
     let axes = if has_axes::<L>() {
@@ -255,30 +274,27 @@ unsafe fn carry<L: Carried<N>, const N: usize>(
     } else {
         Axes(None)
     };
+    let Start {
+        request,
+        begin,
+        end,
+        forces,
+    } = start;
     let mut unused;
-    // SAFETY: `N` components.
-    let point = unsafe {
-        let begin: [f64; N] = s0.gradients.cast::<[f64; N]>().read();
-        let end = if request.prediction {
-            begin
+    let point = Point {
+        gradient: axes.strain(gradient(begin)),
+        increment: axes.strain(gradient(std::array::from_fn(|i| end[i] - begin[i]))),
+        flux: axes.stress(flux(forces)),
+        state0: s0.internal_state_variables,
+        state1: if request.prediction {
+            unused = [0.0; MOST_STATES];
+            unused.as_mut_ptr()
         } else {
-            s1.gradients.cast::<[f64; N]>().read()
-        };
-        Point {
-            gradient: axes.strain(gradient(begin)),
-            increment: axes.strain(gradient(std::array::from_fn(|i| end[i] - begin[i]))),
-            flux: axes.stress(flux(s0.thermodynamic_forces.cast::<[f64; N]>().read())),
-            state0: s0.internal_state_variables,
-            state1: if request.prediction {
-                unused = [0.0; MOST_STATES];
-                unused.as_mut_ptr()
-            } else {
-                s1.internal_state_variables
-            },
-            time: 0.0,
-            time_increment: data.dt,
-            step_time: 0.0,
-        }
+            s1.internal_state_variables
+        },
+        time: 0.0,
+        time_increment: data.dt,
+        step_time: 0.0,
     };
     // With the request as a constant, what it does not ask for costs nothing.
     let answer = match request.tangent {
@@ -295,7 +311,7 @@ unsafe fn carry<L: Carried<N>, const N: usize>(
     }
     if request.tangent != Tangent::None {
         let operator = if rests_on_its_surface::<L, N>(&point, request.tangent) {
-            loading(law, &point).map_or(answer.operator, |answer| answer.operator)
+            loading(law, point).map_or(answer.operator, |answer| answer.operator)
         } else {
             answer.operator
         };
@@ -324,7 +340,7 @@ fn rests_on_its_surface<L: Exported, const N: usize>(point: &Point<N>, tangent: 
 /// two apart.
 #[cold]
 #[inline(never)]
-fn loading<L: Carried<N>, const N: usize>(law: &L, point: &Point<N>) -> Option<Answer<N>> {
+fn loading<L: Carried<N>, const N: usize>(law: &L, point: Point<N>) -> Option<Answer<N>> {
     const SMALL_STRAIN: f64 = 1e-9;
     let mean = (point.flux[0] + point.flux[1] + point.flux[2]) / 3.0;
     let deviator: [f64; N] = std::array::from_fn(|i| {
@@ -339,7 +355,7 @@ fn loading<L: Carried<N>, const N: usize>(law: &L, point: &Point<N>) -> Option<A
     let probe = Point {
         increment: deviator.map(|s| SMALL_STRAIN * s / size),
         state1: unused.as_mut_ptr(),
-        ..*point
+        ..point
     };
     law.carry(&probe, Tangent::Consistent).ok()
 }
