@@ -439,3 +439,35 @@ fn results_do_not_depend_on_the_number_of_threads() {
     assert_eq!(outcome.code, Some(BAD_INPUT));
     assert!(outcome.says("--threads"), "{}", outcome.stderr);
 }
+
+#[test]
+fn the_error_of_the_mesh_is_said_and_shown_where_it_is_asked_for() {
+    let place = Place::new();
+    let more = "profile = \"phases\"\nfields = \"phases\"\nmesh_error = true";
+    let text = edited(&[("profile = \"phases\"", more)]);
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    // The layer has none: it is no solid. Soil and layer are linear here or not; the soil is.
+    let said = "error of the mesh in the strains, estimated at the end of phase `push`: ";
+    let line = outcome
+        .stderr
+        .lines()
+        .find(|line| line.starts_with(said))
+        .unwrap();
+    assert!(line.contains("(soil ") && !line.contains("layer"), "{line}");
+    assert!(!line.contains("yield"), "{line}");
+    let read = |name: &str| std::fs::read_to_string(place.path(name)).unwrap();
+    let report = read("out/report.html");
+    let shown = report.matches("error of the mesh in the strains").count();
+    assert!(shown >= 2, "a line for each phase: {shown}");
+    let summary: serde_json::Value = serde_json::from_str(&read("out/summary.json")).unwrap();
+    let of_phases = summary["mesh_error"].as_array().unwrap();
+    assert_eq!(of_phases.len(), 2);
+    assert!(of_phases[1]["groups"][1]["strains"].is_null());
+    assert!(read("out/fields_00001.vtu").contains("Name=\"mesh_error\""));
+
+    let text = edited(&[("profile = \"phases\"", "mesh_error = \"yes\"")]);
+    let outcome = place.run_case(text);
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    assert!(outcome.says("mesh_error"), "{}", outcome.stderr);
+}

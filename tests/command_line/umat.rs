@@ -10,6 +10,7 @@ mod mohr_coulomb;
 mod routines;
 mod silent;
 mod space;
+mod tangents;
 mod time;
 mod tolerance;
 
@@ -28,7 +29,7 @@ pub(crate) fn place(name: &str) -> Option<Place> {
     if !compiled.contains_key(name) {
         let folder = TempDir::new().unwrap();
         let out = folder.path().join("library");
-        let endings = ["f", "c"];
+        let endings = ["f", "f90", "c"];
         let sources = endings.map(|ending| source(&format!("{name}.{ending}")));
         // It calls the cone.
         let called = (name == "elastic_tangent").then(|| source("drucker_prager.f"));

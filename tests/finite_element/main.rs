@@ -12,6 +12,7 @@ mod cut_back;
 mod cylinder;
 mod footing;
 mod inclusion;
+mod mesh_error;
 mod methods;
 mod newton;
 mod patch;

@@ -82,6 +82,7 @@ impl Case {
             laws: IndexMap::new(),
         };
         refuse_unknown_groups(source, file)?;
+        refuse_mesh_without_accuracy(source, file)?;
         let phases = file.phases.iter().map(|input| phase(source, file, input));
         let mut phases = phases.collect::<Result<Vec<Phase>, Error>>()?;
         let mut groups = Vec::new();
@@ -463,6 +464,18 @@ impl Case {
             }
             _ => error.into(),
         }
+    }
+}
+
+/// Refuses the error of the mesh as a part of nothing.
+fn refuse_mesh_without_accuracy(source: &Source, file: &CaseFile) -> Result<(), Error> {
+    match &file.accuracy_with_mesh {
+        Some(with) if file.accuracy.is_none() && *with.get_ref() => {
+            let message = "`accuracy_with_mesh` counts the error of the mesh as part of `accuracy`, and there is none";
+            let hint = "say how large the error may be, `accuracy = 0.02`";
+            Err(source.error(with.span(), message).hint(hint).into())
+        }
+        _ => Ok(()),
     }
 }
 

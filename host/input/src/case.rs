@@ -1,6 +1,7 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
+use crate::chosen::Chosen;
 use crate::ground::{ProfileInput, StressInput, WaterChange, WaterInput};
 use crate::material::{ForeignKeys, ParameterTable, ParameterValue, Route, shear_zone};
 use crate::{Error, schema};
@@ -11,7 +12,7 @@ use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integration};
 use results::wanted::{Output, Reduce};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, de};
+use serde::{Deserialize, Deserializer, de};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -183,6 +184,10 @@ pub struct CaseFile {
     #[serde(default, deserialize_with = "accuracy")]
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
     pub accuracy: Option<Spanned<f64>>,
+    /// Whether the error of the mesh counts as part of `accuracy`: the mesh is then refined as well.
+    #[serde(default)]
+    #[schemars(with = "Option<bool>")]
+    pub accuracy_with_mesh: Option<Spanned<bool>>,
     /// The settings that such a study chose.
     #[serde(skip)]
     pub chosen: Option<Chosen>,
@@ -217,29 +222,6 @@ impl CaseFile {
                     .flat_map(|pile| pile.line_names(&self.groups)),
             )
     }
-}
-
-/// Settings chosen for an `accuracy`.
-#[derive(Clone, Debug, Serialize)]
-pub struct Chosen {
-    /// Relative error asked for.
-    pub asked: f64,
-    /// Relative error estimated.
-    pub reached: f64,
-    /// It is at most what was asked for.
-    pub is_reached: bool,
-    /// How the error was estimated.
-    pub estimate: String,
-    /// Increments by phase.
-    pub increments: Vec<(String, usize)>,
-    /// Tolerance of the residual.
-    pub force_tolerance: f64,
-    /// Tolerance of the correction.
-    pub displacement_tolerance: f64,
-    /// Parameters of laws that differ from the file, as `law.parameter = value`.
-    pub parameters: Vec<String>,
-    /// Runs that the study took.
-    pub runs: usize,
 }
 
 /// A mesh: a grid of 8-node quads, or a file of Gmsh.

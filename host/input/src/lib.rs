@@ -4,6 +4,7 @@
 pub mod build;
 pub mod calibration;
 pub mod case;
+pub mod chosen;
 pub mod driver;
 mod error;
 pub mod figures;

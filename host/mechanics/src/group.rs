@@ -4,13 +4,18 @@
 //! from it, so a failed increment leaves nothing behind.
 
 mod aside;
+mod carry;
+mod differences;
 mod layer;
+mod look;
 mod operator;
 mod takeover;
 mod tangent;
 mod varying;
 mod water;
 
+pub use differences::{Origin, Reason as MadeBy};
+pub use look::{Deviation, Notice, Went};
 pub use tangent::Fault;
 
 use crate::element::Kinematics;
@@ -20,7 +25,6 @@ pub use aside::Aside;
 use law::Law;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
 use layer::Layer;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -28,15 +32,10 @@ pub use takeover::TakeOver;
 use varying::Varying;
 use water::Pores;
 
-/// Points that one thread takes at a time.
-const BATCH: usize = 1024;
 /// Components of the strain (jump) that a linear law is tried with, and what its stress may be off
 /// its tangent's, relative to the largest of both.
 const PROBE: [f64; 4] = [1e-4, -5e-5, 2.5e-5, 7.5e-5];
 const LINEAR: f64 = 1e-8;
-
-/// Points of a batch, their law, and where their fluxes, internal variables and operators go.
-type Batch<'a> = (Range<usize>, &'a Law, [&'a mut [f64]; 3]);
 
 /// Values of all points, before and during an increment.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -199,6 +198,7 @@ pub struct GroupState<'g> {
     /// Tangents, where a matrix made of them is still in use.
     tangent: Option<Cow<'g, [f64]>>,
     pores: Option<Cow<'g, Pores>>,
+    origin: Origin,
 }
 
 impl GroupState<'_> {
@@ -213,6 +213,7 @@ impl GroupState<'_> {
             law_calls: Cow::Owned(self.law_calls.into_owned()),
             tangent: self.tangent.map(|tangent| Cow::Owned(tangent.into_owned())),
             pores: self.pores.map(|pores| Cow::Owned(pores.into_owned())),
+            origin: self.origin,
         }
     }
 }
@@ -252,6 +253,8 @@ pub struct Group {
     /// Tangents of the element, point by point; of a linear law, those of one element only.
     tangent: Vec<f64>,
     tangents_are_constant: bool,
+    /// Where tangents come from.
+    origin: Origin,
     /// The trial state is what the law, which starts now, makes of the committed one over a nil
     /// increment.
     is_asked: bool,
@@ -293,6 +296,7 @@ impl Group {
             watched: 0,
             tangent: Vec::new(),
             tangents_are_constant: false,
+            origin: Origin::default(),
             is_asked: false,
         };
         group.start_law(law, None)?;
@@ -360,6 +364,7 @@ impl Group {
             law_calls: (&self.law_calls).into(),
             tangent: with_tangents.then(|| (&self.tangent).into()),
             pores: self.pores.as_ref().map(Cow::Borrowed),
+            origin: self.origin,
         }
     }
 
@@ -411,6 +416,7 @@ impl Group {
             self.tangent = tangent.into_owned();
         }
         self.law_calls = state.law_calls.into_owned();
+        self.origin = state.origin;
         self.forget_trial();
         Ok(())
     }
@@ -440,6 +446,7 @@ impl Group {
     fn start_law(&mut self, law: Material, kept: Option<Vec<f64>>) -> Result<(), PointFailure> {
         self.forget_trial();
         self.law = law;
+        self.origin = Origin::default();
         self.watched = calls::name(&format!("group `{}`", self.name));
         let law = &self.law.built.law;
         let name = &self.law.name;
@@ -487,13 +494,9 @@ impl Group {
         self.tangent = vec![0.0; n_points * element_n * element_n];
         if self.uses_layer() {
             let mut operator = vec![0.0; n_points * n * n];
-            self.run_law(
-                Operator::Elastic,
-                self.moment.step_start,
-                0.0,
-                &mut operator,
-            )
-            .map_err(|failure| self.locate(&failure))?;
+            let period = (self.moment.step_start, 0.0);
+            self.run_law(Operator::Elastic, period, &mut operator)
+                .map_err(|failure| self.locate(&failure))?;
             if let Some(layer) = &mut self.layer {
                 layer.start(&operator, starts_anew);
             }
@@ -618,7 +621,7 @@ impl Group {
         let mut tangent = std::mem::take(&mut self.tangent);
         let result = if self.uses_layer() {
             let mut operators = vec![0.0; self.kinematics.n_points() * 4];
-            let result = self.run_law(operator, time, time_increment, &mut operators);
+            let result = self.run_with_tangents(operator, (time, time_increment), &mut operators);
             if let (Ok(_), Some(layer)) = (&result, &self.layer) {
                 layer.stresses_along(&self.strain, &mut self.stress);
                 if operator != Operator::None {
@@ -627,7 +630,7 @@ impl Group {
             }
             result
         } else {
-            let result = self.run_law(operator, time, time_increment, &mut tangent);
+            let result = self.run_with_tangents(operator, (time, time_increment), &mut tangent);
             if operator != Operator::None {
                 self.stiffen(&mut tangent);
             }
@@ -720,98 +723,6 @@ impl Group {
                 calls.operators += n_points as u64;
             }
         }
-    }
-
-    /// Carries all points through the law. `operators` holds room for them, wanted or not.
-    fn run_law(
-        &mut self,
-        operator: Operator,
-        time: f64,
-        time_increment: f64,
-        operators: &mut [f64],
-    ) -> Result<BatchSuccess, BatchFailure> {
-        self.count(self.kinematics.n_points(), operator);
-        for field in self.fields() {
-            field.begin();
-        }
-        let place = self.flux_place();
-        let gradient = match &self.layer {
-            Some(layer) if self.law.built.law.n_components() == 2 => &layer.jump,
-            _ => &self.strain,
-        };
-        let law = &self.law.built.law;
-        let (n, n_states) = (law.n_components(), law.n_states());
-        let rows = Strided::rows(n);
-        // The trial state is written while the rest of the group is read.
-        let mut flux_end = std::mem::take(&mut self.stress.trial);
-        let mut states_end = std::mem::take(&mut self.internal.trial);
-        let (committed, state) = (&self.stress.committed, &self.internal.committed);
-        let (moment, sites) = (self.moment, &self.sites);
-        let (watched, per_element) = (self.watched, self.kinematics.points_of(0).len());
-        let batch = |(points, law, [flux, state_end, operator_end]): Batch<'_>| {
-            calls::of_group(watched, points.start, per_element);
-            let of = |stride: usize| points.start * stride..points.end * stride;
-            law.integrate(
-                &Start {
-                    n_points: points.len(),
-                    gradient: (&gradient.committed[of(n)], rows),
-                    gradient_end: (&gradient.trial[of(n)], rows),
-                    flux: (&committed[of(place.point)], place),
-                    state: &state[of(n_states)],
-                    time,
-                    time_increment,
-                    moment,
-                    sites: sites.get(points.clone()).unwrap_or_default(),
-                },
-                operator,
-                End {
-                    flux: (flux, place),
-                    state: state_end,
-                    operator: operator_end,
-                },
-            )
-            .map_err(|failure| BatchFailure {
-                point: points.start + failure.point,
-                ..failure
-            })
-            .map(|success| BatchSuccess {
-                unreliable: success
-                    .unreliable
-                    .map(|(point, why)| (points.start + point, why)),
-            })
-        };
-        let mut rest = [&mut flux_end[..], &mut states_end[..], operators];
-        let mut work = Vec::new();
-        for (points, law) in self.pieces(BATCH) {
-            let sizes = [place.point, n_states, n * n].map(|stride| points.len() * stride);
-            let [flux, states, operators] = rest;
-            let (flux, flux_left) = flux.split_at_mut(sizes[0]);
-            let (states, states_left) = states.split_at_mut(sizes[1]);
-            let (operators, operators_left) = operators.split_at_mut(sizes[2]);
-            rest = [flux_left, states_left, operators_left];
-            work.push((points, law, [flux, states, operators]));
-        }
-        let outcomes: Vec<_> = if self.kinematics.n_points() <= BATCH {
-            work.into_iter().map(batch).collect()
-        } else {
-            work.into_par_iter().map(batch).collect()
-        };
-        self.stress.trial = flux_end;
-        self.internal.trial = states_end;
-        let mut all = BatchSuccess::default();
-        let mut worst: Option<BatchFailure> = None;
-        for outcome in outcomes {
-            match outcome {
-                Ok(success) => all.unreliable = all.unreliable.or(success.unreliable),
-                Err(failure) => {
-                    worst = Some(match worst {
-                        Some(worst) => worst.or_worse(failure),
-                        None => failure,
-                    });
-                }
-            }
-        }
-        worst.map_or(Ok(all), Err)
     }
 
     fn locate(&self, failure: &BatchFailure) -> PointFailure {

@@ -82,6 +82,7 @@ pub mod group;
 pub mod mesh;
 pub mod model;
 pub mod problem;
+pub mod recovery;
 pub mod settings;
 pub mod simulation;
 

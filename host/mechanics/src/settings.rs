@@ -11,6 +11,8 @@ use std::fmt::Debug;
 pub struct Settings {
     /// Which matrix the iterations use.
     pub method: Method,
+    /// Where the tangents of laws come from.
+    pub tangents: Tangents,
     /// Largest residual force, relative to the largest of the forces in play (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub force_tolerance: f64,
@@ -100,6 +102,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             method: Method::default(),
+            tangents: Tangents::default(),
             force_tolerance: 1e-9,
             displacement_tolerance: 1e-7,
             tolerated_residual: 1e-3,
@@ -159,6 +162,20 @@ impl Method {
             Self::QuasiNewton => 100,
         }
     }
+}
+
+/// Where the tangents of laws come from.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tangents {
+    /// From the law; differences of its stresses where it says that its tangents are approximate, or
+    /// where they are found not to be the derivatives of its stresses. With `auto` and `newton`.
+    #[default]
+    Auto,
+    /// From the law, whatever they are worth.
+    Law,
+    /// Differences of the stresses of all laws that are not linear.
+    Differences,
 }
 
 /// Which tolerances a state has to meet.

@@ -6,7 +6,6 @@ mod complete;
 mod creeping;
 mod history;
 mod loads;
-mod method;
 mod neighbour;
 mod path;
 mod phase;
@@ -14,6 +13,7 @@ mod record;
 mod start;
 mod state;
 mod statics;
+mod tangents;
 mod ties;
 mod warning;
 mod watch;
@@ -34,7 +34,7 @@ use crate::model::Model;
 use crate::problem::{Axis, Material, Problem};
 use crate::settings::{Control, Method, Settings};
 use beyond::Beyond;
-use creeping::{Lead, Turn};
+use creeping::Lead;
 use history::History;
 use law::{Moment, Stop, custody};
 use path::PathEnd;
@@ -292,13 +292,9 @@ impl Simulation {
         self.settings().method
     }
 
-    /// The settings, with the method that suits the laws of the present phase.
+    /// The settings that the iterations are asked for.
     fn settings(&self) -> Settings {
-        let given = self.problem.settings;
-        Settings {
-            method: method::resolved(given.method, &self.groups),
-            ..given.in_force()
-        }
+        self.problem.settings.in_force()
     }
 
     /// Goes on to the end of the last phase.
@@ -480,13 +476,16 @@ impl Simulation {
             place.increment as f64 / n as f64
         };
         let mut done = Progress::default();
-        let mut lead = Lead::new(&settings, phase.course.creeps);
+        let mut lead = Lead::new(&settings);
         while phase.course.lambda < target {
             if phase.course.lambda >= phase.course.loads.leg[1] {
                 self.turn(place, phase)?;
             }
             let target = target.min(phase.course.loads.leg[1]);
-            let (start, step) = (phase.course.lambda, phase.course.step);
+            let (start, mut step) = (phase.course.lambda, phase.course.step);
+            if lead.creeps() {
+                step = step.min(creeping::LONGEST / n as f64);
+            }
             // A remainder that is hardly longer than the step is taken at once.
             let end = if target - start <= 1.0001 * step {
                 target
@@ -498,6 +497,8 @@ impl Simulation {
             let attempt = self.attempt(phase, lead.control, [start, end], guess);
             match self.without_leap(attempt, phase, length) {
                 Ok(success) => {
+                    let period = (self.clock(phase.number), [start, end]);
+                    self.look_after(&success, period, watch);
                     if success.relaxed {
                         phase.record.relaxed += 1;
                         // The phase's end says how many there were.
@@ -508,7 +509,7 @@ impl Simulation {
                             watch.warning(&Warning::Relaxed(place.clone(), by_creep));
                         }
                     }
-                    phase.course.creeps = lead.goes_on(&settings, success.iterations.len());
+                    lead.goes_on();
                     // A motion takes many iterations, and steps of any length.
                     if success.was_motion || success.iterations.len() as f64 <= easy {
                         phase.course.step = (REGROWTH * step).min(1.0 / n as f64);
@@ -519,6 +520,10 @@ impl Simulation {
                 Err(failure) => {
                     go_on(watch.iterations(place, end, &failure.iterations))?;
                     done.iterations += failure.iterations.len();
+                    let period = (self.clock(phase.number), [start, end]);
+                    if self.look_after_failure(&failure, period, watch) {
+                        continue;
+                    }
                     phase.record.cut_backs += 1;
                     let factor = failure.factor().unwrap_or(CUT[1]).clamp(CUT[0], CUT[1]);
                     let step = factor * length;
@@ -527,7 +532,7 @@ impl Simulation {
                     let follows = settings.control == Control::ArcLength
                         && phase.course.history.latest().is_some();
                     let is_small = step < smallest.max(PATIENCE / n as f64);
-                    let turn = lead.turn(&failure, step < smallest);
+                    let turns = lead.turns(&failure, step < smallest);
                     if failure.defect().is_some() {
                         return Err(self.cannot_go_on(phase, place, start, failure));
                     } else if follows && is_small {
@@ -536,8 +541,7 @@ impl Simulation {
                         if let PathEnd::Stopped(failure, highest) = end {
                             return Err(self.cannot_go_on(phase, place, highest, *failure));
                         }
-                    } else if turn == Some(Turn::ToCreep) {
-                        phase.course.step = 1.0 / n as f64;
+                    } else if turns && lead.creeps() {
                         if phase.record.crept_from.is_none() {
                             phase.record.crept_from = Some(place.increment);
                             watch.warning(&Warning::Creeps(place.clone()));

@@ -2,9 +2,10 @@
 
 use crate::file;
 use crate::pressures::Pressure;
-use crate::wanted::When;
+use crate::wanted::{Output, When};
 use mechanics::Simulation;
 use mechanics::problem::Formulation;
+use mechanics::recovery::MeshError;
 use mechanics::simulation::Snapshot;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -28,6 +29,8 @@ pub(crate) struct Fields {
     folder: PathBuf,
     /// There are pressures in pores in the course of the problem.
     has_pressures: bool,
+    /// The error of the mesh is a field.
+    has_mesh_error: bool,
     /// Files written so far.
     pub(crate) written: Vec<Written>,
 }
@@ -56,17 +59,18 @@ pub(crate) fn check(folder: &Path, written: &[Written]) -> Result<(), Error> {
 
 impl Fields {
     /// `None` if fields are not asked for.
-    pub(crate) fn create(folder: &Path, when: When, simulation: &Simulation) -> Option<Self> {
-        (when != When::Never).then(|| Self {
+    pub(crate) fn create(folder: &Path, wanted: Output, simulation: &Simulation) -> Option<Self> {
+        (wanted.fields != When::Never).then(|| Self {
             folder: folder.to_owned(),
             has_pressures: simulation.problem().has_pore_pressure(),
+            has_mesh_error: wanted.mesh_error,
             written: Vec::new(),
         })
     }
 
     pub(crate) fn write(&mut self, time: f64, snapshot: &Snapshot<'_>) -> Result<(), Error> {
         let path = self.folder.join(file_name(self.written.len()));
-        let text = unstructured_grid(snapshot, self.has_pressures);
+        let text = unstructured_grid(snapshot, self.has_pressures, self.has_mesh_error);
         replace(&path, &text)?;
         self.written.push(Written {
             time,
@@ -139,8 +143,24 @@ fn cell_data(snapshot: &Snapshot<'_>, has_pressures: bool) -> Vec<(String, Vec<f
     columns.collect()
 }
 
+/// The share of every element in the error of the mesh; nothing where there is no estimate.
+fn mesh_error(snapshot: &Snapshot<'_>) -> (String, Vec<f64>) {
+    let found = MeshError::of(snapshot);
+    let groups = snapshot.groups.iter().enumerate();
+    let values = groups.flat_map(|(number, group)| {
+        let elements = 0..group.kinematics.n_elements();
+        let found = &found;
+        elements.map(move |element| found.of_element(number, element).unwrap_or_default())
+    });
+    ("mesh_error".to_owned(), values.collect())
+}
+
 /// The text of a file. Cells stand group by group, as `cell_data` has them.
-pub(crate) fn unstructured_grid(snapshot: &Snapshot<'_>, has_pressures: bool) -> String {
+pub(crate) fn unstructured_grid(
+    snapshot: &Snapshot<'_>,
+    has_pressures: bool,
+    has_mesh_error: bool,
+) -> String {
     let mesh = snapshot.mesh;
     let mut connectivity = String::new();
     let (mut offsets, mut types, mut groups) = (Vec::new(), Vec::new(), Vec::new());
@@ -181,7 +201,11 @@ pub(crate) fn unstructured_grid(snapshot: &Snapshot<'_>, has_pressures: bool) ->
             .flat_map(|u| [u[0], u[1], 0.0]),
     );
     let mut cells = String::new();
-    for (name, values) in cell_data(snapshot, has_pressures) {
+    let of_mesh = has_mesh_error.then(|| mesh_error(snapshot));
+    for (name, values) in cell_data(snapshot, has_pressures)
+        .into_iter()
+        .chain(of_mesh)
+    {
         let values = reals(&mut values.into_iter());
         let _ = writeln!(
             cells,

@@ -6,6 +6,7 @@ mod fields;
 pub mod figure;
 mod file;
 mod leftovers;
+mod mesh_error;
 pub mod pile;
 pub mod point_figure;
 pub mod point_table;

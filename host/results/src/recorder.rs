@@ -7,6 +7,7 @@ use crate::fields::{self, Fields, Written};
 use crate::figure::{Curve, Figures};
 use crate::file::{self, Appended, Extent};
 use crate::leftovers;
+use crate::mesh_error::OfPhase;
 use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Stations};
 use crate::points::Points;
 use crate::probe::Probes;
@@ -330,7 +331,7 @@ impl Recorder {
             profile,
             pile: wanted.pile.zip(stations).map(of_pile),
             points,
-            fields: Fields::create(folder, settings.fields, simulation),
+            fields: Fields::create(folder, settings, simulation),
             log,
             summary,
             figures,
@@ -570,6 +571,10 @@ impl Recorder {
         {
             fields.write(*time, snapshot)?;
         }
+        if self.settings.mesh_error && place.increment == *of {
+            let found = OfPhase::of(&place.phase, snapshot);
+            self.summary.course.mesh_errors.push(found);
+        }
         if let Some(warning) = &increment.unreliable {
             self.log.line(&json!({
                 "event": "unreliable",
@@ -604,6 +609,11 @@ impl Recorder {
     pub fn resistances(&self) -> Option<Resistances> {
         let of_pile = self.pile.as_ref()?;
         Some(of_pile.curve.resistances(&of_pile.pile))
+    }
+
+    /// The error of the mesh at the end of the last phase, in words, if it was asked for.
+    pub fn mesh_error(&self) -> Option<String> {
+        self.summary.course.mesh_errors.last().map(OfPhase::words)
     }
 
     /// Folder of the results.

@@ -1,5 +1,6 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
+use crate::mesh_error::OfPhase;
 use crate::wanted::{Figure, Measured, Wanted};
 use indexmap::IndexMap;
 use law::BuiltLaw;
@@ -88,6 +89,8 @@ pub(crate) struct Course {
     pub(crate) at_rest: Option<(String, f64)>,
     /// Where a phase could not go on.
     pub(crate) stopped: Option<Stopped>,
+    /// The error of the mesh at the end of each phase, where it was asked for.
+    pub(crate) mesh_errors: Vec<OfPhase>,
     /// By phase, the first increment with a result that a law calls inaccurate, and why.
     unreliable: Vec<(Place, String)>,
 }
@@ -320,6 +323,9 @@ impl Summary {
                 "probes": self.probes(&stopped.probes),
             }))),
         );
+        if !self.course.mesh_errors.is_empty() {
+            summary.insert("mesh_error".to_owned(), json!(self.course.mesh_errors));
+        }
         let values = last
             .map(|(_, values)| values.as_slice())
             .unwrap_or_default();

@@ -122,6 +122,9 @@ pub struct Output {
     pub points: When,
     /// When fields for a viewer are written.
     pub fields: When,
+    /// Whether the error that the mesh makes in the strains is estimated, at the end of every phase and with
+    /// the fields.
+    pub mesh_error: bool,
 }
 
 /// When something is written.

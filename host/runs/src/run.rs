@@ -322,6 +322,9 @@ fn carry_out(
     if let Some(resistances) = follower.results.resistances() {
         follower.observer.pile(&resistances);
     }
+    if let Some(of_mesh) = follower.results.mesh_error() {
+        follower.observer.note(&of_mesh);
+    }
     let Follower {
         mut results,
         keeper,

@@ -96,7 +96,7 @@ impl Group {
         let room = self.kinematics.n_points() * n * n;
         let time = self.moment.step_start;
         let mut tangent = std::mem::take(&mut self.tangent);
-        let result = self.run_law(Operator::None, time, 0.0, &mut tangent[..room]);
+        let result = self.run_law(Operator::None, (time, 0.0), &mut tangent[..room]);
         self.tangent = tangent;
         result.map(|_| ()).map_err(|failure| self.locate(&failure))
     }

@@ -1,7 +1,7 @@
 //! The tangent of one point, held against differences of the law's own answers.
 
 use super::Group;
-use law::{End, Operator, Site, Start, Strided};
+use law::Operator;
 
 /// Sizes of the differences, relative to the increment of the gradients.
 const DIFFERENCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-6];
@@ -35,8 +35,8 @@ impl std::fmt::Display for Fault {
             Self::Onward(relative) => write!(
                 f,
                 "the tangent of the law differs by {:.0} % from what its stress does as the increment \
-                 goes on (an elastic tangent of a law that flows does): `method = \"quasi_newton\"` does \
-                 without an exact one",
+                 goes on (an elastic tangent of a law that flows does): `tangents = \"differences\"` does \
+                 without it",
                 100.0 * relative
             ),
             Self::Sign(slope, component) => write!(
@@ -53,45 +53,12 @@ impl Group {
     /// anything is.
     pub fn tangent_fault(&self, point: usize, time: f64, time_increment: f64) -> Option<Fault> {
         let law = &self.law.built.law;
-        let (n, n_states) = (law.n_components(), law.n_states());
-        let gradient = match &self.layer {
-            Some(layer) if n == 2 => &layer.jump,
-            _ => &self.strain,
-        };
+        let n = law.n_components();
+        let gradient = self.gradient();
         let start = gradient.committed.get(n * point..n * (point + 1))?;
         let end = gradient.trial.get(n * point..n * (point + 1))?;
-        let place = self.flux_place();
-        let flux = place.of_point(&self.stress.committed, point, n);
-        let state = self
-            .internal
-            .committed
-            .get(n_states * point..n_states * (point + 1))?;
-        let sites: Vec<Site> = self.sites.get(point).copied().into_iter().collect();
-        let rows = Strided::rows(n);
         let answer = |end: &[f64], operator: Operator| {
-            let (mut flux_end, mut state_end) = (vec![0.0; n], vec![0.0; n_states]);
-            let mut matrix = vec![0.0; n * n];
-            law.integrate(
-                &Start {
-                    n_points: 1,
-                    gradient: (start, rows),
-                    gradient_end: (end, rows),
-                    flux: (&flux, rows),
-                    state,
-                    time,
-                    time_increment,
-                    moment: self.moment,
-                    sites: &sites,
-                },
-                operator,
-                End {
-                    flux: (&mut flux_end, rows),
-                    state: &mut state_end,
-                    operator: &mut matrix,
-                },
-            )
-            .ok()?;
-            Some((flux_end, matrix))
+            self.answer(point, end, operator, (time, time_increment))
         };
         let (here, matrix) = answer(end, Operator::Consistent)?;
         let reach = start

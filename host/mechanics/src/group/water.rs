@@ -52,7 +52,7 @@ impl Group {
         }
         let mut operator = vec![0.0; 16 * n];
         let time = self.moment.step_start;
-        self.run_law(Operator::Elastic, time, 0.0, &mut operator)
+        self.run_law(Operator::Elastic, (time, 0.0), &mut operator)
             .map_err(|failure| self.locate(&failure))?;
         self.forget_trial();
         let mut stiffness = Vec::with_capacity(n);

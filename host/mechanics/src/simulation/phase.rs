@@ -2,7 +2,7 @@
 
 use super::history::History;
 use super::state::PhaseCourse;
-use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch, method};
+use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
 use crate::assembly::{Bodies, Places, System, fold};
 use crate::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
 use crate::error::Error;
@@ -89,7 +89,6 @@ impl Simulation {
             increment: 0,
             lambda: 0.0,
             step: 1.0 / increments as f64,
-            creeps: false,
             history: History::default(),
             domain: None,
             has_matrix: false,
@@ -134,9 +133,7 @@ impl Simulation {
         course: PhaseCourse,
         watch: &mut dyn Watch,
     ) {
-        if let Some(other) = method::other(self.problem.settings.method, &self.groups) {
-            watch.warning(&other);
-        }
+        self.choose_tangents(watch);
         let phase = &self.problem.phases[number];
         let active = self.groups.iter().filter(|group| group.is_active);
         let mut dependent =

@@ -39,8 +39,6 @@ pub(super) struct PhaseCourse {
     pub(super) lambda: f64,
     /// Length of the next step.
     pub(super) step: f64,
-    /// Creep leads it, though the load would have to.
-    pub(super) creeps: bool,
     /// The last steps.
     pub(super) history: History,
     /// Where the linear domain stands.

@@ -3,8 +3,7 @@
 use super::Neighbour;
 use crate::equilibrium::Open;
 use crate::error::Place;
-use crate::group::{Parted, TakeOver};
-use crate::settings::Method;
+use crate::group::{Notice, Parted, TakeOver};
 use law::TimeDependence;
 use std::fmt;
 
@@ -15,14 +14,16 @@ pub enum Warning {
     Note(String),
     /// A phase starts out of balance, by this share of the forces in play.
     OutOfBalance(String, f64),
-    /// Another method than was asked for iterates, since the tangents of a law are approximate.
-    OtherMethod {
+    /// The tangents of a law are differences, since it calls its own approximate.
+    Approximate(String),
+    /// The tangents of a law are not the derivatives of its stresses.
+    NoDerivative {
+        /// The group.
+        group: String,
         /// The law.
         law: String,
-        /// The method that iterates.
-        method: Method,
-        /// The one that was asked for.
-        asked: Method,
+        /// By how much, and what follows.
+        notice: Notice,
     },
     /// A law depends on the time, and a phase says none.
     NoTime {
@@ -103,7 +104,7 @@ pub enum Warning {
 impl Warning {
     /// Whether it is enough to say this once, however often it comes.
     pub fn is_said_once(&self) -> bool {
-        matches!(self, Self::OtherMethod { .. })
+        matches!(self, Self::Approximate(_))
     }
 }
 
@@ -121,11 +122,14 @@ impl fmt::Display for Warning {
                     format!("{:.2}", 100.0 * share)
                 }
             ),
-            Self::OtherMethod { law, method, asked } => write!(
+            Self::Approximate(law) => write!(
                 f,
-                "the tangents of law `{law}` are approximate: method `{}` stands for `{}`",
-                method.name(),
-                asked.name()
+                "the tangents of law `{law}` are approximate: they are made by differences of its \
+                 stresses instead"
+            ),
+            Self::NoDerivative { group, law, notice } => write!(
+                f,
+                "group `{group}`: the tangents of law `{law}` are not the derivatives of its stresses, {notice}"
             ),
             Self::NoTime { phase, law, by } => write!(
                 f,

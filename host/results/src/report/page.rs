@@ -9,10 +9,11 @@ use super::pile::Pile;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use super::short::display;
+use crate::mesh_error::OfPhase;
 use crate::record::{entries, list, text};
 use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -235,6 +236,7 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         }),
         warnings => run.warnings(),
         ends => ends(run),
+        mesh_error => mesh_error(&summary["mesh_error"]),
         pictures => pictures(run),
         resistances => resistances(&summary["pile"]),
         groups => list(&summary["groups"]).map(group).collect::<Vec<_>>(),
@@ -267,12 +269,22 @@ fn facts(summary: &Value) -> Vec<String> {
     let count = |value: &Value, what: &str| value.as_u64().map(|n| format!("{n} {what}"));
     facts.extend(count(&summary["mesh"]["nodes"], "nodes"));
     facts.extend(count(&summary["mesh"]["elements"], "elements"));
+    facts.extend(accuracy(&summary["accuracy"]));
     facts.extend(seconds(&summary["seconds"]["total"]).map(|seconds| format!("{seconds} s")));
     match text(&summary["program"]) {
         "" => (),
         program => facts.push(program.to_owned()),
     }
     facts
+}
+
+/// Whether an accuracy that was asked for is reached.
+fn accuracy(chosen: &Value) -> Option<String> {
+    let (asked, verdict) = (chosen["asked"].as_f64()?, text(&chosen["verdict"]));
+    let estimated = chosen["reached"].as_f64();
+    let estimated = estimated.map(|error| format!(", error {error:.1e} estimated"));
+    let estimated = estimated.unwrap_or_default();
+    Some(format!("accuracy {asked} {verdict}{estimated}"))
 }
 
 /// Pictures in the folder that the page does not draw itself, such as figures of cuts: names and
@@ -327,6 +339,13 @@ fn ends(run: &Run) -> Template {
         .map(|end| format!("{}, increment {}", end.phase, end.increment))
         .collect();
     context! { phases, probes }
+}
+
+/// The error of the mesh at the end of each phase, in words.
+fn mesh_error(of_phases: &Value) -> Vec<String> {
+    let of_phase = |found: &Value| OfPhase::deserialize(found).ok();
+    let found = list(of_phases).filter_map(of_phase);
+    found.map(|found| found.words()).collect()
 }
 
 /// Criteria of a pile's resistance: name, load or why there is none. Empty without a pile.

@@ -280,7 +280,7 @@ impl Run {
         let mut summary = Summary::new(about, wanted, simulation).running();
         summary["warnings"] = warnings.into();
         let has_pressures = simulation.problem().has_pore_pressure();
-        let text = unstructured_grid(&simulation.snapshot(), has_pressures);
+        let text = unstructured_grid(&simulation.snapshot(), has_pressures, false);
         let groups = simulation.groups().iter().map(|group| group.name.clone());
         let groups: Vec<String> = groups.collect();
         let pile = wanted.pile.iter();

@@ -5,17 +5,18 @@ use super::pace::{Pace, in_words};
 use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
 use super::study::{Done, Measurement, Reference, Row, Study};
-use super::trial::{SOLVER_CHOICES, Scratch, Settings, Timing, Trial, repetitions};
+use super::trial::{BY_FORCE, SOLVER_CHOICES, Scratch, Settings, Timing, Trial, repetitions};
 use crate::Error;
 use crate::run::begin;
 use input::Case;
 use law::BuiltLaw;
 use mechanics::equilibrium::Reuse;
 use mechanics::problem::{Formulation, Integration};
+use mechanics::settings::Convergence as Counted;
 use std::time::Duration;
 
 /// Seconds of a run above which a study is shorter, so that it ends while somebody waits.
-const LONG: f64 = 0.3;
+pub(super) const LONG: f64 = 0.3;
 /// A probe that the finest runs disagree about by more is nothing but round-off.
 const MEANINGLESS: f64 = 0.5;
 
@@ -240,6 +241,16 @@ fn settings_on_this_mesh(
             add("solver", settings);
         }
     }
+    if file.convergence != Counted::Force {
+        for &tolerance in plan.loose_tolerances {
+            let settings = Settings {
+                tolerance: Some(tolerance),
+                solver: Some(&BY_FORCE),
+                ..default.clone()
+            };
+            add("solver", settings);
+        }
+    }
     all
 }
 
@@ -355,7 +366,7 @@ impl Cases<'_> {
         let times = if settings.solver.is_some() {
             of_solver
         } else {
-            of_others * settings.increments.max(1.0)
+            of_others * settings.increments.max(1.0) * settings.division as f64
         };
         Timing::Within(Duration::from_secs_f64(times * self.unit))
     }

@@ -271,29 +271,32 @@ impl<'a> Interface<'a> {
     }
 }
 
-/// From which factor on the answer stays.
+/// From which factor on the answer stays. A change is that since the run before that has an answer.
 fn plateau(tried: &[Tried]) -> String {
-    let change = |one: &Tried| one.outcome.as_ref().ok().and_then(|a| a.change);
+    let answers = tried
+        .iter()
+        .filter_map(|one| Some((one, one.outcome.as_ref().ok()?)));
+    let answers: Vec<(&Tried, &Answer)> = answers.collect();
     // The last change counts first: a plateau reaches to the stiffest run that succeeded.
-    let last = tried.iter().rposition(|one| change(one).is_some());
-    let Some(last) = last else {
+    let Some((last, Some(change))) = answers.last().map(|(one, answer)| (one, answer.change))
+    else {
         return "no two factors have an answer".to_owned();
     };
-    let flat = |one: &&Tried| change(one).is_some_and(|change| change < PLATEAU);
-    let steps = tried[..=last].iter().rev().take_while(flat).count();
+    let is_flat = |answer: &Answer| answer.change.is_some_and(|change| change < PLATEAU);
+    let steps = answers.iter().rev();
+    let steps = steps.take_while(|(_, answer)| is_flat(answer)).count();
     if steps == 0 {
         return format!(
             "no plateau: the last step still changes a probe by {:.1} %",
-            100.0 * change(&tried[last]).unwrap_or_default()
+            100.0 * change
         );
     }
-    let first = &tried[last - steps];
-    let penetration = first.outcome.as_ref().map_or(f64::NAN, |a| a.penetration);
+    let (first, Answer { penetration, .. }) = answers[answers.len() - 1 - steps];
     format!(
         "plateau: from f = {} to {} no probe changes by 1 % from one value to the next; at f = {}: \
          K_n = {:.2e}, K_t = {:.2e} kPa/m, penetration {penetration:.1e} of the element beside",
         short(first.factor),
-        short(tried[last].factor),
+        short(last.factor),
         short(first.factor),
         first.stiffness[0],
         first.stiffness[1],
@@ -460,4 +463,45 @@ fn largest_pressure(path: &Path, group: &str) -> Result<f64, Error> {
         }
     }
     Ok(largest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tried(factor: f64, change: Result<Option<f64>, &str>) -> Tried {
+        let answer = |change| Answer {
+            penetration: 0.01 / factor,
+            iterations: 10,
+            change,
+        };
+        Tried {
+            group: "joint".to_owned(),
+            factor,
+            stiffness: [factor, factor],
+            conditioning: 1.0,
+            outcome: change.map(answer).map_err(str::to_owned),
+        }
+    }
+
+    #[test]
+    fn a_plateau_begins_and_ends_at_runs_that_have_an_answer() {
+        let runs = [
+            tried(1.0, Ok(None)),
+            tried(3.0, Ok(Some(0.05))),
+            tried(10.0, Err("no equilibrium")),
+            tried(30.0, Ok(Some(0.004))),
+            tried(100.0, Ok(Some(0.001))),
+            tried(300.0, Err("no equilibrium")),
+        ];
+        let said = plateau(&runs);
+        assert!(said.starts_with("plateau: from f = 3 to 100 "), "{said}");
+        assert!(said.contains("penetration 3.3e-3"), "{said}");
+        assert!(
+            plateau(&runs[..2]).starts_with("no plateau"),
+            "{}",
+            plateau(&runs[..2])
+        );
+        assert_eq!(plateau(&runs[..1]), "no two factors have an answer");
+    }
 }

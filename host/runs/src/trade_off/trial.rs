@@ -14,7 +14,7 @@ use law::Stop;
 use mechanics::Place;
 use mechanics::Settings as Solver;
 use mechanics::problem::{Formulation, Integration};
-use mechanics::settings::{Equations, Method};
+use mechanics::settings::{Control, Convergence, Equations, Method};
 use results::wanted::Output;
 use serde_json::Value;
 use std::cell::RefCell;
@@ -34,6 +34,11 @@ impl std::fmt::Debug for SolverChoice {
     }
 }
 
+/// Equilibrium of forces alone. That differs most where little of it is asked for.
+pub(super) const BY_FORCE: SolverChoice = choice("convergence", "force", |s| {
+    s.convergence = Convergence::Force;
+});
+
 /// All choices of the solver that a study tries.
 pub(super) const SOLVER_CHOICES: &[SolverChoice] = &[
     choice("method", "auto", |s| s.method = Method::Auto),
@@ -52,6 +57,13 @@ pub(super) const SOLVER_CHOICES: &[SolverChoice] = &[
     choice("equations", "sparse", |s| s.equations = Equations::Sparse),
     choice("line_search", "true", |s| s.line_search = true),
     choice("line_search", "false", |s| s.line_search = false),
+    choice("control", "auto", |s| s.control = Control::Auto),
+    choice("control", "load", |s| s.control = Control::Load),
+    choice("control", "creep", |s| s.control = Control::Creep),
+    choice("convergence", "both", |s| {
+        s.convergence = Convergence::Both;
+    }),
+    BY_FORCE,
 ];
 
 const fn choice(key: &'static str, value: &'static str, set: fn(&mut Solver)) -> SolverChoice {
@@ -465,6 +477,20 @@ fn counts(summary: &Value) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_choice_of_the_solver_sets_what_it_is_called() {
+        for choice in SOLVER_CHOICES {
+            let mut solver = Solver::default();
+            (choice.set)(&mut solver);
+            let set = serde_json::to_value(solver).unwrap();
+            let value = match &set[choice.key] {
+                Value::String(text) => text.clone(),
+                other => other.to_string(),
+            };
+            assert_eq!(value, choice.value, "{}", choice.key);
+        }
+    }
 
     #[test]
     fn fewer_increments_divide_the_given_ones() {

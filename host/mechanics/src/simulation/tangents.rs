@@ -1,0 +1,85 @@
+//! Where the tangents of a phase's laws come from: from the laws, as long as they are the derivatives of
+//! their stresses, or from differences of these.
+
+use super::{Simulation, Warning, Watch};
+use crate::equilibrium::{Clock, StepFailure, StepSuccess};
+use crate::group::{MadeBy, Went};
+use crate::settings::Tangents;
+
+/// More iterations than consistent tangents mostly need; and so many that differences, with ten evaluations
+/// for each of the few iterations that they take, cost less.
+const MANY: usize = 6;
+const TOO_MANY: usize = 12;
+
+impl Simulation {
+    /// Tells the groups of a phase where their tangents come from, and who watches, what is not from the
+    /// laws.
+    pub(super) fn choose_tangents(&mut self, watch: &mut dyn Watch) {
+        let settings = self.problem.settings;
+        for group in &mut self.groups {
+            group.take_tangents(settings.tangents, settings.method.is_newton());
+            if group.is_active && group.differences() == Some(MadeBy::Declared) {
+                let law = group.law.built.law.description().id.clone();
+                watch.warning(&Warning::Approximate(law));
+            }
+        }
+    }
+
+    /// Looks at the laws' tangents after a step that took many iterations. Says so if some are differences
+    /// from now on.
+    pub(super) fn look_after(
+        &mut self,
+        success: &StepSuccess,
+        (clock, lambda): (Clock, [f64; 2]),
+        watch: &mut dyn Watch,
+    ) {
+        let went = match success.iterations.len() {
+            // What was committed on the way is not where the step began.
+            _ if success.was_motion => return,
+            _ if success.tolerated > 0.0 || success.relaxed => Went::Badly,
+            n if n > TOO_MANY => Went::Badly,
+            n if n > MANY => Went::Slowly,
+            _ => return,
+        };
+        self.look_at_tangents((clock, lambda), went, watch);
+    }
+
+    /// The same after a step that failed; says whether it is worth another attempt.
+    pub(super) fn look_after_failure(
+        &mut self,
+        failure: &StepFailure,
+        period: (Clock, [f64; 2]),
+        watch: &mut dyn Watch,
+    ) -> bool {
+        !failure.is_stop()
+            && failure.defect().is_none()
+            && self.look_at_tangents(period, Went::Wrong, watch)
+    }
+
+    fn look_at_tangents(
+        &mut self,
+        (clock, [from, to]): (Clock, [f64; 2]),
+        went: Went,
+        watch: &mut dyn Watch,
+    ) -> bool {
+        let settings = self.problem.settings;
+        if settings.tangents != Tangents::Auto || !settings.method.is_newton() {
+            return false;
+        }
+        let period = (clock.at(from), clock.at(to) - clock.at(from));
+        let mut is_new = false;
+        for group in &mut self.groups {
+            let Some(notice) = group.look(period, went) else {
+                continue;
+            };
+            is_new |= notice.by_differences;
+            let law = group.law.built.law.description().id.clone();
+            watch.warning(&Warning::NoDerivative {
+                group: group.name.clone(),
+                law,
+                notice,
+            });
+        }
+        is_new
+    }
+}

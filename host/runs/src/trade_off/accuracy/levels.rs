@@ -1,0 +1,202 @@
+//! Runs of one case that differ in how finely one thing is divided, and what they tell about the error of
+//! the finest.
+//!
+//! With an error that falls as h^p, h = 1/n, three runs tell p and the error of the finest, whatever their n:
+//! runs in between may be missing. An error below the difference of the two finest is not claimed: over a gap it
+//! would rest on the order alone.
+
+use super::super::trial::Trial;
+
+/// Bounds of the order that is extrapolated with. A larger one is not relied on.
+pub(super) const ORDERS: [f64; 2] = [0.3, 1.0];
+/// Halvings of the interval that holds the order.
+const BISECTIONS: usize = 40;
+
+/// Runs that came to their end, each finer than the one before.
+#[derive(Debug, Default)]
+pub(super) struct Levels {
+    /// How finely each divides, and what came out.
+    runs: Vec<(f64, Trial)>,
+}
+
+impl Levels {
+    /// Adds a run that is finer than all others.
+    pub(super) fn push(&mut self, n: f64, trial: Trial) {
+        self.runs.push((n, trial));
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// The finest.
+    pub(super) fn finest(&self) -> Option<&(f64, Trial)> {
+        self.runs.last()
+    }
+
+    /// The next finest.
+    pub(super) fn next(&self) -> Option<&(f64, Trial)> {
+        self.runs.len().checked_sub(2).map(|i| &self.runs[i])
+    }
+
+    /// By how much the two finest differ, relative to the largest values.
+    pub(super) fn difference(&self) -> Option<f64> {
+        let [.., (_, next), (_, finest)] = self.runs.as_slice() else {
+            return None;
+        };
+        let scale = finest.rows.largest();
+        Some(next.rows.difference(&finest.rows, &scale))
+    }
+
+    /// Estimated relative error of the finest; of only two runs as if it fell with this order.
+    pub(super) fn error_of_order(&self, order: f64) -> Option<f64> {
+        let [.., (b, _), (c, _)] = self.runs.as_slice() else {
+            return None;
+        };
+        let of_two = || Some(self.difference()? * left([*b, *c], order));
+        self.error().or_else(of_two)
+    }
+
+    /// Estimated relative error of the finest; none where there are fewer than three.
+    pub(super) fn error(&self) -> Option<f64> {
+        let [.., (a, coarse), (b, middle), (c, fine)] = self.runs.as_slice() else {
+            return None;
+        };
+        let scale = fine.rows.largest();
+        let differences =
+            [(coarse, middle), (middle, fine)].map(|(a, b)| a.rows.difference(&b.rows, &scale));
+        let order = order([*a, *b, *c], differences);
+        Some(differences[1] * left([*b, *c], order))
+    }
+
+    /// The coarsest with at most this error, else the finest; with its error, as far as that can be told. The
+    /// finest has the error `of_finest`.
+    pub(super) fn take(
+        mut self,
+        of_finest: Option<f64>,
+        error: f64,
+    ) -> Option<(f64, Trial, Option<f64>)> {
+        let (_, finest) = self.finest()?;
+        let scale = finest.rows.largest();
+        let errors: Vec<Option<f64>> = (self.runs.iter())
+            .map(|(_, run)| Some(run.rows.difference(&finest.rows, &scale) + of_finest?))
+            .collect();
+        let is_enough = |found: &Option<f64>| found.is_some_and(|found| found <= error);
+        let chosen = errors.iter().position(is_enough);
+        let chosen = chosen.unwrap_or(errors.len() - 1);
+        let (n, trial) = self.runs.swap_remove(chosen);
+        Some((n, trial, errors[chosen]))
+    }
+}
+
+/// The error of the finer of two runs, in parts of their difference; at least all of it.
+fn left([coarse, fine]: [f64; 2], order: f64) -> f64 {
+    f64::max(1.0 / ((fine / coarse).powf(order) - 1.0), 1.0)
+}
+
+/// The order that the differences of three runs, coarse to middle and middle to fine, show within the bounds;
+/// the largest where they show none.
+fn order([a, b, c]: [f64; 3], [coarse, fine]: [f64; 2]) -> f64 {
+    let ratio = coarse / fine;
+    // Rises with the order.
+    let expected = |order: f64| {
+        let [a, b, c] = [a, b, c].map(|n| n.powf(-order));
+        (a - b) / (b - c)
+    };
+    let [mut low, mut high] = ORDERS;
+    if ratio.is_nan() || ratio >= expected(high) {
+        return high;
+    }
+    for _ in 0..BISECTIONS {
+        let middle = f64::midpoint(low, high);
+        if expected(middle) < ratio {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::sampled::Sampled;
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Runs to the value 1 with an error n^−p.
+    fn levels(order: f64, divisions: &[f64]) -> Levels {
+        let mut levels = Levels::default();
+        for &n in divisions {
+            let rows = Sampled {
+                names: vec!["f".to_owned()],
+                stretches: vec![vec![vec![1.0 - n.powf(-order)]]],
+            };
+            let trial = Trial {
+                rows,
+                seconds: 0.0,
+                counts: Vec::new(),
+            };
+            levels.push(n, trial);
+        }
+        levels
+    }
+
+    #[test]
+    fn the_error_of_the_finest_is_found_and_over_a_gap_it_is_the_difference() {
+        let runs: [(f64, &[f64]); 4] = [
+            (1.0, &[4.0, 8.0, 16.0]),
+            (0.5, &[4.0, 8.0, 16.0]),
+            (0.7, &[4.0, 64.0, 128.0]),
+            (0.5, &[4.0, 8.0, 16.0, 128.0]),
+        ];
+        for (order, divisions) in runs {
+            let runs = levels(order, divisions);
+            let [.., next, finest] = divisions else {
+                panic!()
+            };
+            let error = |n: f64| n.powf(-order) / (1.0 - finest.powf(-order));
+            let difference = error(*next) - error(*finest);
+            let found = runs.error().unwrap();
+            let expected = error(*finest).max(difference);
+            assert_relative_eq!(found, expected, max_relative = 1e-9);
+            assert_eq!(difference > error(*finest), divisions.len() == 4);
+        }
+    }
+
+    #[test]
+    fn an_order_above_one_is_not_relied_on_and_one_below_the_bound_neither() {
+        // Second order: the error that is left is a third of the difference, and all of it is given.
+        let runs = levels(2.0, &[4.0, 8.0, 16.0]);
+        assert_relative_eq!(runs.error().unwrap(), runs.difference().unwrap());
+        let runs = levels(0.1, &[4.0, 8.0, 16.0]);
+        let left = 1.0 / (ORDERS[0].exp2() - 1.0);
+        let expected = left * runs.difference().unwrap();
+        assert_relative_eq!(runs.error().unwrap(), expected, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn two_runs_tell_a_difference_and_no_error() {
+        let runs = levels(1.0, &[4.0, 8.0]);
+        assert_relative_eq!(runs.difference().unwrap(), 0.125 / 0.875);
+        assert_eq!(runs.error(), None);
+        assert_relative_eq!(runs.error_of_order(1.0).unwrap(), 0.125 / 0.875);
+        let (n, _, error) = runs.take(None, 0.5).unwrap();
+        assert_eq!((n.to_bits(), error), (8.0_f64.to_bits(), None));
+    }
+
+    #[test]
+    fn the_coarsest_that_is_good_enough_is_taken() {
+        let runs = || levels(1.0, &[4.0, 8.0, 16.0, 32.0]);
+        let (n, _, error) = runs().take(runs().error(), 0.14).unwrap();
+        assert_relative_eq!(n, 8.0);
+        assert_relative_eq!(
+            error.unwrap(),
+            0.125 / (1.0 - 1.0 / 32.0),
+            max_relative = 1e-9
+        );
+        let (n, ..) = runs().take(runs().error(), 0.01).unwrap();
+        assert_relative_eq!(n, 32.0);
+    }
+}

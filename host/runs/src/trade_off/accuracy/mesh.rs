@@ -1,0 +1,94 @@
+//! The error of the mesh, from uniform refinements.
+
+use super::super::pace::in_words;
+use super::super::trial::{Settings, Timing};
+use super::levels::{Levels, ORDERS};
+use super::search::Search;
+use super::{STUDY, words};
+use crate::Error;
+use input::chosen::ChosenMesh;
+use std::time::Duration;
+
+/// Divisions of the sides of elements, coarse to fine.
+const DIVISIONS: [usize; 3] = [2, 4, 8];
+/// All refined runs together may take so many times the CPU time of the run on the file's mesh, or so many
+/// seconds, whichever is more.
+const BUDGET: f64 = 100.0;
+const LEAST_BUDGET: f64 = 20.0;
+/// A run on a mesh of half the size of elements probably takes so many times as long: four times the elements,
+/// with twice the bandwidth.
+const DEARER: f64 = 8.0;
+
+/// Refines the mesh until its error is at most `most`, or the time is up. Returns the settings with the coarsest
+/// mesh that is good enough, else the finest that came to its end.
+///
+/// # Errors
+/// The study was stopped; the table cannot be written.
+pub(super) fn refine(
+    search: &mut Search<'_>,
+    settings: Settings,
+    most: f64,
+) -> Result<(Settings, ChosenMesh), Error> {
+    let own = search
+        .scratch
+        .trial(search.case, &settings, Timing::Once, 0)?;
+    let mut left = f64::max(BUDGET * own.seconds, LEAST_BUDGET);
+    let (mut last, mut dearer) = (own.seconds, DEARER);
+    let mut levels = Levels::default();
+    levels.push(1.0, own);
+    let mut why = None;
+    for division in DIVISIONS {
+        let finer = Settings {
+            division,
+            ..settings.clone()
+        };
+        let expected = last * dearer;
+        if expected > left {
+            why = Some(words::too_long(division, [expected, left].map(in_words)));
+            break;
+        }
+        search.begin(&finer, Some([expected, left]));
+        let within = Timing::Within(Duration::from_secs_f64(left));
+        let outcome = search.scratch.trial(search.case, &finer, within, 0);
+        search.scratch.stop.check(STUDY)?;
+        let trial = match outcome {
+            Ok(trial) => trial,
+            Err(error) => {
+                search.failed(&finer, &error)?;
+                why = Some(words::mesh_failed(division));
+                break;
+            }
+        };
+        left -= trial.seconds;
+        dearer = trial.seconds / last;
+        last = trial.seconds;
+        levels.push(division as f64, trial);
+        let told = [levels.difference(), levels.error_of_order(ORDERS[1])];
+        if let Some((_, done)) = levels.finest() {
+            search.table.row((search.runs, &finer), Ok(done), told)?;
+        }
+        // Where increments alone have more than all of it, no mesh is fine enough.
+        if most <= 0.0 || told[1].is_some_and(|error| error <= most) {
+            break;
+        }
+    }
+    let difference = levels.difference();
+    let estimate = words::mesh_estimate(levels.len(), ORDERS[1], why);
+    let of_finest = levels.error_of_order(ORDERS[1]);
+    let none = || Error::internal("the run on the file's mesh is lost".to_owned());
+    let (division, _, error) = levels.take(of_finest, most).ok_or_else(none)?;
+    let division = division as usize;
+    let chosen = ChosenMesh {
+        divided_by: division,
+        error,
+        difference,
+        estimate,
+    };
+    Ok((
+        Settings {
+            division,
+            ..settings
+        },
+        chosen,
+    ))
+}

@@ -1,0 +1,109 @@
+//! What a study for an accuracy says.
+
+use super::super::pace::in_words;
+use super::STUDY;
+use input::chosen::{Chosen, FailedTrial, Verdict};
+use std::fmt::Write;
+
+/// A trial came to no end.
+pub(super) fn failed(run: usize, failed: &FailedTrial) -> String {
+    format!("{STUDY}: run {run} failed: {}", failed.reason)
+}
+
+/// Schemes are not looked for: a run takes so many seconds.
+pub(super) fn no_schemes(seconds: f64) -> String {
+    let takes = in_words(seconds);
+    format!("{STUDY}: a run takes {takes}, so the schemes of the laws are left as they are")
+}
+
+/// How an error was estimated from the two finest of at least three runs.
+pub(super) fn estimate([next, finest]: [f64; 2], order: f64) -> String {
+    format!(
+        "the difference of two runs with increments × {next} and × {finest} of the file, extrapolated \
+         with an order of at most {order}, plus the difference of the chosen run to the finest, plus the effect \
+         of the tolerance; largest over probes and common rows, relative to the largest value of the probe"
+    )
+}
+
+/// Why no error could be estimated.
+pub(super) fn no_estimate(runs: usize) -> String {
+    format!("none: it takes three runs of different increments, and {runs} came to the end")
+}
+
+/// A finer mesh was not tried: it takes so long, and so much is left.
+pub(super) fn too_long(division: usize, [takes, left]: [String; 2]) -> String {
+    format!("mesh / {division} would take about {takes} of CPU time, and {left} are left for it")
+}
+
+/// A finer mesh was tried in vain.
+pub(super) fn mesh_failed(division: usize) -> String {
+    format!("mesh / {division} failed")
+}
+
+/// How the error of so many meshes was estimated, and why there is no finer one.
+pub(super) fn mesh_estimate(n: usize, order: f64, why: Option<String>) -> String {
+    let mut text = match n {
+        1 => "none, there is no finer mesh to tell it".to_owned(),
+        2 => format!(
+            "the difference of two meshes, as if it fell with order {order}: it takes a third one to see the order"
+        ),
+        _ => format!(
+            "the difference of the two finest of {n} meshes, extrapolated with the order they show, at most {order}"
+        ),
+    };
+    text.extend(why.map(|why| format!("; {why}")));
+    text
+}
+
+/// Whether what was asked for is reached, and with what settings: of a result that is short of it a
+/// warning.
+pub(super) fn outcome(chosen: &Chosen) -> Result<String, String> {
+    let settings = settings(chosen);
+    match chosen.verdict {
+        Verdict::Reached => Ok(format!("{STUDY}: {settings}")),
+        Verdict::NotReached => Err(format!("the accuracy is not reached: {settings}")),
+        Verdict::NotKnown => Err(format!(
+            "it is not known whether the accuracy is reached: {settings}"
+        )),
+    }
+}
+
+/// What was chosen, the error that it has, and what failed on the way.
+fn settings(chosen: &Chosen) -> String {
+    let asked = format!("{:.1e} asked for", chosen.asked);
+    let error = match (chosen.reached, chosen.without_mesh, chosen.difference) {
+        (Some(error), ..) => format!("error {error:.1e} estimated, {asked}"),
+        (None, Some(error), _) => format!("{asked}; increments and tolerance have {error:.1e}"),
+        (None, None, Some(difference)) => format!(
+            "{asked}; the two finest runs that came to their end differ by {difference:.1e}, and it takes a third \
+             one to tell the error"
+        ),
+        (None, None, None) => format!("{asked}; a single run came to its end"),
+    };
+    let mesh = chosen.mesh.as_ref().map(|mesh| match mesh.error {
+        Some(error) if mesh.divided_by == 1 => {
+            format!("; the file's mesh, its error {error:.1e}")
+        }
+        Some(error) => format!("; mesh / {}, its error {error:.1e}", mesh.divided_by),
+        None => format!("; error of the mesh: {}", mesh.estimate),
+    });
+    let increments: Vec<String> = chosen
+        .increments
+        .iter()
+        .map(|(phase, n)| format!("{phase} {n}"))
+        .collect();
+    let mut text = format!(
+        "{error}{}; increments {}, force tolerance {:e} {}",
+        mesh.unwrap_or_default(),
+        increments.join(", "),
+        chosen.force_tolerance,
+        chosen.parameters.join(" ")
+    );
+    text.truncate(text.trim_end().len());
+    if !chosen.failed.is_empty() {
+        let failed: Vec<&str> = chosen.failed.iter().map(|f| f.setting.as_str()).collect();
+        let failed = failed.join("; ");
+        let _ = write!(text, "; failed ({STUDY}.csv has why): {failed}");
+    }
+    text
+}
