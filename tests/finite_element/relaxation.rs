@@ -288,7 +288,7 @@ fn creep_leads_where_steps_of_the_load_fail() {
         load.in_phase("load", "stress")
     );
     let warnings = &auto.observer.warnings;
-    let says = |warning: &&String| warning.contains("`lift`, increment 1: steps of the load");
+    let says = |warning: &&String| warning.contains("`lift`, increment 1: three steps of the load");
     assert_eq!(warnings.iter().filter(says).count(), 1, "{warnings:?}");
     let end = |results: &Finished| results.in_phase("lift", "head")[0];
     assert_close("head", end(&auto), end(&load), 0.05, end(&load));

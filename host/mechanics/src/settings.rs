@@ -195,8 +195,8 @@ pub enum Convergence {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Control {
-    /// The load factor, increment by increment; where two steps within an increment find no equilibrium,
-    /// creep, unless `relaxation` is off.
+    /// The load factor, increment by increment; where three steps in a row find no equilibrium, short
+    /// steps of creep to the end of the increment, unless `relaxation` is off.
     #[default]
     Auto,
     /// The load factor alone: a phase ends where it leads no further.

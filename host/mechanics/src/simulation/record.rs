@@ -39,7 +39,7 @@ pub struct PhaseRecord {
     pub round_off: f64,
     /// Steps along the path of equilibrium under arc-length control.
     pub arc_length: usize,
-    /// The increment, from 1, from which creep led steps of the phase, as those by the load found no equilibrium.
+    /// The first increment, from 1, in which creep led under `auto`, as steps by the load found no equilibrium.
     pub crept_from: Option<usize>,
     /// Matrices factorised.
     pub factorisations: u64,

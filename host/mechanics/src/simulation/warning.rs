@@ -144,32 +144,7 @@ impl fmt::Display for Warning {
                 "phase `{phase}`: `force_tolerance` {tolerance:.1e} is below round-off: a residual of \
                  {left:.1e} is left, which is the last bit of the displacements"
             ),
-            Self::Relaxed(place, by_creep) => {
-                write!(
-                    f,
-                    "{place}: Newton iterations came to a standstill; viscous relaxation led to the next \
-                     equilibrium; others may lie near, and which one is found depends on the course of \
-                     the relaxation"
-                )?;
-                match by_creep {
-                    Some(Neighbour::Apart {
-                        displacements,
-                        forces,
-                    }) => write!(
-                        f,
-                        ": creep leads the same step to one that is {:.1e} of its displacements and {:.1e} of \
-                         its changes of forces away",
-                        displacements, forces
-                    )?,
-                    Some(Neighbour::None) => write!(f, ": creep leads the same step to none")?,
-                    None => {}
-                }
-                write!(
-                    f,
-                    "; run it with other increments, or with another `control` (`load`, `creep`), and \
-                     hold the results against each other"
-                )
-            }
+            Self::Relaxed(place, by_creep) => relaxed(f, place, *by_creep),
             Self::RelaxedOften(phase, steps) => write!(
                 f,
                 "phase `{phase}`: viscous relaxation led to the next equilibrium in {steps} steps in all"
@@ -217,9 +192,9 @@ impl fmt::Display for Warning {
             ),
             Self::Creeps(place) => write!(
                 f,
-                "{place}: steps of the load found no equilibrium; from here on creep leads to the next one; others may \
-                 lie near: hold the results against those of `control = \"creep\"` from the start, and of other \
-                 increments"
+                "{place}: three steps of the load in a row found no equilibrium; by short steps creep leads to the end \
+                 of the increment; what flows on its way stays, so that others may lie near: hold the results \
+                 against those of other increments"
             ),
             Self::FollowedPath {
                 place,
@@ -232,4 +207,29 @@ impl fmt::Display for Warning {
             ),
         }
     }
+}
+
+fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour>) -> fmt::Result {
+    write!(
+        f,
+        "{place}: Newton iterations came to a standstill; viscous relaxation led to the next equilibrium; others may \
+         lie near, and which one is found depends on the course of the relaxation"
+    )?;
+    match by_creep {
+        Some(Neighbour::Apart {
+            displacements,
+            forces,
+        }) => write!(
+            f,
+            ": creep leads the same step to one that is {displacements:.1e} of its displacements and {forces:.1e} of \
+             its changes of forces away"
+        )?,
+        Some(Neighbour::None) => write!(f, ": creep leads the same step to none")?,
+        None => {}
+    }
+    write!(
+        f,
+        "; run it with other increments, or with another `control` (`load`, `creep`), and hold the results against \
+         each other"
+    )
 }
