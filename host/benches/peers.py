@@ -10,6 +10,8 @@ is missing and how to get it, and the others still run.
 laws    Mohr-Coulomb and elasticity of MFront, from the Python wheel of OpenGeoSys
         (`python3 -m venv FOLDER && FOLDER/bin/pip install ogs==6.5.9`; FOLDER by --ogs or PILUM_OGS)
 linked  the peer is the law itself, linked into the calling program instead of opened as a plugin
+generic a law called point by point through MFront's generic interface, as OpenGeoSys and MGIS do; the peer
+        is the same library, called by the contract
 elastic the elastic pile in a chamber beside CalculiX (`ccx` on the path, Debian: calculix-ccx)
 plastic the pile in Mohr-Coulomb soil, cases/bonded_pile, beside OpenGeoSys (as above)
 """
@@ -136,6 +138,26 @@ def linked(options):
     return met
 
 
+def generic(_):
+    """One library by the contract and by MFront's generic interface."""
+    cargo, compiler, law = program("cargo"), program("cc"), "mohr_coulomb"
+    run(cargo, "build", "--release", "--quiet", "--manifest-path", ROOT / "models" / law / "Cargo.toml")
+    with tempfile.TemporaryDirectory() as folder:
+        caller = Path(folder) / "generic"
+        run(compiler, "-O2", "-I", ROOT / "abi" / "include", "-o", caller, HERE / "peers" / "generic.c", "-ldl", "-lm")
+        output = run(caller, target() / "release" / f"lib{law}.so")
+    print(f"generic: `{law}`, ns per integration point, CPU time, the least of 25 alternating rounds")
+    print("| step | operator | batch of 512 | native, one by one | MFront's interface | / one by one | goal |")
+    print("|---|---|---|---|---|---|---|")
+    met = True
+    for line in output.splitlines():
+        step, operator, *times = line.split("\t")
+        batch, single, call = map(float, times)
+        met = met and call <= single
+        print(f"| {step} | {operator} | {batch:.0f} | {single:.0f} | {call:.0f} | {call / single:.2f} | 1 |")
+    return met
+
+
 # Mesh: at most this fraction of CalculiX's CPU seconds and of its memory.
 ELASTIC = {"m200": None, "m2k": None, "m5k": None, "m20k": (1 / 8, 1 / 3), "m100k": (1 / 8, 1 / 3)}
 # CalculiX prints the head's force with 7 digits.
@@ -248,7 +270,7 @@ def plastic(options):
     return met
 
 
-PARTS = {"laws": laws, "linked": linked, "elastic": elastic, "plastic": plastic}
+PARTS = {"laws": laws, "linked": linked, "generic": generic, "elastic": elastic, "plastic": plastic}
 
 
 def main():

@@ -1,6 +1,7 @@
 /* Calls every entry of a law library with the same points, as the programs that each entry is for would, and
  * compares with the native one: UMAT and CALCULIX bit for bit, an MFront behaviour, whose components carry √2, to
- * 1e-13 of the largest value, of internal variables also of the gradient's increment.
+ * 1e-13 of the largest value, of internal variables also of the gradient's increment, and bit for bit from a
+ * gradient of zero, where what the behaviour makes of its components is what the native call is given.
  *
  *     entries LIBRARY LAW BEHAVIOUR FLUX STEP PARAMETER...
  *
@@ -157,45 +158,77 @@ static void by_calculix(const struct point *p) {
         }
 }
 
-static void by_behaviour(const char *name, const char *hypothesis, const struct point *p) {
-    char symbol[128], message[512] = "";
+/* What goes in and out of a behaviour. */
+struct carried {
+    double g0[6], g1[6], f0[6], f1[6], k[36], s1[MOST], rdt;
+    char message[512];
+};
+
+/* From its components to ours. */
+static double scale(const struct point *p, int i) { return p->n > 2 && i >= 3 ? 0.70710678118654752440 : 1; }
+
+static int behave(const char *name, const char *hypothesis, const struct point *p, struct carried *m) {
+    char symbol[128];
     snprintf(symbol, sizeof symbol, "%s_%s", name, hypothesis);
     behaviour *call = (behaviour *)dlsym(library, symbol);
     if (!call) {
         wrong(symbol, 0, 1);
-        return;
+        return -2;
     }
-    double g0[6], g1[6], f0[6], f1[6], k[36] = {4}, s1[MOST], rdt = 1, scalar = 0;
-    int shear = p->n > 2 ? 3 : p->n;
-    for (int i = 0; i < p->n; i++) {
-        double root = i < shear ? 1 : sqrt(2);
-        g0[i] = p->gradient0[i] / root;
-        g1[i] = p->gradient1[i] / root;
-        f0[i] = f1[i] = p->flux0[i] * root;
-    }
-    memcpy(s1, p->state0, sizeof s1);
-    struct state begin = {g0, f0, &scalar, 0, (double *)p->state0, &scalar, &scalar, 0};
-    struct state end = {g1, f1, &scalar, property, s1, &scalar, &scalar, 0};
-    struct data data = {message, 1, k, &rdt, &scalar, begin, end};
+    double scalar = 0;
+    memcpy(m->f1, m->f0, sizeof m->f1);
+    memcpy(m->s1, p->state0, sizeof m->s1);
+    m->k[0] = 4, m->rdt = 1, *m->message = 0;
+    struct state begin = {m->g0, m->f0, &scalar, 0, (double *)p->state0, &scalar, &scalar, 0};
+    struct state end = {m->g1, m->f1, &scalar, property, m->s1, &scalar, &scalar, 0};
+    struct data data = {m->message, 1, m->k, &m->rdt, &scalar, begin, end};
     int result = call(&data);
     if (p->status != PILUM_OK) {
-        if (result != -1 || !(rdt < 1) || !*message) wrong("a failed behaviour", result, -1);
-        return;
-    }
-    if (result != 1 || rdt != 1) {
-        printf("%s\n", message);
+        if (result != -1 || !(m->rdt < 1) || !*m->message) wrong("a failed behaviour", result, -1);
+    } else if (result != 1 || m->rdt != 1) {
+        printf("%s\n", m->message);
         wrong("result of a behaviour", result, 1);
-        return;
     }
-    for (int i = 0; i < p->n; i++) f1[i] /= i < shear ? 1 : sqrt(2);
-    for (int i = 0; i < p->n * p->n; i++)
-        k[i] /= (i / p->n < shear ? 1 : sqrt(2)) * (i % p->n < shear ? 1 : sqrt(2));
-    close("forces", f1, p->flux1, p->n, 0);
+    return p->status == PILUM_OK ? result : -1;
+}
+
+static void by_behaviour(const char *name, const char *hypothesis, const struct point *p) {
+    struct carried m = {.rdt = 1};
+    for (int i = 0; i < p->n; i++) {
+        m.g0[i] = p->gradient0[i] * scale(p, i);
+        m.g1[i] = p->gradient1[i] * scale(p, i);
+        m.f0[i] = p->flux0[i] / scale(p, i);
+    }
+    if (behave(name, hypothesis, p, &m) != 1) return;
+    for (int i = 0; i < p->n; i++) m.f1[i] *= scale(p, i);
+    for (int i = 0; i < p->n * p->n; i++) m.k[i] *= scale(p, i / p->n) * scale(p, i % p->n);
+    close("forces", m.f1, p->flux1, p->n, 0);
     /* Plastic strains are what the increment leaves of itself, and have its rounding. */
     double increment = 0;
     for (int i = 0; i < p->n; i++) increment = fmax(increment, fabs(p->gradient1[i] - p->gradient0[i]));
-    close("internal state variables", s1, p->state1, p->n_state, increment);
-    close("K", k, p->tangent, p->n * p->n, 0);
+    close("internal state variables", m.s1, p->state1, p->n_state, increment);
+    close("K", m.k, p->tangent, p->n * p->n, 0);
+}
+
+/* The same increment from a gradient of zero: the native call gets the very numbers that the law gets. */
+static void exactly(const char *name, const char *hypothesis, const struct point *p, const pilum_instance *instance) {
+    struct carried m = {.rdt = 1};
+    struct point q = *p;
+    double f1[6], k[36];
+    for (int i = 0; i < p->n; i++) {
+        m.g1[i] = p->gradient1[i] - p->gradient0[i];
+        m.f0[i] = p->flux0[i];
+        q.gradient0[i] = 0;
+        q.gradient1[i] = m.g1[i] / scale(p, i);
+        q.flux0[i] = m.f0[i] * scale(p, i);
+    }
+    native(instance, &q, 0);
+    if (behave(name, hypothesis, &q, &m) != 1) return;
+    for (int i = 0; i < p->n; i++) f1[i] = q.flux1[i] / scale(p, i);
+    for (int i = 0; i < p->n * p->n; i++) k[i] = q.tangent[i] / (scale(p, i / p->n) * scale(p, i % p->n));
+    bits("forces, to the bit", m.f1, f1, p->n);
+    bits("internal state variables, to the bit", m.s1, q.state1, p->n_state);
+    bits("K, to the bit", m.k, k, p->n * p->n);
 }
 
 int main(int argc, char **argv) {
@@ -250,8 +283,10 @@ int main(int argc, char **argv) {
                 }
                 if (kind == PILUM_H_3D) by_calculix(&p);
                 int turns = kind == PILUM_H_AXISYMMETRIC || s % 2;
-                by_behaviour(name, kind == PILUM_H_3D ? "Tridimensional" : turns ? "Axisymmetrical" : "PlaneStrain",
-                             &p);
+                const char *plane = turns ? "Axisymmetrical" : "PlaneStrain";
+                const char *hypothesis = kind == PILUM_H_3D ? "Tridimensional" : plane;
+                by_behaviour(name, hypothesis, &p);
+                exactly(name, hypothesis, &p, instance);
                 if (p.status == PILUM_OK) {
                     memcpy(p.gradient0, p.gradient1, sizeof p.gradient0);
                     memcpy(p.flux0, p.flux1, sizeof p.flux0);

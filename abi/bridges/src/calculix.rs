@@ -7,8 +7,8 @@
 //! symmetric part, as its own interface to Abaqus' routines makes it. That slows the iteration of
 //! laws with non-associated flow and does not change the stress.
 
-use crate::laws::{Laws, complain, offers};
-use crate::point::Point;
+use crate::laws::{Laws, Trouble, complain, offers};
+use crate::point::{Answer, Carried, Point};
 use crate::umat::{or, row};
 use abi::export::Continuum;
 use abi::{ContinuumLaw, Hypothesis, InternalVariables, Tangent};
@@ -48,15 +48,15 @@ pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
     // SAFETY: `CalculiX`' interface: `stre` has 6 components, `stiff` 21.
     unsafe {
         match carried(laws, call) {
-            Ok((stress, operator)) => {
-                for (i, value) in stress.into_iter().enumerate() {
+            Ok(Answer { flux, operator, .. }) => {
+                for (i, value) in flux.into_iter().enumerate() {
                     *call.stre.add(i) = value;
                 }
                 if or(call.icmd, 0) != ONLY_STRESS {
                     // The upper triangle, column by column.
                     let triangle = (0..6).flat_map(|j| (0..=j).map(move |i| (i, j)));
                     for (place, (i, j)) in triangle.enumerate() {
-                        let mean = 0.5 * (operator[6 * i + j] + operator[6 * j + i]);
+                        let mean = 0.5 * (operator[i][j] + operator[j][i]);
                         *call.stiff.add(place) = mean;
                     }
                 }
@@ -76,14 +76,12 @@ pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
 /// `icmd` of a call that wants no stiffness.
 const ONLY_STRESS: c_int = 3;
 
-type StressAndOperator = ([f64; 6], [f64; 36]);
-
 /// # Safety
 /// As [`answer`].
 unsafe fn carried<L: ContinuumLaw>(
     laws: &Laws<Continuum<L>>,
     call: &Call,
-) -> Result<StressAndOperator, f64> {
+) -> Result<Answer<6>, f64> {
     let id = L::DESCRIPTION.id;
     if !offers::<Continuum<L>>(Hypothesis::ThreeD) {
         complain(
@@ -123,14 +121,13 @@ unsafe fn carried<L: ContinuumLaw>(
         let block = (or(call.iint, 1) - 1) as isize
             + or(call.mi, 1) as isize * (or(call.iel, 1) - 1) as isize;
         let place = n_state as isize * block;
-        let (begin, end) = (row(call.emec0, 6), row(call.emec, 6));
+        let (begin, end) = (row::<6>(call.emec0), row::<6>(call.emec));
         let gamma = |i: usize, value: f64| if i < 3 { value } else { 2.0 * value };
         let dtime = or(call.dtime, 0.0);
         let point = Point {
-            n_components: 6,
             gradient: std::array::from_fn(|i| gamma(i, begin[i])),
             increment: std::array::from_fn(|i| gamma(i, end[i] - begin[i])),
-            flux: row(call.stre, 6),
+            flux: row(call.stre),
             state0: call.xstateini.offset(place),
             state1: call.xstate.offset(place),
             time: or(call.ttime, 0.0) + or(call.time, 0.0) - dtime,
@@ -145,10 +142,10 @@ unsafe fn carried<L: ContinuumLaw>(
         _ => Tangent::Consistent,
     };
     let mut factor = 0.25;
-    laws.carry(given, &point, tangent, |trouble| {
+    let tell = |trouble: Trouble<'_>| {
         factor = trouble.factor();
         complain(id, format_args!("{trouble}"));
-    })
-    .map(|answer| (answer.flux, answer.operator))
-    .ok_or(factor)
+    };
+    laws.carry(given, |law| law.carry(&point, tangent), tell)
+        .ok_or(factor)
 }

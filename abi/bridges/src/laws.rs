@@ -4,10 +4,9 @@
 //! the laws it has built, up to [`MOST_LAWS`] sets of parameters, and finds them by the bits of the
 //! values, without a lock. Beyond that a law is built in every call.
 
-use crate::point::{Answer, Carried, Point};
 use abi::access::{Message, id, panic_text, within_bounds};
 use abi::export::Exported;
-use abi::{Failure, Hypothesis, Parameter, Parameters, Tangent, raw};
+use abi::{Failure, Hypothesis, Parameter, Parameters, raw};
 use std::ffi::CStr;
 use std::fmt;
 use std::io::Write as _;
@@ -58,8 +57,9 @@ struct Built<L> {
     poisoned: AtomicBool,
 }
 
-impl<L: Carried> Built<L> {
+impl<L: Exported> Built<L> {
     /// From the first values in declared order; the rest take their defaults.
+    #[cold]
     fn new(given: &[f64]) -> Self {
         let table = <L::Parameters as Parameters>::TABLE;
         let law = complete(table, given).and_then(|values| {
@@ -76,12 +76,20 @@ impl<L: Carried> Built<L> {
         }
     }
 
-    fn carry(&self, point: &Point, tangent: Tangent) -> Result<Answer, Trouble<'_>> {
+    /// The same in a place of its own, as it may be large.
+    #[cold]
+    #[inline(never)]
+    fn boxed(given: &[f64]) -> Box<Self> {
+        Box::new(Self::new(given))
+    }
+
+    #[inline]
+    fn carry<A>(&self, work: impl FnOnce(&L) -> Result<A, Failure>) -> Result<A, Trouble<'_>> {
         let law = self.law.as_ref().map_err(|why| Trouble::Refused(why))?;
         if self.poisoned.load(Ordering::Relaxed) {
             return Err(Trouble::Panicked);
         }
-        catch_unwind(AssertUnwindSafe(|| law.carry(point, tangent)))
+        catch_unwind(AssertUnwindSafe(|| work(law)))
             .map_err(|_| {
                 self.poisoned.store(true, Ordering::Relaxed);
                 Trouble::Panicked
@@ -148,7 +156,7 @@ struct Kept<L> {
     next: *mut Self,
 }
 
-impl<L: Carried> Laws<L> {
+impl<L: Exported> Laws<L> {
     /// None yet.
     ///
     /// # Panics
@@ -166,42 +174,77 @@ impl<L: Carried> Laws<L> {
 
     /// Carries a point with the law of these parameters, the first values in declared order.
     /// `tell` hears what is in the way of an answer.
-    pub(crate) fn carry(
+    #[inline]
+    pub(crate) fn carry<A>(
         &self,
         given: &[f64],
-        point: &Point,
-        tangent: Tangent,
+        work: impl FnOnce(&L) -> Result<A, Failure>,
         tell: impl FnOnce(Trouble<'_>),
-    ) -> Option<Answer> {
+    ) -> Option<A> {
         let bucket = &self.buckets[hash(given) % N_BUCKETS];
         let head = bucket.load(Ordering::Acquire);
-        let outcome = if let Some(built) = find(head, given) {
-            built.carry(point, tangent)
-        } else if self.n.fetch_add(1, Ordering::Relaxed) < MOST_LAWS {
-            keep(bucket, head, given).carry(point, tangent)
+        let made;
+        let built = if let Some(built) = find(head, given) {
+            built
+        } else if let Some(built) = self.keep(bucket, head, given) {
+            built
         } else {
-            self.n.fetch_sub(1, Ordering::Relaxed);
-            let built = Built::<L>::new(given);
-            return built.carry(point, tangent).map_err(tell).ok();
+            made = Built::boxed(given);
+            &*made
         };
-        outcome.map_err(tell).ok()
+        built.carry(work).map_err(tell).ok()
+    }
+
+    /// Builds a law and puts it at the head of the list, unless there are too many. Two threads may keep
+    /// the same one twice.
+    #[cold]
+    #[inline(never)]
+    fn keep<'a>(
+        &self,
+        bucket: &AtomicPtr<Kept<L>>,
+        mut head: *mut Kept<L>,
+        given: &[f64],
+    ) -> Option<&'a Built<L>> {
+        if self.n.fetch_add(1, Ordering::Relaxed) >= MOST_LAWS {
+            self.n.fetch_sub(1, Ordering::Relaxed);
+            return None;
+        }
+        let kept = Box::into_raw(Box::new(Kept {
+            key: given.iter().map(|v| v.to_bits()).collect(),
+            built: Built::new(given),
+            next: head,
+        }));
+        while let Err(now) =
+            bucket.compare_exchange_weak(head, kept, Ordering::AcqRel, Ordering::Acquire)
+        {
+            head = now;
+            // SAFETY: nobody else knows it yet.
+            unsafe { (*kept).next = head };
+        }
+        // SAFETY: made above, never freed.
+        Some(unsafe { &(*kept).built })
     }
 }
 
-impl<L: Carried> Default for Laws<L> {
+impl<L: Exported> Default for Laws<L> {
     fn default() -> Self {
         Self::new()
     }
 }
 
+/// A sum of products that do not wait for one another. Round numbers end in zeros, and so do their
+/// products: the leading bits differ.
+#[inline]
 fn hash(values: &[f64]) -> usize {
-    let mixed = values.iter().fold(0u64, |hash, value| {
-        (hash ^ value.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-    });
-    // Round numbers end in zeros, and so do their products: the leading bits differ.
-    (mixed >> 56) as usize
+    let (mut sum, mut factor) = (0_u64, 1_u64);
+    for value in values {
+        factor = factor.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        sum = sum.wrapping_add(value.to_bits().wrapping_mul(factor));
+    }
+    (sum >> 56) as usize
 }
 
+#[inline]
 fn find<'a, L>(mut at: *const Kept<L>, given: &[f64]) -> Option<&'a Built<L>> {
     // SAFETY: what is in the list is never freed or changed.
     while let Some(kept) = unsafe { at.as_ref() } {
@@ -212,28 +255,6 @@ fn find<'a, L>(mut at: *const Kept<L>, given: &[f64]) -> Option<&'a Built<L>> {
         at = kept.next;
     }
     None
-}
-
-/// Builds a law and puts it at the head of the list. Two threads may keep the same one twice.
-fn keep<'a, L: Carried>(
-    bucket: &AtomicPtr<Kept<L>>,
-    mut head: *mut Kept<L>,
-    given: &[f64],
-) -> &'a Built<L> {
-    let kept = Box::into_raw(Box::new(Kept {
-        key: given.iter().map(|v| v.to_bits()).collect(),
-        built: Built::new(given),
-        next: head,
-    }));
-    while let Err(now) =
-        bucket.compare_exchange_weak(head, kept, Ordering::AcqRel, Ordering::Acquire)
-    {
-        head = now;
-        // SAFETY: nobody else knows it yet.
-        unsafe { (*kept).next = head };
-    }
-    // SAFETY: made above, never freed.
-    unsafe { &(*kept).built }
 }
 
 /// Says something on the standard error stream, the only channel of a program that takes no

@@ -12,15 +12,15 @@
 //!
 //! Gradients and fluxes are Kelvin–Mandel vectors there: shear strain γ/√2, shear stress √2 τ.
 
-use crate::laws::{Laws, MOST_PARAMETERS, has_default, tell};
-use crate::point::{Carried, Point};
-use crate::umat::row;
+mod call;
+
+pub use call::{Data, InitialState, State, integrate};
+
+use crate::laws::has_default;
 use abi::export::Exported;
-use abi::raw::{self, PILUM_T_LINEAR, PILUM_T_LOCAL_AXES};
-use abi::{Hypothesis, Parameters, Tangent};
-use std::f64::consts::FRAC_1_SQRT_2;
+use abi::raw::{self, PILUM_T_LOCAL_AXES};
+use abi::{Hypothesis, Parameters};
 use std::ffi::{CStr, c_char, c_int};
-use std::fmt;
 use std::ptr::null;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -88,7 +88,8 @@ macro_rules! export_mfront {
 
             static LAWS: $crate::laws::Laws<Law> =
                 $crate::laws::Laws::new();
-            static SETTINGS: m::Settings = m::Settings::of::<Law>();
+            static SETTINGS: m::Settings<{ m::n_parameters::<Law>() }> =
+                m::Settings::of::<Law>();
 
             $crate::export_mfront!(@numbers $law u16 [
                 "_mfront_mkt" = 1,
@@ -161,7 +162,9 @@ macro_rules! export_mfront {
                 #[unsafe(export_name = concat!(stringify!($law), "_", stringify!($hypothesis)))]
                 pub unsafe extern "C" fn integrate(data: *mut m::Data) -> ::std::ffi::c_int {
                     // SAFETY: passed on to the caller.
-                    unsafe { m::integrate::<Law>(&LAWS, &SETTINGS, HYPOTHESIS, data) }
+                    unsafe {
+                        m::integrate::<Law, { HYPOTHESIS.n_components() }, _>(&LAWS, &SETTINGS, data)
+                    }
                 }
             }; )+
         };
@@ -319,8 +322,13 @@ const fn spelled(id: *const c_char) -> Name {
     name
 }
 
+/// Number of all parameters of a law.
+pub const fn n_parameters<L: Exported>() -> usize {
+    <L::Parameters as Parameters>::TABLE.len()
+}
+
 /// The parameters of a law, by whether they may be left out.
-const fn n_parameters<L: Exported>(left_out: bool) -> usize {
+const fn n_declared<L: Exported>(left_out: bool) -> usize {
     let table = <L::Parameters as Parameters>::TABLE;
     let (mut n, mut i) = (0, 0);
     while i < table.len() {
@@ -349,7 +357,7 @@ const fn parameter_names<L: Exported, const N: usize>(left_out: bool) -> [Name; 
 /// Number of material properties: the parameters that must be given, and the layer's angle of a law in
 /// its axes.
 pub const fn n_properties<L: Exported>() -> usize {
-    n_parameters::<L>(false) + has_axes::<L>() as usize
+    n_declared::<L>(false) + has_axes::<L>() as usize
 }
 
 /// Whether a law is in axes of its layer.
@@ -368,7 +376,7 @@ pub const fn property_names<L: Exported, const N: usize>() -> [Name; N] {
 
 /// Number of MFront's parameters.
 pub const fn n_settings<L: Exported>() -> usize {
-    n_parameters::<L>(true)
+    n_declared::<L>(true)
 }
 
 /// Their names.
@@ -477,19 +485,24 @@ pub const fn state_names<L: Exported, const N: usize>() -> [Name; N] {
 
 /// Values of MFront's parameters, in the places that the law's parameters have.
 #[derive(Debug)]
-pub struct Settings([AtomicU64; MOST_PARAMETERS]);
+pub struct Settings<const P: usize>([AtomicU64; P]);
 
-impl Settings {
-    /// The defaults of a law.
+impl<const P: usize> Settings<P> {
+    /// The defaults of a law with `P` parameters.
     pub const fn of<L: Exported>() -> Self {
         let table = <L::Parameters as Parameters>::TABLE;
-        let mut values = [const { AtomicU64::new(0) }; MOST_PARAMETERS];
+        let mut values = [const { AtomicU64::new(0) }; P];
         let mut i = 0;
-        while i < table.len() {
+        while i < P {
             values[i] = AtomicU64::new(table[i].raw().default_value.to_bits());
             i += 1;
         }
         Self(values)
+    }
+
+    /// The value of the parameter in this place.
+    fn value(&self, place: usize) -> f64 {
+        f64::from_bits(self.0[place].load(Ordering::Relaxed))
     }
 
     /// Sets a parameter, for the whole process. 1 if there is one of this name, else 0.
@@ -512,360 +525,5 @@ impl Settings {
             }
         }
         0
-    }
-}
-
-/// A point at the start of the increment, as MFront's interface passes it.
-#[expect(missing_docs, reason = "the names are MFront's")]
-#[repr(C)]
-#[derive(Debug)]
-pub struct InitialState {
-    pub gradients: *const f64,
-    pub thermodynamic_forces: *const f64,
-    pub mass_density: *const f64,
-    pub material_properties: *const f64,
-    pub internal_state_variables: *const f64,
-    pub stored_energy: *const f64,
-    pub dissipated_energy: *const f64,
-    pub external_state_variables: *const f64,
-}
-
-/// The point at the end of the increment.
-#[expect(missing_docs, reason = "the names are MFront's")]
-#[repr(C)]
-#[derive(Debug)]
-pub struct State {
-    pub gradients: *const f64,
-    pub thermodynamic_forces: *mut f64,
-    pub mass_density: *const f64,
-    pub material_properties: *const f64,
-    pub internal_state_variables: *mut f64,
-    pub stored_energy: *mut f64,
-    pub dissipated_energy: *mut f64,
-    pub external_state_variables: *const f64,
-}
-
-/// The argument of a behaviour.
-#[repr(C)]
-#[derive(Debug)]
-pub struct Data {
-    /// Null, or room for 512 bytes.
-    pub error_message: *mut c_char,
-    /// Time increment.
-    pub dt: f64,
-    /// On entry `K[0]` is the request, on exit the operator, row by row.
-    pub k: *mut f64,
-    /// On entry the largest step factor that the caller would take, on exit the law's.
-    pub rdt: *mut f64,
-    /// Not computed.
-    pub speed_of_sound: *mut f64,
-    /// Start of the increment.
-    pub s0: InitialState,
-    /// End of the increment.
-    pub s1: State,
-}
-
-const _: () = assert!(size_of::<Data>() == 168);
-
-/// What a call is for.
-#[derive(Clone, Copy)]
-struct Request {
-    /// The operator of the start only, nothing is carried.
-    prediction: bool,
-    tangent: Tangent,
-}
-
-impl Request {
-    const NONE: Self = Self {
-        prediction: false,
-        tangent: Tangent::None,
-    };
-
-    /// From `K[0]`; with more than 50, 100 of it ask for the speed of sound too.
-    fn decoded(k: f64) -> Result<Self, &'static str> {
-        let k = if k > 50.0 { k - 100.0 } else { k };
-        let prediction = k < -0.25;
-        let tangent = match k.abs() {
-            k if k < 0.5 && !prediction => Tangent::None,
-            k if k < 1.5 => Tangent::Elastic,
-            k if k < 2.5 => return Err("a secant operator is not offered"),
-            k if k.is_finite() => Tangent::Consistent,
-            _ => return Err("K[0] is not finite"),
-        };
-        Ok(Self {
-            prediction,
-            tangent,
-        })
-    }
-}
-
-/// Carries one point, in Kelvin–Mandel components. 1: done, 0: done but inaccurate, −1: not done,
-/// with the step factor in `rdt` and the reason in `error_message`.
-///
-/// # Safety
-/// `data` is null or as MFront's interface says.
-pub unsafe fn integrate<L: Carried>(
-    laws: &Laws<L>,
-    settings: &Settings,
-    hypothesis: Hypothesis,
-    data: *mut Data,
-) -> c_int {
-    // SAFETY: see above.
-    let Some(data) = (unsafe { data.as_ref() }) else {
-        return -1;
-    };
-    let say = |text: fmt::Arguments<'_>| {
-        let id = L::DESCRIPTION.id.to_string_lossy();
-        // SAFETY: `error_message` is null or has room for 512 bytes.
-        unsafe { tell(data.error_message, format_args!("{id}: {text}")) };
-    };
-    // SAFETY: passed on to the caller.
-    match unsafe { carry(laws, settings, hypothesis, data, say) } {
-        Ok(None) => 1,
-        Ok(Some(why)) => {
-            say(format_args!("{why}"));
-            0
-        }
-        Err(factor) => {
-            if !data.rdt.is_null() {
-                // SAFETY: valid where it is not null.
-                unsafe { *data.rdt = factor.min(*data.rdt) };
-            }
-            -1
-        }
-    }
-}
-
-/// The reason why the results are inaccurate, if they are.
-///
-/// # Errors
-/// The step factor; the reason is said.
-///
-/// # Safety
-/// As [`integrate`].
-unsafe fn carry<L: Carried>(
-    laws: &Laws<L>,
-    settings: &Settings,
-    hypothesis: Hypothesis,
-    data: &Data,
-    say: impl Fn(fmt::Arguments<'_>),
-) -> Result<Option<&'static str>, f64> {
-    let refuse = |why: &str| {
-        say(format_args!("{why}"));
-        0.25
-    };
-    let (n, n_states) = (hypothesis.n_components(), L::STATE.len());
-    let (s0, s1) = (&data.s0, &data.s1);
-    // SAFETY: `K` is null or has one value at least.
-    let request = unsafe { data.k.as_ref() }.map_or(Ok(Request::NONE), |k| Request::decoded(*k));
-    let request = request.map_err(refuse)?;
-    let missing = s0.gradients.is_null()
-        || s1.gradients.is_null()
-        || s0.thermodynamic_forces.is_null()
-        || s1.thermodynamic_forces.is_null()
-        || (n_states > 0 && s0.internal_state_variables.is_null())
-        || (n_states > 0 && s1.internal_state_variables.is_null())
-        || (n_properties::<L>() > 0 && s1.material_properties.is_null());
-    if missing {
-        return Err(refuse("an array that is needed is null"));
-    }
-    let mut given = [0.0; MOST_PARAMETERS];
-    let mut properties = 0..;
-    let table = <L::Parameters as Parameters>::TABLE;
-    for (v, declared) in table.iter().enumerate() {
-        given[v] = if has_default(declared) {
-            f64::from_bits(settings.0[v].load(Ordering::Relaxed))
-        } else {
-            // Some programs fill the properties of the end of the increment only.
-            // SAFETY: as many as there are names.
-            unsafe {
-                *s1.material_properties
-                    .add(properties.next().unwrap_or_default())
-            }
-        };
-    }
-    let scale = Scale::of(hypothesis);
-    let axes = if has_axes::<L>() {
-        // SAFETY: as many as there are names, of which the angle is the last.
-        let angle = unsafe { *s1.material_properties.add(n_properties::<L>() - 1) };
-        if !angle.is_finite() {
-            return Err(refuse("LayerAngle is not finite"));
-        }
-        Axes::at(angle)
-    } else {
-        Axes(None)
-    };
-    let mut unused = [0.0; MOST_STATES];
-    // SAFETY: `n` components.
-    let point = unsafe {
-        let begin = row(s0.gradients, n);
-        let end = if request.prediction {
-            begin
-        } else {
-            row(s1.gradients, n)
-        };
-        Point {
-            n_components: n,
-            gradient: axes.strain(scale.gradient(begin)),
-            increment: axes.strain(scale.gradient(std::array::from_fn(|i| end[i] - begin[i]))),
-            flux: axes.stress(scale.flux(row(s0.thermodynamic_forces, n))),
-            state0: s0.internal_state_variables,
-            state1: if request.prediction {
-                unused.as_mut_ptr()
-            } else {
-                s1.internal_state_variables
-            },
-            time: 0.0,
-            time_increment: data.dt,
-            step_time: 0.0,
-        }
-    };
-    let mut factor = 0.25;
-    let answer = laws.carry(&given[..table.len()], &point, request.tangent, |trouble| {
-        factor = trouble.factor();
-        say(format_args!("{trouble}"));
-    });
-    let answer = answer.ok_or(factor)?;
-    let operator =
-        loading(laws, &given[..table.len()], &point, request.tangent).unwrap_or(answer.operator);
-    let (flux, operator) = (axes.back(answer.flux), axes.operator_back(&operator));
-    for i in 0..n {
-        if !request.prediction {
-            // SAFETY: `n` components.
-            unsafe { *s1.thermodynamic_forces.add(i) = flux[i] / scale.0[i] };
-        }
-        for j in 0..n {
-            if request.tangent != Tangent::None {
-                let value = operator[i * n + j] / (scale.0[i] * scale.0[j]);
-                // SAFETY: where an operator is requested, `K` has `n` × `n` components.
-                unsafe { *data.k.add(i * n + j) = value };
-            }
-        }
-    }
-    Ok(answer.unreliable)
-}
-
-/// The tangent of a point on its yield surface that has not moved: the one for loading. Programs of
-/// this interface begin an increment where it starts, with no strain; there the update has two
-/// tangents, and with the elastic one a full Newton iteration may cycle for ever. A point inside
-/// the surface stays elastic under the small strain along its deviatoric stress that tells the
-/// two apart.
-fn loading<L: Carried>(
-    laws: &Laws<L>,
-    given: &[f64],
-    point: &Point,
-    tangent: Tangent,
-) -> Option<[f64; 36]> {
-    const SMALL_STRAIN: f64 = 1e-9;
-    let rests = point.increment.iter().all(|strain| *strain == 0.0);
-    let linear = L::FORMULATIONS[0].flags & PILUM_T_LINEAR != 0;
-    if linear || !rests || tangent != Tangent::Consistent || point.n_components == 2 {
-        return None;
-    }
-    let mean = (point.flux[0] + point.flux[1] + point.flux[2]) / 3.0;
-    let deviator: [f64; 6] = std::array::from_fn(|i| {
-        if i < 3 {
-            point.flux[i] - mean
-        } else {
-            2.0 * point.flux[i]
-        }
-    });
-    let size = deviator.iter().map(|s| s * s).sum::<f64>().sqrt();
-    let mut unused = [0.0; MOST_STATES];
-    let probe = Point {
-        increment: deviator.map(|s| SMALL_STRAIN * s / size),
-        state1: unused.as_mut_ptr(),
-        ..*point
-    };
-    laws.carry(given, &probe, tangent, |_| ())
-        .map(|answer| answer.operator)
-}
-
-/// From Kelvin–Mandel components to ours: σ = s σ_M, ε = ε_M / s, C = s C_M s.
-struct Scale([f64; 6]);
-
-impl Scale {
-    fn of(hypothesis: Hypothesis) -> Self {
-        Self(std::array::from_fn(|i| {
-            if i < 3 || hypothesis.is_interface() {
-                1.0
-            } else {
-                FRAC_1_SQRT_2
-            }
-        }))
-    }
-
-    fn gradient(&self, mandel: [f64; 6]) -> [f64; 6] {
-        std::array::from_fn(|i| mandel[i] / self.0[i])
-    }
-
-    fn flux(&self, mandel: [f64; 6]) -> [f64; 6] {
-        std::array::from_fn(|i| mandel[i] * self.0[i])
-    }
-}
-
-/// Axes of a layer in a plane problem: the matrix that takes strains 11 22 33 12 to them. Stresses come
-/// back by its transpose.
-struct Axes(Option<[[f64; 4]; 4]>);
-
-impl Axes {
-    /// Their tangent lies at this angle in degrees.
-    fn at(angle: f64) -> Self {
-        let (s, c) = angle.to_radians().sin_cos();
-        Self(Some([
-            [c * c, s * s, 0.0, c * s],
-            [s * s, c * c, 0.0, -c * s],
-            [0.0, 0.0, 1.0, 0.0],
-            [-2.0 * c * s, 2.0 * c * s, 0.0, (c - s) * (c + s)],
-        ]))
-    }
-
-    /// Strains in these axes.
-    fn strain(&self, global: [f64; 6]) -> [f64; 6] {
-        self.times(global, |t, i, j| t[i][j])
-    }
-
-    /// Stresses in these axes.
-    fn stress(&self, global: [f64; 6]) -> [f64; 6] {
-        // A shear stress stands for half a shear strain.
-        let halved = |i: usize| if i == 3 { 0.5 } else { 1.0 };
-        self.times(global, |t, i, j| t[i][j] * halved(i) / halved(j))
-    }
-
-    /// Stresses in these axes to global ones.
-    fn back(&self, local: [f64; 6]) -> [f64; 6] {
-        self.times(local, |t, i, j| t[j][i])
-    }
-
-    fn times(
-        &self,
-        vector: [f64; 6],
-        entry: impl Fn(&[[f64; 4]; 4], usize, usize) -> f64,
-    ) -> [f64; 6] {
-        let Some(turn) = &self.0 else {
-            return vector;
-        };
-        let mut turned = [0.0; 6];
-        for (i, to) in turned.iter_mut().take(4).enumerate() {
-            *to = (0..4).map(|j| entry(turn, i, j) * vector[j]).sum();
-        }
-        turned
-    }
-
-    /// Tᵀ C T of a tangent C in these axes, row by row, four components.
-    fn operator_back(&self, operator: &[f64; 36]) -> [f64; 36] {
-        let Some(t) = &self.0 else {
-            return *operator;
-        };
-        let mut turned = [0.0; 36];
-        for i in 0..4 {
-            for j in 0..4 {
-                let sum = (0..4).flat_map(|k| (0..4).map(move |l| (k, l)));
-                turned[4 * i + j] = sum
-                    .map(|(k, l)| t[k][i] * operator[4 * k + l] * t[l][j])
-                    .sum();
-            }
-        }
-        turned
     }
 }

@@ -3,21 +3,18 @@
 use abi::access::{INPUT_NOT_FINITE, assert_declared, defect};
 use abi::export::{Continuum, Exported, Interface};
 use abi::{
-    ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, InternalVariables, SolidPoint,
-    SolidResponse, Tangent,
+    ContinuumLaw, Failure, InterfaceLaw, InterfacePoint, InternalVariables, SolidPoint, Tangent,
 };
 
 /// One point as another program gives it.
-#[derive(Debug)]
-pub struct Point {
-    /// Number of components of gradient and flux.
-    pub(crate) n_components: usize,
+#[derive(Clone, Copy, Debug)]
+pub struct Point<const N: usize> {
     /// Gradient at the start.
-    pub(crate) gradient: [f64; 6],
+    pub(crate) gradient: [f64; N],
     /// Its increment.
-    pub(crate) increment: [f64; 6],
+    pub(crate) increment: [f64; N],
     /// Flux at the start.
-    pub(crate) flux: [f64; 6],
+    pub(crate) flux: [f64; N],
     /// Internal variables at the start and at the end, which may be one place; valid for as many
     /// values as the law declares.
     pub(crate) state0: *const f64,
@@ -32,21 +29,18 @@ pub struct Point {
 
 /// The point at the end of the increment; the internal variables are written where it says.
 #[derive(Debug)]
-pub struct Answer {
-    pub(crate) flux: [f64; 6],
-    /// Row by row, n × n values; zero unless requested.
-    pub(crate) operator: [f64; 36],
+pub struct Answer<const N: usize> {
+    pub(crate) flux: [f64; N],
+    /// Nothing that means anything unless requested.
+    pub(crate) operator: [[f64; N]; N],
     pub(crate) unreliable: Option<&'static str>,
-}
-
-fn first<const N: usize>(values: &[f64; 6]) -> [f64; N] {
-    std::array::from_fn(|i| values[i])
 }
 
 /// Internal variables at the start. Other programs start them from zero, so where all of them are,
 /// the point has not begun: they are then the law's own for the flux it carries.
-fn start<S: InternalVariables>(
-    point: &Point,
+#[inline]
+fn start<const N: usize, S: InternalVariables>(
+    point: &Point<N>,
     initial: impl FnOnce() -> Result<S, Failure>,
 ) -> Result<S, Failure> {
     let n = S::TABLE.len();
@@ -58,8 +52,7 @@ fn start<S: InternalVariables>(
         defects += 0.0 * value(v);
         begun |= value(v) != 0.0;
     }
-    let whole = |values: &[f64; 6]| defect(&values[..point.n_components]);
-    if whole(&point.gradient) + whole(&point.increment) + whole(&point.flux) + defects != 0.0 {
+    if defect(&point.gradient) + defect(&point.increment) + defect(&point.flux) + defects != 0.0 {
         return Err(INPUT_NOT_FINITE);
     }
     if begun {
@@ -73,24 +66,18 @@ fn start<S: InternalVariables>(
     }
 }
 
+/// The results, all of them finite; the internal variables are written.
+#[inline]
 fn end<const N: usize, S: InternalVariables>(
-    point: &Point,
-    flux: &[f64; N],
+    point: &Point<N>,
     state: &S,
-    tangent: Option<&[[f64; N]; N]>,
-    unreliable: Option<&'static str>,
-) -> Result<Answer, Failure> {
-    let mut defects = defect(flux);
+    answer: Answer<N>,
+    tangent: Tangent,
+) -> Result<Answer<N>, Failure> {
+    let mut defects = defect(&answer.flux);
     state.write(|_, value| defects += 0.0 * value);
-    let mut answer = Answer {
-        flux: [0.0; 6],
-        operator: [0.0; 36],
-        unreliable,
-    };
-    answer.flux[..N].copy_from_slice(flux);
-    if let Some(tangent) = tangent {
-        defects += defect(tangent.as_flattened());
-        answer.operator[..N * N].copy_from_slice(tangent.as_flattened());
+    if tangent != Tangent::None {
+        defects += defect(answer.operator.as_flattened());
     }
     if defects != 0.0 {
         return Err(Failure::Numeric("a result is not finite"));
@@ -103,71 +90,65 @@ fn end<const N: usize, S: InternalVariables>(
     Ok(answer)
 }
 
-/// A law that can carry the points of other programs.
-pub trait Carried: Exported {
+/// A law that can carry the points of other programs, with `N` components.
+pub trait Carried<const N: usize>: Exported {
     /// Carries a point over its increment.
     ///
     /// # Errors
     /// Why it cannot; nothing is written then.
-    fn carry(&self, point: &Point, tangent: Tangent) -> Result<Answer, Failure>;
+    fn carry(&self, point: &Point<N>, tangent: Tangent) -> Result<Answer<N>, Failure>;
 }
 
-impl<L: ContinuumLaw> Carried for Continuum<L> {
-    fn carry(&self, point: &Point, tangent: Tangent) -> Result<Answer, Failure> {
-        if point.n_components == 6 {
-            carry_solid::<L, 6>(self.law(), point, tangent)
-        } else {
-            carry_solid::<L, 4>(self.law(), point, tangent)
-        }
+impl<L: ContinuumLaw, const N: usize> Carried<N> for Continuum<L> {
+    #[expect(
+        clippy::inline_always,
+        reason = "a request that is a constant must reach the update"
+    )]
+    #[inline(always)]
+    fn carry(&self, point: &Point<N>, tangent: Tangent) -> Result<Answer<N>, Failure> {
+        let law = self.law();
+        let solid = SolidPoint {
+            strain: point.gradient,
+            strain_increment: point.increment,
+            stress: point.flux,
+            state: start(point, || law.initial_state::<N>(&point.flux))?,
+            time: point.time,
+            time_increment: point.time_increment,
+            step_time: point.step_time,
+        };
+        let response = law.update::<N>(&solid, tangent)?;
+        let answer = Answer {
+            flux: response.stress,
+            operator: response.tangent,
+            unreliable: response.unreliable,
+        };
+        end(point, &response.state, answer, tangent)
     }
 }
 
-fn carry_solid<L: ContinuumLaw, const N: usize>(
-    law: &L,
-    point: &Point,
-    tangent: Tangent,
-) -> Result<Answer, Failure> {
-    let stress = first::<N>(&point.flux);
-    let solid = SolidPoint {
-        strain: first(&point.gradient),
-        strain_increment: first(&point.increment),
-        stress,
-        state: start(point, || law.initial_state::<N>(&stress))?,
-        time: point.time,
-        time_increment: point.time_increment,
-        step_time: point.step_time,
-    };
-    let SolidResponse {
-        stress,
-        state,
-        tangent: operator,
-        unreliable,
-    } = law.update::<N>(&solid, tangent)?;
-    let operator = (tangent != Tangent::None).then_some(&operator);
-    end(point, &stress, &state, operator, unreliable)
-}
-
-impl<L: InterfaceLaw> Carried for Interface<L> {
-    fn carry(&self, point: &Point, tangent: Tangent) -> Result<Answer, Failure> {
+impl<L: InterfaceLaw> Carried<2> for Interface<L> {
+    #[expect(
+        clippy::inline_always,
+        reason = "a request that is a constant must reach the update"
+    )]
+    #[inline(always)]
+    fn carry(&self, point: &Point<2>, tangent: Tangent) -> Result<Answer<2>, Failure> {
         let law = self.law();
-        let traction = first::<2>(&point.flux);
         let interface = InterfacePoint {
-            jump: first(&point.gradient),
-            jump_increment: first(&point.increment),
-            traction,
-            state: start(point, || law.initial_state(&traction))?,
+            jump: point.gradient,
+            jump_increment: point.increment,
+            traction: point.flux,
+            state: start(point, || law.initial_state(&point.flux))?,
             time: point.time,
             time_increment: point.time_increment,
             step_time: point.step_time,
         };
         let response = law.update(&interface, tangent)?;
-        let operator = (tangent != Tangent::None).then_some(&response.tangent);
-        end(
-            point,
-            &response.traction,
-            &response.state,
-            operator,
-            response.unreliable,
-        )
+        let answer = Answer {
+            flux: response.traction,
+            operator: response.tangent,
+            unreliable: response.unreliable,
+        };
+        end(point, &response.state, answer, tangent)
     }
 }

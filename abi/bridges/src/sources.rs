@@ -10,11 +10,12 @@ macro_rules! file {
 }
 
 /// This crate, but for its manifest.
-pub const CRATE: [File; 6] = [
+pub const CRATE: [File; 7] = [
     file!("src/calculix.rs"),
     file!("src/laws.rs"),
     file!("src/lib.rs"),
     file!("src/mfront.rs"),
+    file!("src/mfront/call.rs"),
     file!("src/point.rs"),
     file!("src/umat.rs"),
 ];

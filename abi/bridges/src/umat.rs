@@ -12,8 +12,8 @@
 //! fraction of the increment that the law believes it can follow: a caller that ignores `PNEWDT`, or
 //! passes none, must not take the stress of the start for that of the end.
 
-use crate::laws::{Laws, complain, offers};
-use crate::point::{Answer, Point};
+use crate::laws::{Laws, Trouble, complain, offers};
+use crate::point::{Answer, Carried, Point};
 use abi::export::{Continuum, Exported};
 use abi::{ContinuumLaw, Hypothesis, InternalVariables, Tangent};
 use std::ffi::c_int;
@@ -183,17 +183,13 @@ pub(crate) unsafe fn or<T: Copy>(p: *const T, other: T) -> T {
     unsafe { p.as_ref() }.copied().unwrap_or(other)
 }
 
-/// The first `n` values at `p`, zeros behind them; all zero if it is null.
+/// The first `N` values at `p`; all zero if it is null.
 ///
 /// # Safety
-/// `p` is null or valid for `n` values, at most 6.
-pub(crate) unsafe fn row(p: *const f64, n: usize) -> [f64; 6] {
-    let mut values = [0.0; 6];
-    if !p.is_null() {
-        // SAFETY: passed on to the caller.
-        values[..n].copy_from_slice(unsafe { std::slice::from_raw_parts(p, n) });
-    }
-    values
+/// `p` is null or valid for `N` values.
+pub(crate) unsafe fn row<const N: usize>(p: *const f64) -> [f64; N] {
+    // SAFETY: passed on to the caller.
+    unsafe { or(p.cast(), [0.0; N]) }
 }
 
 /// Answers a call.
@@ -209,32 +205,30 @@ pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
         return;
     }
     let n = ntens.clamp(0, 6) as usize;
-    let answer = match unusable::<Continuum<L>>(ntens, ndi) {
-        None => {
-            // SAFETY: as above.
-            unsafe { carried(laws, call, n) }
-        }
+    let done = match unusable::<Continuum<L>>(ntens, ndi) {
+        // SAFETY: as above.
+        None if n == 6 => unsafe { carry::<L, 6>(laws, call) },
+        // SAFETY: as above.
+        None => unsafe { carry::<L, 4>(laws, call) },
         Some(why) => {
             complain(id, format_args!("NTENS = {ntens} with NDI = {ndi}: {why}"));
             Err(0.25)
         }
     };
+    let Err(factor) = done else {
+        return;
+    };
     // SAFETY: `STRESS` has `NTENS` components, `DDSDDE` their square; `DDSDDE` and `PNEWDT` may be
     // null.
     unsafe {
-        match answer {
-            Ok(answer) => put(call, n, &answer),
-            Err(factor) => {
-                for i in 0..n {
-                    *call.stress.add(i) = f64::NAN;
-                }
-                for i in 0..if call.ddsdde.is_null() { 0 } else { n * n } {
-                    *call.ddsdde.add(i) = f64::NAN;
-                }
-                if !call.pnewdt.is_null() {
-                    *call.pnewdt = factor;
-                }
-            }
+        for i in 0..n {
+            *call.stress.add(i) = f64::NAN;
+        }
+        for i in 0..if call.ddsdde.is_null() { 0 } else { n * n } {
+            *call.ddsdde.add(i) = f64::NAN;
+        }
+        if !call.pnewdt.is_null() {
+            *call.pnewdt = factor;
         }
     }
 }
@@ -249,13 +243,17 @@ fn unusable<L: Exported>(ntens: c_int, ndi: c_int) -> Option<&'static str> {
     }
 }
 
+/// Carries a point with `N` components and writes its end.
+///
+/// # Errors
+/// The step factor; the reason is said.
+///
 /// # Safety
 /// As [`answer`].
-unsafe fn carried<L: ContinuumLaw>(
+unsafe fn carry<L: ContinuumLaw, const N: usize>(
     laws: &Laws<Continuum<L>>,
     call: &Call,
-    n: usize,
-) -> Result<Answer, f64> {
+) -> Result<(), f64> {
     let id = L::DESCRIPTION.id;
     let needed = <L::State as InternalVariables>::TABLE.len();
     // SAFETY: as in `answer`.
@@ -279,10 +277,9 @@ unsafe fn carried<L: ContinuumLaw>(
     // SAFETY: as in `answer`; `TIME` has two entries.
     let point = unsafe {
         Point {
-            n_components: n,
-            gradient: row(call.stran, n),
-            increment: row(call.dstran, n),
-            flux: row(call.stress, n),
+            gradient: row::<N>(call.stran),
+            increment: row(call.dstran),
+            flux: row(call.stress),
             state0: call.statev,
             state1: call.statev,
             time: if call.time.is_null() {
@@ -300,27 +297,31 @@ unsafe fn carried<L: ContinuumLaw>(
         Tangent::Consistent
     };
     let mut factor = 0.25;
-    laws.carry(given, &point, tangent, |trouble| {
+    let tell = |trouble: Trouble<'_>| {
         factor = trouble.factor();
         complain(id, format_args!("{trouble}"));
-    })
-    .ok_or(factor)
+    };
+    let answer = laws.carry(given, |law| law.carry(&point, tangent), tell);
+    let answer = answer.ok_or(factor)?;
+    // SAFETY: as in `answer`.
+    unsafe { put(call, &answer) };
+    Ok(())
 }
 
 /// Writes stress and tangent, column by column.
 ///
 /// # Safety
 /// As [`answer`].
-unsafe fn put(call: &Call, n: usize, answer: &Answer) {
-    for i in 0..n {
+unsafe fn put<const N: usize>(call: &Call, answer: &Answer<N>) {
+    for i in 0..N {
         // SAFETY: `NTENS` components.
         unsafe { *call.stress.add(i) = answer.flux[i] };
     }
     if !call.ddsdde.is_null() {
-        for i in 0..n {
-            for j in 0..n {
+        for i in 0..N {
+            for j in 0..N {
                 // SAFETY: `NTENS` × `NTENS` components.
-                unsafe { *call.ddsdde.add(j * n + i) = answer.operator[i * n + j] };
+                unsafe { *call.ddsdde.add(j * N + i) = answer.operator[i][j] };
             }
         }
     }

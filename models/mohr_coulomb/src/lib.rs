@@ -105,11 +105,10 @@ impl ContinuumLaw for MohrCoulomb {
         if !trial.iter().map(|s| s * s).sum::<f64>().is_finite() {
             return Err(Failure::Numeric("the elastic predictor overflows"));
         }
-        let rested = self.without_viscosity(point, trial, tangent)?;
         if self.relaxation_time > 0.0 {
-            return Ok(self.overstressed(point, &trial, rested, tangent));
+            return self.overstressed(point, &trial, tangent);
         }
-        Ok(rested)
+        self.without_viscosity(point, trial, tangent)
     }
 }
 
@@ -122,15 +121,10 @@ impl MohrCoulomb {
         trial: [f64; N],
         tangent: Tangent,
     ) -> Result<SolidResponse<N, State>, Failure> {
-        let operator = |consistent: &dyn Fn() -> [[f64; N]; N]| match tangent {
-            Tangent::None => [[0.0; N]; N],
-            Tangent::Elastic => self.elasticity.operator(),
-            Tangent::Consistent => consistent(),
-        };
         let elastic = || SolidResponse {
             stress: trial,
             state: point.state,
-            tangent: operator(&|| self.elasticity.operator()),
+            tangent: self.operator(tangent, || self.elasticity.operator()),
             unreliable: None,
         };
         let plastic = |trial: &Vector3<f64>, end: &Returned, stress, tangent| {
@@ -169,7 +163,7 @@ impl MohrCoulomb {
                 &principal.stress,
                 &end,
                 stress,
-                operator(&consistent),
+                self.operator(tangent, consistent),
             ))
         } else {
             let (above, below) = spectral::bounds(&trial);
@@ -194,7 +188,21 @@ impl MohrCoulomb {
                 )
             };
             let stress = resized(principal.compose(&end.stress));
-            Ok(plastic(s, &end, stress, operator(&consistent)))
+            Ok(plastic(s, &end, stress, self.operator(tangent, consistent)))
+        }
+    }
+
+    /// The operator that is asked for.
+    #[inline]
+    fn operator<const N: usize>(
+        &self,
+        tangent: Tangent,
+        consistent: impl FnOnce() -> [[f64; N]; N],
+    ) -> [[f64; N]; N] {
+        match tangent {
+            Tangent::None => [[0.0; N]; N],
+            Tangent::Elastic => self.elasticity.operator(),
+            Tangent::Consistent => consistent(),
         }
     }
 
@@ -204,13 +212,13 @@ impl MohrCoulomb {
         &self,
         point: &SolidPoint<N, State>,
         trial: &[f64; N],
-        rested: SolidResponse<N, State>,
         tangent: Tangent,
-    ) -> SolidResponse<N, State> {
+    ) -> Result<SolidResponse<N, State>, Failure> {
+        let rested = self.without_viscosity(point, *trial, tangent)?;
         let relaxed = point.time_increment / (self.relaxation_time + point.time_increment);
         let between = |all: f64, none: f64| none + relaxed * (all - none);
         let D = self.elasticity.operator::<N>();
-        SolidResponse {
+        Ok(SolidResponse {
             stress: array::from_fn(|i| between(rested.stress[i], trial[i])),
             state: State {
                 plastic_strain: between(rested.state.plastic_strain, point.state.plastic_strain),
@@ -226,7 +234,7 @@ impl MohrCoulomb {
                 }
             },
             unreliable: rested.unreliable,
-        }
+        })
     }
 }
 
