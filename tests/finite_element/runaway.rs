@@ -239,7 +239,7 @@ fn what_ran_away_is_named() {
 
 #[test]
 fn both_criteria_are_given_and_the_failed_one_first() {
-    let failed = fail(&block(""));
+    let failed = fail(&block("control = \"load\""));
     let message = failed.error.to_string();
     let at = |what: &str| {
         message

@@ -195,7 +195,7 @@ pub enum Convergence {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Control {
-    /// The load factor, increment by increment; where three steps in a row find no equilibrium, short
+    /// The load factor, increment by increment; where five steps in a row find no equilibrium, short
     /// steps of creep to the end of the increment, unless `relaxation` is off.
     #[default]
     Auto,

@@ -542,6 +542,9 @@ impl Simulation {
                             return Err(self.cannot_go_on(phase, place, highest, *failure));
                         }
                     } else if turns && lead.creeps() {
+                        if !lead.was_in_vain() {
+                            phase.course.step = creeping::LONGEST / n as f64;
+                        }
                         if phase.record.crept_from.is_none() {
                             phase.record.crept_from = Some(place.increment);
                             watch.warning(&Warning::Creeps(place.clone()));

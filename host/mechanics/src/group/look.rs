@@ -11,6 +11,8 @@ use law::{End, Operator, Strided};
 
 /// Sizes of the differences, relative to the increment of the gradients.
 const SIZES: [f64; 2] = [1e-2, 1e-3];
+/// Gradients beyond this (strains of 100 %, jumps of 1 m) are those of iterates that lead nowhere.
+const ABSURD: f64 = 1.0;
 /// A tangent is off by more than this share of its largest entry, and by so many times what the slopes
 /// differ among themselves.
 const OFF: f64 = 5e-3;
@@ -157,7 +159,7 @@ impl Group {
                 let moved = start.iter().zip(end).map(|(a, b)| (b - a).abs());
                 (moved.fold(0.0, f64::max), point)
             })
-            .filter(|(moved, _)| moved.is_finite() && *moved > 0.0)
+            .filter(|(moved, _)| *moved > 0.0 && *moved < ABSURD)
             .collect();
         moving.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let first = POINTS.min(moving.len());

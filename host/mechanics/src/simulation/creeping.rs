@@ -1,5 +1,5 @@
 //! What leads the steps of an increment under `control = "auto"`: the load; where ever shorter steps by the load fail,
-//! creep by steps as short, to the end of the increment; by turns, where creep fails too.
+//! creep by short steps, to the end of the increment; by turns, where creep fails too.
 
 use crate::equilibrium::{Reason, Singularity, StepFailure};
 use crate::settings::{Control, Settings};
@@ -7,7 +7,7 @@ use crate::settings::{Control, Settings};
 /// Steps by the load that may fail in a row before creep leads. What flows in a motion that sets out from a whole increment stays in the
 /// state: a pile in dilatant sand (φ = ψ = 36°) pushed by whole increments of creep carried 58 % more than by steps
 /// of the load, and what was too much fell with the length of the steps.
-const PATIENCE: usize = 3;
+const PATIENCE: usize = 5;
 /// Longest step by creep, as a fraction of an increment.
 pub(super) const LONGEST: f64 = 0.125;
 
@@ -38,6 +38,11 @@ impl Lead {
     /// Whether creep leads where the load would have to.
     pub(super) fn creeps(&self) -> bool {
         self.may_creep && self.control == Control::Creep
+    }
+
+    /// Whether creep failed in this increment.
+    pub(super) fn was_in_vain(&self) -> bool {
+        self.was_in_vain
     }
 
     /// A step found an equilibrium.

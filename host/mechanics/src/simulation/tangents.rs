@@ -51,7 +51,9 @@ impl Simulation {
         period: (Clock, [f64; 2]),
         watch: &mut dyn Watch,
     ) -> bool {
+        // What ran away is where no law has to answer for its digits.
         !failure.is_stop()
+            && failure.runaway.is_none()
             && failure.defect().is_none()
             && self.look_at_tangents(period, Went::Wrong, watch)
     }

@@ -192,7 +192,7 @@ impl fmt::Display for Warning {
             ),
             Self::Creeps(place) => write!(
                 f,
-                "{place}: three steps of the load in a row found no equilibrium; by short steps creep leads to the end \
+                "{place}: five steps of the load in a row found no equilibrium; by short steps creep leads to the end \
                  of the increment; what flows on its way stays, so that others may lie near: hold the results \
                  against those of other increments"
             ),
