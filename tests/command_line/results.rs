@@ -134,7 +134,20 @@ fn names_the_check_of_a_law_that_may_have_a_wrong_tangent() {
     let Some(place) = troubled::place("SHEAR_TANGENT=0.3") else {
         return;
     };
-    let case = troubled::case("cut").replacen("limit = 1.0e-6", "limit = 1.0", 1);
+    let edits = [
+        ("limit = 1.0e-6", "limit = 1.0"),
+        // By itself the program would take differences instead.
+        (
+            "max_iterations = 20",
+            "max_iterations = 20\ntangents = \"law\"",
+        ),
+    ];
+    let case = edits
+        .iter()
+        .fold(troubled::case("cut"), |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replacen(from, to, 1)
+        });
     let outcome = place.run_case(case);
     assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
     let check = format!("`pilum check {}` {CLAUSE}", troubled::library());

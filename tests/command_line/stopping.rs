@@ -143,7 +143,7 @@ fn a_hopeless_increment_is_stopped_within_it() {
     };
     let solver = (
         "max_iterations = 20",
-        "max_iterations = 10000\nmethod = \"newton\"",
+        "max_iterations = 10000\nmethod = \"newton\"\ntangents = \"law\"",
     );
     let edits = JOINT.iter().copied().chain([solver]);
     let text = edits.fold(troubled::case("cut"), |text, (from, to)| {

@@ -213,7 +213,7 @@ fn lists_the_choices_where_something_else_than_a_text_stands() {
                 &[(SETTING, "control = ^3")],
                 &[
                     "`control`: found the number 3, expected a text in quotes",
-                    "there is: load, arc_length",
+                    "there is: auto, load, arc_length",
                 ],
             ),
             (

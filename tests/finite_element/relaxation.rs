@@ -285,7 +285,8 @@ fn creep_leads_where_steps_of_the_load_fail() {
     let crept_from: Vec<_> = phases.iter().map(|p| p["crept_from"].as_u64()).collect();
     assert_eq!(crept_from, [None, Some(1), None]);
     let warnings = &auto.observer.warnings;
-    let says = |warning: &&String| warning.contains("`lift`, increment 1: five steps of the load");
+    let says =
+        |warning: &&String| warning.contains("`lift`, increment 1: shorter and shorter steps");
     assert_eq!(warnings.iter().filter(says).count(), 1, "{warnings:?}");
     // The load with more halvings gets there, too.
     let halved = run(&punch(OWN, "load"));

@@ -95,10 +95,14 @@ impl Group {
         let n = self.law.built.law.n_components();
         let end = self.gradient().trial.clone();
         let all = vec![true; sizes.len()];
+        let components = DIRECTION.into_iter().take(n).enumerate();
+        let direction: Vec<f64> = components
+            .map(|(i, d)| if self.moves(i) { d } else { 0.0 })
+            .collect();
         let [ahead, behind] = [1.0, -1.0].map(|sign| {
             let mut moved = end.clone();
             for (moved, size) in moved.chunks_exact_mut(n).zip(sizes) {
-                let pairs = moved.iter_mut().zip(DIRECTION);
+                let pairs = moved.iter_mut().zip(&direction);
                 pairs.for_each(|(moved, d)| *moved += sign * size * d);
             }
             self.fluxes_at(&moved, &all, period)
@@ -107,7 +111,7 @@ impl Group {
             let matrix = &tangents[point * n * n..][..n * n];
             let largest = matrix.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let off = |i: usize| {
-                let row = matrix[i * n..][..n].iter().zip(DIRECTION);
+                let row = matrix[i * n..][..n].iter().zip(&direction);
                 let expected: f64 = row.map(|(c, d)| c * d).sum();
                 let apart = 2.0 * sizes[point];
                 ((ahead[n * point + i] - behind[n * point + i]) / apart - expected).abs()
@@ -152,7 +156,7 @@ impl Group {
         let end = self.gradient().trial.clone();
         let n_wanted = wanted.iter().filter(|wanted| **wanted).count();
         self.count(2 * n * n_wanted, Operator::None);
-        for column in 0..n {
+        for column in (0..n).filter(|column| self.moves(*column)) {
             let [ahead, behind] = [1.0, -1.0].map(|sign| {
                 let mut moved = end.clone();
                 let of_points = moved.chunks_exact_mut(n).zip(sizes);
@@ -182,6 +186,15 @@ impl Group {
                 }
             }
         }
+    }
+
+    /// Whether this component of the gradient ever differs from zero: laws need not know of strains out of
+    /// the plane where there are none (the third of four components), nor say what they would call forth.
+    pub(super) fn moves(&self, component: usize) -> bool {
+        let n = self.law.built.law.n_components();
+        let Field { committed, trial } = self.gradient();
+        let of = |values: &[f64]| values.chunks_exact(n).any(|point| point[component] != 0.0);
+        n < 4 || component != 2 || of(committed) || of(trial)
     }
 
     /// Fluxes of some points at these gradients, row by row; not a number where the law fails.

@@ -184,7 +184,7 @@ impl Group {
         }
         let mut worst = 0.0_f64;
         let mut is_smooth = true;
-        for column in 0..n {
+        for column in (0..n).filter(|column| self.moves(*column)) {
             let at = |h: f64| {
                 let mut moved = end.to_vec();
                 moved[column] += h;

@@ -51,17 +51,17 @@ impl Lead {
     }
 
     /// Turns to what leads after a step that failed (the last one that may be tried, or not), and whether that is another one. Laws
-    /// that fail want smaller steps, and what moves freely is held by nothing.
+    /// that fail want smaller steps by the load, and what moves freely is held by nothing.
     pub(super) fn turns(&mut self, failure: &StepFailure, was_last: bool) -> bool {
         let is_free = matches!(
             failure.reason,
             Reason::Singular(Some((Singularity::Free, _)))
         );
-        if !self.may_creep || failure.failed().is_some() || is_free {
+        let creeps = self.creeps();
+        if !self.may_creep || is_free || failure.failed().is_some() && !creeps {
             return false;
         }
         self.failures += 1;
-        let creeps = self.creeps();
         let turns = if creeps || self.was_in_vain {
             creeps || failure.is_singular() && !was_last
         } else {

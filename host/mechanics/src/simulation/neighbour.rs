@@ -1,5 +1,5 @@
-//! How far from each other two ways lead that a step may take: where relaxation has found an equilibrium, creep
-//! may find another one.
+//! How far from each other two ways lead that a step may take: where relaxation has found an equilibrium, Newton
+//! iterations from the tangent, and creep where they stand still, may find another one.
 
 use super::phase::PhaseEquations;
 use super::{Simulation, UnderWay};
@@ -8,7 +8,7 @@ use crate::equilibrium::{Costs, Matrix, Newton, StepSuccess, norm};
 use crate::group::{Aside, Group};
 use crate::settings::{Control, Settings};
 
-/// Where creep leads in a step that relaxation led to equilibrium.
+/// Where a step that relaxation led to equilibrium leads from its tangent, by creep where need be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Neighbour {
     /// Elsewhere, by these shares of what the step changes (2-norms): of its displacement increments, and of the
@@ -24,8 +24,7 @@ pub enum Neighbour {
 }
 
 impl Simulation {
-    /// Where creep leads over a step that ended in `success`, whose trial state is left as it is. `None` if the
-    /// equations for it could not be set up, or it was stopped.
+    /// Where a step leads so that ended in `success`, whose trial state is left as it is. `None` if it was stopped.
     pub(super) fn neighbour(
         &mut self,
         phase: &UnderWay,
@@ -57,13 +56,14 @@ impl Simulation {
         .stopped_by(&self.stop)
         .step(&phase.course.loads, [from, to], clock, None);
         let neighbour = match crept {
-            Ok(crept) => {
+            Ok(crept) if crept.tolerated == 0.0 => {
                 let there = self.forces(equations, Group::add_trial_forces);
                 Some(Neighbour::Apart {
                     displacements: apart(&crept.increment, &success.increment, None),
                     forces: apart(&there, &here, Some(&before)),
                 })
             }
+            Ok(_) => Some(Neighbour::None),
             Err(failure) => (!failure.is_stop()).then_some(Neighbour::None),
         };
         for (group, aside) in self.groups.iter_mut().zip(aside) {

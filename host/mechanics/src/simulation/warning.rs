@@ -43,8 +43,8 @@ pub enum Warning {
         /// What is left.
         left: f64,
     },
-    /// A motion led to the equilibrium of this increment, the first one of its phase; where creep leads, if
-    /// that was relaxation.
+    /// A motion led to the equilibrium of this increment, the first one of its phase; where another way leads,
+    /// if that was relaxation.
     Relaxed(Place, Option<Neighbour>),
     /// It did so in so many steps of a phase.
     RelaxedOften(String, usize),
@@ -192,7 +192,7 @@ impl fmt::Display for Warning {
             ),
             Self::Creeps(place) => write!(
                 f,
-                "{place}: five steps of the load in a row found no equilibrium; by short steps creep leads to the end \
+                "{place}: shorter and shorter steps of the load found no equilibrium; by short steps creep leads to the end \
                  of the increment; what flows on its way stays, so that others may lie near: hold the results \
                  against those of other increments"
             ),
@@ -221,10 +221,13 @@ fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour
             forces,
         }) => write!(
             f,
-            ": creep leads the same step to one that is {displacements:.1e} of its displacements and {forces:.1e} of \
-             its changes of forces away"
+            ": from its tangent, by creep where need be, the same step leads to one that is {displacements:.1e} of its \
+             displacements and {forces:.1e} of its changes of forces away"
         )?,
-        Some(Neighbour::None) => write!(f, ": creep leads the same step to none")?,
+        Some(Neighbour::None) => write!(
+            f,
+            ": from its tangent, by creep where need be, the same step leads to none"
+        )?,
         None => {}
     }
     write!(

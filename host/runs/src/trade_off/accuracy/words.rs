@@ -82,9 +82,15 @@ fn settings(chosen: &Chosen) -> String {
     };
     let mesh = chosen.mesh.as_ref().map(|mesh| match mesh.error {
         Some(error) if mesh.divided_by == 1 => {
-            format!("; the file's mesh, its error {error:.1e}")
+            format!(
+                "; the file's mesh, its error {error:.1e} ({})",
+                mesh.estimate
+            )
         }
-        Some(error) => format!("; mesh / {}, its error {error:.1e}", mesh.divided_by),
+        Some(error) => format!(
+            "; mesh / {}, its error {error:.1e} ({})",
+            mesh.divided_by, mesh.estimate
+        ),
         None => format!("; error of the mesh: {}", mesh.estimate),
     });
     let increments: Vec<String> = chosen
