@@ -101,10 +101,8 @@ fn relaxation_finds_the_next_equilibrium() {
     let warnings = &finished.observer.warnings;
     let says = |warning: &&String| warning.contains("others may lie near");
     let warning = warnings.iter().find(says).expect("a warning");
-    // What creep makes of the same step is at hand, too: it is not the same to the last digit, nor far away.
-    let apart = warning
-        .split("creep leads the same step to one that is ")
-        .nth(1);
+    // Where another way leads the same step is at hand, too: it is not the same to the last digit, nor far away.
+    let apart = warning.split("the same step leads to one that is ").nth(1);
     let displacements: f64 = apart.unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(displacements > 0.0 && displacements < 0.1, "{warning}");
 }

@@ -401,6 +401,9 @@ fn solver(solver: &Settings) -> Value {
         "line_search": solver.line_search,
         "relaxation": solver.relaxation,
         "control": solver.control,
+        "convergence": solver.convergence,
+        "tolerated_residual": solver.tolerated_residual,
+        "tangents": solver.tangents,
         "equations": solver.equations,
     })
 }

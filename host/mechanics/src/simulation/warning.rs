@@ -192,8 +192,8 @@ impl fmt::Display for Warning {
             ),
             Self::Creeps(place) => write!(
                 f,
-                "{place}: shorter and shorter steps of the load found no equilibrium; by short steps creep leads to the end \
-                 of the increment; what flows on its way stays, so that others may lie near: hold the results \
+                "{place}: shorter and shorter steps of the load found no equilibrium; by short steps creep is tried to the \
+                 end of the increment; what flows on its way stays, so that others may lie near: hold the results \
                  against those of other increments"
             ),
             Self::FollowedPath {
