@@ -126,6 +126,31 @@ fn keeps_what_was_reached_when_there_is_no_equilibrium() {
     assert!(report.contains("<span class=\"status failed\">no equilibrium</span>"));
 }
 
+/// A study before a run that finds no equilibrium leaves nothing in the folder that would pass for its result.
+#[test]
+fn a_study_that_fails_leaves_no_results_of_an_earlier_run() {
+    let place = Place::new();
+    let outcome = place.run_case(sliding());
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert!(place.path("out/summary.json").is_file());
+    let outcome = place.run_case(sliding().replacen("title", "accuracy = 0.1\ntitle", 1));
+    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    assert!(
+        outcome.says("the last trial of `accuracy`"),
+        "{}",
+        outcome.stderr
+    );
+    for gone in [
+        "summary.json",
+        "history.csv",
+        "report.html",
+        "checkpoint.bin",
+    ] {
+        assert!(!place.path("out").join(gone).exists(), "{gone}");
+    }
+    assert!(place.path("out/accuracy.csv").is_file());
+}
+
 /// Iterations with a wrong tangent may not converge. A law of the user's own is named, those that
 /// come with the program are not: the checks are among its tests.
 #[test]

@@ -25,7 +25,7 @@ pub mod wanted;
 
 pub use checkpoint::Checkpoint;
 pub use figure::Figures;
-pub use recorder::{Fault, Recorder, ResultsState, end_summary, remove_comparison};
+pub use recorder::{Fault, Recorder, ResultsState, end_summary, make_way, remove_comparison};
 pub use summary::{About, Ending, LawsOfGroup};
 pub use table::number;
 pub use wanted::Wanted;

@@ -674,6 +674,18 @@ impl From<Error> for Fault {
     }
 }
 
+/// Removes what an earlier run left in a folder, for work that comes before the next one begins there: if
+/// that fails, nothing stands there as its result.
+///
+/// # Errors
+/// [`Error::Unwritable`]; another run writes there.
+pub fn make_way(folder: &Path) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
+    let _log = Appended::begin_locked(folder.join("log.jsonl"), false)?;
+    leftovers::remove(folder)?;
+    leftovers::remove_if(folder, |name| name == "history.csv")
+}
+
 /// Removes from the common folder of a case's variants what an earlier run of them wrote there:
 /// figures over all of them, and their comparison.
 ///

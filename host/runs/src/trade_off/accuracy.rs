@@ -56,7 +56,8 @@ pub fn run_accurately(
     let stop = observer.stop();
     let studied = reach_until(case, (folder, options.resume), &stop, &mut |doing| {
         observer.note(doing);
-    })?;
+    })
+    .map_err(of_trials)?;
     let case = studied.as_ref().unwrap_or(case);
     match case.file.chosen.as_ref().map(words::outcome) {
         Some(Ok(reached)) => observer.note(&reached),
@@ -64,6 +65,22 @@ pub fn run_accurately(
         None => (),
     }
     run_reusing(case, folder, observer, reuse, options)
+}
+
+/// The error of a study none of whose trials came to its end: none of them is a run with results.
+fn of_trials(error: Error) -> Error {
+    match error {
+        Error::Simulation { error, .. } if matches!(*error, mechanics::Error::NoEquilibrium(_)) => {
+            Error::Simulation {
+                error,
+                hint: Some(format!(
+                    "this was the last trial of `accuracy`, and none came to its end ({STUDY}.csv has them); without \
+                     `accuracy` the run itself is written as far as it comes"
+                )),
+            }
+        }
+        other => other,
+    }
 }
 
 /// As [`reach`], to be stopped on its way, and to go on (`resume`) with what is kept of an earlier study
@@ -85,6 +102,9 @@ pub fn reach_until(
         let message =
             "`accuracy` is the error of the [probes] and of the [pile], and there are none";
         return Err(case.source.error(accuracy.span(), message).into());
+    }
+    if !resume {
+        results::make_way(folder)?;
     }
     let kept = Kept::begin(folder, &identity_of(case)?, resume)?;
     let scratch = Scratch::new(folder, stop)?.keeping(kept);
