@@ -3,6 +3,7 @@
 use law::Stopped;
 use mechanics::NoEquilibrium;
 use mechanics::equilibrium::{Iterations, Reason, Singularity};
+use mechanics::settings::Control;
 use text::{InputError, add_hint};
 use thiserror::Error;
 
@@ -109,6 +110,10 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
         "`control = \"creep\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on",
     );
     let ways = match &none.failure.reason {
+        reason if none.control == Control::ArcLength && may_have_another_way(reason) => vec![
+            "`control = \"auto\"` in [solver], which relaxes and creeps where the load leads no further, and \
+             `control = \"creep\"` were not tried",
+        ],
         Reason::Unmet(Iterations::Newton(_, Some(_)), _) => vec![
             creep.unwrap_or("other increments may lead on"),
             "`convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, where \
@@ -123,6 +128,19 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
         .chain([written])
         .collect::<Vec<_>>()
         .join("; ")
+}
+
+/// Whether a step that failed so may be made in another way: not one that the model does not allow, or the laws.
+fn may_have_another_way(reason: &Reason) -> bool {
+    match reason {
+        Reason::Followed { end, .. } => may_have_another_way(end),
+        Reason::Law(_)
+        | Reason::Singular(Some((Singularity::Free, _)))
+        | Reason::Unbalanced(_)
+        | Reason::Domain(_)
+        | Reason::Stopped => false,
+        _ => true,
+    }
 }
 
 /// Who has to act.
@@ -260,5 +278,74 @@ impl Error {
             Kind::Internal => 4,
             Kind::Stopped => 130,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mechanics::Place;
+    use mechanics::equilibrium::{Criterion, Motion, Unmet};
+
+    const BY_CREEP: &str = "`control = \"creep\"`";
+    const LIMIT: Reason = Reason::Singular(Some((Singularity::Limit, 0.7)));
+
+    fn help(control: Control, reason: Reason) -> String {
+        after_no_equilibrium(&NoEquilibrium {
+            place: Place {
+                phase: "push".to_owned(),
+                increment: 3,
+            },
+            reached: 2.5,
+            of: 10,
+            control,
+            failure: reason.into(),
+            runaway: None,
+        })
+    }
+
+    fn unmet(iterations: Iterations) -> Reason {
+        let unmet = Unmet {
+            failed: Criterion::Correction,
+            residual: 1e-12,
+            residual_tolerance: 1e-9,
+            correction: Some(0.1),
+            correction_tolerance: 1e-7,
+        };
+        Reason::Unmet(iterations, unmet)
+    }
+
+    #[test]
+    fn auto_proposes_creep_until_creep_has_led() {
+        let in_vain = |motion| unmet(Iterations::Newton(25, Some(motion)));
+        let relaxed = help(Control::Auto, in_vain(Motion::Relaxation));
+        assert!(relaxed.starts_with(BY_CREEP), "{relaxed}");
+        assert!(relaxed.contains("`convergence = \"force\"`"), "{relaxed}");
+        assert!(help(Control::Auto, LIMIT).starts_with(BY_CREEP));
+        // An `auto` that crept hands on creep as its control.
+        let crept = help(Control::Creep, in_vain(Motion::Creep));
+        assert!(!crept.contains(BY_CREEP), "{crept}");
+        assert!(crept.starts_with("other increments"), "{crept}");
+        let written = "results up to the last whole increment";
+        assert!(help(Control::Creep, LIMIT).starts_with(written));
+        assert!(help(Control::Auto, Reason::NoState).starts_with(written));
+    }
+
+    #[test]
+    fn a_path_that_ends_proposes_what_was_not_tried() {
+        let others = |reason| help(Control::ArcLength, reason).contains("were not tried");
+        let back = || Reason::RanBack {
+            steps: 3,
+            highest: 0.2,
+            to: -0.1,
+        };
+        assert!(others(back()) && others(unmet(Iterations::Path(25))) && others(LIMIT));
+        assert!(others(Reason::Followed {
+            end: Box::new(Reason::NoState),
+            start: 0.1,
+            between: [0.0, 0.2],
+        }));
+        assert!(!others(Reason::Singular(Some((Singularity::Free, 0.7)))));
+        assert!(!help(Control::Load, back()).contains("were not tried"));
     }
 }

@@ -500,14 +500,13 @@ impl Simulation {
                     let period = (self.clock(phase.number), [start, end]);
                     self.look_after(&success, period, watch);
                     if success.relaxed {
-                        phase.record.relaxed += 1;
-                        // The phase's end says how many there were.
-                        if phase.record.relaxed == 1 {
-                            let by_creep = (lead.control != Control::Creep)
-                                .then(|| self.neighbour(phase, &success, [start, end]))
-                                .flatten();
-                            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
-                        }
+                        self.note_motion(
+                            &success,
+                            [start, end],
+                            lead.control,
+                            (place, phase),
+                            watch,
+                        );
                     }
                     lead.goes_on();
                     // A motion takes many iterations, and steps of any length.
@@ -532,7 +531,9 @@ impl Simulation {
                     let follows = settings.control == Control::ArcLength
                         && phase.course.history.latest().is_some();
                     let is_small = step < smallest.max(PATIENCE / n as f64);
-                    let turns = lead.turns(&failure, step < smallest);
+                    let is_out = step < smallest;
+                    let stays = lead.stays(is_out, step * n as f64);
+                    let turns = !stays && lead.turns(&failure, is_out);
                     if failure.defect().is_some() {
                         return Err(self.cannot_go_on(phase, place, start, failure));
                     } else if follows && is_small {
@@ -549,13 +550,35 @@ impl Simulation {
                             phase.record.crept_from = Some(place.increment);
                             watch.warning(&Warning::Creeps(place.clone()));
                         }
-                    } else if step < smallest {
+                    } else if is_out && !stays {
                         return Err(self.cannot_go_on(phase, place, start, failure));
                     }
                 }
             }
         }
         Ok(done)
+    }
+
+    /// Counts a motion that led to equilibrium, and speaks of the first one of its kind; the phase's end says how
+    /// many there were.
+    fn note_motion(
+        &mut self,
+        success: &StepSuccess,
+        step: [f64; 2],
+        control: Control,
+        (place, phase): (&Place, &mut UnderWay),
+        watch: &mut dyn Watch,
+    ) {
+        phase.record.relaxed += 1;
+        if control == Control::Creep {
+            phase.record.crept += 1;
+            if phase.record.crept == 1 && self.problem.settings.control == Control::Creep {
+                watch.warning(&Warning::Crept(place.clone()));
+            }
+        } else if phase.record.relaxed - phase.record.crept == 1 {
+            let by_creep = self.neighbour(phase, success, step);
+            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
+        }
     }
 
     /// Goes on to the next leg of the phase's course, from a complete state.
@@ -583,9 +606,16 @@ impl Simulation {
         done: &mut Progress,
     ) -> Result<(), Error> {
         let iterations = success.iterations.len();
-        go_on(watch.iterations(place, lambda, &success.iterations))?;
+        // Whoever wants no more has the state of this equilibrium: creep has committed its way to it.
+        let flow = watch.iterations(place, lambda, &success.iterations);
         done.iterations += iterations;
         let record = &mut phase.record;
+        let is_met = success.round_off <= self.problem.settings.force_tolerance;
+        if success.round_off > 0.0 && is_met {
+            let last = success.iterations.last().and_then(|last| last.correction);
+            let above = last.filter(|left| *left > self.problem.settings.displacement_tolerance);
+            record.unsettled = record.unsettled.max(above.unwrap_or(0.0));
+        }
         record.round_off = record.round_off.max(success.round_off);
         if success.tolerated > 0.0 {
             record.tolerated += 1;
@@ -616,6 +646,7 @@ impl Simulation {
         let course = &mut phase.course;
         course.history.add(lambda - course.lambda, success);
         course.lambda = lambda;
+        go_on(flow)?;
         if self.problem.settings.control == Control::ArcLength {
             self.hand_out_step(place, phase, iterations, watch)?;
         }

@@ -11,6 +11,9 @@ const PATIENCE: usize = 5;
 /// Longest step by creep, as a fraction of an increment.
 pub(super) const LONGEST: f64 = 0.125;
 
+/// Shortest one, where the load may not be cut any further: creep has some cuts of its own.
+const SHORTEST: f64 = LONGEST / 8.0;
+
 /// What leads the steps of an increment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lead {
@@ -38,6 +41,12 @@ impl Lead {
     /// Whether creep leads where the load would have to.
     pub(super) fn creeps(&self) -> bool {
         self.may_creep && self.control == Control::Creep
+    }
+
+    /// Whether creep goes on with a step of this fraction of an increment after one that failed: where the load may
+    /// not be cut so far (`is_out`), no other way is left.
+    pub(super) fn stays(&self, is_out: bool, step: f64) -> bool {
+        self.creeps() && is_out && step >= SHORTEST
     }
 
     /// Whether creep failed in this increment.

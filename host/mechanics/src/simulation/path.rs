@@ -33,6 +33,8 @@ struct Course {
     /// Load factors it has been at.
     lowest: f64,
     highest: f64,
+    /// Steps taken.
+    steps: usize,
 }
 
 impl Simulation {
@@ -72,11 +74,20 @@ impl Simulation {
                 step = onto.map(|success| (success, target));
             }
             match step {
+                Ok((_, lambda)) if lambda < 0.0 => {
+                    let reason = Reason::RanBack {
+                        steps: course.steps,
+                        highest: course.highest,
+                        to: lambda,
+                    };
+                    return Ok(PathEnd::Stopped(Box::new(reason.into()), course.highest));
+                }
                 Ok((success, lambda)) => {
                     let most = self.problem.settings.max_iterations() as f64;
                     let is_easy = success.iterations.len() as f64 <= EASY * most;
                     self.take_over(success, lambda, place, phase, watch, done)?;
                     phase.record.arc_length += 1;
+                    course.steps += 1;
                     if lambda >= target {
                         // Not so short that the next increment starts with next to nothing.
                         phase.course.step = (target - from).clamp(FIRST / n, 1.0 / n);
@@ -162,6 +173,7 @@ impl Simulation {
             whole,
             lowest: phase.course.lambda,
             highest: phase.course.lambda,
+            steps: 0,
         })
     }
 

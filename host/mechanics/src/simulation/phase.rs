@@ -175,7 +175,11 @@ impl Simulation {
             equations, record, ..
         } = phase;
         if record.relaxed > 1 {
-            watch.warning(&Warning::RelaxedOften(record.name.clone(), record.relaxed));
+            watch.warning(&Warning::RelaxedOften {
+                phase: record.name.clone(),
+                relaxed: record.relaxed - record.crept,
+                crept: record.crept,
+            });
         }
         if record.tolerated > 1 {
             watch.warning(&Warning::ToleratedOften {
@@ -197,11 +201,19 @@ impl Simulation {
             .as_ref()
             .map_or(0.0, |d| d.standing().round_off);
         let left = of_domain.max(record.round_off);
-        if left > 0.0 {
+        let tolerance = self.problem.settings.force_tolerance;
+        if left > tolerance {
             watch.warning(&Warning::RoundOff {
                 phase: record.name.clone(),
-                tolerance: self.problem.settings.force_tolerance,
+                tolerance,
                 left,
+            });
+        }
+        if record.unsettled > 0.0 {
+            watch.warning(&Warning::Unsettled {
+                phase: record.name.clone(),
+                tolerance: self.problem.settings.displacement_tolerance,
+                left: record.unsettled,
             });
         }
         let (mesh, analysis) = (&self.problem.mesh, self.problem.analysis);

@@ -23,8 +23,11 @@ pub struct PhaseRecord {
     pub cut_backs: usize,
     /// Steps with results that a law calls inaccurate.
     pub unreliable: usize,
-    /// Steps that viscous relaxation led to equilibrium.
+    /// Steps that a motion led to equilibrium: viscous relaxation, or creep.
     pub relaxed: usize,
+    /// Those of them that creep did.
+    #[serde(default)]
+    pub crept: usize,
     /// Steps whose residual was tolerated above the tolerance.
     pub tolerated: usize,
     /// The largest of these residuals, relative.
@@ -37,6 +40,10 @@ pub struct PhaseRecord {
     pub open: Open,
     /// Largest relative residual that was taken for round-off in the steps' iterations.
     pub round_off: f64,
+    /// Largest last correction, relative to its increment, of steps whose residual is within its tolerance and
+    /// whose corrections came to a standstill above theirs.
+    #[serde(default)]
+    pub unsettled: f64,
     /// Steps along the path of equilibrium under arc-length control.
     pub arc_length: usize,
     /// The first increment, from 1, in which creep led under `auto`, as steps by the load found no equilibrium.

@@ -12,7 +12,7 @@ use crate::problem::{Cause, InitialStress, Item, Key, Refusal};
 use abi::status::Outcome;
 use law::Moment;
 
-/// Change of stress, relative to the largest of its group, that is worth a word.
+/// Change of stress, relative to the largest of its group and of all groups, that is worth a word.
 const WORTH_A_WORD: f64 = 1e-6;
 /// The same, of earth pressure at rest, from which the law's strength is what is meant and not its own
 /// tolerance.
@@ -152,6 +152,13 @@ impl Simulation {
         stress
     }
 
+    /// The largest component of all stresses.
+    fn largest_stress(&self) -> f64 {
+        let active = self.groups.iter().filter(|group| group.is_active);
+        let stresses = active.flat_map(|group| &group.stress.committed);
+        stresses.fold(0.0, |most, stress| most.max(stress.abs()))
+    }
+
     /// Takes over what the law of a group, which starts now, makes of the stresses it finds, and
     /// says how much that is. What it leaves out of balance is carried in the phase's course.
     ///
@@ -160,9 +167,10 @@ impl Simulation {
     fn ask_law(&mut self, group: usize, number: usize, watch: &mut dyn Watch) -> Result<(), Error> {
         let phase = &self.problem.phases[number];
         let name = phase.name.clone();
+        // What a group that carries nothing has beside others that do is round-off.
+        let worth = WORTH_A_WORD * self.largest_stress();
         match self.groups[group].take_over() {
-            Ok(None) => Ok(()),
-            Ok(Some(change)) => {
+            Ok(Some(change)) if change.change > worth => {
                 let own = &self.problem.groups[group];
                 let at_rest = matches!(own.initial_stress, Some(InitialStress::AtRest(_)));
                 if number == 0 && at_rest && change.relative > OUTSIDE {
@@ -181,6 +189,7 @@ impl Simulation {
                 }
                 Ok(())
             }
+            Ok(_) => Ok(()),
             Err(point) => {
                 let is_given = !self.groups[group].law.initial.is_empty();
                 if is_given && point.failure.outcome == Outcome::Domain {

@@ -43,11 +43,28 @@ pub enum Warning {
         /// What is left.
         left: f64,
     },
-    /// A motion led to the equilibrium of this increment, the first one of its phase; where another way leads,
-    /// if that was relaxation.
+    /// The residual is within its tolerance, and corrections came to a standstill above theirs.
+    Unsettled {
+        /// The phase.
+        phase: String,
+        /// What was asked for.
+        tolerance: f64,
+        /// The largest last correction, relative to its increment.
+        left: f64,
+    },
+    /// Relaxation led to the equilibrium of this increment, the first one of its phase; where another way leads.
     Relaxed(Place, Option<Neighbour>),
-    /// It did so in so many steps of a phase.
-    RelaxedOften(String, usize),
+    /// Creep, which the settings ask for, did so.
+    Crept(Place),
+    /// Motions did so in several steps of a phase.
+    RelaxedOften {
+        /// The phase.
+        phase: String,
+        /// Relaxation in so many.
+        relaxed: usize,
+        /// Creep in so many.
+        crept: usize,
+    },
     /// Residuals were tolerated in so many steps of a phase.
     ToleratedOften {
         /// The phase.
@@ -145,10 +162,25 @@ impl fmt::Display for Warning {
                  {left:.1e} is left, which is the last bit of the displacements"
             ),
             Self::Relaxed(place, by_creep) => relaxed(f, place, *by_creep),
-            Self::RelaxedOften(phase, steps) => write!(
+            Self::Unsettled {
+                phase,
+                tolerance,
+                left,
+            } => write!(
                 f,
-                "phase `{phase}`: viscous relaxation led to the next equilibrium in {steps} steps in all"
+                "phase `{phase}`: `displacement_tolerance` {tolerance:.1e} is not met where residuals are within their \
+                 tolerance and fall no further: the last correction is up to {left:.1e} of the increment"
             ),
+            Self::Crept(place) => write!(
+                f,
+                "{place}: Newton iterations came to a standstill; creep led to the next equilibrium; what flows on its way \
+                 stays, so that others may lie near: hold the results against those of other increments"
+            ),
+            Self::RelaxedOften {
+                phase,
+                relaxed,
+                crept,
+            } => motions(f, phase, *relaxed, *crept),
             Self::ToleratedOften {
                 phase,
                 steps,
@@ -207,6 +239,19 @@ impl fmt::Display for Warning {
             ),
         }
     }
+}
+
+fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, crept: usize) -> fmt::Result {
+    let steps = |n: usize| match n {
+        1 => "1 step".to_owned(),
+        n => format!("{n} steps"),
+    };
+    let of = [("viscous relaxation", relaxed), ("creep", crept)];
+    let told = of.iter().filter(|(_, n)| *n > 0);
+    let told: Vec<String> = told
+        .map(|(by, n)| format!("{by} led to the next equilibrium in {}", steps(*n)))
+        .collect();
+    write!(f, "phase `{phase}`: {} in all", told.join(", "))
 }
 
 fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour>) -> fmt::Result {

@@ -107,6 +107,15 @@ pub enum Reason {
         /// Where it is.
         at: f64,
     },
+    /// The path of equilibrium led back beyond the start of the phase.
+    RanBack {
+        /// Number of steps along it.
+        steps: usize,
+        /// Highest load factor on it.
+        highest: f64,
+        /// Where the next step led.
+        to: f64,
+    },
     /// Reactions and loads do not balance.
     Unbalanced(Imbalance),
     /// The linear groups are left out of equilibrium.

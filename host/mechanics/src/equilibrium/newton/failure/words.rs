@@ -106,6 +106,11 @@ impl fmt::Display for Reason {
                 "the load does not rise beyond {highest:.4} of the phase: in {steps} steps along the \
                  path of equilibrium it went down to {lowest:.4} and is at {at:.4}"
             ),
+            Self::RanBack { steps, highest, to } => write!(
+                f,
+                "the path of equilibrium runs backwards: after {steps} steps along it, which reached {highest:.4} of the \
+                 phase, the next one leads to {to:.4}, before its start"
+            ),
             Self::Unbalanced(imbalance) => imbalance.fmt(f),
             Self::Domain(failure) => failure.fmt(f),
             Self::Stopped => write!(f, "stopped as asked"),
