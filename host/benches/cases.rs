@@ -198,7 +198,7 @@ impl Chamber {
             model,
             prescribed,
             loads,
-            settings: case.file.solver,
+            settings: *case.file.solver.get_ref(),
         }
     }
 

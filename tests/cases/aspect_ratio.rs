@@ -367,8 +367,8 @@ fn a_tolerance_of_a_tenth_of_a_percent_gives_no_visible_oscillation() {
         for ratio in [1000, 10_000] {
             for integration in [Integration::Full, Integration::Reduced] {
                 let loose = changed(file, ratio, |file| {
-                    file.solver.force_tolerance = 1e-3;
-                    file.solver.displacement_tolerance = 1e-3;
+                    file.solver.get_mut().force_tolerance = 1e-3;
+                    file.solver.get_mut().displacement_tolerance = 1e-3;
                     let group = file.groups.get_mut("interface").unwrap().get_mut();
                     *group.integration.as_mut().unwrap().get_mut() = integration;
                 });

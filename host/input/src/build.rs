@@ -7,7 +7,7 @@ use crate::material::{
     LawTables, ParameterValue, ZONE, is_solid_at_interface, place_failure, try_law,
 };
 use crate::mesh::{self, Built, MeshFile};
-use crate::{Error, figures, pile, probes};
+use crate::{Error, figures, idle, pile, probes};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -150,7 +150,7 @@ impl Case {
                     .transpose()?,
                 supports: supports.collect(),
                 phases,
-                settings: file.solver,
+                settings: *file.solver.get_ref(),
             },
             laws: shelf.laws,
             notes: mesh_file
@@ -197,7 +197,7 @@ impl Case {
             pile: pile::resolve(self, simulation)?,
             title: self.file.title.clone(),
             figures: Vec::new(),
-            follows_path: self.file.solver.control == Control::ArcLength,
+            follows_path: self.file.solver.get_ref().control == Control::ArcLength,
         };
         let columns: Vec<&str> = wanted.columns().collect();
         wanted.figures = figures::case_figures(self, &columns)?;
@@ -240,6 +240,7 @@ impl Case {
         let mut warnings = probes::reactions(self, simulation.problem());
         warnings.extend(self.forgetful_swaps(simulation.problem()));
         warnings.extend(self.timeless_phases(simulation.problem()));
+        warnings.extend(idle::choices(self));
         warnings
     }
 

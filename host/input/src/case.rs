@@ -174,8 +174,9 @@ pub struct CaseFile {
     #[serde(default, rename = "figure")]
     pub figures: Vec<FigureInput>,
     /// Solver settings.
-    #[serde(default)]
-    pub solver: Settings,
+    #[serde(default = "default_solver")]
+    #[schemars(with = "Settings")]
+    pub solver: Spanned<Settings>,
     /// What is written.
     #[serde(default)]
     pub output: Output,
@@ -869,6 +870,11 @@ impl JsonSchema for MeasuredTables {
         let one = generator.subschema_for::<MeasuredInput>();
         json_schema!({ "anyOf": [one, { "type": "array", "items": one }] })
     }
+}
+
+/// Of a file without `[solver]`.
+fn default_solver() -> Spanned<Settings> {
+    Spanned::new(0..0, Settings::default())
 }
 
 /// A relative error that can be aimed at.

@@ -29,6 +29,8 @@ pub struct Chosen {
     pub displacement_tolerance: f64,
     /// Parameters of laws that differ from the file, as `law.parameter = value`.
     pub parameters: Vec<String>,
+    /// Columns that are zero but for round-off in all of the chosen run, and do not count.
+    pub zero: Vec<String>,
     /// Runs that the study took.
     pub runs: usize,
     /// Those of them that did not come to their end.

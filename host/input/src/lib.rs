@@ -11,6 +11,7 @@ pub mod figures;
 pub mod gmsh;
 mod grid;
 pub mod ground;
+mod idle;
 pub mod incremental_driver;
 pub mod lock;
 pub mod material;

@@ -67,7 +67,7 @@ pub fn overflow(case: &Case, probe: &str, place: &Place) -> Error {
 
 /// Refuses a probe that is called as a column of the tables that it would be written to.
 fn refuse_column(case: &Case, name: &Spanned<String>) -> Result<(), Error> {
-    let has_path = case.file.solver.control == Control::ArcLength;
+    let has_path = case.file.solver.get_ref().control == Control::ArcLength;
     let mut tables = vec![("history.csv", OF_HISTORY)];
     tables.extend(has_path.then_some(("path.csv", OF_PATH)));
     tables.extend(

@@ -56,7 +56,7 @@ impl Model {
             let subject = with_fixed(calibration, (number, subject), &claims)?;
             let mut exactness = EXACTNESS_OF_DRIVERS;
             if let Subject::Case(case) = &subject {
-                let tolerance = case.file.solver.force_tolerance;
+                let tolerance = case.file.solver.get_ref().force_tolerance;
                 exactness = exactness.max(tolerance);
                 model.difference = model.difference.max(tolerance.sqrt().clamp(1e-3, 0.03));
             }
