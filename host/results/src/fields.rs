@@ -143,14 +143,17 @@ fn cell_data(snapshot: &Snapshot<'_>, has_pressures: bool) -> Vec<(String, Vec<f
     columns.collect()
 }
 
-/// The share of every element in the error of the mesh; nothing where there is no estimate.
+/// Stands where an element has no estimate: no share is negative, and readers of VTK files in text do not take NaN.
+const NO_ESTIMATE: f64 = -1.0;
+
+/// The share of every element in the error of the mesh.
 fn mesh_error(snapshot: &Snapshot<'_>) -> (String, Vec<f64>) {
     let found = MeshError::of(snapshot);
     let groups = snapshot.groups.iter().enumerate();
     let values = groups.flat_map(|(number, group)| {
         let elements = 0..group.kinematics.n_elements();
         let found = &found;
-        elements.map(move |element| found.of_element(number, element).unwrap_or_default())
+        elements.map(move |element| found.of_element(number, element).unwrap_or(NO_ESTIMATE))
     });
     ("mesh_error".to_owned(), values.collect())
 }

@@ -21,6 +21,7 @@ pub use criteria::{Curve, Resistances};
 pub use geometry::Misfit;
 pub(crate) use table::Stations;
 
+use crate::probe::Sizes;
 use geometry::{Facet, Geometry};
 use mechanics::Simulation;
 use mechanics::group::Group;
@@ -34,6 +35,11 @@ pub const COLUMNS: [&str; 4] = [
     "pile_base_load",
     "pile_settlement",
 ];
+
+/// How large the columns could be, by what is in the model.
+pub(crate) fn sizes(of: &Sizes) -> [f64; 4] {
+    [of.force, of.force, of.force, of.length]
+}
 
 /// The pile that a case names.
 #[derive(Clone, Debug)]

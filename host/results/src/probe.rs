@@ -1,6 +1,7 @@
 //! Probes: numbers that a case asks for after every increment.
 
 mod section;
+mod size;
 
 use crate::pressures::Pressure;
 use crate::wanted::Reduce;
@@ -8,6 +9,7 @@ use mechanics::assembly::fold;
 use mechanics::group::Group;
 use mechanics::simulation::{Part, Snapshot};
 pub use section::{Section, section};
+pub use size::Sizes;
 
 /// Probes, in order.
 #[derive(Debug, Default)]

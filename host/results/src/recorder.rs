@@ -10,7 +10,7 @@ use crate::leftovers;
 use crate::mesh_error::OfPhase;
 use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Stations};
 use crate::points::Points;
-use crate::probe::Probes;
+use crate::probe::{Probes, Sizes};
 use crate::profile::Profile;
 use crate::summary::{About, Course, Ending, Stopped, Summary};
 use crate::table::Number;
@@ -501,6 +501,20 @@ impl Recorder {
         (values, state)
     }
 
+    /// Notes how large what the columns are made of is in a state.
+    fn note_sizes(&mut self, snapshot: &Snapshot<'_>) {
+        let of = Sizes::of(snapshot);
+        let mut sizes = self.probes.sizes(snapshot, &of);
+        if self.pile.is_some() {
+            sizes.extend(crate::pile::sizes(&of));
+        }
+        let known = &mut self.summary.course.sizes;
+        known.resize(sizes.len(), 0.0);
+        for (known, size) in known.iter_mut().zip(sizes) {
+            *known = known.max(size);
+        }
+    }
+
     /// Notes the last state of equilibrium of a phase that cannot go on, and writes its fields if
     /// there are any. `place` is the increment that it lies in.
     ///
@@ -570,6 +584,9 @@ impl Recorder {
             && let Some(fields) = &mut self.fields
         {
             fields.write(*time, snapshot)?;
+        }
+        if place.increment == *of {
+            self.note_sizes(snapshot);
         }
         if self.settings.mesh_error && place.increment == *of {
             let found = OfPhase::of(&place.phase, snapshot);

@@ -67,6 +67,8 @@ impl Ending {
 pub(crate) struct Summary {
     head: Map<String, Value>,
     probe_names: Vec<String>,
+    /// The error of the mesh is asked for.
+    estimates_mesh: bool,
     pub(crate) course: Course,
 }
 
@@ -91,6 +93,9 @@ pub(crate) struct Course {
     pub(crate) stopped: Option<Stopped>,
     /// The error of the mesh at the end of each phase, where it was asked for.
     pub(crate) mesh_errors: Vec<OfPhase>,
+    /// How large the quantities of the probes are in the model at the end of any phase, where it is known.
+    #[serde(default)]
+    pub(crate) sizes: Vec<f64>,
     /// By phase, the first increment with a result that a law calls inaccurate, and why.
     unreliable: Vec<(Place, String)>,
 }
@@ -166,6 +171,7 @@ impl Summary {
         Self {
             head,
             probe_names: wanted.columns().map(str::to_owned).collect(),
+            estimates_mesh: wanted.output.mesh_error,
             course: Course::default(),
         }
     }
@@ -323,13 +329,15 @@ impl Summary {
                 "probes": self.probes(&stopped.probes),
             }))),
         );
-        if !self.course.mesh_errors.is_empty() {
+        if self.estimates_mesh || !self.course.mesh_errors.is_empty() {
             summary.insert("mesh_error".to_owned(), json!(self.course.mesh_errors));
         }
         let values = last
             .map(|(_, values)| values.as_slice())
             .unwrap_or_default();
         summary.insert("probes".to_owned(), self.probes(values));
+        let sizes: Vec<Option<f64>> = self.course.sizes.iter().copied().map(Some).collect();
+        summary.insert("probe_magnitudes".to_owned(), self.probes(&sizes));
         summary.insert(
             "seconds".to_owned(),
             json!({ "total": total.as_secs_f64(), "output": output.as_secs_f64() }),
@@ -521,6 +529,7 @@ mod tests {
         let mut summary = Summary {
             head: Map::new(),
             probe_names: Vec::new(),
+            estimates_mesh: false,
             course: Course::default(),
         };
         for (phase, increment, warning) in [

@@ -10,6 +10,7 @@ mod clock;
 mod diagram;
 mod division;
 mod driver_study;
+mod expected;
 mod kept;
 mod pace;
 mod page;
@@ -27,7 +28,7 @@ pub use study::{Measurement, Reference, Row, Study};
 
 use crate::Error;
 use crate::run::identity_of;
-use crate::variants::keep;
+use crate::variants::{keep, of_variant};
 use input::{Case, Driver, is_driver};
 use kept::Kept;
 use law::{Opener, Stop};
@@ -124,7 +125,8 @@ fn run_drivers(
         let mut done = |study: &Study| write_table(study, &place);
         let most = options.most_increments;
         let outcome = driver_study::study(driver, &mut study, most, stop, (&mut done, say));
-        finish(&mut study, &place, outcome, show)?;
+        let finished = finish(&mut study, &place, outcome, show);
+        finished.map_err(|error| of_variant(error, driver.point().variant()))?;
     }
     Ok(())
 }
@@ -140,13 +142,17 @@ fn run_cases(
     keep(&mut cases, options.variant.as_deref(), |c| {
         c.variant.clone()
     })?;
-    cases.iter().try_for_each(crate::run::check)?;
+    for case in &cases {
+        let checked = crate::run::check(case);
+        checked.map_err(|error| of_variant(error, case.variant.as_deref()))?;
+    }
     let folder = options.folder(&cases.first().map(Case::name).unwrap_or_default());
     for case in &cases {
         let name = options.full_name(&case.name(), case.variant.as_deref());
         let place = options.place(&folder, case.variant.as_deref());
         if options.interface_stiffness {
-            stiffness::run(case, &name, (&place, &options.stop), show, say)?;
+            let studied = stiffness::run(case, &name, (&place, &options.stop), show, say);
+            studied.map_err(|error| of_variant(error, case.variant.as_deref()))?;
             continue;
         }
         let kept = Kept::begin(&place, &identity_of(case)?, options.resume)?;
@@ -165,7 +171,8 @@ fn run_cases(
             )),
             _ => scratch.end(),
         }
-        finish(&mut study, &place, outcome, show)?;
+        let finished = finish(&mut study, &place, outcome, show);
+        finished.map_err(|error| of_variant(error, case.variant.as_deref()))?;
     }
     Ok(())
 }

@@ -22,3 +22,12 @@ pub fn keep<T>(
     }
     Ok(())
 }
+
+/// An error of one of several runs, which names the variant if it is of one.
+#[must_use]
+pub fn of_variant(error: Error, variant: Option<&str>) -> Error {
+    match variant {
+        Some(name) => error.with_hint(&format!("this is variant `{name}`")),
+        None => error,
+    }
+}

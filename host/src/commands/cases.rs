@@ -31,6 +31,7 @@ pub(super) fn run_cases(
     }
     // All variants are checked before the first one runs.
     if cases.len() > 1 {
+        let check = |case: &Case| check(case).map_err(|error| of_variant(error, case));
         cases.iter().try_for_each(check)?;
     }
     let together = match (out, cases.first()) {
@@ -68,7 +69,7 @@ pub(super) fn run_cases(
                 let _ = writeln!(supervision::stdout(), "results in {}", folder.display());
                 drawn.extend(case.variant.clone().map(|variant| (variant, figures)));
             }
-            Err(error) => keep_last(&mut outcome, error),
+            Err(error) => keep_last(&mut outcome, of_variant(error, case)),
         }
         let is_stopped = outcome.as_ref().is_err_and(Error::is_stop);
         if has_results {
@@ -123,10 +124,14 @@ pub(super) fn dry_run_cases(
             Ok(report) => {
                 let _ = writeln!(supervision::stdout(), "report in {}", report.display());
             }
-            Err(error) => keep_last(&mut outcome, error),
+            Err(error) => keep_last(&mut outcome, of_variant(error, case)),
         }
     }
     outcome
+}
+
+fn of_variant(error: Error, case: &Case) -> Error {
+    variants::of_variant(error, case.variant.as_deref())
 }
 
 /// Where the results of a case go.

@@ -11,7 +11,7 @@ mod levels;
 mod mesh;
 mod search;
 mod table;
-mod words;
+pub(super) mod words;
 
 use super::kept::Kept;
 use super::scheme::Values;
@@ -154,9 +154,10 @@ pub fn reach_until(
         failed: search.failed,
         estimate: found.estimate,
         increments: increments.collect(),
-        force_tolerance: chosen.file.solver.force_tolerance,
-        displacement_tolerance: chosen.file.solver.displacement_tolerance,
+        force_tolerance: chosen.file.solver.get_ref().force_tolerance,
+        displacement_tolerance: chosen.file.solver.get_ref().displacement_tolerance,
         parameters: settings.law.iter().flat_map(parameters).collect(),
+        zero: found.trial.rows.zero(),
         runs: search.runs,
     });
     Ok(Some(chosen))

@@ -1,11 +1,14 @@
 //! The study of a case: one setting at a time away from the file's, and some together.
 
+use super::accuracy::words;
+use super::clock::cpu_seconds;
 use super::driver_study::in_one_line;
-use super::pace::{Pace, in_words};
+use super::expected::Expected;
+use super::pace::in_words;
 use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
 use super::study::{Done, Measurement, Reference, Row, Study};
-use super::trial::{BY_FORCE, SOLVER_CHOICES, Scratch, Settings, Timing, Trial, repetitions};
+use super::trial::{BY_FORCE, SOLVER_CHOICES, Scratch, Settings, Timing, Trial};
 use crate::Error;
 use crate::run::begin;
 use input::Case;
@@ -13,7 +16,7 @@ use law::BuiltLaw;
 use mechanics::equilibrium::Reuse;
 use mechanics::problem::{Formulation, Integration};
 use mechanics::settings::Convergence as Counted;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Seconds of a run above which a study is shorter, so that it ends while somebody waits.
 pub(super) const LONG: f64 = 0.3;
@@ -80,9 +83,8 @@ pub(super) fn study(
         scratch,
         say,
         plan: &WHOLE,
-        pace: Pace::new(0.0),
+        expected: Expected::default(),
         unit: 1.0,
-        tight: 1.0,
         left: Vec::new(),
     };
     let mut default = cases.run(&Settings::default(), Timing::Repeated, 0)?;
@@ -139,6 +141,10 @@ pub(super) fn study(
     }
     let (mut reference, path) = cases.path_reference(&laws)?;
     let mut scale = path.rows.largest();
+    let zero = path.rows.zero();
+    study
+        .notes
+        .extend((!zero.is_empty()).then(|| words::zero(&zero)));
     study.notes.extend(path.leave_out_round_off(&mut scale));
     reference.convergence = path.convergence(&scale);
     study.references.push(reference);
@@ -198,7 +204,7 @@ fn settings_on_this_mesh(
     for &factor in plan.factors {
         add("increments", fewer_or_more(factor));
     }
-    let file = &case.file.solver;
+    let file = case.file.solver.get_ref();
     let is_new = |tolerance: &f64| (tolerance / file.force_tolerance - 1.0).abs() > 1e-9;
     for tolerance in plan.tolerances.iter().copied().filter(is_new) {
         let settings = Settings {
@@ -293,11 +299,9 @@ struct Cases<'a> {
     scratch: &'a Scratch,
     say: &'a mut dyn FnMut(&str),
     plan: &'static Plan,
-    pace: Pace,
+    expected: Expected,
     /// Seconds of a run with the file's settings.
     unit: f64,
-    /// How many times as long a tighter tolerance takes.
-    tight: f64,
     /// What is left to do, as far as it is known.
     left: Vec<(Settings, Timing)>,
 }
@@ -317,44 +321,30 @@ impl Cases<'_> {
         if self.scratch.has(settings, round) {
             return self.scratch.trial(self.case, settings, timing, round);
         }
-        let left = self
-            .left
-            .iter()
-            .map(|(of, timing)| self.weight(of, *timing));
-        let rest = left.sum::<f64>() + self.weight(settings, timing);
-        self.pace.left(rest);
-        (self.say)(&self.pace.line(&settings.label()));
+        let line = self.line(settings, timing);
+        (self.say)(&line);
         let bounded = self.bounded(settings, timing);
+        let (started, cpu) = (Instant::now(), cpu_seconds());
         let outcome = self.scratch.trial(self.case, settings, bounded, round);
-        if let Ok(trial) = &outcome
-            && self.is_tight(settings)
-        {
-            self.tight *= trial.seconds / self.unit / self.weight(settings, Timing::Once);
-        }
-        self.pace.did(self.weight(settings, timing));
+        let spent = [started.elapsed().as_secs_f64(), cpu_seconds() - cpu];
+        let once = outcome.as_ref().ok().map(|trial| trial.seconds);
+        self.expected.took(settings, spent, once);
         // Whatever became of it, the study goes no further once it is to stop.
         self.scratch.stop.check("the study")?;
         outcome
     }
 
-    fn is_tight(&self, settings: &Settings) -> bool {
-        let own = self.case.file.solver.force_tolerance;
-        settings.tolerance.is_some_and(|tolerance| tolerance < own)
-    }
-
-    /// Probable cost of a trial, in runs with the file's settings. An element more costs time, and
-    /// an equation more bandwidth.
-    fn weight(&self, settings: &Settings, timing: Timing) -> f64 {
-        let tight = if self.is_tight(settings) {
-            self.tight
-        } else {
-            1.0
-        };
-        let once = tight * settings.increments * (settings.division as f64).powi(3);
-        if timing == Timing::Repeated {
-            once * repetitions(once * self.unit)
-        } else {
-            once
+    /// What is run next, with the time that it and all others probably take.
+    fn line(&self, settings: &Settings, timing: Timing) -> String {
+        let this = (settings.clone(), timing);
+        let left = self.left.iter().chain([&this]).map(|(of, timing)| {
+            let bounded = self.bounded(of, *timing);
+            self.expected.seconds(of, *timing, bounded)
+        });
+        let label = settings.label();
+        match self.expected.lasts(left.sum()) {
+            left if left > 0.0 => format!("{label} (about {} left)", in_words(left)),
+            _ => label,
         }
     }
 
@@ -378,7 +368,7 @@ impl Cases<'_> {
     /// The file's settings with the tolerance of the reference.
     fn tight(&self) -> Settings {
         Settings {
-            tolerance: Some(TIGHT.min(self.case.file.solver.force_tolerance)),
+            tolerance: Some(TIGHT.min(self.case.file.solver.get_ref().force_tolerance)),
             ..Settings::default()
         }
     }

@@ -199,6 +199,7 @@ fn follow(driver: &Driver) -> Result<(Sampled, Vec<u64>), Error> {
     let sampled = Sampled {
         names,
         stretches: stretches.collect(),
+        zeros: Vec::new(),
     };
     let counts = [report.increments, report.calls, report.cut_backs];
     Ok((sampled, counts.map(|n| n as u64).to_vec()))

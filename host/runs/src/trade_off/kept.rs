@@ -40,6 +40,7 @@ struct Line<'a> {
     counts: Cow<'a, [u64]>,
     names: Cow<'a, [String]>,
     bits: Vec<Vec<Vec<u64>>>,
+    zeros: Vec<u64>,
 }
 
 impl Kept {
@@ -95,6 +96,7 @@ impl Kept {
             counts: trial.counts.as_slice().into(),
             names: trial.rows.names.as_slice().into(),
             bits: stretches.map(|s| s.iter().map(bits).collect()).collect(),
+            zeros: bits(&trial.rows.zeros),
         })?;
         self.done.insert(settings, trial.clone());
         Ok(())
@@ -142,6 +144,7 @@ fn read(path: &Path, identity: &str) -> Result<BTreeMap<String, Trial>, Error> {
                 rows: Sampled {
                     names: line.names.into_owned(),
                     stretches: line.bits.into_iter().map(stretch).collect(),
+                    zeros: row(line.zeros),
                 },
                 seconds: line.cpu_seconds.parse().unwrap_or(f64::NAN),
                 counts: line.counts.into_owned(),
@@ -160,6 +163,7 @@ mod tests {
             rows: Sampled {
                 names: vec!["f".to_owned()],
                 stretches: vec![vec![vec![value], vec![f64::NAN]]],
+                zeros: vec![1e-8],
             },
             seconds: 0.25,
             counts: vec![3, 7],
@@ -186,6 +190,7 @@ mod tests {
             (0.1_f64 + 0.2).to_bits()
         );
         assert!(found.rows.stretches[0][1][0].is_nan());
+        assert_eq!(found.rows.zeros, [1e-8]);
         assert_eq!(
             (found.seconds, found.counts.as_slice()),
             (0.25, &[3, 7][..])

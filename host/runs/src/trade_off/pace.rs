@@ -30,11 +30,6 @@ impl Pace {
         self.done += piece;
     }
 
-    /// What is left, where that is known better by now.
-    pub(super) fn left(&mut self, rest: f64) {
-        self.all = self.done + rest;
-    }
-
     /// What is being done, with the time that is left if it goes on at this pace.
     pub(super) fn line(&self, doing: &str) -> String {
         let rest = (self.all - self.done) / self.done;

@@ -7,10 +7,13 @@ pub(crate) struct Sampled {
     pub(crate) names: Vec<String>,
     /// Values by stretch (segment or phase) and increment; NaN where there is none.
     pub(crate) stretches: Vec<Vec<Vec<f64>>>,
+    /// Of every value the magnitude up to which it is zero, but for what round-off and the tolerance of equilibrium
+    /// leave; none is where there are none of these.
+    pub(crate) zeros: Vec<f64>,
 }
 
 impl Sampled {
-    /// The largest magnitude of every value.
+    /// The largest magnitude of every value; 0 of those that are [zero](Self::zeros).
     pub(super) fn largest(&self) -> Vec<f64> {
         let mut largest = vec![0.0_f64; self.names.len()];
         for row in self.stretches.iter().flatten() {
@@ -18,7 +21,23 @@ impl Sampled {
                 *largest = largest.max(value.abs());
             }
         }
+        for (largest, zero) in largest.iter_mut().zip(&self.zeros) {
+            if *largest <= *zero {
+                *largest = 0.0;
+            }
+        }
         largest
+    }
+
+    /// Names of the values that never differ from zero by more than that.
+    pub(super) fn zero(&self) -> Vec<String> {
+        let has_value = |column: usize| {
+            let mut rows = self.stretches.iter().flatten();
+            rows.any(|row| row[column].is_finite())
+        };
+        let columns = self.largest().into_iter().zip(&self.names).enumerate();
+        let zero = columns.filter(|(column, (largest, _))| *largest <= 0.0 && has_value(*column));
+        zero.map(|(_, (_, name))| name.clone()).collect()
     }
 
     /// The largest difference of every value over the rows that both paths have, relative to
@@ -74,7 +93,7 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 const ROUND_OFF: f64 = 1e-13;
 /// Differences below this come from round-off and from the tolerances of equilibrium; no order can
 /// be read from them.
-const NOISE: f64 = 1e-9;
+pub(super) const NOISE: f64 = 1e-9;
 /// An order below this counts as this one: the estimate grows without bound towards order 0.
 const LEAST_ORDER: f64 = 0.1;
 
@@ -134,7 +153,25 @@ mod tests {
         Sampled {
             names: vec!["f".to_owned()],
             stretches: vec![(1..=n).map(row).collect()],
+            zeros: Vec::new(),
         }
+    }
+
+    #[test]
+    fn what_is_round_off_of_larger_values_has_no_scale() {
+        let noise = |seed: f64| Sampled {
+            zeros: vec![1e-8],
+            ..path(4, |s| 1e-14 * (seed * s).sin())
+        };
+        let (a, b) = (noise(100.0), noise(300.0));
+        assert_eq!(a.zero(), ["f"]);
+        assert_relative_eq!(a.difference(&b, &a.largest()), 0.0);
+        let small = Sampled {
+            zeros: vec![1e-8],
+            ..path(4, |s| 2e-8 * s)
+        };
+        assert!(small.zero().is_empty());
+        assert_relative_eq!(small.largest()[0], 2e-8);
     }
 
     #[test]

@@ -105,15 +105,20 @@ impl Reference {
             order,
             uncertainty,
         } = self.convergence;
-        let order = order.map_or_else(
-            || "order not observed".to_owned(),
-            |order| format!("observed order {order:.2}"),
-        );
-        format!(
-            "{}; differs by {difference:.1e} from {}, {order}: reference converged to \
-             {uncertainty:.0e}",
-            self.label, self.next
-        )
+        let (label, next) = (&self.label, &self.next);
+        let differs = format!("{label}; differs by {difference:.1e} from {next}");
+        match order {
+            Some(order) if order <= 0.0 => format!(
+                "{differs}, no less than the next two from each other (observed order {order:.2}): the reference does not \
+                 converge, and how far it is from a limit is not known"
+            ),
+            Some(order) => format!(
+                "{differs}, observed order {order:.2}: reference converged to {uncertainty:.0e}"
+            ),
+            None => {
+                format!("{differs}, order not observed: reference converged to {uncertainty:.0e}")
+            }
+        }
     }
 }
 

@@ -157,7 +157,7 @@ impl Settings {
             }
         }
         if let Some(tolerance) = self.tolerance {
-            let solver = &mut file.solver;
+            let solver = file.solver.get_mut();
             let ratio = solver.displacement_tolerance / solver.force_tolerance;
             solver.force_tolerance = tolerance;
             solver.displacement_tolerance = (ratio * tolerance).clamp(1e-14, 1.0);
@@ -175,7 +175,7 @@ impl Settings {
             }
         }
         if let Some(choice) = self.solver {
-            (choice.set)(&mut file.solver);
+            (choice.set)(file.solver.get_mut());
         }
         Ok(case)
     }
@@ -306,6 +306,11 @@ pub(crate) struct Trial {
     pub(super) counts: Vec<u64>,
 }
 
+/// A probe is zero that never exceeds this share of what its quantity has in the model: so many times the tolerance of
+/// equilibrium, within bounds.
+const TOLERATED: f64 = 10.0;
+const ZERO: [f64; 2] = [1e-8, 1e-6];
+
 /// Repetitions of a trial end after this many, or when they took so many seconds.
 const MOST_REPETITIONS: usize = 8;
 const LONG_ENOUGH: f64 = 0.5;
@@ -399,10 +404,19 @@ pub(crate) fn measure(
         .iter()
         .map(|phase| phase.name.get_ref().as_str())
         .collect();
+    let summary = summary(scratch.folder())?;
+    let mut rows = history(&scratch.folder().join("history.csv"), &phases)?;
+    let share = (TOLERATED * case.file.solver.get_ref().force_tolerance).clamp(ZERO[0], ZERO[1]);
+    let magnitude = |name: &String| summary["probe_magnitudes"][name].as_f64();
+    let zeros = rows
+        .names
+        .iter()
+        .map(|name| share * magnitude(name).unwrap_or_default());
+    rows.zeros = zeros.collect();
     Ok(Trial {
-        rows: history(&scratch.folder().join("history.csv"), &phases)?,
+        rows,
         seconds,
-        counts: counts(&summary(scratch.folder())?),
+        counts: counts(&summary),
     })
 }
 
@@ -440,6 +454,7 @@ fn history(path: &Path, phases: &[&str]) -> Result<Sampled, Error> {
     let mut sampled = Sampled {
         names: probes.iter().map(|&i| headers[i].to_owned()).collect(),
         stretches: vec![Vec::new(); phases.len()],
+        zeros: Vec::new(),
     };
     for row in reader.records() {
         let row = row.map_err(broken)?;

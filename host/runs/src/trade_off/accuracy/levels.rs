@@ -5,6 +5,7 @@
 //! runs in between may be missing. An error below the difference of the two finest is not claimed: over a gap it
 //! would rest on the order alone.
 
+use super::super::sampled::NOISE;
 use super::super::trial::Trial;
 
 /// Bounds of the order that is extrapolated with. A larger one is not relied on.
@@ -60,14 +61,29 @@ impl Levels {
 
     /// Estimated relative error of the finest; none where there are fewer than three.
     pub(super) fn error(&self) -> Option<f64> {
+        let (n, differences) = self.three()?;
+        let [_, b, c] = n;
+        Some(differences[1] * left([b, c], order(n, differences)))
+    }
+
+    /// The differences of the three finest, coarse to middle and middle to fine, where they do not fall as those of
+    /// an error of any order would: what is refined leads to no limit. Round-off leads nowhere, and is none.
+    pub(super) fn growth(&self) -> Option<[f64; 2]> {
+        let ([a, b, c], [coarse, fine]) = self.three()?;
+        // Of order 0: the error grows with the logarithm of n.
+        let grows = coarse / fine <= (b / a).ln() / (c / b).ln();
+        (grows && fine > NOISE).then_some([coarse, fine])
+    }
+
+    /// How finely the three finest divide, and their differences: coarse to middle, middle to fine.
+    fn three(&self) -> Option<([f64; 3], [f64; 2])> {
         let [.., (a, coarse), (b, middle), (c, fine)] = self.runs.as_slice() else {
             return None;
         };
         let scale = fine.rows.largest();
-        let differences =
-            [(coarse, middle), (middle, fine)].map(|(a, b)| a.rows.difference(&b.rows, &scale));
-        let order = order([*a, *b, *c], differences);
-        Some(differences[1] * left([*b, *c], order))
+        let difference = |(a, b): (&Trial, &Trial)| a.rows.difference(&b.rows, &scale);
+        let differences = [(coarse, middle), (middle, fine)].map(difference);
+        Some(([*a, *b, *c], differences))
     }
 
     /// The coarsest with at most this error, else the finest; with its error, as far as that can be told. The
@@ -132,6 +148,7 @@ mod tests {
             let rows = Sampled {
                 names: vec!["f".to_owned()],
                 stretches: vec![vec![vec![1.0 - n.powf(-order)]]],
+                zeros: Vec::new(),
             };
             let trial = Trial {
                 rows,
@@ -174,6 +191,33 @@ mod tests {
         let left = 1.0 / (ORDERS[0].exp2() - 1.0);
         let expected = left * runs.difference().unwrap();
         assert_relative_eq!(runs.error().unwrap(), expected, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn what_does_not_fall_leads_to_no_limit() {
+        let of = |values: [f64; 3]| {
+            let mut levels = Levels::default();
+            for (n, value) in [1.0, 2.0, 4.0].into_iter().zip(values) {
+                let rows = Sampled {
+                    names: vec!["f".to_owned()],
+                    stretches: vec![vec![vec![value]]],
+                    zeros: Vec::new(),
+                };
+                let trial = Trial {
+                    rows,
+                    seconds: 0.0,
+                    counts: Vec::new(),
+                };
+                levels.push(n, trial);
+            }
+            levels.growth()
+        };
+        let [coarse, fine] = of([1.0, 1.1, 1.25]).unwrap();
+        assert!(coarse < fine);
+        assert!(of([1.0, 1.1, 1.2]).is_some());
+        assert!(of([1.0, 1.1, 1.19]).is_none());
+        assert!(of([1.0, 1.0 + 1e-12, 1.0 + 3e-12]).is_none());
+        assert!(levels(0.1, &[4.0, 8.0, 16.0]).growth().is_none());
     }
 
     #[test]

@@ -19,6 +19,15 @@ const LEAST_BUDGET: f64 = 20.0;
 /// with twice the bandwidth.
 const DEARER: f64 = 8.0;
 
+/// The error of the finest mesh; of two as if it fell with the largest order, and none of those that show that it does
+/// not fall.
+fn error(levels: &Levels) -> Option<f64> {
+    match levels.growth() {
+        Some(_) => None,
+        None => levels.error_of_order(ORDERS[1]),
+    }
+}
+
 /// Refines the mesh until its error is at most `most`, or the time is up. Returns the settings with the coarsest
 /// mesh that is good enough, else the finest that came to its end.
 ///
@@ -63,7 +72,7 @@ pub(super) fn refine(
         dearer = trial.seconds / last;
         last = trial.seconds;
         levels.push(division as f64, trial);
-        let told = [levels.difference(), levels.error_of_order(ORDERS[1])];
+        let told = [levels.difference(), error(&levels)];
         if let Some((_, done)) = levels.finest() {
             search.table.row((search.runs, &finer), Ok(done), told)?;
         }
@@ -73,8 +82,11 @@ pub(super) fn refine(
         }
     }
     let difference = levels.difference();
-    let estimate = words::mesh_estimate(levels.len(), ORDERS[1], why);
-    let of_finest = levels.error_of_order(ORDERS[1]);
+    let estimate = match levels.growth() {
+        Some(differences) => words::mesh_diverges(levels.len(), differences, why),
+        None => words::mesh_estimate(levels.len(), ORDERS, why),
+    };
+    let of_finest = error(&levels);
     let none = || Error::internal("the run on the file's mesh is lost".to_owned());
     let (division, _, error) = levels.take(of_finest, most).ok_or_else(none)?;
     let division = division as usize;

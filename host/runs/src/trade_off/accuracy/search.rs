@@ -248,7 +248,7 @@ impl Search<'_> {
         if found.error.is_none_or(|error| error > self.asked) {
             return Ok((settings, 0.0));
         }
-        let given = self.case.file.solver.force_tolerance;
+        let given = self.case.file.solver.get_ref().force_tolerance;
         for tolerance in TOLERANCES.into_iter().filter(|t| *t > given) {
             let loose = Settings {
                 tolerance: Some(tolerance),

@@ -41,16 +41,28 @@ pub(super) fn mesh_failed(division: usize) -> String {
 }
 
 /// How the error of so many meshes was estimated, and why there is no finer one.
-pub(super) fn mesh_estimate(n: usize, order: f64, why: Option<String>) -> String {
+pub(super) fn mesh_estimate(n: usize, [least, order]: [f64; 2], why: Option<String>) -> String {
     let mut text = match n {
         1 => "none, there is no finer mesh to tell it".to_owned(),
         2 => format!(
             "the difference of two meshes, as if it fell with order {order}: it takes a third one to see the order"
         ),
         _ => format!(
-            "the difference of the two finest of {n} meshes, extrapolated with the order they show, at most {order}"
+            "the difference of the two finest of {n} meshes, extrapolated with the order they show, at most {order} and \
+             at least {least}"
         ),
     };
+    text.extend(why.map(|why| format!("; {why}")));
+    text
+}
+
+/// Why the error of so many meshes is not estimated: the difference of the two finest is not smaller than the one
+/// before.
+pub(super) fn mesh_diverges(n: usize, [coarse, fine]: [f64; 2], why: Option<String>) -> String {
+    let mut text = format!(
+        "none, the results do not converge under refinement: of {n} meshes the two finest differ by {fine:.1e}, those \
+         before by {coarse:.1e}"
+    );
     text.extend(why.map(|why| format!("; {why}")));
     text
 }
@@ -66,6 +78,19 @@ pub(super) fn outcome(chosen: &Chosen) -> Result<String, String> {
             "it is not known whether the accuracy is reached: {settings}"
         )),
     }
+}
+
+/// Of columns that do not count.
+pub(in super::super) fn zero(names: &[String]) -> String {
+    let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    let (is, counts) = match names.len() {
+        1 => ("is", "does not count"),
+        _ => ("are", "do not count"),
+    };
+    format!(
+        "{} {is} zero within round-off and {counts}",
+        names.join(", ")
+    )
 }
 
 /// What was chosen, the error that it has, and what failed on the way.
@@ -106,6 +131,9 @@ fn settings(chosen: &Chosen) -> String {
         chosen.parameters.join(" ")
     );
     text.truncate(text.trim_end().len());
+    if !chosen.zero.is_empty() {
+        let _ = write!(text, "; {}", zero(&chosen.zero));
+    }
     if !chosen.failed.is_empty() {
         let failed: Vec<&str> = chosen.failed.iter().map(|f| f.setting.as_str()).collect();
         let failed = failed.join("; ");
