@@ -526,3 +526,19 @@ fn a_phase_without_a_time_is_told_of_where_a_parameter_is_one() {
     let words = "law `mohr_coulomb` (`relaxation_time` is 2 s) depends on the time, and segment 1 says none";
     assert!(outcome.says(words), "{}", outcome.stderr);
 }
+
+#[test]
+fn choices_of_the_solver_without_effect_are_said_with_their_line() {
+    let text = edited(&[]);
+    let at = text.find("[solver]").unwrap();
+    let place = format!("case.toml:{}:", text[..at].matches('\n').count() + 1);
+    let says = "`control = \"creep\"` has no effect with `method = \"modified_newton\"`";
+    let creep = "[solver]\nmethod = \"modified_newton\"\ncontrol = \"creep\"";
+    warns(&[("[solver]", creep)], &[&place, says]);
+    let says = "`tangents = \"differences\"` has no effect with `method = \"initial_stress\"`";
+    let differences = "[solver]\nmethod = \"initial_stress\"\ntangents = \"differences\"";
+    warns(&[("[solver]", differences)], &[&place, says]);
+    let newton = "[solver]\nmethod = \"newton\"\ncontrol = \"creep\"\ntangents = \"differences\"";
+    let said = warnings(&[("[solver]", newton)]);
+    assert!(!said.iter().any(|w| w.contains("no effect")), "{said:?}");
+}

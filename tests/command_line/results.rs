@@ -423,6 +423,12 @@ fn compares_all_variants_that_have_results() {
          report in out/rougher/report.html\n\
          report in out/report.html\n"
     );
+    // The error comes last, after the variants that went on.
+    assert!(
+        outcome.says("this is variant `overloaded`"),
+        "{}",
+        outcome.stderr
+    );
     let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
     assert!(report.contains("<title>Comparison: rough, overloaded, rougher</title>"));
     let read = |file: &str| std::fs::read_to_string(place.path(file)).unwrap();

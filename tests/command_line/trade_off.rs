@@ -543,3 +543,107 @@ fn the_error_of_a_mesh_that_no_finer_one_tells_is_not_known() {
         "{chosen}"
     );
 }
+
+/// A column that shortens under a pressure, free to its sides: its reaction aside and the stress across are zero.
+const COLUMN: &str = r#"
+analysis = "plane_strain"
+accuracy = 0.01
+[mesh]
+columns = [{ n = 2, to = 1.0 }]
+rows = [{ n = 3, to = 1.0 }]
+region = [{ group = "soil" }]
+[mesh.lines]
+bottom = { y = 0.0 }
+top = { y = 1.0 }
+left = { x = 0.0 }
+[laws]
+soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.3 } }
+[groups]
+soil = { formulation = "solid", law = "soil" }
+[[supports]]
+line = "bottom"
+fixed = ["y"]
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[phase]]
+name = "press"
+increments = 7
+pressure = [{ line = "top", value = 77.7 }]
+[probes]
+aside = { line = "left", quantity = "reaction_x" }
+across = { group = "soil", quantity = "stress_11", reduce = "max" }
+settlement = { line = "top", quantity = "displacement_y" }
+"#;
+
+#[test]
+fn probes_that_are_round_off_do_not_count_and_are_named() {
+    let place = Place::new();
+    let (outcome, chosen) = studied(&place, COLUMN.to_owned());
+    assert_eq!(chosen["verdict"], "reached", "{}", outcome.stderr);
+    assert_eq!(chosen["zero"], serde_json::json!(["aside", "across"]));
+    assert_eq!(chosen["increments"][0][1], 2, "{chosen}");
+    assert!(outcome.says("`aside`, `across` are zero within round-off and do not count"));
+    // They are what rounding leaves, or the test shows nothing.
+    let rows = table(&place.path("out/history.csv"));
+    let most = |probe: &str| {
+        rows.iter()
+            .map(|r| number(r, probe).abs())
+            .fold(0.0, f64::max)
+    };
+    assert!(most("aside").max(most("across")) > 0.0);
+    assert!(most("aside") < 1e-10 && most("across") < 1e-10);
+
+    // Alone there is nothing else to tell by: the model does.
+    let alone = COLUMN.replace("settlement = {", "# settlement = {");
+    let (_, chosen) = studied(&place, alone);
+    assert_eq!(chosen["zero"], serde_json::json!(["aside", "across"]));
+
+    let without = COLUMN.replace("accuracy = 0.01\n", "");
+    let outcome = study(&place, "column.toml", &without, &[]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let said = outcome
+        .stdout
+        .contains("`aside`, `across` are zero within round-off");
+    assert!(said, "{}", outcome.stdout);
+}
+
+/// The largest stress below a stiff punch, which has no bound at its edge.
+#[test]
+fn meshes_that_diverge_have_no_error() {
+    let place = Place::new();
+    let text = COLUMN
+        .replace(
+            "accuracy = 0.01",
+            "accuracy = 0.02\naccuracy_with_mesh = true",
+        )
+        .replace(
+            "columns = [{ n = 2, to = 1.0 }]",
+            "columns = [{ n = 1, to = 1.0 }, { n = 1, to = 2.0 }]",
+        )
+        .replace("top = { y = 1.0 }", "top = { y = 1.0, x = [0.0, 1.0] }")
+        .replace(
+            "pressure = [{ line = \"top\", value = 77.7 }]",
+            "displacement = [{ line = \"top\", x = 0.0, y = -0.01 }]",
+        );
+    let (probes, _) = text.split_once("[probes]").unwrap();
+    let text = format!(
+        "{probes}[probes]\nedge = {{ group = \"soil\", quantity = \"stress_22\", reduce = \"min\" }}\n"
+    );
+    let (outcome, chosen) = studied(&place, text);
+    assert_eq!(chosen["verdict"], "not known", "{}", outcome.stderr);
+    assert!(
+        chosen["mesh"]["error"].is_null() && chosen["mesh"]["worst"] == "edge",
+        "{chosen}"
+    );
+    assert!(
+        outcome.says("the results do not converge under refinement"),
+        "{}",
+        outcome.stderr
+    );
+    assert!(
+        outcome.says("the runs differ most in `edge`"),
+        "{}",
+        outcome.stderr
+    );
+}

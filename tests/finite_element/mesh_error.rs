@@ -10,7 +10,7 @@
 //! The true error is integrated here, with shape functions and a Gauss rule of this file, from the
 //! displacements of the nodes and the closed form.
 
-use crate::setup::{Results, elastic, run};
+use crate::setup::{Results, elastic, fail, run};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
@@ -284,4 +284,56 @@ mesh_error = true
     // Not asked for, it is not there.
     let summary = run(&text.replacen("mesh_error = true", "", 1)).summary();
     assert!(summary["mesh_error"].is_null());
+}
+
+/// A joint, and what is not there, have no estimate: their share is no number that an error could be. A run whose
+/// first phase fails says that none was found.
+#[test]
+fn no_estimate_is_not_taken_for_no_error() {
+    let text = r#"
+analysis = "plane_strain"
+[mesh]
+columns = [{ n = 3, to = 1.0 }]
+rows = [{ n = 2, to = 1.0 }, { n = 2, to = 2.0 }]
+region = [{ group = "lower" }, { group = "upper", y = [1.0, 2.0] }]
+[mesh.lines]
+bottom = { y = 0.0 }
+top = { y = 2.0 }
+seam = { y = 1.0 }
+[laws]
+soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.3 } }
+joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_stiffness = 1e6, cohesion = 0.0, friction_angle = 20.0, dilatancy_angle = 0.0 } }
+[groups]
+lower = { formulation = "solid", law = "soil" }
+upper = { formulation = "solid", law = "soil" }
+seam = { formulation = "zero_thickness", line = "seam", law = "joint" }
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "press"
+increments = 1
+pressure = [{ line = "top", value = 10.0 }]
+[output]
+mesh_error = true
+fields = "phases"
+[solver]
+max_halvings = 0
+"#;
+    let finished = run(text);
+    let vtu = std::fs::read_to_string(finished.folder().join("fields_00000.vtu")).unwrap();
+    let (groups, shares) = (
+        numbers(&vtu, "Name=\"group\""),
+        numbers(&vtu, "Name=\"mesh_error\""),
+    );
+    assert_eq!(groups.len(), shares.len());
+    for (group, share) in groups.iter().zip(&shares) {
+        assert_eq!(*group > 1.0, *share == -1.0, "group {group}: {share}");
+        assert!(*group > 1.0 || *share >= 0.0);
+    }
+    // The upper block has no friction to hold it against a pull.
+    let lifted = text.replace("value = 10.0", "value = -10.0");
+    let failed = fail(&lifted);
+    assert_eq!(failed.error.exit_code(), 2);
+    assert_eq!(failed.summary()["mesh_error"], serde_json::json!([]));
 }

@@ -10,8 +10,16 @@
 //!             the same in another unit of stress, in the mirror, and with x and y exchanged, to 1e-8
 
 use crate::setup::{Finished, Results, assert_close, fail, run};
+use input::Case;
+use input::case::CaseFile;
+use mechanics::equilibrium::Iteration;
+use mechanics::problem::Formulation;
+use mechanics::simulation::Snapshot;
+use mechanics::{Place, Simulation, Watch};
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 use std::path::Path;
+use text::{Source, parse};
 
 /// The chamber with sand that yields.
 fn chamber(solver: &str) -> String {
@@ -290,4 +298,85 @@ fn creep_leads_where_steps_of_the_load_fail() {
     let halved = run(&punch(OWN, "load"));
     let end = |results: &Finished| results.in_phase("lift", "head")[0];
     assert_close("head", end(&auto), end(&halved), 0.05, end(&halved));
+}
+
+#[test]
+fn what_creep_led_to_is_not_said_to_be_relaxed() {
+    let finished = run(&punch(OWN, "creep"));
+    let warnings = &finished.observer.warnings;
+    let say = |words: &str| warnings.iter().filter(|w| w.contains(words)).count();
+    assert_eq!(say("relax"), 0, "{warnings:?}");
+    assert!(
+        say("; creep led to the next equilibrium;") >= 1,
+        "{warnings:?}"
+    );
+    let often = warnings
+        .iter()
+        .find(|w| w.contains("steps in all"))
+        .unwrap();
+    assert!(
+        often.contains("creep led to the next equilibrium in"),
+        "{often}"
+    );
+}
+
+/// Ends a run once creep has led to an equilibrium.
+struct Halts {
+    is_over: bool,
+    last: Option<f64>,
+}
+
+impl Watch for Halts {
+    fn iterations(&mut self, _: &Place, _: f64, iterations: &[Iteration]) -> ControlFlow<()> {
+        self.is_over = iterations.iter().any(|i| i.viscosity > 0.0);
+        match self.is_over {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+
+    fn last_equilibrium(&mut self, _: &Place, load_factor: f64, _: f64, state: &Snapshot<'_>) {
+        self.last = Some(load_factor);
+        // Strains that are committed are those of the displacements that stand beside them.
+        for group in state
+            .groups
+            .iter()
+            .filter(|g| g.formulation == Formulation::Solid)
+        {
+            let mut strains = vec![0.0; group.strain.committed.len()];
+            group
+                .kinematics
+                .add_gradients(state.displacement, &mut strains);
+            for (strain, expected) in group.strain.committed.iter().zip(&strains) {
+                assert_close(&group.name, *strain, *expected, 1e-9, 1e-2);
+            }
+        }
+    }
+}
+
+/// Whoever wants no more, a full disk for one, gets the state of an equilibrium, though creep has committed the
+/// states on its way there before the step was taken over.
+#[test]
+fn a_run_that_is_ended_after_creep_has_the_state_of_an_equilibrium() {
+    let source = Source::new("case.toml", punch(OWN, "creep"));
+    let file: CaseFile = parse(&source).unwrap();
+    let case = Case {
+        source,
+        file,
+        variant: None,
+        opener: law::Opener::default(),
+    };
+    let mut simulation = Simulation::new(case.pose().unwrap().problem).unwrap();
+    let mut halts = Halts {
+        is_over: false,
+        last: None,
+    };
+    let outcome = simulation.run(&mut halts);
+    assert!(
+        matches!(outcome, Err(mechanics::Error::Halted)),
+        "{outcome:?}"
+    );
+    assert!(halts.is_over && halts.last.is_some_and(|last| last > 0.0));
+    // Nothing is wrong with it: it goes on to its end.
+    simulation.run(&mut ()).unwrap();
 }

@@ -275,3 +275,78 @@ fn the_arc_length_takes_over_at_the_last_halving() {
         assert!(steps >= Some(8), "{halvings}: {steps:?}");
     }
 }
+
+/// Ground whose weightless stress does not go with its water, beside a joint that softens: the path goes back and on
+/// back. It went to −34.6 of the phase in 500 steps.
+#[test]
+fn a_path_that_runs_backwards_is_recognised() {
+    let text = r#"
+analysis = "axisymmetric"
+water = { level = -0.2186 }
+[mesh]
+origin = [0.0, -4.31501]
+columns = [{ n = 1, to = 1.00032 }, { n = 2, to = 7.15826, ratio = 1.42 }]
+rows = [{ n = 4, to = -2.66602 }, { n = 3, to = 0.0 }]
+region = [{ group = "soil" }, { group = "pile", x = [0.0, 1.00032], y = [-2.66602, 0.0] }]
+[mesh.lines]
+axis = { x = 0.0 }
+far = { x = 7.15826 }
+bottom = { y = -4.31501 }
+surface = { y = 0.0, x = [1.00032, 7.15826] }
+head = { y = 0.0, x = [0.0, 1.00032] }
+shaft = { x = 1.00032, y = [-2.66602, 0.0] }
+[laws]
+steel = { law = "elastic", parameters = { young_modulus = 30e6, poisson_ratio = 0.2 } }
+[laws.soil]
+law = "mohr_coulomb"
+parameters = { young_modulus = 13792, poisson_ratio = 0.411, cohesion = 0.0, friction_angle = 37.55, dilatancy_angle = 0 }
+[laws.joint]
+law = "mepi_softening"
+[laws.joint.parameters]
+k_n = 86e3
+k_t = 37e3
+n = 0.55
+t = 0.002
+p_0 = 100.0
+sigma_ni = 100.0
+mu_0 = 0.0
+mu_p = 0.78
+mu_c0 = 0.67
+a = 0.00045
+c_0 = 0.05
+mu_r = 0.6
+a_0 = 4.0
+u_tp = 0.0014
+[groups]
+soil = { formulation = "solid", law = "soil", initial_stress = { 11 = -1.0, 22 = -1.0, 33 = -1.0 } }
+pile = { formulation = "solid", law = "steel", initial_stress = { 11 = -1.0, 22 = -1.0, 33 = -1.0 } }
+shaft = { formulation = "zero_thickness", line = "shaft", law = "joint" }
+[[supports]]
+line = "axis"
+fixed = ["x"]
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[supports]]
+line = "far"
+fixed = ["x"]
+[[phase]]
+name = "p1"
+increments = 1
+pressure = [{ line = "surface", value = 1.0 }, { line = "head", value = 1.0 }]
+[solver]
+control = "arc_length"
+"#;
+    let failed = fail(text);
+    assert_eq!(failed.error.exit_code(), 2);
+    let said = failed.error.to_string();
+    assert!(
+        said.contains("the path of equilibrium runs backwards"),
+        "{said}"
+    );
+    let help = failed.error.help().unwrap();
+    assert!(
+        help.contains("`control = \"creep\"` were not tried"),
+        "{help}"
+    );
+}

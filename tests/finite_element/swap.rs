@@ -292,3 +292,63 @@ fn a_run_stopped_after_a_swap_goes_on_to_the_same_bits() {
     assert_eq!(a, b);
     assert_eq!(a.lines().count(), 6);
 }
+
+/// What rounding leaves in a joint that carries nothing is no stress that a law could change.
+#[test]
+fn a_swap_says_nothing_of_stresses_that_are_round_off() {
+    let joint = |cohesion: f64| {
+        format!(
+            "{{ law = \"coulomb_joint\", parameters = {{ normal_stiffness = 1e6, shear_stiffness = 1e6, cohesion = \
+             {cohesion:?}, friction_angle = 10.0, dilatancy_angle = 0.0 }} }}"
+        )
+    };
+    let text = format!(
+        r#"
+analysis = "plane_strain"
+[mesh]
+columns = [{{ n = 2, to = 1.0 }}, {{ n = 2, to = 2.0 }}]
+rows = [{{ n = 3, to = 1.0 }}]
+region = [{{ group = "soil" }}]
+[mesh.lines]
+bottom = {{ y = 0.0 }}
+top = {{ y = 1.0 }}
+left = {{ x = 0.0 }}
+seam = {{ x = 1.0 }}
+[laws]
+soil = {{ law = "elastic", parameters = {{ young_modulus = 1e4, poisson_ratio = 0.3 }} }}
+first = {}
+second = {}
+[groups]
+soil = {{ formulation = "solid", law = "soil" }}
+joint = {{ formulation = "zero_thickness", line = "seam", law = "first" }}
+[[supports]]
+line = "bottom"
+fixed = ["y"]
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[phase]]
+name = "press"
+increments = 3
+pressure = [{{ line = "top", value = 77.7 }}]
+[[phase]]
+name = "swap"
+increments = 1
+laws = {{ joint = "second" }}
+[probes]
+normal = {{ group = "joint", quantity = "traction_n", reduce = "min" }}
+shear = {{ group = "joint", quantity = "traction_t", reduce = "min" }}
+"#,
+        joint(100.0),
+        joint(0.0)
+    );
+    let finished = run(&text);
+    for probe in ["normal", "shear"] {
+        assert!(finished.last(probe).abs() < 1e-10 * 77.7);
+    }
+    let warnings = &finished.observer.warnings;
+    assert!(
+        !warnings.iter().any(|w| w.contains("different from")),
+        "{warnings:?}"
+    );
+}

@@ -19,6 +19,8 @@ pub struct Chosen {
     pub verdict: Verdict,
     /// By how much the two finest runs differ that came to their end, relative to the largest value.
     pub difference: Option<f64>,
+    /// The column that they differ most in.
+    pub worst: Option<String>,
     /// How the error was estimated.
     pub estimate: String,
     /// Increments by phase.
@@ -46,6 +48,8 @@ pub struct ChosenMesh {
     pub error: Option<f64>,
     /// By how much the two finest meshes differ.
     pub difference: Option<f64>,
+    /// The column that they differ most in.
+    pub worst: Option<String>,
     /// How the error was estimated, or why it was not.
     pub estimate: String,
 }

@@ -613,7 +613,7 @@ impl Simulation {
         let is_met = success.round_off <= self.problem.settings.force_tolerance;
         if success.round_off > 0.0 && is_met {
             let last = success.iterations.last().and_then(|last| last.correction);
-            let above = last.filter(|left| *left > self.problem.settings.displacement_tolerance);
+            let above = last.filter(|left| *left > self.settings().displacement_tolerance);
             record.unsettled = record.unsettled.max(above.unwrap_or(0.0));
         }
         record.round_off = record.round_off.max(success.round_off);

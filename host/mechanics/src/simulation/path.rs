@@ -17,6 +17,10 @@ const LEAP: f64 = 4.0;
 /// Growth of a step after an easy one.
 const GROWTH: f64 = 1.5;
 
+/// A path that has gone back beyond the start of the phase by more of it than this runs the other way. A snap-back may
+/// pass the start where earlier phases have loaded what gives way.
+const BACK: f64 = 1.0;
+
 /// How a path ends.
 pub(super) enum PathEnd {
     /// At the load that was sought.
@@ -74,7 +78,7 @@ impl Simulation {
                 step = onto.map(|success| (success, target));
             }
             match step {
-                Ok((_, lambda)) if lambda < 0.0 => {
+                Ok((_, lambda)) if lambda < -BACK => {
                     let reason = Reason::RanBack {
                         steps: course.steps,
                         highest: course.highest,

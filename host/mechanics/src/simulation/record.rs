@@ -40,8 +40,8 @@ pub struct PhaseRecord {
     pub open: Open,
     /// Largest relative residual that was taken for round-off in the steps' iterations.
     pub round_off: f64,
-    /// Largest last correction, relative to its increment, of steps whose residual is within its tolerance and
-    /// whose corrections came to a standstill above theirs.
+    /// Largest last correction, relative to its increment, of steps whose residual is within its tolerance, and
+    /// round-off, and whose corrections are above theirs.
     #[serde(default)]
     pub unsettled: f64,
     /// Steps along the path of equilibrium under arc-length control.

@@ -43,7 +43,7 @@ pub enum Warning {
         /// What is left.
         left: f64,
     },
-    /// The residual is within its tolerance, and corrections came to a standstill above theirs.
+    /// The residual is within its tolerance, and round-off; corrections are above theirs.
     Unsettled {
         /// The phase.
         phase: String,
@@ -168,8 +168,9 @@ impl fmt::Display for Warning {
                 left,
             } => write!(
                 f,
-                "phase `{phase}`: `displacement_tolerance` {tolerance:.1e} is not met where residuals are within their \
-                 tolerance and fall no further: the last correction is up to {left:.1e} of the increment"
+                "phase `{phase}`: `displacement_tolerance` {tolerance:.1e} is below round-off: residuals are within their \
+                 tolerance, and what is left of them is the last bit of the displacements; last corrections are up to \
+                 {left:.1e} of the increment"
             ),
             Self::Crept(place) => write!(
                 f,
@@ -190,6 +191,17 @@ impl fmt::Display for Warning {
                 f,
                 "phase `{phase}`: a residual was tolerated in {steps} steps in all, at most {largest:.1e}, \
                  a force of {force:.1e}"
+            ),
+            Self::Tolerated {
+                place,
+                residual,
+                force,
+                tolerance,
+            } if residual <= tolerance => write!(
+                f,
+                "{place}: iterations came to a standstill: the residual, {residual:.1e}, is within its tolerance, \
+                 corrections stay above `displacement_tolerance`; `tolerated_residual` accepts it; displacements are \
+                 uncertain by up to a tenth of the increment"
             ),
             Self::Tolerated {
                 place,

@@ -151,6 +151,7 @@ pub fn reach_until(
         is_reached: verdict == Verdict::Reached,
         verdict,
         difference: found.difference,
+        worst: found.worst,
         failed: search.failed,
         estimate: found.estimate,
         increments: increments.collect(),

@@ -29,9 +29,14 @@ impl Expected {
     pub(super) fn once(&self, settings: &Settings) -> Option<f64> {
         let unlikeness = |other: &Settings| {
             let tolerances = [settings, other].map(|s| s.tolerance.unwrap_or(0.0));
+            let differ = |is_other: bool| f64::from(u8::from(is_other));
+            let choices =
+                [settings, other].map(|s| s.solver.map(|choice| (choice.key, choice.value)));
             [
                 settings.division.abs_diff(other.division) as f64,
-                f64::from(u8::from(tolerances[0].total_cmp(&tolerances[1]).is_ne())),
+                differ(settings.law != other.law),
+                differ(choices[0] != choices[1]),
+                differ(tolerances[0].total_cmp(&tolerances[1]).is_ne()),
                 (settings.increments / other.increments).ln().abs(),
             ]
         };

@@ -107,7 +107,7 @@ pub enum Reason {
         /// Where it is.
         at: f64,
     },
-    /// The path of equilibrium led back beyond the start of the phase.
+    /// The path of equilibrium led back far beyond the start of the phase.
     RanBack {
         /// Number of steps along it.
         steps: usize,

@@ -138,8 +138,9 @@ impl Control for LoadControl {
         let series = self.series(iterations);
         let stands_still = newton.settings.method.is_newton() && relaxation::stands_still(series);
         let ends = stands_still || newton.is_over(series);
+        let last = iterations.last()?;
         let is_round_off =
-            ends && newton.is_round_off(&state.increment, &state.balance, &self.task);
+            ends && newton.is_round_off(&state.increment, (&state.balance, last), &self.task);
         is_round_off.then_some(state.balance.relative)
     }
 

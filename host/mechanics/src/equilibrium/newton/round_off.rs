@@ -1,6 +1,7 @@
 //! What rounding leaves of forces that should cancel.
 
 use super::Newton;
+use super::outcome::Iteration;
 use super::residual::{Balance, Task};
 use crate::assembly::norms;
 use law::Operator;
@@ -15,11 +16,12 @@ pub(crate) const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 impl Newton<'_> {
     /// Whether a small residual is one that the last bit of the displacement increments makes, so
-    /// that no iteration can lessen it. The trial state stays.
+    /// that no iteration can lessen it: in all bodies that are not in equilibrium anyway after the last iteration. One
+    /// that is within its tolerance while corrections go on is none. The trial state stays.
     pub(super) fn is_round_off(
         &mut self,
         increment: &[f64],
-        balance: &Balance,
+        (balance, last): (&Balance, &Iteration),
         task: &Task,
     ) -> bool {
         if balance.relative > STILL_SMALL || balance.away.contains(&true) {
@@ -39,12 +41,9 @@ impl Newton<'_> {
         let bodies = &self.places.bodies;
         let of = |vector: &[f64]| norms(&bodies.of_equation, bodies.n, vector);
         let sizes = of(&balance.residual).into_iter().zip(of(&change));
-        let tolerance = self.settings.force_tolerance;
         sizes
-            .zip(&balance.by_body)
-            .all(|((left, noise), &relative)| {
-                relative <= tolerance || left <= ACCEPTED_ROUND_OFF * noise
-            })
+            .zip(self.in_equilibrium(balance, last))
+            .all(|((left, noise), is_there)| is_there || left <= ACCEPTED_ROUND_OFF * noise)
     }
 }
 

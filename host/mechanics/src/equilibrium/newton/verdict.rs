@@ -66,11 +66,17 @@ impl Newton<'_> {
 
     /// Whether an iteration has ended in equilibrium.
     pub(super) fn is_equilibrium(&self, balance: &Balance, last: &Iteration) -> bool {
+        let bodies = self.in_equilibrium(balance, last);
+        bodies.into_iter().all(|is_there| is_there)
+    }
+
+    /// Which bodies are in equilibrium after an iteration.
+    pub(super) fn in_equilibrium(&self, balance: &Balance, last: &Iteration) -> Vec<bool> {
         let criteria = self.criteria(last.correction.is_some() && self.is_stale());
         let is_whole =
             last.correction.is_some() && last.step_length >= 1.0 && last.viscosity <= 0.0;
-        let bodies = self.measures(balance, is_whole);
-        bodies.iter().all(|body| body.is_equilibrium(criteria))
+        let bodies = self.measures(balance, is_whole).into_iter();
+        bodies.map(|body| body.is_equilibrium(criteria)).collect()
     }
 
     /// What a state of equilibrium leaves open, if the residual alone has made it one.

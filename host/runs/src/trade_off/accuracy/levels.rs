@@ -50,6 +50,17 @@ impl Levels {
         Some(next.rows.difference(&finest.rows, &scale))
     }
 
+    /// The value by which the two finest differ most.
+    pub(super) fn worst(&self) -> Option<String> {
+        let [.., (_, next), (_, finest)] = self.runs.as_slice() else {
+            return None;
+        };
+        let differences = next.rows.differences(&finest.rows, &finest.rows.largest());
+        let named = differences.iter().zip(&finest.rows.names);
+        let (most, name) = named.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        (*most > 0.0).then(|| name.clone())
+    }
+
     /// Estimated relative error of the finest; of only two runs as if it fell with this order.
     pub(super) fn error_of_order(&self, order: f64) -> Option<f64> {
         let [.., (b, _), (c, _)] = self.runs.as_slice() else {

@@ -81,7 +81,7 @@ pub(super) fn refine(
             break;
         }
     }
-    let difference = levels.difference();
+    let (difference, worst) = (levels.difference(), levels.worst());
     let estimate = match levels.growth() {
         Some(differences) => words::mesh_diverges(levels.len(), differences, why),
         None => words::mesh_estimate(levels.len(), ORDERS, why),
@@ -94,6 +94,7 @@ pub(super) fn refine(
         divided_by: division,
         error,
         difference,
+        worst,
         estimate,
     };
     Ok((

@@ -36,6 +36,8 @@ pub(super) struct Found {
     pub(super) error: Option<f64>,
     /// By how much the two finest runs differ.
     pub(super) difference: Option<f64>,
+    /// What they differ most in.
+    pub(super) worst: Option<String>,
     /// How the error was estimated.
     pub(super) estimate: String,
     pub(super) trial: Trial,
@@ -218,7 +220,7 @@ impl Search<'_> {
     fn found(&self, levels: Levels) -> Option<Found> {
         let (finest_factor, finest) = levels.finest()?;
         let scale = finest.rows.largest();
-        let difference = levels.difference();
+        let (difference, worst) = (levels.difference(), levels.worst());
         let of_finest = levels.error();
         let estimate = match (levels.next(), of_finest) {
             (Some((next, _)), Some(_)) => words::estimate([*next, *finest_factor], ORDERS[1]),
@@ -229,6 +231,7 @@ impl Search<'_> {
             factor,
             error,
             difference,
+            worst,
             estimate,
             trial,
             scale,

@@ -131,6 +131,17 @@ fn settings(chosen: &Chosen) -> String {
         chosen.parameters.join(" ")
     );
     text.truncate(text.trim_end().len());
+    let of_mesh = chosen.mesh.as_ref().filter(|mesh| {
+        let rest = chosen.without_mesh.unwrap_or_default();
+        mesh.difference.is_some_and(|difference| difference > rest)
+    });
+    let worst = of_mesh.map_or(&chosen.worst, |mesh| &mesh.worst);
+    if let Some(probe) = worst
+        .as_ref()
+        .filter(|_| chosen.verdict != Verdict::Reached)
+    {
+        let _ = write!(text, "; the runs differ most in `{probe}`");
+    }
     if !chosen.zero.is_empty() {
         let _ = write!(text, "; {}", zero(&chosen.zero));
     }

@@ -109,7 +109,7 @@ impl fmt::Display for Reason {
             Self::RanBack { steps, highest, to } => write!(
                 f,
                 "the path of equilibrium runs backwards: after {steps} steps along it, which reached {highest:.4} of the \
-                 phase, the next one leads to {to:.4}, before its start"
+                 phase, the next one leads to {to:.4}, far before its start"
             ),
             Self::Unbalanced(imbalance) => imbalance.fmt(f),
             Self::Domain(failure) => failure.fmt(f),
