@@ -29,7 +29,7 @@ pub struct Settings {
     /// Iterations after which an increment is cut back; those of the method if left out.
     #[serde(deserialize_with = "iterations")]
     pub max_iterations: Option<usize>,
-    /// An increment is halved at most so many times.
+    /// An increment is halved at most so many times; where creep leads, at least to a 64th of it.
     #[serde(deserialize_with = "halvings")]
     pub max_halvings: u32,
     /// Whether to search along a correction that makes the residual grow.

@@ -273,6 +273,7 @@ impl Summary {
                     "cut_backs": p.cut_backs,
                     "unreliable_steps": p.unreliable,
                     "relaxed_steps": p.relaxed,
+                    "crept_steps": p.crept,
                     "crept_from": p.crept_from,
                     "tolerated_steps": p.tolerated,
                     "tolerated_residual": p.tolerated_residual,
