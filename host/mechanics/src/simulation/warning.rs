@@ -197,32 +197,8 @@ impl fmt::Display for Warning {
                 residual,
                 force,
                 tolerance,
-            } if residual <= tolerance => write!(
-                f,
-                "{place}: iterations came to a standstill: the residual, {residual:.1e}, is within its tolerance, \
-                 corrections stay above `displacement_tolerance`; `tolerated_residual` accepts it; displacements are \
-                 uncertain by up to a tenth of the increment"
-            ),
-            Self::Tolerated {
-                place,
-                residual,
-                force,
-                tolerance,
-            } => write!(
-                f,
-                "{place}: iterations came to a standstill short of the tolerances, with a residual of \
-                 {residual:.1e} ({tolerance:.1e} asked for); `tolerated_residual` accepts it: of all \
-                 forces in play that share is out of balance, {force:.1e} (2-norm over the nodes; hold it against the \
-                 loads asked for); displacements are uncertain by up to a tenth of the increment"
-            ),
-            Self::ByForce { phase, steps, open } => write!(
-                f,
-                "phase `{phase}`: equilibrium by forces alone in {steps} steps: residuals of at most {:.1e} of all \
-                 forces in play, which is a force of {:.1e} (2-norm over the nodes; hold it against the loads asked \
-                 for: they are known no better), last corrections of at most {:.1e} of their increment, at most {} \
-                 nodes out of balance by more than the tolerance",
-                open.residual, open.force, open.correction, open.nodes
-            ),
+            } => tolerated(f, place, [*residual, *force, *tolerance]),
+            Self::ByForce { phase, steps, open } => by_force(f, phase, *steps, open),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::Parted(phase, parted) => write!(f, "phase `{phase}`: {parted}"),
             Self::TookOver(phase, change) => write!(
@@ -251,6 +227,38 @@ impl fmt::Display for Warning {
             ),
         }
     }
+}
+
+fn tolerated(
+    f: &mut fmt::Formatter<'_>,
+    place: &Place,
+    [residual, force, tolerance]: [f64; 3],
+) -> fmt::Result {
+    const UNCERTAIN: &str = "displacements are uncertain by up to a tenth of the increment";
+    if residual <= tolerance {
+        return write!(
+            f,
+            "{place}: iterations came to a standstill: the residual, {residual:.1e}, is within its tolerance, corrections \
+             stay above `displacement_tolerance`; `tolerated_residual` accepts it; {UNCERTAIN}"
+        );
+    }
+    write!(
+        f,
+        "{place}: iterations came to a standstill short of the tolerances, with a residual of {residual:.1e} \
+         ({tolerance:.1e} asked for); `tolerated_residual` accepts it: of all forces in play that share is out of \
+         balance, {force:.1e} (2-norm over the nodes; hold it against the loads asked for); {UNCERTAIN}"
+    )
+}
+
+fn by_force(f: &mut fmt::Formatter<'_>, phase: &str, steps: usize, open: &Open) -> fmt::Result {
+    write!(
+        f,
+        "phase `{phase}`: equilibrium by forces alone in {steps} steps: residuals of at most {:.1e} of all forces in \
+         play, which is a force of {:.1e} (2-norm over the nodes; hold it against the loads asked for: they are known \
+         no better), last corrections of at most {:.1e} of their increment, at most {} nodes out of balance by more \
+         than the tolerance",
+        open.residual, open.force, open.correction, open.nodes
+    )
 }
 
 fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, crept: usize) -> fmt::Result {
@@ -292,4 +300,62 @@ fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour
         "; run it with other increments, or with another `control` (`load`, `creep`), and hold the results against \
          each other"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_below_round_off_or_tolerated_is_what_is_above_its_tolerance() {
+        let tolerated = |residual| {
+            let place = Place {
+                phase: "push".to_owned(),
+                increment: 1,
+            };
+            let warning = Warning::Tolerated {
+                place,
+                residual,
+                force: 1.0,
+                tolerance: 1e-9,
+            };
+            warning.to_string()
+        };
+        assert!(tolerated(1e-5).contains("of all forces in play that share is out of balance"));
+        let within = tolerated(9.9e-12);
+        assert!(
+            within.contains("is within its tolerance, corrections stay above"),
+            "{within}"
+        );
+        assert!(!within.contains("out of balance"), "{within}");
+        let unsettled = Warning::Unsettled {
+            phase: "push".to_owned(),
+            tolerance: 1e-7,
+            left: 3e-6,
+        };
+        let said = unsettled.to_string();
+        assert!(
+            said.contains("`displacement_tolerance` 1.0e-7 is below round-off"),
+            "{said}"
+        );
+        assert!(said.contains("3.0e-6 of the increment"), "{said}");
+    }
+
+    #[test]
+    fn motions_are_counted_by_what_they_are() {
+        let of = |relaxed, crept| {
+            let phase = "push".to_owned();
+            let warning = Warning::RelaxedOften {
+                phase,
+                relaxed,
+                crept,
+            };
+            warning.to_string()
+        };
+        let relaxed = "viscous relaxation led to the next equilibrium in 3 steps";
+        let crept = "creep led to the next equilibrium in 1 step";
+        assert_eq!(of(3, 0), format!("phase `push`: {relaxed} in all"));
+        assert_eq!(of(0, 1), format!("phase `push`: {crept} in all"));
+        assert_eq!(of(3, 1), format!("phase `push`: {relaxed}, {crept} in all"));
+    }
 }
