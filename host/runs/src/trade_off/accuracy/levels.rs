@@ -225,7 +225,7 @@ mod tests {
         };
         let [coarse, fine] = of([1.0, 1.1, 1.25]).unwrap();
         assert!(coarse < fine);
-        assert!(of([1.0, 1.1, 1.2]).is_some());
+        assert!(of([1.0, 1.25, 1.5]).is_some());
         assert!(of([1.0, 1.1, 1.19]).is_none());
         assert!(of([1.0, 1.0 + 1e-12, 1.0 + 3e-12]).is_none());
         assert!(levels(0.1, &[4.0, 8.0, 16.0]).growth().is_none());
