@@ -329,10 +329,10 @@ struct Halts {
 impl Watch for Halts {
     fn iterations(&mut self, _: &Place, _: f64, iterations: &[Iteration]) -> ControlFlow<()> {
         self.is_over = iterations.iter().any(|i| i.viscosity > 0.0);
-        match self.is_over {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        if self.is_over {
+            return ControlFlow::Break(());
         }
+        ControlFlow::Continue(())
     }
 
     fn last_equilibrium(&mut self, _: &Place, load_factor: f64, _: f64, state: &Snapshot<'_>) {
