@@ -3,6 +3,7 @@
 
 use super::Kind;
 use super::supernodes::Supernodes;
+use super::updates::{Run, add_runs};
 use crate::{Pattern, Singular};
 use std::ops::Range;
 
@@ -17,8 +18,8 @@ pub(super) struct Analysis {
     pub(super) fronts: Vec<Shape>,
     /// Rows below the pivot block of all fronts: positions in `order`, then, counted on, in `kept`.
     pub(super) rows: Vec<u32>,
-    /// Where each of them stands in the parent's front; without a parent, in `kept`.
-    pub(super) relative: Vec<u32>,
+    /// Where they stand in the parents' fronts; without a parent, in `kept`.
+    pub(super) runs: Vec<Run>,
     /// Entries of the matrix by front: their places in the pattern, and where they go.
     pub(super) sources: Vec<u32>,
     pub(super) targets: Vec<u32>,
@@ -41,6 +42,8 @@ pub(super) struct Shape {
     pub(super) pivots: Range<usize>,
     /// Within `rows`.
     pub(super) rows: Range<usize>,
+    /// Within `runs`.
+    pub(super) runs: Range<usize>,
     /// Within `sources` and `targets`.
     pub(super) entries: Range<usize>,
     pub(super) children: Vec<usize>,
@@ -67,7 +70,7 @@ impl Analysis {
             kept,
             fronts: Vec::new(),
             rows: Vec::new(),
-            relative: Vec::new(),
+            runs: Vec::new(),
             sources: Vec::new(),
             targets: Vec::new(),
             kept_entries: Vec::new(),
@@ -191,6 +194,7 @@ impl Analysis {
             self.fronts.push(Shape {
                 pivots,
                 rows,
+                runs: 0..0,
                 entries: 0..0,
                 children: std::mem::take(&mut children[front]),
                 work: own + below,
@@ -207,30 +211,28 @@ impl Analysis {
     /// Where the rows of every front stand in its parent's.
     fn place_rows(&mut self, parent: &[Option<usize>]) {
         let n_eliminated = self.order.len();
-        self.relative = vec![0; self.rows.len()];
         let mut place = vec![0_u32; n_eliminated + self.kept.len()];
         for front in 0..self.fronts.len() {
-            let Shape {
-                pivots,
-                rows,
-                children,
-                ..
-            } = &self.fronts[front];
+            let Shape { pivots, rows, .. } = &self.fronts[front];
+            let k = pivots.len();
             self.place_front(pivots.clone(), rows.clone(), &mut place);
-            for &child in children {
-                let of_child = self.fronts_rows(child);
-                for at in of_child {
-                    self.relative[at] = place[self.rows[at] as usize];
-                }
+            for at in 0..self.fronts[front].children.len() {
+                let child = self.fronts[front].children[at];
+                self.add_runs(child, k, |row| place[row as usize]);
             }
         }
         for (front, parent) in parent.iter().enumerate() {
             if parent.is_none() {
-                for at in self.fronts_rows(front) {
-                    self.relative[at] = self.rows[at] - n_eliminated as u32;
-                }
+                self.add_runs(front, 0, |row| row - n_eliminated as u32);
             }
         }
+    }
+
+    fn add_runs(&mut self, front: usize, k: usize, place: impl Fn(u32) -> u32) {
+        let start = self.runs.len();
+        let rows = self.rows[self.fronts_rows(front)].iter();
+        add_runs(rows.map(|&row| place(row)), k, &mut self.runs);
+        self.fronts[front].runs = start..self.runs.len();
     }
 
     /// Numbers the rows of one front.
@@ -251,6 +253,7 @@ impl Analysis {
         let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
         let mut place = vec![0_u32; position.len()];
         let (mut sources, mut targets) = (Vec::new(), Vec::new());
+        let mut entries = Vec::new();
         for front in 0..self.fronts.len() {
             let Shape { pivots, rows, .. } = &self.fronts[front];
             let (pivots, rows) = (pivots.clone(), rows.clone());
@@ -264,18 +267,22 @@ impl Analysis {
                     let lower = self.kind == Kind::Unsymmetric || row >= pivot;
                     if row >= pivots.start && lower {
                         let target = column * n + place[row] as usize;
-                        sources.push(at as u32);
-                        targets.push(target as u32);
+                        entries.push((at as u32, target as u32));
                     }
                     // The entry across the diagonal, in the row of this pivot.
                     if let Some(transposed) = &transposed
                         && row >= pivots.end
                     {
                         let target = n * k + (place[row] as usize - k) * k + column;
-                        sources.push(transposed[at]);
-                        targets.push(target as u32);
+                        entries.push((transposed[at], target as u32));
                     }
                 }
+            }
+            // In the order in which they stand in memory.
+            entries.sort_unstable();
+            for (source, target) in entries.drain(..) {
+                sources.push(source);
+                targets.push(target);
             }
             self.fronts[front].entries = start..targets.len();
         }
