@@ -26,7 +26,26 @@ pub(super) struct Analysis {
     /// Entries between kept equations; targets in the column-major Schur complement.
     pub(super) kept_entries: Vec<Entry>,
     pub(super) roots: Vec<usize>,
+    /// Branches that are solved with at the same time; the same for any number of threads.
+    pub(super) branches: Vec<Branch>,
+    /// Fronts of no branch, ascending.
+    pub(super) top: Vec<usize>,
+    /// Where every pivot stands among those of its branch.
+    pub(super) in_branch: Vec<u32>,
 }
+
+/// A front with all its descendants.
+#[derive(Debug, Default)]
+pub(super) struct Branch {
+    /// Ascending: it is the last one.
+    pub(super) fronts: Vec<usize>,
+    /// How many pivots they have.
+    pub(super) n_pivots: usize,
+}
+
+/// Operations from which on solutions are shared among threads, and the largest share of a branch.
+const WORTH_SHARING: f64 = 2e7;
+const LARGEST_SHARE: f64 = 0.125;
 
 /// Where an entry between kept equations goes.
 #[derive(Clone, Copy, Debug)]
@@ -75,6 +94,9 @@ impl Analysis {
             targets: Vec::new(),
             kept_entries: Vec::new(),
             roots: Vec::new(),
+            branches: Vec::new(),
+            top: Vec::new(),
+            in_branch: Vec::new(),
         };
         // Where every equation stands: eliminated ones first, kept ones after them.
         let mut position = vec![0_u32; eliminated.len() + analysis.kept.len()];
@@ -200,8 +222,44 @@ impl Analysis {
                 work: own + below,
             });
         }
+        self.find_branches(&parent);
         self.place_rows(&parent);
         self.place_entries(pattern, position);
+    }
+
+    /// Shares the fronts among branches and what is above them.
+    fn find_branches(&mut self, parent: &[Option<usize>]) {
+        let fronts = &self.fronts;
+        let all: f64 = self.roots.iter().map(|&root| fronts[root].work).sum();
+        let largest = if all > WORTH_SHARING {
+            LARGEST_SHARE * all
+        } else {
+            0.0
+        };
+        // Parents come after their children.
+        let mut branch_of = vec![None; fronts.len()];
+        let mut n_branches = 0;
+        for front in (0..fronts.len()).rev() {
+            branch_of[front] = parent[front].and_then(|parent| branch_of[parent]);
+            if branch_of[front].is_none() && fronts[front].work <= largest {
+                branch_of[front] = Some(n_branches);
+                n_branches += 1;
+            }
+        }
+        self.branches.resize_with(n_branches, Branch::default);
+        self.in_branch = vec![0; self.order.len()];
+        for (front, branch) in branch_of.into_iter().enumerate() {
+            let Some(branch) = branch else {
+                self.top.push(front);
+                continue;
+            };
+            let branch = &mut self.branches[branch];
+            for pivot in fronts[front].pivots.clone() {
+                self.in_branch[pivot] = branch.n_pivots as u32;
+                branch.n_pivots += 1;
+            }
+            branch.fronts.push(front);
+        }
     }
 
     fn fronts_rows(&self, front: usize) -> Range<usize> {
