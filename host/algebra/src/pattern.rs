@@ -1,6 +1,12 @@
 //! Which entries of a sparse matrix are not zero.
 
+use rayon::prelude::*;
 use std::ops::Range;
+
+/// Entries from which on products with a vector are shared among threads, and the parts in which they
+/// are then added up whatever the number of threads.
+const WORTH_SHARING: usize = 50_000;
+const PARTS: usize = 4;
 
 /// Compressed columns: row numbers, sorted, of every column.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -75,6 +81,44 @@ impl Pattern {
     /// Rows of a column.
     pub fn column(&self, column: usize) -> &[u32] {
         &self.rows[self.places(column)]
+    }
+
+    /// The product of a matrix with these values and a vector.
+    pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
+        let [product] = self.add_up(|at, column| [values[at] * x[column]]);
+        product
+    }
+
+    /// Sums by row of terms by place and column.
+    pub(crate) fn add_up<const N: usize>(
+        &self,
+        term: impl Fn(usize, usize) -> [f64; N] + Sync,
+    ) -> [Vec<f64>; N] {
+        let n = self.n();
+        let of_columns = |columns: Range<usize>| {
+            let mut sums = [(); N].map(|()| vec![0.0; n]);
+            for column in columns {
+                for at in self.places(column) {
+                    let row = self.rows[at] as usize;
+                    for (sum, term) in sums.iter_mut().zip(term(at, column)) {
+                        sum[row] += term;
+                    }
+                }
+            }
+            sums
+        };
+        if self.rows.len() < WORTH_SHARING {
+            return of_columns(0..n);
+        }
+        let part = |part: usize| of_columns(part * n / PARTS..(part + 1) * n / PARTS);
+        let parts: Vec<_> = (0..PARTS).into_par_iter().map(part).collect();
+        let mut sums = [(); N].map(|()| vec![0.0; n]);
+        for of_part in parts {
+            for (sum, of_part) in sums.iter_mut().zip(of_part) {
+                sum.iter_mut().zip(of_part).for_each(|(sum, of)| *sum += of);
+            }
+        }
+        sums
     }
 
     /// For every entry the place of the one across the diagonal, in a symmetric pattern.

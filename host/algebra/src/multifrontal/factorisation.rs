@@ -15,6 +15,9 @@ use pulp::Arch;
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// Fronts whose entries one thread compares at a time.
+const PER_TASK: usize = 64;
+
 /// Values of a matrix.
 #[derive(Clone, Copy)]
 enum Values<'v> {
@@ -127,9 +130,14 @@ impl Multifrontal {
             return tasks;
         }
         let is_same = |&at: &u32| before[at as usize].to_bits() == values[at as usize].to_bits();
+        let stays = shapes
+            .par_iter()
+            .with_min_len(PER_TASK)
+            .map(|shape| sources[shape.entries.clone()].iter().all(is_same));
+        let stays: Vec<bool> = stays.collect();
         // Children come before their parents.
         for (front, shape) in shapes.iter().enumerate() {
-            if sources[shape.entries.clone()].iter().all(is_same)
+            if stays[front]
                 && shape.children.iter().all(|&c| tasks[c] == Task::TakeOver)
             {
                 tasks[front] = Task::TakeOver;
