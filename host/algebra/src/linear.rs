@@ -319,10 +319,8 @@ impl LinearSolver {
 
     /// b − A x, and the backward error ‖b − A x‖ / (‖A‖‖x‖ + ‖b‖) in maximum norms.
     fn residual(&self, right: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
-        let values = &self.values;
-        let [product, mut row_sums] = self
-            .pattern
-            .add_up(|at, column| [values[at] * x[column], values[at].abs()]);
+        let terms = |value: f64, column: usize| [value * x[column], value.abs()];
+        let [product, mut row_sums] = self.pattern.add_up(&self.values, terms);
         let both = right.iter().zip(product);
         let mut residual: Vec<f64> = both.map(|(right, product)| right - product).collect();
         if let Some(block) = &self.block {

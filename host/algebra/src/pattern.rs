@@ -85,23 +85,24 @@ impl Pattern {
 
     /// The product of a matrix with these values and a vector.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
-        let [product] = self.add_up(|at, column| [values[at] * x[column]]);
+        let [product] = self.add_up(values, |value, column| [value * x[column]]);
         product
     }
 
-    /// Sums by row of terms by place and column.
+    /// Sums by row of terms that follow from a value and its column.
     pub(crate) fn add_up<const N: usize>(
         &self,
-        term: impl Fn(usize, usize) -> [f64; N] + Sync,
+        values: &[f64],
+        term: impl Fn(f64, usize) -> [f64; N] + Sync,
     ) -> [Vec<f64>; N] {
         let n = self.n();
         let of_columns = |columns: Range<usize>| {
             let mut sums = [(); N].map(|()| vec![0.0; n]);
             for column in columns {
-                for at in self.places(column) {
-                    let row = self.rows[at] as usize;
-                    for (sum, term) in sums.iter_mut().zip(term(at, column)) {
-                        sum[row] += term;
+                let places = self.places(column);
+                for (&row, &value) in self.rows[places.clone()].iter().zip(&values[places]) {
+                    for (sum, term) in sums.iter_mut().zip(term(value, column)) {
+                        sum[row as usize] += term;
                     }
                 }
             }
@@ -134,5 +135,50 @@ impl Pattern {
             }
         }
         across
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of `n` equations that reach ten rows each way.
+    fn band(n: usize) -> Pattern {
+        let mut pattern = Pattern {
+            column_start: vec![0],
+            rows: Vec::new(),
+        };
+        for column in 0..n {
+            let rows = column.saturating_sub(10)..(column + 11).min(n);
+            pattern.rows.extend(rows.map(|row| row as u32));
+            pattern.column_start.push(pattern.rows.len() as u32);
+        }
+        pattern
+    }
+
+    #[test]
+    fn multiplies_alike_in_parts_and_with_any_number_of_threads() {
+        for n in [40, 5_001] {
+            let pattern = band(n);
+            assert_eq!(pattern.rows.len() >= WORTH_SHARING, n > 1_000);
+            let values: Vec<f64> = (0..pattern.rows.len()).map(|i| (i as f64).sin()).collect();
+            let x: Vec<f64> = (0..n).map(|i| (3.0 * i as f64).cos()).collect();
+            let mut by_column = vec![0.0; n];
+            for column in 0..n {
+                for at in pattern.places(column) {
+                    by_column[pattern.rows[at] as usize] += values[at] * x[column];
+                }
+            }
+            let product = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+                let pool = pool.build().unwrap();
+                pool.install(|| pattern.multiply(&values, &x))
+            };
+            let one = product(1);
+            assert_eq!(one, product(3));
+            for (own, expected) in one.iter().zip(by_column) {
+                assert!((own - expected).abs() < 1e-13, "{own} {expected}");
+            }
+        }
     }
 }

@@ -375,7 +375,10 @@ impl System {
                 };
                 let add = |part: Part<'_>| part.add(maps, &pieces);
                 if is_shared {
-                    self.parts(values).into_par_iter().with_max_len(1).for_each(add);
+                    self.parts(values)
+                        .into_par_iter()
+                        .with_max_len(1)
+                        .for_each(add);
                 } else {
                     add(Part { start: 0, values });
                 }
@@ -532,7 +535,7 @@ impl ElementMap {
             dofs,
             transform: Some(transform),
             slots: Vec::new(),
-                span: [u32::MAX, 0],
+            span: [u32::MAX, 0],
         }
     }
 }

@@ -1,16 +1,11 @@
 //! The numerical factorisation: front after front, branches of the tree in parallel.
 
 use super::analysis::{Analysis, Shape};
-use super::kernels::{WORTHWHILE, leave_product, leave_square, pack};
+use super::kernels::{WORTHWHILE, factorise_symmetric, factorise_unsymmetric, pack};
 use super::updates::{OnPivots, OnRest, Pile, Update};
 use super::{Front, Gathered, Kind, Multifrontal};
-use crate::dense::{self, Exchanges};
 use crate::Singular;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor as cholesky_kernel;
-use faer::linalg::triangular_solve as triangular;
-use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{MatMut, Par, Spec};
+use crate::dense::Exchanges;
 use pulp::Arch;
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -137,9 +132,7 @@ impl Multifrontal {
         let stays: Vec<bool> = stays.collect();
         // Children come before their parents.
         for (front, shape) in shapes.iter().enumerate() {
-            if stays[front]
-                && shape.children.iter().all(|&c| tasks[c] == Task::TakeOver)
-            {
+            if stays[front] && shape.children.iter().all(|&c| tasks[c] == Task::TakeOver) {
                 tasks[front] = Task::TakeOver;
             }
         }
@@ -291,17 +284,14 @@ impl Multifrontal {
         let analysis = &self.analysis;
         let shape = &analysis.fronts[number];
         let (k, m) = (shape.pivots.len(), shape.rows.len());
-        let n = k + m;
         let mut guard = self.front(number);
         let front = &mut *guard;
         front.is_retained = task == Task::Restore;
         front.assemble(analysis, shape, values);
-        let (l, u) = front.values.split_at_mut(n * k);
         let mut children: Vec<_> = shape.children.iter().map(|&c| self.front(c)).collect();
-        let size_of = |child: usize| analysis.fronts[child].rows.len().pow(2);
-        let waits = |child: &Front| child.update.is_empty();
         let numbered = || shape.children.iter().zip(&children);
-        let on_pile = numbered().filter(|(_, child)| waits(child));
+        let on_pile = numbered().filter(|(_, child)| child.update.is_empty());
+        let size_of = |child: usize| analysis.fronts[child].rows.len().pow(2);
         let on_pile: usize = on_pile.map(|(&number, _)| size_of(number)).sum();
         let update = match own {
             Some(pile) if task != Task::Restore => {
@@ -316,7 +306,7 @@ impl Multifrontal {
         let mut from_pile = of_children.last(on_pile);
         let updates: Vec<Update<'_>> = numbered()
             .map(|(&number, child)| {
-                let values = if waits(child) {
+                let values = if child.update.is_empty() {
                     from_pile.split_off(..size_of(number)).unwrap_or_default()
                 } else {
                     &child.update
@@ -324,31 +314,41 @@ impl Multifrontal {
                 self.update_of(number, values)
             })
             .collect();
-        Arch::new().dispatch(OnPivots {
-            updates: &updates,
-            l,
-            u,
-            k,
-        });
-        match analysis.kind {
-            Kind::Symmetric => factorise_symmetric(l, n, k, update)?,
-            Kind::Unsymmetric => {
-                factorise_unsymmetric(l, u, n, k, update, &mut front.exchanges)?;
-            }
-        }
-        Arch::new().dispatch(OnRest {
-            updates: &updates,
-            target: update,
-            m,
-            k,
-        });
+        let parts = (&mut *front.values, update, &mut front.exchanges);
+        eliminate_pivots(analysis.kind, parts, (k, m), &updates)?;
         of_children.remove(on_pile);
-        children.iter_mut().for_each(|child| child.update_is_taken());
+        for child in &mut children {
+            child.update_is_taken();
+        }
         if analysis.kind == Kind::Symmetric {
-            pack(&mut front.values, n, k);
+            pack(&mut front.values, k + m, k);
         }
         Ok(())
     }
+}
+
+/// Eliminates the k pivots of a front with m rows below them: its columns and rows, what it leaves,
+/// and its row exchanges; `updates` are those of its children.
+fn eliminate_pivots(
+    kind: Kind,
+    (values, update, exchanges): (&mut [f64], &mut [f64], &mut Exchanges),
+    (k, m): (usize, usize),
+    updates: &[Update<'_>],
+) -> Result<(), Singular> {
+    let n = k + m;
+    let (l, u) = values.split_at_mut(n * k);
+    Arch::new().dispatch(OnPivots { updates, l, u, k });
+    match kind {
+        Kind::Symmetric => factorise_symmetric(l, n, k, update)?,
+        Kind::Unsymmetric => factorise_unsymmetric(l, u, n, k, update, exchanges)?,
+    }
+    Arch::new().dispatch(OnRest {
+        updates,
+        target: update,
+        m,
+        k,
+    });
+    Ok(())
 }
 
 impl Front {
@@ -376,61 +376,4 @@ impl Front {
             }
         }
     }
-}
-
-/// L Lᵀ of the pivots of a front (n × k), and −L Lᵀ of what is below them.
-fn factorise_symmetric(
-    l: &mut [f64],
-    n: usize,
-    k: usize,
-    update: &mut [f64],
-) -> Result<(), Singular> {
-    let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
-    let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
-    let scratch = cholesky_kernel::cholesky_in_place_scratch::<f64>(k, Par::Seq, Spec::default());
-    cholesky_kernel::cholesky_in_place(
-        pivots.rb_mut(),
-        cholesky_kernel::LltRegularization::default(),
-        Par::Seq,
-        MemStack::new(&mut MemBuffer::new(scratch)),
-        Spec::default(),
-    )
-    .map_err(|_| Singular)?;
-    triangular::solve_lower_triangular_in_place(
-        pivots.rb(),
-        below.rb_mut().transpose_mut(),
-        Par::Seq,
-    );
-    leave_square(update, n - k, below.rb());
-    Ok(())
-}
-
-/// L U of the pivots of a front, with L below (n × k) and U beside them (k × m), and −L U of these.
-fn factorise_unsymmetric(
-    l: &mut [f64],
-    u: &mut [f64],
-    n: usize,
-    k: usize,
-    update: &mut [f64],
-    exchanges: &mut Exchanges,
-) -> Result<(), Singular> {
-    let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
-    let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
-    dense::factorise(pivots.rb_mut(), exchanges)?;
-    let mut exchanged = vec![0.0; k];
-    for column in u.chunks_exact_mut(k) {
-        for (value, &from) in exchanged.iter_mut().zip(&exchanges.forward) {
-            *value = column[from];
-        }
-        column.copy_from_slice(&exchanged);
-    }
-    let mut right = MatMut::from_column_major_slice_mut(u, k, n - k);
-    triangular::solve_unit_lower_triangular_in_place(pivots.rb(), right.rb_mut(), Par::Seq);
-    triangular::solve_lower_triangular_in_place(
-        pivots.rb().transpose(),
-        below.rb_mut().transpose_mut(),
-        Par::Seq,
-    );
-    leave_product(update, below.rb(), right.rb());
-    Ok(())
 }

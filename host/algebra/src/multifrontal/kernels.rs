@@ -1,9 +1,14 @@
 //! Dense work inside a front, and what it leaves to its parent.
 
+use crate::Singular;
+use crate::dense::{self, Exchanges};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor as cholesky_kernel;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul as triangular_matmul};
-use faer::prelude::ReborrowMut;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::linalg::triangular_solve as triangular;
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
 
 /// Branches with fewer floating-point operations than this are not worth a task of their own.
@@ -41,7 +46,7 @@ pub(super) fn pack(values: &mut Vec<f64>, n: usize, k: usize) {
 }
 
 /// update = −L Lᵀ, lower half.
-pub(super) fn leave_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) {
+fn leave_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) {
     let piece = |(number, columns): (usize, &mut [f64])| {
         let start = number * PIECE;
         let width = columns.len() / m;
@@ -75,7 +80,7 @@ pub(super) fn leave_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) {
 }
 
 /// update = −L U.
-pub(super) fn leave_product(update: &mut [f64], l: MatRef<'_, f64>, u: MatRef<'_, f64>) {
+fn leave_product(update: &mut [f64], l: MatRef<'_, f64>, u: MatRef<'_, f64>) {
     let m = l.nrows();
     let piece = |(number, columns): (usize, &mut [f64])| {
         let width = columns.len() / m;
@@ -105,4 +110,61 @@ fn in_pieces(
     } else {
         update.chunks_mut(PIECE * m).enumerate().for_each(piece);
     }
+}
+
+/// L Lᵀ of the pivots of a front (n × k), and −L Lᵀ of what is below them.
+pub(super) fn factorise_symmetric(
+    l: &mut [f64],
+    n: usize,
+    k: usize,
+    update: &mut [f64],
+) -> Result<(), Singular> {
+    let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
+    let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
+    let scratch = cholesky_kernel::cholesky_in_place_scratch::<f64>(k, Par::Seq, Spec::default());
+    cholesky_kernel::cholesky_in_place(
+        pivots.rb_mut(),
+        cholesky_kernel::LltRegularization::default(),
+        Par::Seq,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Spec::default(),
+    )
+    .map_err(|_| Singular)?;
+    triangular::solve_lower_triangular_in_place(
+        pivots.rb(),
+        below.rb_mut().transpose_mut(),
+        Par::Seq,
+    );
+    leave_square(update, n - k, below.rb());
+    Ok(())
+}
+
+/// L U of the pivots of a front, with L below (n × k) and U beside them (k × m), and −L U of these.
+pub(super) fn factorise_unsymmetric(
+    l: &mut [f64],
+    u: &mut [f64],
+    n: usize,
+    k: usize,
+    update: &mut [f64],
+    exchanges: &mut Exchanges,
+) -> Result<(), Singular> {
+    let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
+    let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
+    dense::factorise(pivots.rb_mut(), exchanges)?;
+    let mut exchanged = vec![0.0; k];
+    for column in u.chunks_exact_mut(k) {
+        for (value, &from) in exchanged.iter_mut().zip(&exchanges.forward) {
+            *value = column[from];
+        }
+        column.copy_from_slice(&exchanged);
+    }
+    let mut right = MatMut::from_column_major_slice_mut(u, k, n - k);
+    triangular::solve_unit_lower_triangular_in_place(pivots.rb(), right.rb_mut(), Par::Seq);
+    triangular::solve_lower_triangular_in_place(
+        pivots.rb().transpose(),
+        below.rb_mut().transpose_mut(),
+        Par::Seq,
+    );
+    leave_product(update, below.rb(), right.rb());
+    Ok(())
 }

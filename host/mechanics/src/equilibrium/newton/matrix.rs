@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::time::Instant;
 
 /// Entries that one thread looks at, at a time.
-const PER_TASK: usize = 1 << 16;
+pub(super) const PER_TASK: usize = 1 << 16;
 
 /// What the solver of a phase holds factorised.
 #[derive(Debug, Default)]
