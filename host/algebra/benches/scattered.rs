@@ -1,5 +1,6 @@
 //! Analysis and factorisation where nodes do not lie on a grid, by number of unknowns: items are
-//! unknowns. Wall-clock time. `operations` prints what orders cost, instead of timing them.
+//! unknowns. Wall-clock time. `operations` prints what orders cost, instead of timing them; `again`
+//! SIZE COUNT factorises 8-node quads on a grid so many times, for profilers.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -22,7 +23,13 @@ const SIZES: [usize; 5] = [40, 56, 80, 112, 158];
 type Make = fn(usize) -> Mesh;
 
 fn main() {
-    if std::env::args().any(|argument| argument == "operations") {
+    let arguments: Vec<String> = std::env::args().collect();
+    let again = arguments.iter().position(|argument| argument == "again");
+    if let Some(at) = again {
+        let number = |at: usize| arguments.get(at)?.parse().ok();
+        let (size, count) = (number(at + 1), number(at + 2));
+        repeat(size.unwrap_or(40), count.unwrap_or(100));
+    } else if arguments.iter().any(|argument| argument == "operations") {
         operations();
     } else {
         divan::main();
@@ -69,6 +76,38 @@ fn operations() {
             }
         }
     }
+}
+
+/// Factorises and solves again and again; the last line says what one took.
+fn repeat(size: usize, count: usize) {
+    let mesh = meshes::grid(size);
+    let pattern = mesh.pattern();
+    let values = meshes::values(&pattern, 0.0);
+    let mut factors = analysed(&pattern, Some(&mesh.lines()));
+    let right: Vec<f64> = (0..pattern.n()).map(|i| ((13 * i) % 7) as f64).collect();
+    let mut seconds = [Vec::new(), Vec::new()];
+    for _ in 0..count {
+        let start = Instant::now();
+        factors.factorise(&values).expect("a regular matrix");
+        seconds[0].push(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        let (y, kept) = factors.forward(&right, None);
+        std::hint::black_box(factors.backward(&y, &kept, None));
+        seconds[1].push(start.elapsed().as_secs_f64());
+    }
+    let [factorisation, solution] = seconds.map(|mut of| {
+        of.sort_by(f64::total_cmp);
+        (1e3 * of[0], 1e3 * of[count / 2])
+    });
+    println!(
+        "{} unknowns, {:.3e} operations; ms, least and median: factorisation {:.2} {:.2}, solution {:.2} {:.2}",
+        pattern.n(),
+        factors.operations(),
+        factorisation.0,
+        factorisation.1,
+        solution.0,
+        solution.1
+    );
 }
 
 /// Order and supernodes, mesh lines given.

@@ -319,15 +319,10 @@ impl LinearSolver {
 
     /// b − A x, and the backward error ‖b − A x‖ / (‖A‖‖x‖ + ‖b‖) in maximum norms.
     fn residual(&self, right: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
-        let mut residual = right.to_vec();
-        let mut row_sums = vec![0.0; right.len()];
-        for column in 0..right.len() {
-            for at in self.pattern.places(column) {
-                let row = self.pattern.rows[at] as usize;
-                residual[row] -= self.values[at] * x[column];
-                row_sums[row] += self.values[at].abs();
-            }
-        }
+        let terms = |value: f64, column: usize| [value * x[column], value.abs()];
+        let [product, mut row_sums] = self.pattern.add_up(&self.values, terms);
+        let both = right.iter().zip(product);
+        let mut residual: Vec<f64> = both.map(|(right, product)| right - product).collect();
         if let Some(block) = &self.block {
             let at = block.equations.iter();
             let n = block.equations.len().max(1);

@@ -22,12 +22,14 @@ mod factorisation;
 mod kernels;
 mod solution;
 mod supernodes;
+mod updates;
 
 pub(crate) use analysis::work;
 
 use crate::{Pattern, Singular, dense};
 use analysis::Analysis;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use updates::Pile;
 
 /// Which half of the matrix counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +64,8 @@ pub struct Gathered(Vec<f64>);
 pub struct Multifrontal {
     analysis: Analysis,
     fronts: Vec<Mutex<Front>>,
+    /// Where the updates of small branches wait, for one thread each.
+    memory: Mutex<Vec<[Pile; 2]>>,
     schur: Vec<f64>,
     /// All fronts hold the factors of one matrix.
     is_complete: bool,
@@ -86,6 +90,7 @@ impl Multifrontal {
         Ok(Self {
             analysis,
             fronts,
+            memory: Mutex::default(),
             schur: Vec::new(),
             is_complete: false,
             computed: 0,

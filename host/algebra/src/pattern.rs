@@ -1,6 +1,12 @@
 //! Which entries of a sparse matrix are not zero.
 
+use rayon::prelude::*;
 use std::ops::Range;
+
+/// Entries from which on products with a vector are shared among threads, and the parts in which they
+/// are then added up whatever the number of threads.
+const WORTH_SHARING: usize = 50_000;
+const PARTS: usize = 4;
 
 /// Compressed columns: row numbers, sorted, of every column.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -77,6 +83,45 @@ impl Pattern {
         &self.rows[self.places(column)]
     }
 
+    /// The product of a matrix with these values and a vector.
+    pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
+        let [product] = self.add_up(values, |value, column| [value * x[column]]);
+        product
+    }
+
+    /// Sums by row of terms that follow from a value and its column.
+    pub(crate) fn add_up<const N: usize>(
+        &self,
+        values: &[f64],
+        term: impl Fn(f64, usize) -> [f64; N] + Sync,
+    ) -> [Vec<f64>; N] {
+        let n = self.n();
+        let of_columns = |columns: Range<usize>| {
+            let mut sums = [(); N].map(|()| vec![0.0; n]);
+            for column in columns {
+                let places = self.places(column);
+                for (&row, &value) in self.rows[places.clone()].iter().zip(&values[places]) {
+                    for (sum, term) in sums.iter_mut().zip(term(value, column)) {
+                        sum[row as usize] += term;
+                    }
+                }
+            }
+            sums
+        };
+        if self.rows.len() < WORTH_SHARING {
+            return of_columns(0..n);
+        }
+        let part = |part: usize| of_columns(part * n / PARTS..(part + 1) * n / PARTS);
+        let parts: Vec<_> = (0..PARTS).into_par_iter().map(part).collect();
+        let mut sums = [(); N].map(|()| vec![0.0; n]);
+        for of_part in parts {
+            for (sum, of_part) in sums.iter_mut().zip(of_part) {
+                sum.iter_mut().zip(of_part).for_each(|(sum, of)| *sum += of);
+            }
+        }
+        sums
+    }
+
     /// For every entry the place of the one across the diagonal, in a symmetric pattern.
     pub fn transposed_places(&self) -> Vec<u32> {
         // Columns are visited in ascending order, so entry after entry of a row is met.
@@ -90,5 +135,50 @@ impl Pattern {
             }
         }
         across
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of `n` equations that reach ten rows each way.
+    fn band(n: usize) -> Pattern {
+        let mut pattern = Pattern {
+            column_start: vec![0],
+            rows: Vec::new(),
+        };
+        for column in 0..n {
+            let rows = column.saturating_sub(10)..(column + 11).min(n);
+            pattern.rows.extend(rows.map(|row| row as u32));
+            pattern.column_start.push(pattern.rows.len() as u32);
+        }
+        pattern
+    }
+
+    #[test]
+    fn multiplies_alike_in_parts_and_with_any_number_of_threads() {
+        for n in [40, 5_001] {
+            let pattern = band(n);
+            assert_eq!(pattern.rows.len() >= WORTH_SHARING, n > 1_000);
+            let values: Vec<f64> = (0..pattern.rows.len()).map(|i| (i as f64).sin()).collect();
+            let x: Vec<f64> = (0..n).map(|i| (3.0 * i as f64).cos()).collect();
+            let mut by_column = vec![0.0; n];
+            for column in 0..n {
+                for at in pattern.places(column) {
+                    by_column[pattern.rows[at] as usize] += values[at] * x[column];
+                }
+            }
+            let product = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+                let pool = pool.build().unwrap();
+                pool.install(|| pattern.multiply(&values, &x))
+            };
+            let one = product(1);
+            assert_eq!(one, product(3));
+            for (own, expected) in one.iter().zip(by_column) {
+                assert!((own - expected).abs() < 1e-13, "{own} {expected}");
+            }
+        }
     }
 }

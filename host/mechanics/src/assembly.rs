@@ -17,6 +17,8 @@ use std::sync::Arc;
 const PIECE: usize = 256;
 /// Pieces that are computed before their matrices are added up.
 const ROUND: usize = 16;
+/// Parts of the columns that are added up at the same time.
+const PARTS: usize = 4;
 
 /// A degree of freedom that follows others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -214,6 +216,8 @@ struct ElementMap {
     transform: Option<Vec<f64>>,
     /// Position in the matrix of every pair of `dofs`, row-major; `u32::MAX` if not free.
     slots: Vec<u32>,
+    /// The first and the last position.
+    span: [u32; 2],
 }
 
 impl System {
@@ -264,6 +268,10 @@ impl System {
         let pattern = Pattern::new(free.len(), &equation, of_elements);
         for map in elements.iter_mut().flatten() {
             map.slots = find_slots(&map.dofs, &equation, &pattern);
+            let filled = map.slots.iter().filter(|&&slot| slot != u32::MAX);
+            map.span = filled.fold([u32::MAX, 0], |[first, last], &slot| {
+                [first.min(slot), last.max(slot)]
+            });
         }
         Self {
             equation,
@@ -359,19 +367,37 @@ impl System {
                     }
                     matrices
                 };
-                let pieces: Vec<Vec<f64>> = if maps.len() > PIECE {
+                let is_shared = maps.len() > PIECE;
+                let pieces: Vec<Vec<f64>> = if is_shared {
                     maps.par_chunks(PIECE).enumerate().map(compute).collect()
                 } else {
                     vec![compute((0, maps))]
                 };
-                let slots = maps.iter().flat_map(|map| &map.slots);
-                for (slot, value) in slots.zip(pieces.iter().flatten()) {
-                    if *slot != u32::MAX {
-                        values[*slot as usize] += value;
-                    }
+                let add = |part: Part<'_>| part.add(maps, &pieces);
+                if is_shared {
+                    self.parts(values)
+                        .into_par_iter()
+                        .with_max_len(1)
+                        .for_each(add);
+                } else {
+                    add(Part { start: 0, values });
                 }
             }
         }
+    }
+
+    /// The values of the matrix in parts of some columns.
+    fn parts<'v>(&self, mut values: &'v mut [f64]) -> Vec<Part<'v>> {
+        let starts = &self.pattern.column_start;
+        let mut start = 0;
+        let mut parts = Vec::with_capacity(PARTS);
+        for part in 1..=PARTS {
+            let end = starts[part * self.free.len() / PARTS];
+            let (own, rest) = values.split_at_mut((end - start) as usize);
+            parts.push(Part { start, values: own });
+            (start, values) = (end, rest);
+        }
+        parts
     }
 
     /// Adds the forces that increments of prescribed displacements cause at constant tangent to
@@ -393,6 +419,38 @@ impl System {
                         if self.equation[*dof].is_none() {
                             forces[row] += matrix[i * n + j] * increment[*dof];
                         }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Part of the values of a matrix.
+struct Part<'v> {
+    /// Position of the first one.
+    start: u32,
+    values: &'v mut [f64],
+}
+
+impl Part<'_> {
+    /// Adds the matrices of elements, one after the other, which stand in pieces.
+    fn add(self, maps: &[ElementMap], pieces: &[Vec<f64>]) {
+        let end = self.start + self.values.len() as u32;
+        for (maps, matrices) in maps.chunks(PIECE).zip(pieces) {
+            let mut rest = matrices.as_slice();
+            for map in maps {
+                let (matrix, others) = rest.split_at(map.slots.len());
+                rest = others;
+                let [first, last] = map.span;
+                if first >= end || last < self.start {
+                    continue;
+                }
+                for (slot, value) in map.slots.iter().zip(matrix) {
+                    // Positions before this part wrap around, as those of no equation do.
+                    let at = slot.wrapping_sub(self.start) as usize;
+                    if let Some(sum) = self.values.get_mut(at) {
+                        *sum += value;
                     }
                 }
             }
@@ -453,6 +511,7 @@ impl ElementMap {
                 dofs: own,
                 transform: None,
                 slots: Vec::new(),
+                span: [u32::MAX, 0],
             };
         }
         let expand = |dof: usize| match tie_of[dof] {
@@ -476,6 +535,7 @@ impl ElementMap {
             dofs,
             transform: Some(transform),
             slots: Vec::new(),
+            span: [u32::MAX, 0],
         }
     }
 }

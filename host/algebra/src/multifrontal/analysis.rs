@@ -3,6 +3,7 @@
 
 use super::Kind;
 use super::supernodes::Supernodes;
+use super::updates::{Run, add_runs};
 use crate::{Pattern, Singular};
 use std::ops::Range;
 
@@ -17,15 +18,34 @@ pub(super) struct Analysis {
     pub(super) fronts: Vec<Shape>,
     /// Rows below the pivot block of all fronts: positions in `order`, then, counted on, in `kept`.
     pub(super) rows: Vec<u32>,
-    /// Where each of them stands in the parent's front; without a parent, in `kept`.
-    pub(super) relative: Vec<u32>,
+    /// Where they stand in the parents' fronts; without a parent, in `kept`.
+    pub(super) runs: Vec<Run>,
     /// Entries of the matrix by front: their places in the pattern, and where they go.
     pub(super) sources: Vec<u32>,
     pub(super) targets: Vec<u32>,
     /// Entries between kept equations; targets in the column-major Schur complement.
     pub(super) kept_entries: Vec<Entry>,
     pub(super) roots: Vec<usize>,
+    /// Branches that are solved with at the same time; the same for any number of threads.
+    pub(super) branches: Vec<Branch>,
+    /// Fronts of no branch, ascending.
+    pub(super) top: Vec<usize>,
+    /// Where every pivot stands among those of its branch.
+    pub(super) in_branch: Vec<u32>,
 }
+
+/// A front with all its descendants.
+#[derive(Debug, Default)]
+pub(super) struct Branch {
+    /// Ascending: it is the last one.
+    pub(super) fronts: Vec<usize>,
+    /// How many pivots they have.
+    pub(super) n_pivots: usize,
+}
+
+/// Operations from which on solutions are shared among threads, and the largest share of a branch.
+const WORTH_SHARING: f64 = 2e7;
+const LARGEST_SHARE: f64 = 0.125;
 
 /// Where an entry between kept equations goes.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +61,8 @@ pub(super) struct Shape {
     pub(super) pivots: Range<usize>,
     /// Within `rows`.
     pub(super) rows: Range<usize>,
+    /// Within `runs`.
+    pub(super) runs: Range<usize>,
     /// Within `sources` and `targets`.
     pub(super) entries: Range<usize>,
     pub(super) children: Vec<usize>,
@@ -67,11 +89,14 @@ impl Analysis {
             kept,
             fronts: Vec::new(),
             rows: Vec::new(),
-            relative: Vec::new(),
+            runs: Vec::new(),
             sources: Vec::new(),
             targets: Vec::new(),
             kept_entries: Vec::new(),
             roots: Vec::new(),
+            branches: Vec::new(),
+            top: Vec::new(),
+            in_branch: Vec::new(),
         };
         // Where every equation stands: eliminated ones first, kept ones after them.
         let mut position = vec![0_u32; eliminated.len() + analysis.kept.len()];
@@ -191,13 +216,50 @@ impl Analysis {
             self.fronts.push(Shape {
                 pivots,
                 rows,
+                runs: 0..0,
                 entries: 0..0,
                 children: std::mem::take(&mut children[front]),
                 work: own + below,
             });
         }
+        self.find_branches(&parent);
         self.place_rows(&parent);
         self.place_entries(pattern, position);
+    }
+
+    /// Shares the fronts among branches and what is above them.
+    fn find_branches(&mut self, parent: &[Option<usize>]) {
+        let fronts = &self.fronts;
+        let all: f64 = self.roots.iter().map(|&root| fronts[root].work).sum();
+        let largest = if all > WORTH_SHARING {
+            LARGEST_SHARE * all
+        } else {
+            0.0
+        };
+        // Parents come after their children.
+        let mut branch_of = vec![None; fronts.len()];
+        let mut n_branches = 0;
+        for front in (0..fronts.len()).rev() {
+            branch_of[front] = parent[front].and_then(|parent| branch_of[parent]);
+            if branch_of[front].is_none() && fronts[front].work <= largest {
+                branch_of[front] = Some(n_branches);
+                n_branches += 1;
+            }
+        }
+        self.branches.resize_with(n_branches, Branch::default);
+        self.in_branch = vec![0; self.order.len()];
+        for (front, branch) in branch_of.into_iter().enumerate() {
+            let Some(branch) = branch else {
+                self.top.push(front);
+                continue;
+            };
+            let branch = &mut self.branches[branch];
+            for pivot in fronts[front].pivots.clone() {
+                self.in_branch[pivot] = branch.n_pivots as u32;
+                branch.n_pivots += 1;
+            }
+            branch.fronts.push(front);
+        }
     }
 
     fn fronts_rows(&self, front: usize) -> Range<usize> {
@@ -207,30 +269,28 @@ impl Analysis {
     /// Where the rows of every front stand in its parent's.
     fn place_rows(&mut self, parent: &[Option<usize>]) {
         let n_eliminated = self.order.len();
-        self.relative = vec![0; self.rows.len()];
         let mut place = vec![0_u32; n_eliminated + self.kept.len()];
         for front in 0..self.fronts.len() {
-            let Shape {
-                pivots,
-                rows,
-                children,
-                ..
-            } = &self.fronts[front];
+            let Shape { pivots, rows, .. } = &self.fronts[front];
+            let k = pivots.len();
             self.place_front(pivots.clone(), rows.clone(), &mut place);
-            for &child in children {
-                let of_child = self.fronts_rows(child);
-                for at in of_child {
-                    self.relative[at] = place[self.rows[at] as usize];
-                }
+            for at in 0..self.fronts[front].children.len() {
+                let child = self.fronts[front].children[at];
+                self.add_runs(child, k, |row| place[row as usize]);
             }
         }
         for (front, parent) in parent.iter().enumerate() {
             if parent.is_none() {
-                for at in self.fronts_rows(front) {
-                    self.relative[at] = self.rows[at] - n_eliminated as u32;
-                }
+                self.add_runs(front, 0, |row| row - n_eliminated as u32);
             }
         }
+    }
+
+    fn add_runs(&mut self, front: usize, k: usize, place: impl Fn(u32) -> u32) {
+        let start = self.runs.len();
+        let rows = self.rows[self.fronts_rows(front)].iter();
+        add_runs(rows.map(|&row| place(row)), k, &mut self.runs);
+        self.fronts[front].runs = start..self.runs.len();
     }
 
     /// Numbers the rows of one front.
@@ -251,6 +311,7 @@ impl Analysis {
         let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
         let mut place = vec![0_u32; position.len()];
         let (mut sources, mut targets) = (Vec::new(), Vec::new());
+        let mut entries = Vec::new();
         for front in 0..self.fronts.len() {
             let Shape { pivots, rows, .. } = &self.fronts[front];
             let (pivots, rows) = (pivots.clone(), rows.clone());
@@ -264,18 +325,22 @@ impl Analysis {
                     let lower = self.kind == Kind::Unsymmetric || row >= pivot;
                     if row >= pivots.start && lower {
                         let target = column * n + place[row] as usize;
-                        sources.push(at as u32);
-                        targets.push(target as u32);
+                        entries.push((at as u32, target as u32));
                     }
                     // The entry across the diagonal, in the row of this pivot.
                     if let Some(transposed) = &transposed
                         && row >= pivots.end
                     {
                         let target = n * k + (place[row] as usize - k) * k + column;
-                        sources.push(transposed[at]);
-                        targets.push(target as u32);
+                        entries.push((transposed[at], target as u32));
                     }
                 }
+            }
+            // In the order in which they stand in memory.
+            entries.sort_unstable();
+            for (source, target) in entries.drain(..) {
+                sources.push(source);
+                targets.push(target);
             }
             self.fronts[front].entries = start..targets.len();
         }

@@ -1,15 +1,17 @@
 //! The numerical factorisation: front after front, branches of the tree in parallel.
 
-use super::kernels::{WORTHWHILE, extend, pack, subtract_product, subtract_square};
+use super::analysis::{Analysis, Shape};
+use super::kernels::{WORTHWHILE, factorise_symmetric, factorise_unsymmetric, pack};
+use super::updates::{OnPivots, OnRest, Pile, Update};
 use super::{Front, Gathered, Kind, Multifrontal};
-use crate::{Singular, dense};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor as cholesky_kernel;
-use faer::linalg::triangular_solve as triangular;
-use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{MatMut, Par, Spec};
+use crate::Singular;
+use crate::dense::Exchanges;
+use pulp::Arch;
 use rayon::prelude::*;
-use std::sync::PoisonError;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Fronts whose entries one thread compares at a time.
+const PER_TASK: usize = 64;
 
 /// Values of a matrix.
 #[derive(Clone, Copy)]
@@ -94,7 +96,8 @@ impl Multifrontal {
     pub fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
         self.eliminate_all(&[], Values::OfFronts(&values.0))?;
         self.analysis.targets = Vec::new();
-        self.analysis.relative = Vec::new();
+        self.analysis.runs = Vec::new();
+        self.memory = Mutex::default();
         Ok(())
     }
 
@@ -122,11 +125,14 @@ impl Multifrontal {
             return tasks;
         }
         let is_same = |&at: &u32| before[at as usize].to_bits() == values[at as usize].to_bits();
+        let stays = shapes
+            .par_iter()
+            .with_min_len(PER_TASK)
+            .map(|shape| sources[shape.entries.clone()].iter().all(is_same));
+        let stays: Vec<bool> = stays.collect();
         // Children come before their parents.
         for (front, shape) in shapes.iter().enumerate() {
-            if sources[shape.entries.clone()].iter().all(is_same)
-                && shape.children.iter().all(|&c| tasks[c] == Task::TakeOver)
-            {
+            if stays[front] && shape.children.iter().all(|&c| tasks[c] == Task::TakeOver) {
                 tasks[front] = Task::TakeOver;
             }
         }
@@ -170,19 +176,13 @@ impl Multifrontal {
             .collect();
         results.into_iter().collect::<Result<(), _>>()?;
         for &root in &analysis.roots {
-            let relative = &analysis.relative[analysis.fronts[root].rows.clone()];
-            let m = relative.len();
             let mut front = self.front(root);
-            for (j, &column) in relative.iter().enumerate() {
-                let first = if analysis.kind == Kind::Symmetric {
-                    j
-                } else {
-                    0
-                };
-                for i in first..m {
-                    schur[column as usize * n + relative[i] as usize] += front.update[j * m + i];
-                }
-            }
+            Arch::new().dispatch(OnRest {
+                updates: &[self.update_of(root, &front.update)],
+                target: &mut schur,
+                m: n,
+                k: 0,
+            });
             front.update_is_taken();
         }
         if analysis.kind == Kind::Symmetric {
@@ -218,7 +218,7 @@ impl Multifrontal {
         } else if let Some(&child) = shape.children.first() {
             self.branch(child, tasks, values)?;
         }
-        self.eliminate(front, tasks[front], values)
+        self.eliminate(front, tasks[front], values, None, &mut Pile::default())
     }
 
     fn small_branch(
@@ -227,99 +227,153 @@ impl Multifrontal {
         tasks: &[Task],
         values: Values<'_>,
     ) -> Result<(), Singular> {
-        // Every front is visited twice: before its children, and after them.
-        let mut todo = vec![(front, false)];
-        while let Some((front, children_done)) = todo.pop() {
+        let mut piles = self.memory().pop().unwrap_or_default();
+        piles.iter_mut().for_each(Pile::clear);
+        // Every front is visited twice: before its children, and after them. What those leave is on
+        // one pile, what it leaves itself on the other.
+        let mut todo = vec![(front, 0, false)];
+        while let Some((front, depth, children_done)) = todo.pop() {
             if tasks[front] == Task::TakeOver {
                 continue;
             }
             let children = &self.analysis.fronts[front].children;
             if children_done || children.is_empty() {
-                self.eliminate(front, tasks[front], values)?;
+                let [even, odd] = &mut piles;
+                let (own, of_children) = if depth % 2 == 0 {
+                    (even, odd)
+                } else {
+                    (odd, even)
+                };
+                let own = (depth > 0).then_some(own);
+                self.eliminate(front, tasks[front], values, own, of_children)?;
             } else {
-                todo.push((front, true));
-                todo.extend(children.iter().rev().map(|&child| (child, false)));
+                todo.push((front, depth, true));
+                let children = children.iter().rev();
+                todo.extend(children.map(|&child| (child, depth + 1, false)));
             }
         }
+        self.memory().push(piles);
         Ok(())
     }
 
+    fn memory(&self) -> MutexGuard<'_, Vec<[Pile; 2]>> {
+        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn update_of<'u>(&'u self, front: usize, values: &'u [f64]) -> Update<'u> {
+        let shape = &self.analysis.fronts[front];
+        Update {
+            values,
+            size: shape.rows.len(),
+            runs: &self.analysis.runs[shape.runs.clone()],
+            is_symmetric: self.analysis.kind == Kind::Symmetric,
+        }
+    }
+
     /// Assembles a front from the matrix and the updates of its children, and eliminates its pivots.
-    fn eliminate(&self, number: usize, task: Task, values: Values<'_>) -> Result<(), Singular> {
+    /// What it leaves goes to the pile, if there is one and it is not to be kept. What its children
+    /// have left is with them, or the last on their pile.
+    fn eliminate(
+        &self,
+        number: usize,
+        task: Task,
+        values: Values<'_>,
+        own: Option<&mut Pile>,
+        of_children: &mut Pile,
+    ) -> Result<(), Singular> {
         let analysis = &self.analysis;
         let shape = &analysis.fronts[number];
         let (k, m) = (shape.pivots.len(), shape.rows.len());
-        let n = k + m;
-        let symmetric = analysis.kind == Kind::Symmetric;
         let mut guard = self.front(number);
         let front = &mut *guard;
         front.is_retained = task == Task::Restore;
-        front.values.clear();
-        front
-            .values
-            .resize(if symmetric { n * k } else { n * k + k * m }, 0.0);
+        front.assemble(analysis, shape, values);
+        let mut children: Vec<_> = shape.children.iter().map(|&c| self.front(c)).collect();
+        let numbered = || shape.children.iter().zip(&children);
+        let on_pile = numbered().filter(|(_, child)| child.update.is_empty());
+        let size_of = |child: usize| analysis.fronts[child].rows.len().pow(2);
+        let on_pile: usize = on_pile.map(|(&number, _)| size_of(number)).sum();
+        let update = match own {
+            Some(pile) if task != Task::Restore => {
+                front.update = Vec::new();
+                pile.add(m * m)
+            }
+            _ => {
+                front.update.resize(m * m, 0.0);
+                &mut front.update
+            }
+        };
+        let mut from_pile = of_children.last(on_pile);
+        let updates: Vec<Update<'_>> = numbered()
+            .map(|(&number, child)| {
+                let values = if child.update.is_empty() {
+                    from_pile.split_off(..size_of(number)).unwrap_or_default()
+                } else {
+                    &child.update
+                };
+                self.update_of(number, values)
+            })
+            .collect();
+        let parts = (&mut *front.values, update, &mut front.exchanges);
+        eliminate_pivots(analysis.kind, parts, (k, m), &updates)?;
+        of_children.remove(on_pile);
+        for child in &mut children {
+            child.update_is_taken();
+        }
+        if analysis.kind == Kind::Symmetric {
+            pack(&mut front.values, k + m, k);
+        }
+        Ok(())
+    }
+}
+
+/// Eliminates the k pivots of a front with m rows below them: its columns and rows, what it leaves,
+/// and its row exchanges; `updates` are those of its children.
+fn eliminate_pivots(
+    kind: Kind,
+    (values, update, exchanges): (&mut [f64], &mut [f64], &mut Exchanges),
+    (k, m): (usize, usize),
+    updates: &[Update<'_>],
+) -> Result<(), Singular> {
+    let n = k + m;
+    let (l, u) = values.split_at_mut(n * k);
+    Arch::new().dispatch(OnPivots { updates, l, u, k });
+    match kind {
+        Kind::Symmetric => factorise_symmetric(l, n, k, update)?,
+        Kind::Unsymmetric => factorise_unsymmetric(l, u, n, k, update, exchanges)?,
+    }
+    Arch::new().dispatch(OnRest {
+        updates,
+        target: update,
+        m,
+        k,
+    });
+    Ok(())
+}
+
+impl Front {
+    /// Takes the entries of the matrix.
+    fn assemble(&mut self, analysis: &Analysis, shape: &Shape, values: Values<'_>) {
+        let (k, m) = (shape.pivots.len(), shape.rows.len());
+        let len = match analysis.kind {
+            Kind::Symmetric => (k + m) * k,
+            Kind::Unsymmetric => (k + 2 * m) * k,
+        };
+        self.values.clear();
+        self.values.resize(len, 0.0);
         let targets = &analysis.targets[shape.entries.clone()];
         match values {
             Values::OfPattern(values) => {
                 let sources = &analysis.sources[shape.entries.clone()];
                 for (&target, &source) in targets.iter().zip(sources) {
-                    front.values[target as usize] += values[source as usize];
+                    self.values[target as usize] = values[source as usize];
                 }
             }
             Values::OfFronts(values) => {
-                for (&target, value) in targets.iter().zip(&values[shape.entries.clone()]) {
-                    front.values[target as usize] += value;
+                for (&target, &value) in targets.iter().zip(&values[shape.entries.clone()]) {
+                    self.values[target as usize] = value;
                 }
             }
         }
-        front.update = vec![0.0; m * m];
-        let update = &mut front.update;
-        let (l, u) = front.values.split_at_mut(n * k);
-        for &child in &shape.children {
-            let relative = &analysis.relative[analysis.fronts[child].rows.clone()];
-            let mut child = self.front(child);
-            extend(relative, &child.update, k, n, symmetric, l, u, update);
-            child.update_is_taken();
-        }
-        let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
-        let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
-        if symmetric {
-            let scratch =
-                cholesky_kernel::cholesky_in_place_scratch::<f64>(k, Par::Seq, Spec::default());
-            let mut memory = MemBuffer::new(scratch);
-            cholesky_kernel::cholesky_in_place(
-                pivots.rb_mut(),
-                cholesky_kernel::LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Spec::default(),
-            )
-            .map_err(|_| Singular)?;
-            triangular::solve_lower_triangular_in_place(
-                pivots.rb(),
-                below.rb_mut().transpose_mut(),
-                Par::Seq,
-            );
-            subtract_square(update, m, below.rb());
-            pack(&mut front.values, n, k);
-            return Ok(());
-        }
-        dense::factorise(pivots.rb_mut(), &mut front.exchanges)?;
-        let mut exchanged = vec![0.0; k];
-        for column in u.chunks_exact_mut(k) {
-            for (value, &from) in exchanged.iter_mut().zip(&front.exchanges.forward) {
-                *value = column[from];
-            }
-            column.copy_from_slice(&exchanged);
-        }
-        let mut right = MatMut::from_column_major_slice_mut(u, k, m);
-        triangular::solve_unit_lower_triangular_in_place(pivots.rb(), right.rb_mut(), Par::Seq);
-        triangular::solve_lower_triangular_in_place(
-            pivots.rb().transpose(),
-            below.rb_mut().transpose_mut(),
-            Par::Seq,
-        );
-        subtract_product(update, m, below.rb(), right.rb());
-        Ok(())
     }
 }

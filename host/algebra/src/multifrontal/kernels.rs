@@ -1,11 +1,15 @@
-//! Dense work inside a front: the updates of its children, and what it leaves to its parent.
+//! Dense work inside a front, and what it leaves to its parent.
 
+use crate::Singular;
+use crate::dense::{self, Exchanges};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor as cholesky_kernel;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul as triangular_matmul};
-use faer::prelude::ReborrowMut;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::linalg::triangular_solve as triangular;
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Branches with fewer floating-point operations than this are not worth a task of their own.
 pub(super) const WORTHWHILE: f64 = 4e6;
@@ -41,81 +45,8 @@ pub(super) fn pack(values: &mut Vec<f64>, n: usize, k: usize) {
     values.shrink_to_fit();
 }
 
-/// Adds a child's update to its parent's front (L: n × k, U: k × m) and update (m × m).
-#[expect(clippy::too_many_arguments, reason = "one front, in its three parts")]
-pub(super) fn extend(
-    relative: &[u32],
-    of_child: &[f64],
-    k: usize,
-    n: usize,
-    symmetric: bool,
-    l: &mut [f64],
-    u: &mut [f64],
-    update: &mut [f64],
-) {
-    let size = relative.len();
-    let m = n - k;
-    let inside = relative.partition_point(|&at| (at as usize) < k);
-    let runs = runs(relative, inside);
-    for (j, &column) in relative.iter().enumerate() {
-        let source = &of_child[j * size..(j + 1) * size];
-        let column = column as usize;
-        let first = if symmetric { j } else { 0 };
-        if column < k {
-            let target = &mut l[column * n..(column + 1) * n];
-            add(&runs, first, size, source, target, 0);
-        } else {
-            let column = column - k;
-            if !symmetric {
-                let target = &mut u[column * k..(column + 1) * k];
-                add(&runs, 0, inside, source, target, 0);
-            }
-            let target = &mut update[column * m..(column + 1) * m];
-            add(&runs, first.max(inside), size, source, target, k);
-        }
-    }
-}
-
-/// Rows that are neighbours in a child and in its parent.
-struct Run {
-    /// In the child.
-    rows: Range<usize>,
-    /// Where the first one stands in the parent.
-    at: usize,
-}
-
-/// The runs of a child's rows; one ends where those that its parent eliminates end.
-fn runs(relative: &[u32], inside: usize) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
-    for (row, &at) in relative.iter().enumerate() {
-        let at = at as usize;
-        match runs.last_mut() {
-            Some(run) if row != inside && run.at + run.rows.len() == at => run.rows.end += 1,
-            _ => runs.push(Run {
-                rows: row..row + 1,
-                at,
-            }),
-        }
-    }
-    runs
-}
-
-/// Adds rows `from..to` of a child's column to its parent's, which begins with row `top`.
-fn add(runs: &[Run], from: usize, to: usize, source: &[f64], target: &mut [f64], top: usize) {
-    for Run { rows, at } in runs {
-        let (start, end) = (rows.start.max(from), rows.end.min(to));
-        if start < end {
-            let at = at + start - rows.start - top;
-            let target = &mut target[at..at + end - start];
-            for (target, value) in target.iter_mut().zip(&source[start..end]) {
-                *target += value;
-            }
-        }
-    }
-}
-
-/// update −= L Lᵀ, lower half.
-pub(super) fn subtract_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) {
+/// update = −L Lᵀ, lower half.
+fn leave_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) {
     let piece = |(number, columns): (usize, &mut [f64])| {
         let start = number * PIECE;
         let width = columns.len() / m;
@@ -128,7 +59,7 @@ pub(super) fn subtract_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) 
         triangular_matmul(
             square.rb_mut(),
             BlockStructure::TriangularLower,
-            Accum::Add,
+            Accum::Replace,
             of_square,
             BlockStructure::Rectangular,
             of_square.transpose(),
@@ -138,7 +69,7 @@ pub(super) fn subtract_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) 
         );
         matmul(
             rest.rb_mut(),
-            Accum::Add,
+            Accum::Replace,
             of_rest,
             of_square.transpose(),
             -1.0,
@@ -148,18 +79,14 @@ pub(super) fn subtract_square(update: &mut [f64], m: usize, l: MatRef<'_, f64>) 
     in_pieces(update, m, l.ncols(), piece);
 }
 
-/// update −= L U.
-pub(super) fn subtract_product(
-    update: &mut [f64],
-    m: usize,
-    l: MatRef<'_, f64>,
-    u: MatRef<'_, f64>,
-) {
+/// update = −L U.
+fn leave_product(update: &mut [f64], l: MatRef<'_, f64>, u: MatRef<'_, f64>) {
+    let m = l.nrows();
     let piece = |(number, columns): (usize, &mut [f64])| {
         let width = columns.len() / m;
         let target = MatMut::from_column_major_slice_mut(columns, m, width);
         let right = u.subcols(number * PIECE, width);
-        matmul(target, Accum::Add, l, right, -1.0, Par::Seq);
+        matmul(target, Accum::Replace, l, right, -1.0, Par::Seq);
     };
     in_pieces(update, m, l.ncols(), piece);
 }
@@ -183,4 +110,61 @@ fn in_pieces(
     } else {
         update.chunks_mut(PIECE * m).enumerate().for_each(piece);
     }
+}
+
+/// L Lᵀ of the pivots of a front (n × k), and −L Lᵀ of what is below them.
+pub(super) fn factorise_symmetric(
+    l: &mut [f64],
+    n: usize,
+    k: usize,
+    update: &mut [f64],
+) -> Result<(), Singular> {
+    let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
+    let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
+    let scratch = cholesky_kernel::cholesky_in_place_scratch::<f64>(k, Par::Seq, Spec::default());
+    cholesky_kernel::cholesky_in_place(
+        pivots.rb_mut(),
+        cholesky_kernel::LltRegularization::default(),
+        Par::Seq,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Spec::default(),
+    )
+    .map_err(|_| Singular)?;
+    triangular::solve_lower_triangular_in_place(
+        pivots.rb(),
+        below.rb_mut().transpose_mut(),
+        Par::Seq,
+    );
+    leave_square(update, n - k, below.rb());
+    Ok(())
+}
+
+/// L U of the pivots of a front, with L below (n × k) and U beside them (k × m), and −L U of these.
+pub(super) fn factorise_unsymmetric(
+    l: &mut [f64],
+    u: &mut [f64],
+    n: usize,
+    k: usize,
+    update: &mut [f64],
+    exchanges: &mut Exchanges,
+) -> Result<(), Singular> {
+    let mut lower = MatMut::from_column_major_slice_mut(l, n, k);
+    let (mut pivots, mut below) = lower.rb_mut().split_at_row_mut(k);
+    dense::factorise(pivots.rb_mut(), exchanges)?;
+    let mut exchanged = vec![0.0; k];
+    for column in u.chunks_exact_mut(k) {
+        for (value, &from) in exchanged.iter_mut().zip(&exchanges.forward) {
+            *value = column[from];
+        }
+        column.copy_from_slice(&exchanged);
+    }
+    let mut right = MatMut::from_column_major_slice_mut(u, k, n - k);
+    triangular::solve_unit_lower_triangular_in_place(pivots.rb(), right.rb_mut(), Par::Seq);
+    triangular::solve_lower_triangular_in_place(
+        pivots.rb().transpose(),
+        below.rb_mut().transpose_mut(),
+        Par::Seq,
+    );
+    leave_product(update, below.rb(), right.rb());
+    Ok(())
 }

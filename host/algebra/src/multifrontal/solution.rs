@@ -1,7 +1,10 @@
 //! Solutions with the factors, one right-hand side at a time.
 
+use super::analysis::{Analysis, Branch};
 use super::kernels::{dot, packed};
 use super::{Kind, Multifrontal};
+use rayon::prelude::*;
+use std::ops::Range;
 
 impl Multifrontal {
     /// The supernodes that give the values of some equations: theirs, and all above them.
@@ -27,38 +30,25 @@ impl Multifrontal {
         let n_eliminated = analysis.order.len();
         let all = analysis.order.iter().chain(&analysis.kept);
         let mut y: Vec<f64> = all.map(|&equation| right[equation as usize]).collect();
+        let is_wanted = |number: usize| fronts.is_none_or(|fronts| fronts[number]);
+        let solved: Vec<(Vec<f64>, Vec<f64>)> = analysis
+            .branches
+            .par_iter()
+            .with_max_len(1)
+            .map(|branch| self.forward_branch(branch, &y, is_wanted))
+            .collect();
+        // In one order, whoever computed them.
+        for (branch, (values, left)) in analysis.branches.iter().zip(solved) {
+            analysis.put(branch, &values, &mut y);
+            for (&row, value) in analysis.above(branch).iter().zip(left) {
+                y[row as usize] += value;
+            }
+        }
         let mut own = Vec::new();
-        let numbered = analysis.fronts.iter().enumerate();
-        for (number, shape) in numbered.filter(|(number, _)| fronts.is_none_or(|f| f[*number])) {
-            let front = self.front(number);
-            let k = shape.pivots.len();
-            let rows = &analysis.rows[shape.rows.clone()];
-            let n = k + rows.len();
-            own.clear();
-            let start = shape.pivots.start;
-            match analysis.kind {
-                Kind::Symmetric => own.extend_from_slice(&y[shape.pivots.clone()]),
-                Kind::Unsymmetric => {
-                    let exchanged = front.exchanges.forward.iter();
-                    own.extend(exchanged.map(|&from| y[start + from]));
-                }
-            }
-            own.resize(n, 0.0);
-            for j in 0..k {
-                let start = match analysis.kind {
-                    Kind::Symmetric => packed(n, j),
-                    Kind::Unsymmetric => j * n + j,
-                };
-                let column = &front.values[start..start + n - j];
-                if analysis.kind == Kind::Symmetric {
-                    own[j] /= column[0];
-                }
-                let x = own[j];
-                for (value, l) in own[j + 1..].iter_mut().zip(&column[1..]) {
-                    *value -= l * x;
-                }
-            }
-            y[shape.pivots.clone()].copy_from_slice(&own[..k]);
+        for &number in analysis.top.iter().filter(|&&number| is_wanted(number)) {
+            let (pivots, rows) = analysis.shape(number);
+            let k = pivots.len();
+            self.forward_front(number, &mut y[pivots], rows.len(), &mut own);
             for (&row, value) in rows.iter().zip(&own[k..]) {
                 y[row as usize] += value;
             }
@@ -67,49 +57,85 @@ impl Multifrontal {
         (y, kept)
     }
 
+    /// Eliminates the pivots of a branch: their values, and what is left to the rows above it.
+    fn forward_branch(
+        &self,
+        branch: &Branch,
+        y: &[f64],
+        is_wanted: impl Fn(usize) -> bool,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let analysis = &self.analysis;
+        let mut y = analysis.take(branch, y);
+        let mut left = vec![0.0; analysis.above(branch).len()];
+        let mut own = Vec::new();
+        for &number in branch.fronts.iter().filter(|&&number| is_wanted(number)) {
+            let (pivots, rows) = analysis.shape(number);
+            let (k, at) = (pivots.len(), analysis.in_branch[pivots.start] as usize);
+            self.forward_front(number, &mut y[at..at + k], rows.len(), &mut own);
+            let mut places = Places::new(analysis, branch);
+            for (&row, value) in rows.iter().zip(&own[k..]) {
+                match places.of(row) {
+                    Ok(inside) => y[inside] += value,
+                    Err(above) => left[above] += value,
+                }
+            }
+        }
+        (y, left)
+    }
+
+    /// Eliminates the pivots of a front; what is left to its `m` rows stands behind them in `own`.
+    fn forward_front(&self, number: usize, pivots: &mut [f64], m: usize, own: &mut Vec<f64>) {
+        let front = self.front(number);
+        let k = pivots.len();
+        let n = k + m;
+        own.clear();
+        match self.analysis.kind {
+            Kind::Symmetric => own.extend_from_slice(pivots),
+            Kind::Unsymmetric => {
+                let exchanged = front.exchanges.forward.iter();
+                own.extend(exchanged.map(|&from| pivots[from]));
+            }
+        }
+        own.resize(n, 0.0);
+        for j in 0..k {
+            let start = match self.analysis.kind {
+                Kind::Symmetric => packed(n, j),
+                Kind::Unsymmetric => j * n + j,
+            };
+            let column = &front.values[start..start + n - j];
+            if self.analysis.kind == Kind::Symmetric {
+                own[j] /= column[0];
+            }
+            let x = own[j];
+            for (value, l) in own[j + 1..].iter_mut().zip(&column[1..]) {
+                *value -= l * x;
+            }
+        }
+        pivots.copy_from_slice(&own[..k]);
+    }
+
     /// Values of all equations from `y` of [`Self::forward`] and those of the kept ones.
     /// Only those of some supernodes, see [`Self::fronts_of`]; the others mean nothing.
     pub fn backward(&self, y: &[f64], kept: &[f64], fronts: Option<&[bool]>) -> Vec<f64> {
         let analysis = &self.analysis;
         let mut x = [y, kept].concat();
-        let mut own = Vec::new();
-        let numbered = analysis.fronts.iter().enumerate().rev();
-        for (number, shape) in numbered.filter(|(number, _)| fronts.is_none_or(|f| f[*number])) {
-            let front = self.front(number);
-            let k = shape.pivots.len();
-            let rows = &analysis.rows[shape.rows.clone()];
-            let n = k + rows.len();
-            own.clear();
-            own.extend_from_slice(&x[shape.pivots.clone()]);
-            match analysis.kind {
-                Kind::Symmetric => {
-                    let below: Vec<f64> = rows.iter().map(|&row| x[row as usize]).collect();
-                    for j in (0..k).rev() {
-                        let column = &front.values[packed(n, j)..packed(n, j + 1)];
-                        let from_below = dot(&column[k - j..], &below);
-                        let from_own = dot(&column[1..k - j], &own[j + 1..]);
-                        own[j] = (own[j] - from_below - from_own) / column[0];
-                    }
-                }
-                Kind::Unsymmetric => {
-                    let (l, u) = front.values.split_at(n * k);
-                    for (column, &row) in u.chunks_exact(k).zip(rows) {
-                        let value = x[row as usize];
-                        for (own, u) in own.iter_mut().zip(column) {
-                            *own -= u * value;
-                        }
-                    }
-                    for j in (0..k).rev() {
-                        let column = &l[j * n..j * n + k];
-                        own[j] /= column[j];
-                        let value = own[j];
-                        for (own, u) in own[..j].iter_mut().zip(column) {
-                            *own -= u * value;
-                        }
-                    }
-                }
-            }
-            x[shape.pivots.clone()].copy_from_slice(&own);
+        let is_wanted = |number: usize| fronts.is_none_or(|fronts| fronts[number]);
+        let mut below = Vec::new();
+        let top = analysis.top.iter().rev();
+        for &number in top.filter(|&&number| is_wanted(number)) {
+            let (pivots, rows) = analysis.shape(number);
+            below.clear();
+            below.extend(rows.iter().map(|&row| x[row as usize]));
+            self.backward_front(number, &mut x[pivots], &below);
+        }
+        let solved: Vec<Vec<f64>> = analysis
+            .branches
+            .par_iter()
+            .with_max_len(1)
+            .map(|branch| self.backward_branch(branch, &x, is_wanted))
+            .collect();
+        for (branch, values) in analysis.branches.iter().zip(solved) {
+            analysis.put(branch, &values, &mut x);
         }
         let mut result = vec![0.0; x.len()];
         let all = analysis.order.iter().chain(&analysis.kept);
@@ -117,5 +143,125 @@ impl Multifrontal {
             result[equation as usize] = value;
         }
         result
+    }
+
+    /// Values of the pivots of a branch from those of the rows above it.
+    fn backward_branch(
+        &self,
+        branch: &Branch,
+        all: &[f64],
+        is_wanted: impl Fn(usize) -> bool,
+    ) -> Vec<f64> {
+        let analysis = &self.analysis;
+        let mut x = analysis.take(branch, all);
+        let mut below = Vec::new();
+        let fronts = branch.fronts.iter().rev();
+        for &number in fronts.filter(|&&number| is_wanted(number)) {
+            let (pivots, rows) = analysis.shape(number);
+            let mut places = Places::new(analysis, branch);
+            below.clear();
+            below.extend(rows.iter().map(|&row| match places.of(row) {
+                Ok(inside) => x[inside],
+                Err(_) => all[row as usize],
+            }));
+            let at = analysis.in_branch[pivots.start] as usize;
+            self.backward_front(number, &mut x[at..at + pivots.len()], &below);
+        }
+        x
+    }
+
+    /// Values of the pivots of a front from those of the rows below them.
+    fn backward_front(&self, number: usize, own: &mut [f64], below: &[f64]) {
+        let front = self.front(number);
+        let k = own.len();
+        let n = k + below.len();
+        match self.analysis.kind {
+            Kind::Symmetric => {
+                for j in (0..k).rev() {
+                    let column = &front.values[packed(n, j)..packed(n, j + 1)];
+                    let from_below = dot(&column[k - j..], below);
+                    let from_own = dot(&column[1..k - j], &own[j + 1..]);
+                    own[j] = (own[j] - from_below - from_own) / column[0];
+                }
+            }
+            Kind::Unsymmetric => {
+                let (l, u) = front.values.split_at(n * k);
+                for (column, value) in u.chunks_exact(k).zip(below) {
+                    for (own, u) in own.iter_mut().zip(column) {
+                        *own -= u * value;
+                    }
+                }
+                for j in (0..k).rev() {
+                    let column = &l[j * n..j * n + k];
+                    own[j] /= column[j];
+                    let value = own[j];
+                    for (own, u) in own[..j].iter_mut().zip(column) {
+                        *own -= u * value;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Analysis {
+    /// Pivots of a front, and the rows below them.
+    fn shape(&self, front: usize) -> (Range<usize>, &[u32]) {
+        let shape = &self.fronts[front];
+        (shape.pivots.clone(), &self.rows[shape.rows.clone()])
+    }
+
+    /// Rows above a branch that it touches: those of its last front.
+    fn above(&self, branch: &Branch) -> &[u32] {
+        branch.fronts.last().map_or(&[], |&last| self.shape(last).1)
+    }
+
+    /// Values of the pivots of a branch, from those of all positions.
+    fn take(&self, branch: &Branch, values: &[f64]) -> Vec<f64> {
+        let mut taken = Vec::with_capacity(branch.n_pivots);
+        for &front in &branch.fronts {
+            taken.extend_from_slice(&values[self.fronts[front].pivots.clone()]);
+        }
+        taken
+    }
+
+    /// Puts them back.
+    fn put(&self, branch: &Branch, taken: &[f64], values: &mut [f64]) {
+        for &front in &branch.fronts {
+            let pivots = self.fronts[front].pivots.clone();
+            let at = self.in_branch[pivots.start] as usize;
+            values[pivots.clone()].copy_from_slice(&taken[at..at + pivots.len()]);
+        }
+    }
+}
+
+/// Where ascending rows of a front stand: among the pivots of its branch, or the rows above it.
+struct Places<'b> {
+    in_branch: &'b [u32],
+    /// Position of the first pivot above the branch.
+    end: usize,
+    above: &'b [u32],
+    next: usize,
+}
+
+impl<'b> Places<'b> {
+    fn new(analysis: &'b Analysis, branch: &'b Branch) -> Self {
+        let last = branch.fronts.last();
+        Self {
+            in_branch: &analysis.in_branch,
+            end: last.map_or(0, |&last| analysis.fronts[last].pivots.end),
+            above: analysis.above(branch),
+            next: 0,
+        }
+    }
+
+    fn of(&mut self, row: u32) -> Result<usize, usize> {
+        if (row as usize) < self.end {
+            return Ok(self.in_branch[row as usize] as usize);
+        }
+        while self.above[self.next] < row {
+            self.next += 1;
+        }
+        Err(self.next)
     }
 }

@@ -377,12 +377,10 @@ impl Newton<'_> {
             }
         }
         let free = &self.places.free;
-        let mut forces: Vec<f64> = free.iter().map(|&place| by_place[place]).collect();
-        for (column, &place) in free.iter().enumerate() {
-            let rows = pattern.column(column);
-            for (&row, stiffness) in rows.iter().zip(&elastic[pattern.places(column)]) {
-                forces[row as usize] += stiffness * moved[place];
-            }
+        let moved: Vec<f64> = free.iter().map(|&place| moved[place]).collect();
+        let mut forces = pattern.multiply(elastic, &moved);
+        for (force, &place) in forces.iter_mut().zip(free) {
+            *force += by_place[place];
         }
         forces
     }

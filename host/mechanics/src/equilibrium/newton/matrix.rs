@@ -4,7 +4,11 @@ use super::Newton;
 use super::failure::{Reason, StepFailure};
 use crate::settings::Method;
 use law::Operator;
+use rayon::prelude::*;
 use std::time::Instant;
+
+/// Entries that one thread looks at, at a time.
+pub(super) const PER_TASK: usize = 1 << 16;
 
 /// What the solver of a phase holds factorised.
 #[derive(Debug, Default)]
@@ -69,7 +73,9 @@ impl Newton<'_> {
         self.system.assemble(self.groups, &mut values);
         let largest = |largest: f64, value: &f64| largest.max(value.abs());
         let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
-        self.matrix.largest = values.iter().fold(of_domain, largest);
+        let parts = values.par_chunks(PER_TASK);
+        let of_parts = parts.map(|values| values.iter().fold(of_domain, largest));
+        self.matrix.largest = of_parts.reduce(|| of_domain, f64::max);
         let bodies = &self.places.bodies;
         if !bodies.of_equation.is_empty() {
             let mut by_body = vec![0.0; bodies.n];

@@ -20,10 +20,12 @@
 
 use super::Newton;
 use super::failure::{Iterations, Reason, StepFailure};
+use super::matrix::PER_TASK;
 use super::outcome::Iteration;
 use super::residual::{Balance, Task};
 use crate::settings::Settings;
 use law::Operator;
+use rayon::prelude::*;
 
 /// α at first. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
 /// of D + α D_e is positive definite for α above (1/cos θ − 1)/2. This value was found by trial:
@@ -237,11 +239,16 @@ impl Newton<'_> {
     ) -> Result<Vec<f64>, StepFailure> {
         let share = 1.0 / (1.0 + viscosity);
         let mut values = self.stiffness();
-        for (value, elastic) in values.iter_mut().zip(elastic) {
-            if value.to_bits() != elastic.to_bits() {
-                *value = share * (*value + viscosity * elastic);
-            }
-        }
+        let parts = values.par_chunks_mut(PER_TASK);
+        parts
+            .zip(elastic.par_chunks(PER_TASK))
+            .for_each(|(values, elastic)| {
+                for (value, elastic) in values.iter_mut().zip(elastic) {
+                    if value.to_bits() != elastic.to_bits() {
+                        *value = share * (*value + viscosity * elastic);
+                    }
+                }
+            });
         self.factorise(values, 1.0)?;
         let residual: Vec<f64> = residual.iter().map(|r| share * r).collect();
         self.solve(&residual, None)
