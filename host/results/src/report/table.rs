@@ -159,7 +159,8 @@ impl Row {
     /// A cell's number, NaN if it is not a finite one.
     pub(super) fn number(&self, column: usize) -> f64 {
         let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
-        let value = text.trim().parse().unwrap_or(f64::NAN);
+        let value = text.parse().or_else(|_| text.trim().parse());
+        let value = value.unwrap_or(f64::NAN);
         if f64::is_finite(value) {
             value
         } else {
