@@ -241,6 +241,8 @@ pub struct Group {
     pub law_calls: Vec<LawCalls>,
     /// It is there: it has stiffness, weight and stress.
     pub is_active: bool,
+    /// A later phase gives it a law that is not linear.
+    pub will_iterate: bool,
     layer: Option<Layer>,
     /// Pore water that follows the deformation, if it does or did.
     pores: Option<Pores>,
@@ -289,6 +291,7 @@ impl Group {
             moment: Moment::default(),
             law_calls: Vec::new(),
             is_active: true,
+            will_iterate: false,
             layer,
             pores: None,
             varying: None,
@@ -556,6 +559,19 @@ impl Group {
     /// Whether stresses follow strains by one constant matrix.
     pub fn is_linear(&self) -> bool {
         self.tangents_are_constant
+    }
+
+    /// Whether it can be condensed with others for as long as it keeps the laws it is to have: what is
+    /// condensed in one phase is then known in the next.
+    pub fn stays_linear(&self) -> bool {
+        self.is_linear() && !self.will_iterate
+    }
+
+    /// Whether a law leaves it linear.
+    pub fn is_linear_with(&self, law: &Material) -> bool {
+        let law = &law.built.law;
+        let is_same_kind = law.n_components() == self.law.built.law.n_components();
+        law.formulation().linear && is_same_kind
     }
 
     /// Whether the law's tangents are symmetric.

@@ -101,7 +101,7 @@ fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
 }
 
 impl LinearDomain {
-    /// Condenses the linear groups of a mesh whose nodes lie on these lines. `None` if there are
+    /// Condenses the groups that [stay linear](Group::stays_linear), of a mesh whose nodes lie on these lines. `None` if there are
     /// none, or if it does not pay and is not wanted `always`.
     ///
     /// # Errors
@@ -116,7 +116,7 @@ impl LinearDomain {
     ) -> Result<Option<(Self, System)>, Singular> {
         let mut system = System::new(
             groups,
-            |group| group.is_active && group.is_linear(),
+            |group| group.is_active && group.stays_linear(),
             prescribed,
             ties,
             None,
@@ -124,7 +124,7 @@ impl LinearDomain {
         if system.n_equations() == 0 {
             return Ok(None);
         }
-        let is_other = |group: &Group| group.is_active && !group.is_linear();
+        let is_other = |group: &Group| group.is_active && !group.stays_linear();
         let rest = System::new(groups, is_other, prescribed, ties, Some(&system));
         let n_boundary = rest.boundary().len();
         let n_interior = system.n_equations() - n_boundary;
@@ -141,7 +141,7 @@ impl LinearDomain {
         }
         let symmetric = groups
             .iter()
-            .filter(|group| group.is_linear())
+            .filter(|group| group.stays_linear())
             .all(Group::is_symmetric);
         let kind = if symmetric {
             Kind::Symmetric
@@ -307,7 +307,9 @@ impl LinearDomain {
     /// forces += S u.
     pub fn add_product(&self, displacement: &[f64], forces: &mut [f64]) {
         let n = self.boundary.len();
-        for (column, u) in self.stiffness().chunks_exact(n.max(1)).zip(displacement) {
+        let columns = self.stiffness().chunks_exact(n.max(1)).zip(displacement);
+        // Just after a state that is counted from, nothing has moved.
+        for (column, u) in columns.filter(|(_, u)| **u != 0.0) {
             for (force, s) in forces.iter_mut().zip(column) {
                 *force += s * u;
             }

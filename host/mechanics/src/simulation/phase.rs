@@ -250,18 +250,8 @@ impl Simulation {
         mut loads: Loads,
         course: Option<&PhaseCourse>,
     ) -> Result<(PhaseEquations, Loads), Singular> {
+        let condensed = self.condensed(number, is_prescribed);
         let (groups, ties) = (&self.groups, &self.tied);
-        let lines = mesh_lines(&self.problem.mesh.nodes);
-        self.reuse.is_last_phase = number + 1 == self.problem.phases.len();
-        let wanted = self.problem.settings.equations;
-        let condensed = if wanted == Equations::Sparse {
-            None
-        } else {
-            // Groups that are held by the others alone cannot be condensed.
-            let always = wanted == Equations::Condensed;
-            let reuse = Some(&mut self.reuse);
-            LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
-        };
         self.reuse.forget();
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),
@@ -327,6 +317,46 @@ impl Simulation {
             ];
         }
         Ok((equations, loads))
+    }
+
+    /// The linear part of a phase and the equations of the rest, if it is to be condensed: the groups that stay
+    /// linear in the phases to come, which need no other factors then; where that does not pay, those that are now.
+    fn condensed(
+        &mut self,
+        number: usize,
+        is_prescribed: &[bool],
+    ) -> Option<(LinearDomain, System)> {
+        self.reuse.is_last_phase = number + 1 == self.problem.phases.len();
+        let wanted = self.problem.settings.equations;
+        if wanted == Equations::Sparse {
+            return None;
+        }
+        // Groups that are held by the others alone cannot be condensed.
+        let always = wanted == Equations::Condensed;
+        let lines = mesh_lines(&self.problem.mesh.nodes);
+        for group in &mut self.groups {
+            group.will_iterate = false;
+        }
+        let later = self.swaps.iter().skip(number + 1).flatten();
+        let mut waits = false;
+        for (number, law) in later {
+            let group = &mut self.groups[*number];
+            group.will_iterate |= !group.is_linear_with(law);
+            waits |= group.is_linear() && group.will_iterate;
+        }
+        let (groups, ties) = (&self.groups, &self.tied);
+        if waits {
+            let reuse = Some(&mut self.reuse);
+            let lasting = LinearDomain::new(groups, is_prescribed, ties, &lines, false, reuse);
+            if let Ok(Some(lasting)) = lasting {
+                return Some(lasting);
+            }
+        }
+        for group in &mut self.groups {
+            group.will_iterate = false;
+        }
+        let (groups, reuse) = (&self.groups, Some(&mut self.reuse));
+        LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
     }
 
     /// A solver for these equations.
