@@ -490,10 +490,20 @@ fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> 
         };
         let start = pattern.column_start[column];
         let rows = pattern.column(column);
+        // The components of a node mostly stand one after the other.
+        let mut next = 0;
         for (i, &row) in dofs.iter().enumerate() {
-            let row = equation[row].map(|row| row as u32);
-            if let Some(at) = row.and_then(|row| rows.binary_search(&row).ok()) {
+            let Some(row) = equation[row].map(|row| row as u32) else {
+                continue;
+            };
+            let at = if rows.get(next) == Some(&row) {
+                Ok(next)
+            } else {
+                rows.binary_search(&row)
+            };
+            if let Ok(at) = at {
                 slots[i * n + j] = start + at as u32;
+                next = at + 1;
             }
         }
     }
