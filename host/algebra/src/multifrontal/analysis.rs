@@ -251,7 +251,7 @@ impl Analysis {
         let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
         let mut place = vec![0_u32; position.len()];
         let most = match self.kind {
-            Kind::Symmetric => (pattern.rows.len() + pattern.n()) / 2,
+            Kind::Symmetric => pattern.rows.len().midpoint(pattern.n()),
             Kind::Unsymmetric => pattern.rows.len(),
         };
         let (mut sources, mut targets) = (Vec::with_capacity(most), Vec::with_capacity(most));

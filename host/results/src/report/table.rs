@@ -163,9 +163,8 @@ impl Lines {
                     break;
                 }
                 self.n += 1;
-                // A line ends within quotation marks if their number is odd up to there.
-                let marks = self.bytes[from..].iter().filter(|&&byte| byte == b'"');
-                is_open ^= marks.count() % 2 == 1;
+                let line = &self.bytes[from..];
+                is_open = (is_open || line.contains(&b'"')) && ends_open(line, is_open);
                 if !is_open {
                     break;
                 }
@@ -272,6 +271,18 @@ impl Row {
     pub(super) fn count(&self, column: usize) -> Option<usize> {
         self.cell(column).trim().parse().ok()
     }
+}
+
+/// Whether a line ends within the quotation marks of a cell; whether it begins so is known.
+fn ends_open(line: &[u8], mut is_open: bool) -> bool {
+    let (mut begins, mut has_closed) = (!is_open, false);
+    for &byte in line {
+        let is_mark = byte == b'"' && (is_open || begins || has_closed);
+        has_closed = is_mark && is_open;
+        is_open ^= is_mark;
+        begins = byte == b',' && !is_open;
+    }
+    is_open
 }
 
 /// Whether a file ends without the end of a line.
