@@ -221,7 +221,7 @@ impl System {
     /// are neither prescribed nor tied. They may share some with a `domain` of other groups.
     pub fn new(
         groups: &[Group],
-        takes_part: impl Fn(&Group) -> bool,
+        takes_part: impl Fn(usize, &Group) -> bool,
         prescribed: &[bool],
         ties: &[Tie],
         domain: Option<&System>,
@@ -233,8 +233,9 @@ impl System {
         }
         let mut elements: Vec<Vec<ElementMap>> = groups
             .iter()
-            .map(|group| {
-                let n = if takes_part(group) {
+            .enumerate()
+            .map(|(number, group)| {
+                let n = if takes_part(number, group) {
                     group.kinematics.n_elements()
                 } else {
                     0

@@ -241,8 +241,6 @@ pub struct Group {
     pub law_calls: Vec<LawCalls>,
     /// It is there: it has stiffness, weight and stress.
     pub is_active: bool,
-    /// A later phase gives it a law that is not linear.
-    pub will_iterate: bool,
     layer: Option<Layer>,
     /// Pore water that follows the deformation, if it does or did.
     pores: Option<Pores>,
@@ -291,7 +289,6 @@ impl Group {
             moment: Moment::default(),
             law_calls: Vec::new(),
             is_active: true,
-            will_iterate: false,
             layer,
             pores: None,
             varying: None,
@@ -559,12 +556,6 @@ impl Group {
     /// Whether stresses follow strains by one constant matrix.
     pub fn is_linear(&self) -> bool {
         self.tangents_are_constant
-    }
-
-    /// Whether it can be condensed with others for as long as it keeps the laws it is to have: what is
-    /// condensed in one phase is then known in the next.
-    pub fn stays_linear(&self) -> bool {
-        self.is_linear() && !self.will_iterate
     }
 
     /// Whether a law leaves it linear.

@@ -57,7 +57,6 @@ impl Shortest {
 fn whole(text: &[u8]) -> i32 {
     let (sign, digits) = match text {
         [b'-', digits @ ..] => (-1, digits),
-        [b'+', digits @ ..] => (1, digits),
         digits => (1, digits),
     };
     let value = |value: i32, digit: &u8| 10 * value + i32::from(digit - b'0');

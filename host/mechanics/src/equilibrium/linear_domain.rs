@@ -101,13 +101,13 @@ fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
 }
 
 impl LinearDomain {
-    /// Condenses the groups that [stay linear](Group::stays_linear), of a mesh whose nodes lie on these lines. `None` if there are
-    /// none, or if it does not pay and is not wanted `always`.
+    /// Condenses those of the groups that are to be `condensed`, all of them linear, of a mesh whose nodes lie
+    /// on these lines. `None` if there are none, or if it does not pay and is not wanted `always`.
     ///
     /// # Errors
     /// [`Singular`] if they are not held where they are not connected to the rest.
     pub fn new(
-        groups: &[Group],
+        (groups, condensed): (&[Group], &[bool]),
         prescribed: &[bool],
         ties: &[Tie],
         lines: &[[u32; 2]],
@@ -116,7 +116,7 @@ impl LinearDomain {
     ) -> Result<Option<(Self, System)>, Singular> {
         let mut system = System::new(
             groups,
-            |group| group.is_active && group.stays_linear(),
+            |number, group| group.is_active && condensed[number],
             prescribed,
             ties,
             None,
@@ -124,7 +124,7 @@ impl LinearDomain {
         if system.n_equations() == 0 {
             return Ok(None);
         }
-        let is_other = |group: &Group| group.is_active && !group.stays_linear();
+        let is_other = |number: usize, group: &Group| group.is_active && !condensed[number];
         let rest = System::new(groups, is_other, prescribed, ties, Some(&system));
         let n_boundary = rest.boundary().len();
         let n_interior = system.n_equations() - n_boundary;
@@ -141,8 +141,8 @@ impl LinearDomain {
         }
         let symmetric = groups
             .iter()
-            .filter(|group| group.stays_linear())
-            .all(Group::is_symmetric);
+            .zip(condensed)
+            .all(|(group, condensed)| !condensed || group.is_symmetric());
         let kind = if symmetric {
             Kind::Symmetric
         } else {

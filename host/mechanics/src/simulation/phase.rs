@@ -256,7 +256,13 @@ impl Simulation {
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),
             None => (
-                System::new(groups, |group| group.is_active, is_prescribed, ties, None),
+                System::new(
+                    groups,
+                    |_, group| group.is_active,
+                    is_prescribed,
+                    ties,
+                    None,
+                ),
                 None,
             ),
         };
@@ -334,29 +340,27 @@ impl Simulation {
         // Groups that are held by the others alone cannot be condensed.
         let always = wanted == Equations::Condensed;
         let lines = mesh_lines(&self.problem.mesh.nodes);
-        for group in &mut self.groups {
-            group.will_iterate = false;
-        }
-        let later = self.swaps.iter().skip(number + 1).flatten();
-        let mut waits = false;
-        for (number, law) in later {
-            let group = &mut self.groups[*number];
-            group.will_iterate |= !group.is_linear_with(law);
-            waits |= group.is_linear() && group.will_iterate;
-        }
         let (groups, ties) = (&self.groups, &self.tied);
-        if waits {
-            let reuse = Some(&mut self.reuse);
-            let lasting = LinearDomain::new(groups, is_prescribed, ties, &lines, false, reuse);
-            if let Ok(Some(lasting)) = lasting {
-                return Some(lasting);
+        let linear: Vec<bool> = groups.iter().map(Group::is_linear).collect();
+        let mut lasting = linear.clone();
+        for (group, law) in self.swaps.iter().skip(number + 1).flatten() {
+            lasting[*group] &= groups[*group].is_linear_with(law);
+        }
+        if lasting != linear {
+            let (of, reuse) = (
+                (groups.as_slice(), lasting.as_slice()),
+                Some(&mut self.reuse),
+            );
+            let found = LinearDomain::new(of, is_prescribed, ties, &lines, false, reuse);
+            if let Ok(Some(found)) = found {
+                return Some(found);
             }
         }
-        for group in &mut self.groups {
-            group.will_iterate = false;
-        }
-        let (groups, reuse) = (&self.groups, Some(&mut self.reuse));
-        LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
+        let (of, reuse) = (
+            (groups.as_slice(), linear.as_slice()),
+            Some(&mut self.reuse),
+        );
+        LinearDomain::new(of, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
     }
 
     /// A solver for these equations.
