@@ -55,12 +55,10 @@ impl Shortest {
 
 /// A whole number, with its sign.
 fn whole(text: &[u8]) -> i32 {
-    let (sign, digits) = match text {
-        [b'-', digits @ ..] => (-1, digits),
-        digits => (1, digits),
-    };
+    let sign = if text.starts_with(b"-") { -1 } else { 1 };
+    let digits = text.iter().skip_while(|byte| !byte.is_ascii_digit());
     let value = |value: i32, digit: &u8| 10 * value + i32::from(digit - b'0');
-    sign * digits.iter().fold(0, value)
+    sign * digits.fold(0, value)
 }
 
 /// Appends a number with 17 significant digits: the shortest that read back to the same bits, filled up with
