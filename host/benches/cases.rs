@@ -63,7 +63,7 @@ impl Equations {
             let evaluated = group.evaluate(&still, Operator::Consistent, 0.0, 1.0);
             evaluated.expect("the law starts");
         }
-        let system = System::new(&model.groups, |_| true, &prescribed, &model.ties, None);
+        let system = System::new(&model.groups, |_, _| true, &prescribed, &model.ties, None);
         Self {
             lines: system.lines(&mesh_lines(&problem.mesh.nodes)),
             groups: model.groups,
@@ -205,7 +205,9 @@ impl Chamber {
     fn condense(&self) -> (LinearDomain, System) {
         let Model { groups, ties, .. } = &self.model;
         let lines = mesh_lines(&self.mesh.nodes);
-        let condensed = LinearDomain::new(groups, &self.prescribed, ties, &lines, true, None);
+        let linear: Vec<bool> = groups.iter().map(mechanics::group::Group::is_linear).collect();
+        let of = (groups.as_slice(), linear.as_slice());
+        let condensed = LinearDomain::new(of, &self.prescribed, ties, &lines, true, None);
         condensed.expect("supported").expect("linear groups")
     }
 }

@@ -71,8 +71,8 @@ fn condensing_the_ground_changes_no_answer() {
             panic!("three variants")
         };
         if case == "chamber_mesh1" {
-            // All is linear in its confinement, and factorised once.
-            assert_eq!(condensed.1[0], 1);
+            // In its confinement the interface is linear, but not later: it is factorised beside the ground.
+            assert_eq!(condensed.1[0], 2);
         }
         assert_eq!(auto.1, condensed.1, "auto condenses here");
         let probes = condensed.0[0].keys();
@@ -136,6 +136,25 @@ fn variants_on_one_mesh_share_the_factors_of_the_ground() {
     assert_eq!(changed, changed_own);
     assert!(alone == together, "reuse changes results");
     assert!(alone == last, "what is not kept changes results");
+}
+
+#[test]
+fn a_phase_whose_interface_iterates_uses_the_factors_of_the_one_before() {
+    let variants = "[[variant]]\nname = \"kept\"\nsolver.method = \"initial_stress\"\n";
+    let folder = tempfile::tempdir().unwrap();
+    let mut reuse = Reuse::default();
+    let case = &chamber("chamber_mesh1", variants)[0];
+    let options = Options::default();
+    run_reusing(
+        case,
+        folder.path(),
+        &mut Silent::default(),
+        &mut reuse,
+        options,
+    )
+    .unwrap();
+    // Ground and interface; the interface alone; both, since the head is held.
+    assert_eq!(factorisations(folder.path()), [2, 1, 2]);
 }
 
 /// A column on a linear thin layer with mean strain: its mid-thickness nodes are tied. Beside it one

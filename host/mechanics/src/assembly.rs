@@ -225,7 +225,7 @@ impl System {
     /// are neither prescribed nor tied. They may share some with a `domain` of other groups.
     pub fn new(
         groups: &[Group],
-        takes_part: impl Fn(&Group) -> bool,
+        takes_part: impl Fn(usize, &Group) -> bool,
         prescribed: &[bool],
         ties: &[Tie],
         domain: Option<&System>,
@@ -237,8 +237,9 @@ impl System {
         }
         let mut elements: Vec<Vec<ElementMap>> = groups
             .iter()
-            .map(|group| {
-                let n = if takes_part(group) {
+            .enumerate()
+            .map(|(number, group)| {
+                let n = if takes_part(number, group) {
                     group.kinematics.n_elements()
                 } else {
                     0
@@ -550,10 +551,20 @@ fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> 
         };
         let start = pattern.column_start[column];
         let rows = pattern.column(column);
+        // The components of a node mostly stand one after the other.
+        let mut next = 0;
         for (i, &row) in dofs.iter().enumerate() {
-            let row = equation[row].map(|row| row as u32);
-            if let Some(at) = row.and_then(|row| rows.binary_search(&row).ok()) {
+            let Some(row) = equation[row].map(|row| row as u32) else {
+                continue;
+            };
+            let at = if rows.get(next) == Some(&row) {
+                Ok(next)
+            } else {
+                rows.binary_search(&row)
+            };
+            if let Ok(at) = at {
                 slots[i * n + j] = start + at as u32;
+                next = at + 1;
             }
         }
     }

@@ -558,6 +558,13 @@ impl Group {
         self.tangents_are_constant
     }
 
+    /// Whether a law leaves it linear.
+    pub fn is_linear_with(&self, law: &Material) -> bool {
+        let law = &law.built.law;
+        let is_same_kind = law.n_components() == self.law.built.law.n_components();
+        law.formulation().linear && is_same_kind
+    }
+
     /// Whether the law's tangents are symmetric.
     pub fn is_symmetric(&self) -> bool {
         self.law.built.law.formulation().symmetric

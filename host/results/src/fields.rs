@@ -2,6 +2,7 @@
 
 use crate::file;
 use crate::pressures::Pressure;
+use crate::table::{push_count, push_shortest};
 use crate::wanted::{Output, When};
 use mechanics::Simulation;
 use mechanics::problem::Formulation;
@@ -158,6 +159,26 @@ fn mesh_error(snapshot: &Snapshot<'_>) -> (String, Vec<f64>) {
     ("mesh_error".to_owned(), values.collect())
 }
 
+/// Whole numbers, each with a blank after it.
+fn list(values: &[usize]) -> String {
+    let mut text = Vec::new();
+    for &value in values {
+        push_count(&mut text, value);
+        text.push(b' ');
+    }
+    String::from_utf8_lossy(&text).into_owned()
+}
+
+/// Numbers, each with a blank after it.
+fn reals(values: impl Iterator<Item = f64>) -> String {
+    let mut text = Vec::new();
+    for value in values {
+        push_shortest(&mut text, value);
+        text.push(b' ');
+    }
+    String::from_utf8_lossy(&text).into_owned()
+}
+
 /// The text of a file. Cells stand group by group, as `cell_data` has them.
 pub(crate) fn unstructured_grid(
     snapshot: &Snapshot<'_>,
@@ -165,7 +186,7 @@ pub(crate) fn unstructured_grid(
     has_mesh_error: bool,
 ) -> String {
     let mesh = snapshot.mesh;
-    let mut connectivity = String::new();
+    let mut connectivity = Vec::new();
     let (mut offsets, mut types, mut groups) = (Vec::new(), Vec::new(), Vec::new());
     let mut active = Vec::new();
     let mut end = 0;
@@ -174,9 +195,7 @@ pub(crate) fn unstructured_grid(
             let nodes = group.kinematics.nodes(element);
             let is_joint = group.formulation == Formulation::ZeroThickness;
             let shown = if is_joint { &nodes[..3] } else { nodes };
-            for node in shown {
-                let _ = write!(connectivity, "{node} ");
-            }
+            connectivity.extend(shown.iter().copied());
             end += shown.len();
             offsets.push(end);
             types.push(cell_type(shown.len()).map_or(0, usize::from));
@@ -184,32 +203,21 @@ pub(crate) fn unstructured_grid(
             active.push(usize::from(group.is_active));
         }
     }
-    let list = |values: &[usize]| {
-        values.iter().fold(String::new(), |mut text, value| {
-            let _ = write!(text, "{value} ");
-            text
-        })
-    };
-    let reals = |values: &mut dyn Iterator<Item = f64>| {
-        values.fold(String::new(), |mut text, value| {
-            let _ = write!(text, "{value:e} ");
-            text
-        })
-    };
-    let points = reals(&mut mesh.nodes.iter().flat_map(|[x, y]| [*x, *y, 0.0]));
+    let points = reals(mesh.nodes.iter().flat_map(|[x, y]| [*x, *y, 0.0]));
     let u = reals(
-        &mut snapshot
+        snapshot
             .displacement
             .chunks_exact(2)
             .flat_map(|u| [u[0], u[1], 0.0]),
     );
+    let connectivity = list(&connectivity);
     let mut cells = String::new();
     let of_mesh = has_mesh_error.then(|| mesh_error(snapshot));
     for (name, values) in cell_data(snapshot, has_pressures)
         .into_iter()
         .chain(of_mesh)
     {
-        let values = reals(&mut values.into_iter());
+        let values = reals(values.into_iter());
         let _ = writeln!(
             cells,
             "<DataArray type=\"Float64\" Name=\"{name}\" format=\"ascii\">{values}</DataArray>"

@@ -162,10 +162,6 @@ impl Appended {
         Ok(self)
     }
 
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
     fn extent(&self) -> Extent {
         Extent {
             length: self.length,

@@ -84,7 +84,7 @@ impl Points {
                     .map(|id| group.internal_variable(point, id));
                 let numbers = values.map(Some).chain(pressures).chain(internal);
                 self.table
-                    .row(place.into_iter().chain(numbers.map(Cell::Number)))?;
+                    .row(place.into_iter().chain(numbers.map(Cell::Number)));
             }
         }
         self.table.flush()

@@ -3,6 +3,7 @@
 use crate::file::Extent;
 use crate::pressures::Pressure;
 use crate::recorder::{Cell, Table, internal_variables};
+use crate::table::{push, push_count, push_text};
 use crate::wanted::When;
 use mechanics::group::Group;
 use mechanics::simulation::Snapshot;
@@ -19,6 +20,9 @@ pub(crate) struct Profile {
     has_water: bool,
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,
+    /// What is the same in every increment: group, element, point and position of every point, as cells; by
+    /// group, as soon as one is written.
+    places: Vec<Vec<Vec<u8>>>,
 }
 
 impl Profile {
@@ -58,28 +62,27 @@ impl Profile {
             table,
             has_water,
             variables,
+            places: vec![Vec::new(); simulation.groups().len()],
         }))
     }
 
     pub(crate) fn write(&mut self, place: &Place, snapshot: &Snapshot<'_>) -> Result<(), Error> {
         let groups = snapshot.groups.iter().enumerate();
         for (number, group) in groups.filter(|(_, group)| group.is_active) {
-            for point in 0..group.kinematics.n_points() {
+            if self.places[number].is_empty() && group.jump_and_traction(0).is_some() {
+                let points = 0..group.kinematics.n_points();
+                self.places[number] = points.map(|point| cells_of(group, point)).collect();
+            }
+            for (point, cells) in self.places[number].iter().enumerate() {
                 let Some((jump, traction)) = group.jump_and_traction(point) else {
                     break;
                 };
-                let [x, y] = group.kinematics.position(point);
-                let (element, within) = group.kinematics.place_of(point);
-                let along = group.kinematics.axes(element).along;
-                let s = along[0] * x + along[1] * y;
                 let place = [
                     Cell::Text(&place.phase),
                     Cell::Count(place.increment),
-                    Cell::Text(&group.name),
-                    Cell::Count(element + 1),
-                    Cell::Count(within + 1),
+                    Cell::Written(cells),
                 ];
-                let values = [x, y, s, jump[0], jump[1], traction[0], traction[1]].map(Some);
+                let values = [jump[0], jump[1], traction[0], traction[1]].map(Some);
                 let pressure = self
                     .has_water
                     .then(|| Pressure::Pore.at(snapshot, number, point));
@@ -89,9 +92,28 @@ impl Profile {
                     .map(|id| group.internal_variable(point, id));
                 let numbers = values.into_iter().chain(pressure).chain(internal);
                 self.table
-                    .row(place.into_iter().chain(numbers.map(Cell::Number)))?;
+                    .row(place.into_iter().chain(numbers.map(Cell::Number)));
             }
         }
         self.table.flush()
     }
+}
+
+/// What is the same in every row of a point: its group, its element, its number there, where it is.
+fn cells_of(group: &Group, point: usize) -> Vec<u8> {
+    let [x, y] = group.kinematics.position(point);
+    let (element, within) = group.kinematics.place_of(point);
+    let along = group.kinematics.axes(element).along;
+    let s = along[0] * x + along[1] * y;
+    let mut cells = Vec::new();
+    push_text(&mut cells, &group.name);
+    for count in [element + 1, within + 1] {
+        cells.push(b',');
+        push_count(&mut cells, count);
+    }
+    for value in [x, y, s] {
+        cells.push(b',');
+        push(&mut cells, value);
+    }
+    cells
 }

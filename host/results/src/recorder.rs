@@ -13,7 +13,7 @@ use crate::points::Points;
 use crate::probe::{Probes, Sizes};
 use crate::profile::Profile;
 use crate::summary::{About, Course, Ending, Stopped, Summary};
-use crate::table::Number;
+use crate::table::{push, push_count, push_text};
 use crate::wanted::{Output, Wanted, When};
 use mechanics::equilibrium::Iteration;
 use mechanics::group::Group;
@@ -115,6 +115,21 @@ pub(crate) enum Cell<'a> {
     Count(usize),
     /// Empty where there is none.
     Number(Option<f64>),
+    /// Some cells as a row has them.
+    Written(&'a [u8]),
+}
+
+impl Cell<'_> {
+    /// Appends it to a row.
+    pub(crate) fn push(self, row: &mut Vec<u8>) {
+        match self {
+            Cell::Text(text) => push_text(row, text),
+            Cell::Count(count) => push_count(row, count),
+            Cell::Number(None) => (),
+            Cell::Number(Some(value)) => push(row, value),
+            Cell::Written(cells) => row.extend_from_slice(cells),
+        }
+    }
 }
 
 /// A CSV file.
@@ -122,7 +137,7 @@ pub(crate) enum Cell<'a> {
 pub(crate) struct Table {
     file: Appended,
     /// Rows that are not in the file yet.
-    rows: csv::Writer<Vec<u8>>,
+    rows: Vec<u8>,
 }
 
 impl Table {
@@ -134,40 +149,30 @@ impl Table {
     ) -> Result<Self, Error> {
         let mut table = Self {
             file: Appended::begin(path, from)?,
-            rows: csv::Writer::from_writer(Vec::new()),
+            rows: Vec::new(),
         };
         if from.is_none() {
-            table.row(columns.into_iter().map(Cell::Text))?;
+            table.row(columns.into_iter().map(Cell::Text));
             table.flush()?;
         }
         Ok(table)
     }
 
-    pub(crate) fn row<'a>(
-        &mut self,
-        cells: impl IntoIterator<Item = Cell<'a>>,
-    ) -> Result<(), Error> {
-        let rows = &mut self.rows;
-        let mut write = |cell: Cell<'_>| match cell {
-            Cell::Text(text) => rows.write_field(text),
-            Cell::Count(count) => rows.write_field(count.to_string()),
-            Cell::Number(None) => rows.write_field(b""),
-            Cell::Number(Some(value)) => rows.write_field(Number::of(value).as_bytes()),
-        };
-        cells
-            .into_iter()
-            .try_for_each(&mut write)
-            .and_then(|()| rows.write_record(None::<&[u8]>))
-            .map_err(|error| Error::unwritable(self.file.path(), std::io::Error::other(error)))
+    /// Adds a row, of two cells at least.
+    pub(crate) fn row<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) {
+        for cell in cells {
+            cell.push(&mut self.rows);
+            self.rows.push(b',');
+        }
+        self.rows.pop();
+        self.rows.push(b'\n');
     }
 
     /// Writes the rows that are waiting, all of them or none.
     pub(crate) fn flush(&mut self) -> Result<(), Error> {
-        let rows = std::mem::replace(&mut self.rows, csv::Writer::from_writer(Vec::new()));
-        let rows = rows
-            .into_inner()
-            .map_err(|error| Error::Internal(error.to_string()))?;
-        self.file.append(&rows)
+        let written = self.file.append(&self.rows);
+        self.rows.clear();
+        written
     }
 
     /// Waits until everything is on the disk.
@@ -470,7 +475,7 @@ impl Recorder {
         let Some(path) = &mut self.path else {
             return Ok(());
         };
-        path.row(history_row(place, load_factor, &probes, iterations))?;
+        path.row(history_row(place, load_factor, &probes, iterations));
         Ok(path.flush()?)
     }
 
@@ -556,7 +561,7 @@ impl Recorder {
         let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
         self.history
-            .row(history_row(place, *time, &probes, increment.iterations))?;
+            .row(history_row(place, *time, &probes, increment.iterations));
         self.history.flush()?;
         if self.settings.profile.includes(place.increment, *of)
             && let Some(profile) = &mut self.profile

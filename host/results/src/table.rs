@@ -1,98 +1,134 @@
 //! Numbers as tables have them.
 
-use std::fmt;
-
 /// Significant digits: reading them back gives the same bits.
 const DIGITS: usize = 17;
-/// Of the longest number: `-1.2345678901234567e-308`.
-const LONGEST: usize = DIGITS + 7;
 
-/// A number with 17 significant digits.
-#[derive(Clone, Copy)]
-pub(crate) struct Number {
-    text: [u8; LONGEST],
-    length: usize,
+/// The shortest decimal digits that read back to the same bits.
+struct Shortest {
+    /// Filled up with zeros.
+    digits: [u8; DIGITS],
+    /// So many of them are shown where they are not filled up, at least one.
+    n: usize,
+    /// Power of ten of the first.
+    exponent: i32,
 }
 
-impl Number {
-    /// The shortest digits that read back to the same bits, filled up with zeros: much faster than the first 17
-    /// digits of the exact value, which are no more exact.
-    pub(crate) fn of(value: f64) -> Self {
-        let mut number = Self {
-            text: [b'0'; LONGEST],
-            length: 0,
-        };
-        if !value.is_finite() {
-            let text = match value {
-                f64::INFINITY => "inf",
-                f64::NEG_INFINITY => "-inf",
-                _ => "NaN",
-            };
-            number.push(text.as_bytes());
-            return number;
-        }
-        if value.is_sign_negative() {
-            number.push(b"-");
-        }
+impl Shortest {
+    /// Those of a finite number's size.
+    fn of(value: f64) -> Self {
         let mut buffer = zmij::Buffer::new();
-        let shortest = buffer.format_finite(value.abs());
-        let (digits, exponent) = shortest.split_once('e').unwrap_or((shortest, "0"));
-        let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-        let exponent: i32 = exponent.parse().unwrap_or_default();
-        if whole == "0" {
-            let significant = fraction.trim_start_matches('0');
-            let n_zeros = fraction.len() - significant.len();
-            if significant.is_empty() {
-                number.scientific("0", "", 0);
-            } else {
-                number.scientific(significant, "", exponent - 1 - n_zeros as i32);
-            }
-        } else {
-            number.scientific(whole, fraction, exponent + whole.len() as i32 - 1);
+        let text = buffer.format_finite(value.abs()).as_bytes();
+        let find = |text: &[u8], wanted: u8| text.iter().position(|&byte| byte == wanted);
+        let (mantissa, power) = match find(text, b'e') {
+            Some(at) => (&text[..at], whole(&text[at + 1..])),
+            None => (text, 0),
+        };
+        let (before, after) = match find(mantissa, b'.') {
+            Some(at) => (&mantissa[..at], &mantissa[at + 1..]),
+            None => (mantissa, &[][..]),
+        };
+        let mut shortest = Self {
+            digits: [b'0'; DIGITS],
+            n: 1,
+            exponent: 0,
+        };
+        if before != b"0" {
+            shortest.exponent = power + before.len() as i32 - 1;
+            let n = shortest.take(before, 0);
+            shortest.take(after, n);
+        } else if let Some(zeros) = after.iter().position(|&byte| byte != b'0') {
+            shortest.exponent = power - 1 - zeros as i32;
+            shortest.take(&after[zeros..], 0);
         }
-        number
+        let last = shortest.digits.iter().rposition(|&digit| digit != b'0');
+        shortest.n = last.map_or(1, |last| last + 1);
+        shortest
     }
 
-    /// Digits in two pieces, the first not empty; 17 of them, or with zeros from then on.
-    fn scientific(&mut self, digits: &str, more: &str, exponent: i32) {
-        let (first, rest) = digits.as_bytes().split_at(1);
-        self.push(first);
-        self.push(b".");
-        let end = self.length + DIGITS - 1;
-        self.push(rest);
-        let more = more.as_bytes();
-        self.push(&more[..more.len().min(end - self.length)]);
-        self.length = end;
-        self.push(if exponent < 0 { b"e-" } else { b"e" });
-        let size = exponent.unsigned_abs();
-        for (least, unit) in [(100, 100), (10, 10), (0, 1)] {
-            if size >= least {
-                self.push(&[b'0' + (size / unit % 10) as u8]);
-            }
-        }
-    }
-
-    fn push(&mut self, bytes: &[u8]) {
-        let end = self.length + bytes.len();
-        self.text[self.length..end].copy_from_slice(bytes);
-        self.length = end;
-    }
-
-    /// Its characters, all of them ASCII.
-    pub(crate) fn as_bytes(&self) -> &[u8] {
-        &self.text[..self.length]
+    /// Takes digits from this place on; the place after them. Zeros at the end need no place.
+    fn take(&mut self, digits: &[u8], from: usize) -> usize {
+        let end = (from + digits.len()).min(DIGITS);
+        self.digits[from..end].copy_from_slice(&digits[..end - from]);
+        end
     }
 }
 
-impl fmt::Display for Number {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&String::from_utf8_lossy(self.as_bytes()))
+/// A whole number, with its sign.
+fn whole(text: &[u8]) -> i32 {
+    let sign = if text.starts_with(b"-") { -1 } else { 1 };
+    let digits = text.iter().skip_while(|byte| !byte.is_ascii_digit());
+    let value = |value: i32, digit: &u8| 10 * value + i32::from(digit - b'0');
+    sign * digits.fold(0, value)
+}
+
+/// Appends a number with 17 significant digits: the shortest that read back to the same bits, filled up with
+/// zeros. That is much faster than the first 17 digits of the exact value, which are no more exact.
+pub(crate) fn push(text: &mut Vec<u8>, value: f64) {
+    push_digits(text, value, |_| DIGITS);
+}
+
+/// Appends a number in the form of `{:e}`: the shortest digits that read back to the same bits.
+pub(crate) fn push_shortest(text: &mut Vec<u8>, value: f64) {
+    push_digits(text, value, |shortest| shortest.n);
+}
+
+fn push_digits(text: &mut Vec<u8>, value: f64, n: impl Fn(&Shortest) -> usize) {
+    if !value.is_finite() {
+        text.extend_from_slice(match value {
+            f64::INFINITY => b"inf",
+            f64::NEG_INFINITY => b"-inf",
+            _ => b"NaN",
+        });
+        return;
     }
+    if value.is_sign_negative() {
+        text.push(b'-');
+    }
+    let shortest = Shortest::of(value);
+    let (first, rest) = shortest.digits[..n(&shortest)].split_at(1);
+    text.extend_from_slice(first);
+    if !rest.is_empty() {
+        text.push(b'.');
+        text.extend_from_slice(rest);
+    }
+    text.push(b'e');
+    if shortest.exponent < 0 {
+        text.push(b'-');
+    }
+    push_count(text, shortest.exponent.unsigned_abs() as usize);
+}
+
+/// Appends a whole number.
+pub(crate) fn push_count(text: &mut Vec<u8>, count: usize) {
+    // The largest has 20 digits.
+    let mut digits = [b'0'; 20];
+    let (mut at, mut left) = (digits.len() - 1, count);
+    digits[at] += (left % 10) as u8;
+    while left >= 10 {
+        left /= 10;
+        at -= 1;
+        digits[at] += (left % 10) as u8;
+    }
+    text.extend_from_slice(&digits[at..]);
+}
+
+/// Appends a cell of a CSV file, in quotation marks where it needs them.
+pub(crate) fn push_text(row: &mut Vec<u8>, text: &str) {
+    let is_special = |byte: u8| matches!(byte, b',' | b'"' | b'\r' | b'\n');
+    if !text.bytes().any(is_special) {
+        row.extend_from_slice(text.as_bytes());
+        return;
+    }
+    row.push(b'"');
+    row.extend_from_slice(text.replace('"', "\"\"").as_bytes());
+    row.push(b'"');
 }
 
 /// A number with 17 significant digits: reading it back gives the same bits.
 pub fn number(value: f64) -> String {
-    Number::of(value).to_string()
+    let mut text = Vec::with_capacity(DIGITS + 7);
+    push(&mut text, value);
+    String::from_utf8_lossy(&text).into_owned()
 }
 
 #[cfg(test)]
@@ -135,6 +171,9 @@ mod tests {
             assert_eq!(back.to_bits(), value.to_bits(), "{text}");
             // As the standard library has it, but for the zeros.
             let short = format!("{value:e}");
+            let mut shortest = Vec::new();
+            push_shortest(&mut shortest, value);
+            assert_eq!(shortest, short.as_bytes());
             let (shown, exponent) = short.split_once('e').unwrap();
             assert!(text.starts_with(shown), "{text} {short}");
             assert!(text.ends_with(&format!("e{exponent}")), "{text} {short}");
@@ -143,5 +182,42 @@ mod tests {
         assert_eq!(number(0.0), "0.0000000000000000e0");
         assert_eq!(number(f64::NAN), "NaN");
         assert_eq!(number(f64::NEG_INFINITY), "-inf");
+    }
+
+    #[test]
+    fn shortest_digits_are_as_many_as_those_of_the_standard_library() {
+        // Bits of all kinds, by a multiplicative sequence.
+        let mut bits = 1_u64;
+        for _ in 0..100_000 {
+            bits = bits.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+            let value = f64::from_bits(bits.rotate_left(11));
+            let mut text = Vec::new();
+            push_shortest(&mut text, value);
+            let text = String::from_utf8(text).unwrap();
+            // Of two that are as near to it either will do.
+            let back: f64 = text.parse().unwrap();
+            assert!(
+                back.to_bits() == value.to_bits() || value.is_nan(),
+                "{text}"
+            );
+            assert_eq!(text.len(), format!("{value:e}").len(), "{text}");
+        }
+    }
+
+    #[test]
+    fn counts_and_texts_are_those_of_a_csv_file() {
+        for count in [0, 7, 10, 99, 100, 12_345, usize::MAX] {
+            let mut text = Vec::new();
+            push_count(&mut text, count);
+            assert_eq!(String::from_utf8(text).unwrap(), count.to_string());
+        }
+        for text in ["sand", "", "a,b", "say \"so\"", "two\nlines", "a\rb", " b "] {
+            let mut own = Vec::new();
+            push_text(&mut own, text);
+            own.extend_from_slice(b",1\n");
+            let mut writer = csv::Writer::from_writer(Vec::new());
+            writer.write_record([text, "1"]).unwrap();
+            assert_eq!(own, writer.into_inner().unwrap(), "{text:?}");
+        }
     }
 }

@@ -310,7 +310,11 @@ impl Analysis {
         // Rows of the matrix, for entries above the diagonal: the transposed pattern is the same.
         let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
         let mut place = vec![0_u32; position.len()];
-        let (mut sources, mut targets) = (Vec::new(), Vec::new());
+        let most = match self.kind {
+            Kind::Symmetric => pattern.rows.len().midpoint(pattern.n()),
+            Kind::Unsymmetric => pattern.rows.len(),
+        };
+        let (mut sources, mut targets) = (Vec::with_capacity(most), Vec::with_capacity(most));
         let mut entries = Vec::new();
         for front in 0..self.fronts.len() {
             let Shape { pivots, rows, .. } = &self.fronts[front];

@@ -101,13 +101,13 @@ fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
 }
 
 impl LinearDomain {
-    /// Condenses the linear groups of a mesh whose nodes lie on these lines. `None` if there are
-    /// none, or if it does not pay and is not wanted `always`.
+    /// Condenses those of the groups that are to be `condensed`, all of them linear, of a mesh whose nodes lie
+    /// on these lines. `None` if there are none, or if it does not pay and is not wanted `always`.
     ///
     /// # Errors
     /// [`Singular`] if they are not held where they are not connected to the rest.
     pub fn new(
-        groups: &[Group],
+        (groups, condensed): (&[Group], &[bool]),
         prescribed: &[bool],
         ties: &[Tie],
         lines: &[[u32; 2]],
@@ -116,7 +116,7 @@ impl LinearDomain {
     ) -> Result<Option<(Self, System)>, Singular> {
         let mut system = System::new(
             groups,
-            |group| group.is_active && group.is_linear(),
+            |number, group| group.is_active && condensed[number],
             prescribed,
             ties,
             None,
@@ -124,7 +124,7 @@ impl LinearDomain {
         if system.n_equations() == 0 {
             return Ok(None);
         }
-        let is_other = |group: &Group| group.is_active && !group.is_linear();
+        let is_other = |number: usize, group: &Group| group.is_active && !condensed[number];
         let rest = System::new(groups, is_other, prescribed, ties, Some(&system));
         let n_boundary = rest.boundary().len();
         let n_interior = system.n_equations() - n_boundary;
@@ -141,8 +141,8 @@ impl LinearDomain {
         }
         let symmetric = groups
             .iter()
-            .filter(|group| group.is_linear())
-            .all(Group::is_symmetric);
+            .zip(condensed)
+            .all(|(group, condensed)| !condensed || group.is_symmetric());
         let kind = if symmetric {
             Kind::Symmetric
         } else {
@@ -307,7 +307,9 @@ impl LinearDomain {
     /// forces += S u.
     pub fn add_product(&self, displacement: &[f64], forces: &mut [f64]) {
         let n = self.boundary.len();
-        for (column, u) in self.stiffness().chunks_exact(n.max(1)).zip(displacement) {
+        let columns = self.stiffness().chunks_exact(n.max(1)).zip(displacement);
+        // Just after a state that is counted from, nothing has moved.
+        for (column, u) in columns.filter(|(_, u)| **u != 0.0) {
             for (force, s) in forces.iter_mut().zip(column) {
                 *force += s * u;
             }

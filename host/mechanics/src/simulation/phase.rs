@@ -262,23 +262,19 @@ impl Simulation {
         mut loads: Loads,
         course: Option<&PhaseCourse>,
     ) -> Result<(PhaseEquations, Loads), Singular> {
+        let condensed = self.condensed(number, is_prescribed);
         let (groups, ties) = (&self.groups, &self.tied);
-        let lines = mesh_lines(&self.problem.mesh.nodes);
-        self.reuse.is_last_phase = number + 1 == self.problem.phases.len();
-        let wanted = self.problem.settings.equations;
-        let condensed = if wanted == Equations::Sparse {
-            None
-        } else {
-            // Groups that are held by the others alone cannot be condensed.
-            let always = wanted == Equations::Condensed;
-            let reuse = Some(&mut self.reuse);
-            LinearDomain::new(groups, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
-        };
         self.reuse.forget();
         let (system, mut domain) = match condensed {
             Some((domain, system)) => (system, Some(domain)),
             None => (
-                System::new(groups, |group| group.is_active, is_prescribed, ties, None),
+                System::new(
+                    groups,
+                    |_, group| group.is_active,
+                    is_prescribed,
+                    ties,
+                    None,
+                ),
                 None,
             ),
         };
@@ -339,6 +335,44 @@ impl Simulation {
             ];
         }
         Ok((equations, loads))
+    }
+
+    /// The linear part of a phase and the equations of the rest, if it is to be condensed: the groups that stay
+    /// linear in the phases to come, which need no other factors then; where that does not pay, those that are now.
+    fn condensed(
+        &mut self,
+        number: usize,
+        is_prescribed: &[bool],
+    ) -> Option<(LinearDomain, System)> {
+        self.reuse.is_last_phase = number + 1 == self.problem.phases.len();
+        let wanted = self.problem.settings.equations;
+        if wanted == Equations::Sparse {
+            return None;
+        }
+        // Groups that are held by the others alone cannot be condensed.
+        let always = wanted == Equations::Condensed;
+        let lines = mesh_lines(&self.problem.mesh.nodes);
+        let (groups, ties) = (&self.groups, &self.tied);
+        let linear: Vec<bool> = groups.iter().map(Group::is_linear).collect();
+        let mut lasting = linear.clone();
+        for (group, law) in self.swaps.iter().skip(number + 1).flatten() {
+            lasting[*group] &= groups[*group].is_linear_with(law);
+        }
+        if lasting != linear {
+            let (of, reuse) = (
+                (groups.as_slice(), lasting.as_slice()),
+                Some(&mut self.reuse),
+            );
+            let found = LinearDomain::new(of, is_prescribed, ties, &lines, false, reuse);
+            if let Ok(Some(found)) = found {
+                return Some(found);
+            }
+        }
+        let (of, reuse) = (
+            (groups.as_slice(), linear.as_slice()),
+            Some(&mut self.reuse),
+        );
+        LinearDomain::new(of, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
     }
 
     /// A solver for these equations.

@@ -26,7 +26,7 @@ impl Stations {
             let cell = |name: &str| Cell::Number(station.named(name));
             let place = [Cell::Text(&place.phase), Cell::Count(place.increment)];
             self.table
-                .row(place.into_iter().chain(OF_STATION.map(cell)))?;
+                .row(place.into_iter().chain(OF_STATION.map(cell)));
         }
         self.table.flush()
     }

@@ -26,13 +26,32 @@ impl Serialize for Short {
     }
 }
 
+/// Powers of ten. Those from 1 on are exact.
+const POWERS: [f64; 45] = [
+    1e-22, 1e-21, 1e-20, 1e-19, 1e-18, 1e-17, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10,
+    1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7,
+    1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
+];
+/// Where 1 stands among them.
+const ONE: usize = 22;
+
+/// The power of ten of the first digit; of what is less than a last bit from a power of ten either of both.
+fn exponent(size: f64) -> i32 {
+    if (POWERS[0]..POWERS[2 * ONE]).contains(&size) {
+        POWERS.partition_point(|power| *power <= size) as i32 - 1 - ONE as i32
+    } else {
+        size.log10().floor() as i32
+    }
+}
+
 /// A number with so many digits.
 fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
-    let places = digits - 1 - value.abs().log10().floor() as i32;
-    let power = 10_f64.powi(places.abs());
+    let places = digits - 1 - exponent(value.abs());
+    let known = POWERS.get(ONE + places.unsigned_abs() as usize);
+    let power = known.copied().unwrap_or(f64::NAN);
     // Powers of ten up to 10²² are exact: quotient and product are what the digits read as.
     match places {
         0..=22 => (value * power).round() / power,
