@@ -22,9 +22,11 @@ mod walk;
 
 use crate::Error;
 use abi::raw;
+use law::adapter::Foreign;
 use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
-use law::probe::{NO_OUTCOME, kept};
+use law::probe::NO_OUTCOME;
+use law::probe::kept::{self, KeptPhase, Phase};
 use law::{LoadedLaw, Opener, SearchPath, Trust, hexadecimal_sha256};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -274,13 +276,20 @@ impl Subject {
         file::read_library(&self.path).map_err(|why| failed(format!("it cannot be read: {why}")))
     }
 
+    /// The library as a file would name it, called in this process, if it keeps no contract: that of a check
+    /// is one of its own.
+    fn foreign(&self) -> Option<Foreign> {
+        routine::is_one(&self.path).then(|| Foreign {
+            in_process: true,
+            ..Foreign::umat(&self.path)
+        })
+    }
+
     /// The laws of the library.
     fn laws(&self) -> Result<Vec<LoadedLaw>, Verdict> {
-        let library = if routine::is_one(&self.path) {
-            self.opener
-                .open_foreign(&routine::foreign(self), |_| Ok(()))
-        } else {
-            self.opener.open(&self.path)
+        let library = match self.foreign() {
+            Some(foreign) => self.opener.open_foreign(&foreign, |_| Ok(())),
+            None => self.opener.open(&self.path),
         };
         let library = library.map_err(|why| failed(why.to_string()))?;
         let ids = library.laws().map(|law| law.id.as_str());
@@ -384,6 +393,8 @@ pub fn run(
                 Some(kept) => replace(&kept.with_extension(ANSWERED), answer)?,
                 None => print(&format!("\n{ANSWER}{answer}\n")),
             }
+            // What is left is the end of the process.
+            kept::keep_phase(KeptPhase::new(Phase::Exit, false)).map_err(internal)?;
         }
         return Ok(());
     }
@@ -708,12 +719,12 @@ struct Answer {
     capsule: Option<String>,
 }
 
-/// Notes where the call of a capsule comes from.
-fn stamp(capsule: &mut Capsule, check: &Check, seed: u64) {
-    let keys = [("check", check.id.to_owned()), ("seed", seed.to_string())];
-    for (key, value) in keys {
-        capsule.origin.insert(key.to_owned(), value.into());
-    }
+/// Where what is in a capsule comes from, by key.
+fn origin(check: &Check, seed: u64) -> [(&'static str, toml::Value); 2] {
+    [
+        ("check", check.id.into()),
+        ("seed", seed.to_string().into()),
+    ]
 }
 
 /// Runs one check here.
@@ -726,7 +737,9 @@ fn run_check(check: &Check, subject: &Subject) -> Answer {
     };
     let (verdict, capsule) = match found {
         Err(Verdict::At(verdict, mut capsule)) => {
-            stamp(&mut capsule, check, subject.seed);
+            let origin = origin(check, subject.seed);
+            let origin = origin.map(|(key, value)| (key.to_owned(), value));
+            capsule.origin.extend(origin);
             (Err(*verdict), Some(capsule.to_string()))
         }
         verdict => (verdict, None),
@@ -888,11 +901,7 @@ fn led_in_child(
     if answer.outcome == Outcome::Crashed {
         let limit = Duration::from_secs_f64(arguments.time_limit.min(10.0));
         let told = [told, vec!["--tell".into(), kept.clone().into()]].concat();
-        let found = crashed::repeated(told, &kept, limit);
-        answer.capsule = found.map(|mut capsule| {
-            stamp(&mut capsule, check, arguments.seed);
-            capsule.to_string()
-        });
+        answer.capsule = crashed::repeated(told, &kept, limit, origin(check, arguments.seed));
     }
     answer.reported(check, arguments, path)
 }

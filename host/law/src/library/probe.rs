@@ -13,7 +13,7 @@ use abi::Hypothesis;
 use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};
 use abi::status::most_severe;
 use abi::version;
-use kept::{Function, KeptCall};
+use kept::{Function, KeptCall, KeptPhase, Phase};
 pub use pages::Fence;
 use pages::Pages;
 use serde::{Deserialize, Serialize};
@@ -291,6 +291,18 @@ enum Held {
     Foreign(Box<dyn ForeignInstance>),
 }
 
+impl Drop for Probe {
+    fn drop(&mut self) {
+        if let Held::Own(_) = self.instance {
+            // `destroy` is called all the same if that cannot be written.
+            let _ = kept::keep(|| {
+                let names = (self.id.as_str(), self.hypothesis.name());
+                KeptCall::new(names, Function::Destroy, Form::of(0), &self.values, &[])
+            });
+        }
+    }
+}
+
 /// Arguments of `create`.
 #[derive(Clone, Copy, Debug)]
 pub struct CreateForm<'a> {
@@ -466,8 +478,14 @@ fn ended(text: String) -> Vec<u8> {
 }
 
 /// Calls `destroy` with null, which the contract allows.
-pub(crate) fn destroy_nothing(law: LawHandle) {
+pub(crate) fn destroy_nothing(id: &str, law: LawHandle) {
     if let Some(destroy) = law.known.destroy {
+        let law = Some(id.to_owned());
+        // It is called all the same if that cannot be written.
+        let _ = kept::keep_phase(KeptPhase {
+            law,
+            ..KeptPhase::new(Phase::DestroyNull, false)
+        });
         // SAFETY: contract, "create": null is allowed.
         unsafe { destroy(null_mut()) };
     }
@@ -613,7 +631,7 @@ impl Probe {
         };
         let known = &own.law.known;
         let Some(called) = (match function {
-            Function::Create => None,
+            Function::Create | Function::Destroy => None,
             Function::InitState => known.init_state,
             Function::Integrate => known.integrate,
         }) else {
@@ -878,8 +896,14 @@ pub fn open(path: &Path) -> Result<(), String> {
     symbols(path).map(|_| ())
 }
 
+/// Notes what is about to be done with a library that is loaded from its file.
+fn begin(phase: Phase) -> Result<(), String> {
+    kept::keep_phase(KeptPhase::new(phase, true)).map_err(|error| error.to_string())
+}
+
 /// The library, never unloaded.
 fn symbols(path: &Path) -> Result<&'static libloading::Library, String> {
+    begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library = unsafe { load(path) }.map_err(|error| {
         std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string)
@@ -895,6 +919,7 @@ pub fn shake_hands(path: &Path) -> Result<(), String> {
     // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
     let magic = unsafe { symbols(path)?.get::<*const MagicBlock>(b"pilum_magic\0") }
         .map_err(|_| "there is no symbol `pilum_magic`".to_owned())?;
+    begin(Phase::Handshake)?;
     // SAFETY: as above; the block is at least 64 bytes in every version.
     let magic = unsafe { (*magic).read_unaligned() };
     version::check(&magic).map_err(|mismatch| mismatch.to_string())
@@ -917,6 +942,7 @@ pub fn enter(path: &Path) -> Result<[usize; 3], String> {
         // SAFETY: as above.
         Ok(unsafe { entry(host) }.addr())
     };
+    begin(Phase::Entry)?;
     let (first, second) = (call(), call());
     let third = std::thread::spawn(other)
         .join()

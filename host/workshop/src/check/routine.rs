@@ -13,7 +13,7 @@ use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
 use law::Tangent;
-use law::adapter::{Foreign, sidecar, sidecar_of};
+use law::adapter::{sidecar, sidecar_of};
 use law::probe::{Form, PointStart};
 use std::path::Path;
 use text::{Source, suggestion};
@@ -151,14 +151,6 @@ pub(super) fn refuse_settings(settings: &[(String, f64)], path: &Path) -> Result
         }
     }
     Ok(())
-}
-
-/// The library as a file would name it, called in this process: that of a check is one of its own.
-pub(super) fn foreign(subject: &Subject) -> Foreign {
-    Foreign {
-        in_process: true,
-        ..Foreign::umat(&subject.path)
-    }
 }
 
 /// What a check of responses says of a routine: it is not led far if its calls take long, and a failure of
