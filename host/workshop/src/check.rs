@@ -10,6 +10,7 @@ mod crashed;
 mod description;
 mod inputs;
 mod load;
+mod margins;
 mod mathematics;
 mod memory;
 mod purity;
@@ -22,7 +23,7 @@ mod walk;
 
 use crate::Error;
 use abi::raw;
-use law::adapter::Foreign;
+use law::adapter::{Adapter, Foreign};
 use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
 use law::probe::NO_OUTCOME;
@@ -279,9 +280,18 @@ impl Subject {
     /// The library as a file would name it, called in this process, if it keeps no contract: that of a check
     /// is one of its own.
     fn foreign(&self) -> Option<Foreign> {
-        routine::is_one(&self.path).then(|| Foreign {
+        let adapter = routine::adapter(&self.path)?;
+        let of_driver = self
+            .driver
+            .as_ref()
+            .and_then(|driver| course::foreign(&self.opener, driver));
+        Some(Foreign {
             in_process: true,
-            ..Foreign::umat(&self.path)
+            record: None,
+            ..of_driver.unwrap_or_else(|| Foreign {
+                adapter,
+                ..Foreign::umat(&self.path)
+            })
         })
     }
 
@@ -338,6 +348,9 @@ struct Finding {
     /// The file with the call that it is about.
     #[serde(skip_serializing_if = "Option::is_none")]
     capsule: Option<PathBuf>,
+    /// The largest of what was found, as a part of each threshold.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    nearest: BTreeMap<String, f64>,
 }
 
 #[derive(Serialize)]
@@ -410,7 +423,7 @@ pub fn run(
         let whose = if is_routine {
             "libraries of the contract"
         } else {
-            "UMATs"
+            "UMATs, UDSMs and MFront behaviours"
         };
         return Err(Error::usage(format!(
             "--only {id}: this check is for {whose}"
@@ -418,11 +431,7 @@ pub fn run(
     }
     let arguments = &with_absolute_driver(arguments)?;
     if is_routine {
-        if arguments.driver.is_some() {
-            return Err(Error::usage(
-                "--driver leads the laws of a library of the contract; a UMAT is led by `pilum point`",
-            ));
-        }
+        routine::refuse_without_driver(&path, arguments.driver.is_some())?;
         routine::refuse_settings(&arguments.set, &path)?;
     } else if !arguments.set.is_empty() {
         refuse_settings(arguments, &path)?;
@@ -462,10 +471,10 @@ pub fn run(
     if bad.is_empty() {
         return Ok(());
     }
-    let keeps = if is_routine {
-        "is not what its sidecar says"
-    } else {
-        "does not keep the contract"
+    let keeps = match routine::adapter(&path) {
+        None => "does not keep the contract",
+        Some(Adapter::Umat) => "is not what its sidecar says",
+        Some(_) => "is not what it says of itself",
     };
     Err(Error::library(format!(
         "library {} {keeps}: {}",
@@ -700,6 +709,7 @@ fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
         details,
         replay: None,
         capsule: None,
+        nearest: BTreeMap::new(),
     }
 }
 
@@ -717,6 +727,8 @@ struct Answer {
     details: String,
     /// The call that it is about.
     capsule: Option<String>,
+    /// The largest of what was found, as a part of each threshold.
+    nearest: BTreeMap<String, f64>,
 }
 
 /// Where what is in a capsule comes from, by key.
@@ -759,6 +771,7 @@ fn run_check(check: &Check, subject: &Subject) -> Answer {
         outcome,
         details,
         capsule,
+        nearest: margins::take(),
     }
 }
 
@@ -766,6 +779,7 @@ impl Answer {
     /// The line of the report, with the file for `pilum replay`.
     fn reported(self, check: &Check, arguments: &Arguments, path: &Path) -> Result<Finding, Error> {
         let mut finding = finding(check, self.outcome, self.details);
+        finding.nearest = self.nearest;
         if finding.outcome.is_bad() {
             let own: Vec<String> = own_arguments(check, arguments)
                 .iter()
@@ -869,6 +883,7 @@ fn led_in_child(
         outcome: Outcome::Crashed,
         details,
         capsule: None,
+        nearest: BTreeMap::new(),
     };
     let answer = match (answer, outcome.ending) {
         (_, Ending::TimedOut) => crashed(format!(
@@ -883,7 +898,7 @@ fn led_in_child(
                 (Outcome::Passed, Some(details)) => Answer {
                     outcome: Outcome::Failed,
                     details,
-                    capsule: None,
+                    ..answer
                 },
                 _ => answer,
             }

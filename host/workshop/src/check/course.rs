@@ -4,7 +4,8 @@ use super::specimen::{Specimen, create_form};
 use super::{Found, Subject, Verdict, failed, skipped};
 use crate::Error;
 use input::driver::Driver;
-use law::Opener;
+use law::adapter::Foreign;
+use law::{LoadedLaw, Opener};
 use law::probe::PointStart;
 use std::path::Path;
 
@@ -26,9 +27,10 @@ pub(super) fn driver_fits(subject: &Subject) -> Found {
     for driver in &drivers {
         let law = driver.point().law();
         let library = law.library();
-        if library.foreign().is_some() || law.loaded().shear_zone().is_some() {
+        if law.loaded().shear_zone().is_some() {
             return Err(failed(format!(
-                "{} leads a law behind an adapter; checks are of libraries that keep the contract",
+                "{} leads a law that fills a shear zone; checks are of laws as they are: a driver \
+                 without `adapter = \"shear_zone\"` leads it",
                 path.display()
             )));
         }
@@ -45,6 +47,13 @@ pub(super) fn driver_fits(subject: &Subject) -> Found {
     Ok(String::new())
 }
 
+/// The library as the driver names it, if that is made for another program.
+pub(super) fn foreign(opener: &Opener, path: &Path) -> Option<Foreign> {
+    let drivers = read(opener, path).ok()?;
+    let library = drivers.first()?.point().law().library();
+    library.foreign().cloned()
+}
+
 impl Subject {
     /// The laws of the driver, with its parameters and the increments of its path; one for each
     /// variant, and for each length of increments in time.
@@ -55,7 +64,7 @@ impl Subject {
         let drivers = read(&self.opener, path).map_err(|why| failed(why.to_string()))?;
         let mut specimens = Vec::new();
         for driver in &drivers {
-            specimens.extend(of_driver(driver)?);
+            specimens.extend(self.of_driver(driver)?);
         }
         if specimens.is_empty() {
             return Err(skipped(format!(
@@ -65,9 +74,21 @@ impl Subject {
         }
         Ok(specimens)
     }
-}
 
-fn of_driver(driver: &Driver) -> Result<Vec<Specimen>, Verdict> {
+/// The law of a driver, called in this process.
+    fn loaded(&self, driver: &Driver) -> Result<LoadedLaw, Verdict> {
+        let loaded = driver.point().law().loaded();
+        if loaded.library().foreign().is_none() {
+            return Ok(loaded.clone());
+        }
+        // That of the driver may be in a worker.
+        let id = &loaded.description().id;
+        let mut laws = self.laws()?.into_iter();
+        laws.find(|law| law.description().id == *id)
+            .ok_or_else(|| failed(format!("the library has no law `{id}`")))
+    }
+
+    fn of_driver(&self, driver: &Driver) -> Result<Vec<Specimen>, Verdict> {
     let point = driver.point();
     let segments = point.segments().iter();
     let times: Vec<f64> = segments
@@ -101,19 +122,20 @@ fn of_driver(driver: &Driver) -> Result<Vec<Specimen>, Verdict> {
         });
     });
     let law = point.law();
+    let loaded = self.loaded(driver)?;
     let mut specimens = Vec::new();
     for (time_increment, course) in courses {
         let formulation = law.formulation().clone();
         let values = law.parameters().to_vec();
         let form = create_form(&formulation, law.hypothesis(), &values);
-        let Some(probe) = law.loaded().probe(&form)?.probe else {
+        let Some(probe) = loaded.probe(&form)?.probe else {
             return Err(failed(format!(
                 "`create` refuses the parameters of {}",
                 driver.path().display()
             )));
         };
         specimens.push(Specimen {
-            law: law.loaded().clone(),
+            law: loaded.clone(),
             formulation,
             hypothesis: law.hypothesis(),
             values,
@@ -124,4 +146,5 @@ fn of_driver(driver: &Driver) -> Result<Vec<Specimen>, Verdict> {
         });
     }
     Ok(specimens)
+}
 }

@@ -1,5 +1,6 @@
 //! Are operators, flags and restrictions what they claim to be?
 
+use super::margins;
 use super::random::Random;
 use super::specimen::{
     INSTANT, Specimen, create_form, first_difference, hypotheses, is_finite, is_success,
@@ -292,6 +293,7 @@ pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slop
     let ends = specimen.call(&moved, raw::PILUM_REQ_FLUX)?.points;
     let mut verdict = Slope::Kink;
     let mut left = None;
+    let mut off = 0.0;
     // The differences of the length before, entry by entry.
     let mut longer: Vec<f64> = Vec::new();
     for (l, _) in LENGTHS.iter().enumerate() {
@@ -336,6 +338,7 @@ pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slop
             }
         }
         if disagreement.is_finite() && error <= TANGENT * scale {
+            margins::note("tangent", error / (TANGENT * scale));
             return Ok(left.map_or(Slope::Right, |(row, c)| Slope::Left(row, c)));
         }
         // Between two kinks, sides agree with each other, but the shorter the length the steeper.
@@ -348,10 +351,12 @@ pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slop
             let agrees = (before - slopes[row * n + column]).abs() <= 0.1 * error;
             if agrees && !is_steeper {
                 verdict = worst;
+                off = error / (TANGENT * scale);
             }
         }
         longer = slopes;
     }
+    margins::note("tangent", off);
     Ok(verdict)
 }
 
@@ -901,7 +906,7 @@ fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
         signs[0] = 1.0;
         let mirror = DMatrix::from_diagonal(&DVector::from_vec(signs));
         for _ in 0..TWINS {
-            n += twin(&specimen, &mirror, &mirror, ROUND_OFF, &mut random)?.map_err(|unlike| {
+            n += twin(&specimen, &mirror, &mirror, ("mirrored", ROUND_OFF), &mut random)?.map_err(|unlike| {
                 let name = specimen.name();
                 specimen.recorded(&unlike.start, Verdict::Warning(format!("{name}: {unlike}")))
             })?;
@@ -950,7 +955,7 @@ fn twin(
     specimen: &Specimen,
     of_fluxes: &DMatrix<f64>,
     of_gradients: &DMatrix<f64>,
-    tolerance: f64,
+    (name, tolerance): (&'static str, f64),
     random: &mut Random,
 ) -> Result<Result<usize, Unlike>, Verdict> {
     let turned = |by: &DMatrix<f64>, values: &[f64]| -> Vec<f64> {
@@ -1003,10 +1008,9 @@ fn twin(
             .max(largest(&first.flux0))
             .max(stiffness * largest(&move_));
         let pairs = expected.iter().zip(&b.flux);
-        if pairs
-            .into_iter()
-            .any(|(a, b)| (a - b).abs() > tolerance * scale)
-        {
+        let off = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        margins::note(name, off / (tolerance * scale));
+        if off > tolerance * scale || off.is_nan() {
             return Ok(Err(Unlike {
                 start: second,
                 flux: a.flux,
@@ -1062,12 +1066,12 @@ fn response_is_isotropic(subject: &Subject) -> Found {
         }
         for _ in 0..TWINS {
             let (of_fluxes, of_gradients) = rotation(components, &mut random);
-            let mut found = twin(&specimen, &of_fluxes, &of_gradients, ROTATED, &mut random)?;
+            let mut found = twin(&specimen, &of_fluxes, &of_gradients, ("rotated", ROTATED), &mut random)?;
             // Where a law branches, rounding may take the other branch: a fault shows again and again.
             for _ in 0..2 {
                 if found.is_err() {
                     let (of_fluxes, of_gradients) = rotation(components, &mut random);
-                    found = twin(&specimen, &of_fluxes, &of_gradients, ROTATED, &mut random)?;
+                    found = twin(&specimen, &of_fluxes, &of_gradients, ("rotated", ROTATED), &mut random)?;
                 }
             }
             n += found.map_err(|unlike| {

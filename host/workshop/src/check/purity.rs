@@ -1,5 +1,6 @@
 //! Is an update a function of its arguments, and of nothing else?
 
+use super::margins;
 use super::random::Random;
 use super::specimen::{Function, Specimen, create_form, first_difference, is_same, is_success};
 use super::{Check, Family, Found, Subject, Verdict, skipped};
@@ -366,6 +367,7 @@ fn rounding(start: &PointStart, a: &PointEnd, b: &PointEnd) -> Option<f64> {
     });
     let all: Vec<f64> = fluxes.chain(states).collect();
     let most = all.iter().copied().fold(0.0, f64::max);
+    margins::note("rounding", most / ROUNDINGS);
     (all.iter().all(|by| *by <= ROUNDINGS)).then_some(most)
 }
 

@@ -3,9 +3,9 @@
 //!
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
-use super::mathematics::{ITERATED, ROUND_OFF, Slope, UPDATE, flux_scale, largest, slope};
+use super::mathematics::{depends_on_time, ITERATED, ROUND_OFF, Slope, UPDATE, flux_scale, largest, slope};
 use super::random::Random;
-use super::specimen::{LONG, Specimen, first_difference, is_success};
+use super::specimen::{LONG, Specimen, create_form, first_difference, hypotheses, is_success};
 use super::walk::Step;
 use super::{Check, Family, Found, Subject, Verdict, refusal, skipped};
 use crate::Error;
@@ -13,7 +13,7 @@ use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
 use law::Tangent;
-use law::adapter::{sidecar, sidecar_of};
+use law::adapter::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointStart};
 use std::path::Path;
 use text::{Source, suggestion};
@@ -22,7 +22,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "sidecar-is-read",
         family: Family::Routine,
-        description: "UMAT: the sidecar beside the library is there and makes sense.",
+        description: "UMAT: the sidecar beside the library, or that of the driver, is there and makes sense. (What is \
+                      asked of a UMAT here is asked of a UDSM and of MFront behaviours, too, along a driver.)",
         needs: &["file-is-a-library"],
         run: sidecar_is_read,
     },
@@ -124,9 +125,92 @@ const SLOWER: f64 = 1e3;
 const LATER: f64 = 1e5;
 const ELSEWHERE: u64 = 39;
 
-/// Whether a library is a UMAT and none of the contract. Nothing of it runs.
+/// What a library is made for, if not for the contract. Nothing of it runs.
+pub(super) fn adapter(path: &Path) -> Option<Adapter> {
+    law::inspect::inspect(path).ok()?.adapter()
+}
+
+/// Whether a library is made for another program.
 pub(super) fn is_one(path: &Path) -> bool {
-    law::inspect::inspect(path).is_ok_and(|inspection| inspection.is_umat())
+    adapter(path).is_some()
+}
+
+/// Refuses a library whose description has no ranges that parameters could be drawn from.
+///
+/// # Errors
+/// [`text::Error::Usage`].
+pub(super) fn refuse_without_driver(path: &Path, has_driver: bool) -> Result<(), Error> {
+    let what = match adapter(path) {
+        Some(Adapter::Udsm) if !has_driver => "a UDSM of PLAXIS",
+        Some(Adapter::Mfront) if !has_driver => "a library of MFront behaviours",
+        _ => return Ok(()),
+    };
+    Err(Error::usage(format!(
+        "{} is {what}, which says nothing of the ranges of its parameters: `--driver FILE` checks it along a \
+         path of yours",
+        path.display()
+    )))
+}
+
+/// What a program calls arguments and who describes a routine of it.
+#[derive(Clone, Copy, Debug)]
+struct Words {
+    stress: &'static str,
+    strain: &'static str,
+    stiffness: &'static str,
+    state: &'static str,
+    duration: &'static str,
+    time: &'static str,
+    element: &'static str,
+    describer: &'static str,
+}
+
+impl Words {
+    fn of(routine: &Specimen) -> Self {
+        match routine.law.library().foreign().map(|f| f.adapter) {
+            Some(Adapter::Udsm) => Self {
+                stress: "Sig",
+                strain: "dEps",
+                stiffness: "D",
+                state: "StVar",
+                duration: "dTime",
+                time: "Time0",
+                element: "iEl",
+                describer: "the library",
+            },
+            Some(Adapter::Mfront) => Self {
+                stress: "the stress",
+                strain: "the increment",
+                stiffness: "K",
+                state: "internal variables",
+                duration: "dt",
+                time: "the time",
+                element: "element",
+                describer: "the library",
+            },
+            _ => Self {
+                stress: "STRESS",
+                strain: "DSTRAN",
+                stiffness: "DDSDDE",
+                state: "STATEV",
+                duration: "DTIME",
+                time: "TIME",
+                element: "NOEL",
+                describer: "the sidecar",
+            },
+        }
+    }
+}
+
+/// Whether it is a behaviour of MFront.
+fn is_mfront(routine: &Specimen) -> bool {
+    routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Mfront)
+}
+
+/// What an author of a UMAT can write into the sidecar; nothing of routines that have none.
+fn advice(routine: &Specimen, text: &'static str) -> &'static str {
+    let is_umat = routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Umat);
+    if is_umat { text } else { "" }
 }
 
 /// Refuses settings that the sidecar does not know, or whose values are outside its bounds.
@@ -212,21 +296,32 @@ fn sidecar_is_read(subject: &Subject) -> Found {
 /// Compression of a first call, kPa.
 const PRESSURE: f64 = 100.0;
 
+/// A point that is compressed and has not moved.
+fn under_pressure(routine: &Specimen) -> Result<PointStart, Verdict> {
+    let flux0 = routine.under_pressure(PRESSURE);
+    let state0 = match routine.initial_state(&flux0)? {
+        Ok(state0) => state0,
+        Err(why) => return Err(routine.fails(why)),
+    };
+    let zero = vec![0.0; flux0.len()];
+    Ok(PointStart {
+        gradient0: zero.clone(),
+        gradient1: zero,
+        flux0,
+        state0,
+    })
+}
+
 fn routine_answers(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "answers");
     let mut all = Vec::new();
     for routine in subject.specimens_by_default(1, &mut random)? {
-        let flux = routine.under_pressure(PRESSURE);
-        let state0 = match routine.initial_state(&flux)? {
-            Ok(state0) => state0,
-            Err(why) => return Err(routine.fails(why)),
-        };
-        let zero = vec![0.0; flux.len()];
-        let start = PointStart {
-            gradient0: zero.clone(),
-            gradient1: zero,
-            flux0: flux,
-            state0,
+        let start = match routine.course.iter().flatten().next() {
+            Some(first) => PointStart {
+                gradient1: first.gradient0.clone(),
+                ..first.clone()
+            },
+            None => under_pressure(&routine)?,
         };
         let answer = routine.call(std::slice::from_ref(&start), UPDATE)?;
         if !is_success(answer.status) {
@@ -235,15 +330,20 @@ fn routine_answers(subject: &Subject) -> Found {
         }
         let stiffness = largest(&answer.points[0].tangent);
         if stiffness <= 0.0 {
-            return Err(routine.fails_at(
-                &start,
-                "DDSDDE of a call without any strain is zero: the routine leaves it unset, and without it there is no \
-                 iteration; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar",
-            ));
+            let why = format!(
+                "{} of a call without any strain is zero: the routine leaves it unset, and without it there is no \
+                 iteration{}",
+                Words::of(&routine).stiffness,
+                advice(
+                    &routine,
+                    "; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar"
+                )
+            );
+            return Err(routine.fails_at(&start, why));
         }
         all.push(format!("{} {stiffness:.3e}", routine.hypothesis.name()));
     }
-    Ok(format!("largest entry of DDSDDE: {}", all.join(", ")))
+    Ok(format!("largest entry of the stiffness: {}", all.join(", ")))
 }
 
 fn routine_stays_inside(subject: &Subject) -> Found {
@@ -285,13 +385,21 @@ fn routine_stays_inside(subject: &Subject) -> Found {
     }
 }
 
+/// Whether it is the same law with the same parameters.
+fn is_like(other: &Specimen, routine: &Specimen) -> bool {
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    other.hypothesis == routine.hypothesis
+        && other.law.description().id == routine.law.description().id
+        && bits(&other.values) == bits(&routine.values)
+}
+
 fn routine_is_repeatable(subject: &Subject) -> Found {
     let mut others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
     let mut by_element = None;
     let n = each(subject, "repeatable", |routine, steps, random| {
         let fresh = others
             .iter_mut()
-            .find(|other| other.hypothesis == routine.hypothesis);
+            .find(|other| is_like(other, routine));
         // Backwards, so that other calls come before; some with a component that does not move.
         let mut points = starts(steps);
         points.extend(routine.points(24, random)?);
@@ -312,10 +420,11 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
                 continue;
             };
             let [before, after] = [&expected[i], &found[i]];
+            let words = Words::of(routine);
             let results = [
-                ("STRESS", &before.flux, &after.flux),
-                ("STATEV", &before.state, &after.state),
-                ("DDSDDE", &before.tangent, &after.tangent),
+                (words.stress, &before.flux, &after.flux),
+                (words.state, &before.state, &after.state),
+                (words.stiffness, &before.tangent, &after.tangent),
             ];
             let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
             let other = results
@@ -337,8 +446,11 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
         };
         let there = routine.probe.integrate(&points, &form)?.points;
         if let Some(i) = first_difference(&expected, &there) {
+            let Words {
+                element, stress, ..
+            } = Words::of(routine);
             let why = format!(
-                "with another NOEL STRESS {:?} becomes {:?}, at {:?}",
+                "with another {element} {stress} {:?} becomes {:?}, at {:?}",
                 expected[i].flux, there[i].flux, points[i]
             );
             by_element = by_element
@@ -352,9 +464,11 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
 
 fn routine_stays_at_rest(subject: &Subject) -> Found {
     let n = each(subject, "rest", |routine, steps, _| {
-        if routine.formulation.time_dependent {
+        // An MFront behaviour does not say whether it depends on the time.
+        if routine.formulation.time_dependent || is_mfront(routine) && depends_on_time(routine, steps)? {
             return Ok(0);
         }
+        let Words { strain, stress, .. } = Words::of(routine);
         let still: Vec<PointStart> = steps
             .iter()
             .map(|step| PointStart {
@@ -368,13 +482,17 @@ fn routine_stays_at_rest(subject: &Subject) -> Found {
         for ((step, point), end) in steps.iter().zip(&still).zip(&answer.points) {
             if !is_success(end.status) {
                 let why = refusal(end.status, answer.text().as_deref());
-                return Err(routine.fails_at(point, format!("DSTRAN = 0 is refused: {why}")));
+                return Err(routine.fails_at(point, format!("{strain} = 0 is refused: {why}")));
             }
             if differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step)) {
                 let why = format!(
-                    "DSTRAN = 0 changes STRESS {:?} to {:?}; what the time does is declared by \
-                     `time_dependent = true` in the sidecar",
-                    step.end.flux, end.flux
+                    "{strain} = 0 changes {stress} {:?} to {:?}{}",
+                    step.end.flux,
+                    end.flux,
+                    advice(
+                        routine,
+                        "; what the time does is declared by `time_dependent = true` in the sidecar"
+                    )
                 );
                 return Err(routine.fails_at(point, why));
             }
@@ -393,8 +511,14 @@ fn differ(a: &[f64], b: &[f64], bound: f64) -> bool {
 }
 
 fn time_as_declared(subject: &Subject) -> Found {
+    if adapter(&subject.path) == Some(Adapter::Mfront) {
+        return Err(skipped(
+            "a behaviour of MFront does not say whether it depends on the time",
+        ));
+    }
     let (mut declared, mut seen) = (false, false);
     let n = each(subject, "time", |routine, steps, _| {
+        let words = Words::of(routine);
         let is_declared = routine.formulation.time_dependent;
         declared |= is_declared;
         let starts = starts(steps);
@@ -404,7 +528,7 @@ fn time_as_declared(subject: &Subject) -> Found {
             ..routine.form(raw::PILUM_REQ_FLUX)
         };
         let later = routine.probe.integrate(&starts, &later)?.points;
-        for (ends, what) in [(&slower, "DTIME"), (&later, "TIME")] {
+        for (ends, what) in [(&slower, words.duration), (&later, words.time)] {
             for (step, end) in steps.iter().zip(ends) {
                 let depends = is_success(end.status)
                     && differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
@@ -413,9 +537,16 @@ fn time_as_declared(subject: &Subject) -> Found {
                     return Err(routine.warns_at(
                         &step.start,
                         format!(
-                            "with another {what} STRESS {:?} becomes {:?}: say `time_dependent = true` in \
-                             the sidecar, so that phases and segments without a `time` are told of",
-                            step.end.flux, end.flux
+                            "with another {what} {} {:?} becomes {:?}, which {} does not say{}",
+                            words.stress,
+                            step.end.flux,
+                            end.flux,
+                            words.describer,
+                            advice(
+                                routine,
+                                ": say `time_dependent = true` in the sidecar, so that phases and segments \
+                                 without a `time` are told of"
+                            )
                         ),
                     ));
                 }
@@ -424,7 +555,7 @@ fn time_as_declared(subject: &Subject) -> Found {
         Ok(steps.len())
     })?;
     if declared && !seen {
-        let why = "`time_dependent = true`, and DTIME changes nothing, nor does TIME";
+        let why = "it is said to depend on the time, and neither the length of an increment nor its time changes anything";
         return Err(Verdict::Warning(why.to_owned()));
     }
     Ok(format!("{n} increments"))
@@ -438,6 +569,7 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
     let mut worst: Option<(f64, Verdict)> = None;
     let n = each(subject, "ddsdde", |routine, steps, _| {
         let formulation = &routine.formulation;
+        let words = Words::of(routine);
         let n = routine.probe.n_components();
         let mut compared = 0;
         for step in steps.iter().step_by(COMPARED) {
@@ -450,7 +582,8 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
                 let most = most.fold(0.0, f64::max);
                 if most > ROUND_OFF * scale {
                     let why = format!(
-                        "`symmetric = true`, and DDSDDE is off by {:.1e} of the stiffness, at {:?}",
+                        "it is said to be symmetric, and {} is off by {:.1e} of the stiffness, at {:?}",
+                        words.stiffness,
                         most / scale,
                         step.start
                     );
@@ -466,8 +599,15 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
                 ))
             };
             let by_columns = format!(
-                "the transpose of DDSDDE is the derivative of STRESS, DDSDDE is not: its transpose fits: \
-                 `tangent_order` in the sidecar, at {:?}",
+                "the transpose of {0} is the derivative of {1}, {0} is not: its transpose fits: \
+                 `tangent_order` in {2}, at {3:?}",
+                words.stiffness,
+                words.stress,
+                if advice(routine, "a sidecar").is_empty() {
+                    "the driver and the case"
+                } else {
+                    "the sidecar"
+                },
                 step.start
             );
             if formulation.tangent != Tangent::Consistent {
@@ -497,14 +637,19 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
                     }
                     let names = routine.hypothesis.components();
                     let why = format!(
-                        "DDSDDE({}, {}), {} by {}, is {by_law:.6e}, differences give {by_differences:.6e}: \
+                        "{}({}, {}), {} by {}, is {by_law:.6e}, differences give {by_differences:.6e}: \
                          wrong by {off:.1e} of the stiffness, the most of all, which a run pays for with iterations. \
-                         An elastic or otherwise approximate one is declared by `tangent = \
-                         \"approximate\"` in the sidecar. At {:?}",
+                         {}At {:?}",
+                        words.stiffness,
                         row + 1,
                         column + 1,
                         names[row],
                         names[column],
+                        advice(
+                            routine,
+                            "An elastic or otherwise approximate one is declared by `tangent = \
+                             \"approximate\"` in the sidecar. "
+                        ),
                         step.start
                     );
                     worst = Some((off, routine.warns_at(&step.start, why)));
@@ -517,7 +662,7 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
         return Err(verdict.led_by(&format!("{n_wrong} of {n} increments: ")));
     }
     if n == 0 {
-        return Err(skipped("the sidecar says `tangent = \"approximate\"`"));
+        return Err(skipped("the stiffness is said to be approximate"));
     }
     let details = format!("{n} increments, {n_kinks} at kinks");
     if 2 * n_kinks > n {
@@ -527,15 +672,34 @@ fn ddsdde_matches_differences(subject: &Subject) -> Found {
     Ok(details)
 }
 
+/// The same routine with the same parameters under another hypothesis, if it offers that.
+fn under(routine: &Specimen, wanted: Hypothesis) -> Result<Option<Specimen>, Verdict> {
+    let mut all = hypotheses(&routine.law).into_iter();
+    let Some((formulation, hypothesis)) = all.find(|(_, other)| *other == wanted) else {
+        return Ok(None);
+    };
+    let form = create_form(&formulation, hypothesis, &routine.values);
+    let created = routine.law.probe(&form)?;
+    Ok(created.probe.map(|probe| Specimen {
+        law: routine.law.clone(),
+        formulation,
+        hypothesis,
+        values: routine.values.clone(),
+        probe,
+        course: None,
+        time_increment: routine.time_increment,
+        is_led_near: routine.is_led_near,
+    }))
+}
+
 fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
-    let all = subject.specimens_by_default(1, &mut Random::new(subject.seed, "larger"))?;
     let n = each(subject, "plane", |routine, steps, _| {
         let wanted = match routine.hypothesis {
             Hypothesis::PlaneStrain | Hypothesis::Axisymmetric => Hypothesis::ThreeD,
             Hypothesis::Interface2d => Hypothesis::Interface3d,
             _ => return Ok(0),
         };
-        let Some(larger) = all.iter().find(|other| other.hypothesis == wanted) else {
+        let Some(larger) = under(routine, wanted)? else {
             return Ok(0);
         };
         let longer = |values: &[f64]| {
@@ -561,7 +725,8 @@ fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
             let expected = longer(&step.end.flux);
             if differ(&end.flux, &expected, ITERATED * flux_scale(step)) {
                 let why = format!(
-                    "STRESS is {:?}, under {} it is {:?}, at {:?}",
+                    "{} is {:?}, under {} it is {:?}, at {:?}",
+                    Words::of(routine).stress,
                     step.end.flux,
                     wanted.name(),
                     end.flux,
