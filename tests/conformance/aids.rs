@@ -343,7 +343,8 @@ fn a_routine_that_crashes_on_opening_or_at_the_end_can_be_repeated() {
         let more = format!(
             "\n#include <stdlib.h>\n__attribute__(({attribute})) static void plant(void) {{ abort(); }}\n"
         );
-        std::fs::write(&source, text + &more).unwrap();
+        let visible = "#pragma GCC visibility push(default)\n";
+        std::fs::write(&source, format!("{visible}{text}{more}")).unwrap();
         let Some(library) = crate::program::compiled_from(&source, &umat, folder.path()) else {
             return;
         };

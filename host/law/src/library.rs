@@ -113,9 +113,8 @@ pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
 
 fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let begin = |phase| {
-        kept::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string())
-    };
+    let begin =
+        |phase| kept::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string());
     begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =

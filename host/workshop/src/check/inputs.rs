@@ -286,7 +286,9 @@ fn unit_number(sentence: &str, smaller: Smaller) -> Option<String> {
             let last = before.chars().next_back();
             last.is_none_or(|c| !c.is_ascii_digit() && !['.', '-', ','].contains(&c))
         });
-        let counts = smaller.of(unit).is_some_and(|factor| factor.log2().abs() > 0.1);
+        let counts = smaller
+            .of(unit)
+            .is_some_and(|factor| factor.log2().abs() > 0.1);
         (is_one && counts).then(|| format!("1 {unit}"))
     })
 }
@@ -478,7 +480,10 @@ mod tests {
         for (sentence, counts) in [
             ("Specific volume at 1 kPa.", [true, false, false]),
             ("v = N − λ ln(p/1 kPa).", [true, false, false]),
-            ("Slip, in parts of 1 m, of rates (1 m/s).", [false, true, true]),
+            (
+                "Slip, in parts of 1 m, of rates (1 m/s).",
+                [false, true, true],
+            ),
             ("Rate of 1 1/s.", [false, false, true]),
             ("Pressure up to 21 kPa, 0.1 kPa or -1 kPa.", [false; 3]),
             ("One kPa, or 1 of them.", [false; 3]),

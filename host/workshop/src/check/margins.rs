@@ -43,7 +43,10 @@ mod tests {
         }
         note("other", 1.234e-3);
         let found: Vec<(String, f64)> = take().into_iter().collect();
-        assert_eq!(found, [("one".to_owned(), 0.2), ("other".to_owned(), 1.2e-3)]);
+        assert_eq!(
+            found,
+            [("one".to_owned(), 0.2), ("other".to_owned(), 1.2e-3)]
+        );
         assert!(take().is_empty());
     }
 }

@@ -138,6 +138,9 @@ const TANGENT: f64 = 1e-4;
 pub(super) const ITERATED: f64 = 1e-8;
 /// Asymmetry, relative to the largest entry.
 pub(super) const ROUND_OFF: f64 = 1e-9;
+/// Roundings of a flux, each of half a unit of the largest term in play, that two sides of a difference may
+/// have between them: a component of a solid is a sum of six terms.
+const NOISE: f64 = 6.0;
 /// Lengths of difference steps, relative to the increment.
 const LENGTHS: [f64; 3] = [1e-3, 1e-5, 1e-7];
 
@@ -293,10 +296,17 @@ pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slop
     let ends = specimen.call(&moved, raw::PILUM_REQ_FLUX)?.points;
     let mut verdict = Slope::Kink;
     let mut left = None;
-    let mut off = 0.0;
+    let (mut off, mut right) = (0.0, f64::INFINITY);
     // The differences of the length before, entry by entry.
     let mut longer: Vec<f64> = Vec::new();
     for (l, _) in LENGTHS.iter().enumerate() {
+        // What rounding of the fluxes makes of differences this short: where that is more than is allowed, they
+        // say nothing.
+        let noise = NOISE * f64::EPSILON * flux_scale(step) / (LENGTHS[l] * size);
+        if noise > TANGENT * scale {
+            break;
+        }
+        let allowed = TANGENT * scale + noise;
         let mut slopes = vec![f64::NAN; n * n];
         let (mut error, mut disagreement, mut worst) = (0.0_f64, 0.0_f64, Slope::Right);
         for (k, &c) in columns.iter().enumerate() {
@@ -337,9 +347,12 @@ pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slop
                 }
             }
         }
-        if disagreement.is_finite() && error <= TANGENT * scale {
-            margins::note("tangent", error / (TANGENT * scale));
-            return Ok(left.map_or(Slope::Right, |(row, c)| Slope::Left(row, c)));
+        if disagreement.is_finite() && error <= allowed {
+            // The nearest of the lengths: the others have an error of their own.
+            right = right.min(error / allowed);
+        }
+        if right.is_finite() {
+            continue;
         }
         // Between two kinks, sides agree with each other, but the shorter the length the steeper.
         if let Slope::Wrong { row, column, .. } = worst
@@ -351,10 +364,14 @@ pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slop
             let agrees = (before - slopes[row * n + column]).abs() <= 0.1 * error;
             if agrees && !is_steeper {
                 verdict = worst;
-                off = error / (TANGENT * scale);
+                off = error / allowed;
             }
         }
         longer = slopes;
+    }
+    if right.is_finite() {
+        margins::note("tangent", right);
+        return Ok(left.map_or(Slope::Right, |(row, c)| Slope::Left(row, c)));
     }
     margins::note("tangent", off);
     Ok(verdict)
@@ -906,7 +923,15 @@ fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
         signs[0] = 1.0;
         let mirror = DMatrix::from_diagonal(&DVector::from_vec(signs));
         for _ in 0..TWINS {
-            n += twin(&specimen, &mirror, &mirror, ("mirrored", ROUND_OFF), &mut random)?.map_err(|unlike| {
+            n += twin(
+                &specimen,
+                &mirror,
+                &mirror,
+                ("mirrored", ROUND_OFF),
+                &mut random,
+            )?
+            .map_err(|unlike| {
+                margins::note(unlike.part.0, unlike.part.1);
                 let name = specimen.name();
                 specimen.recorded(&unlike.start, Verdict::Warning(format!("{name}: {unlike}")))
             })?;
@@ -927,6 +952,8 @@ const ROTATED: f64 = 1e-4;
 
 /// Fluxes of a point and of its image that do not belong together.
 struct Unlike {
+    /// How far, as a part of the threshold of this name.
+    part: (&'static str, f64),
     start: PointStart,
     flux: Vec<f64>,
     image: Vec<f64>,
@@ -940,6 +967,7 @@ impl std::fmt::Display for Unlike {
             flux,
             image,
             expected,
+            ..
         } = self;
         write!(
             f,
@@ -1009,15 +1037,16 @@ fn twin(
             .max(stiffness * largest(&move_));
         let pairs = expected.iter().zip(&b.flux);
         let off = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-        margins::note(name, off / (tolerance * scale));
         if off > tolerance * scale || off.is_nan() {
             return Ok(Err(Unlike {
+                part: (name, off / (tolerance * scale)),
                 start: second,
                 flux: a.flux,
                 image: b.flux,
                 expected,
             }));
         }
+        margins::note(name, off / (tolerance * scale));
         n += 1;
         for (point, end) in [(&mut first, a), (&mut second, b)] {
             point.gradient0.clone_from(&point.gradient1);
@@ -1066,15 +1095,28 @@ fn response_is_isotropic(subject: &Subject) -> Found {
         }
         for _ in 0..TWINS {
             let (of_fluxes, of_gradients) = rotation(components, &mut random);
-            let mut found = twin(&specimen, &of_fluxes, &of_gradients, ("rotated", ROTATED), &mut random)?;
+            let mut found = twin(
+                &specimen,
+                &of_fluxes,
+                &of_gradients,
+                ("rotated", ROTATED),
+                &mut random,
+            )?;
             // Where a law branches, rounding may take the other branch: a fault shows again and again.
             for _ in 0..2 {
                 if found.is_err() {
                     let (of_fluxes, of_gradients) = rotation(components, &mut random);
-                    found = twin(&specimen, &of_fluxes, &of_gradients, ("rotated", ROTATED), &mut random)?;
+                    found = twin(
+                        &specimen,
+                        &of_fluxes,
+                        &of_gradients,
+                        ("rotated", ROTATED),
+                        &mut random,
+                    )?;
                 }
             }
             n += found.map_err(|unlike| {
+                margins::note(unlike.part.0, unlike.part.1);
                 let hint = shear_factor(&specimen, &mut random).map_or(String::new(), |factor| {
                     format!(
                         "; the shear modulus is {factor:.3} times (D11 − D12)/2, where shear \

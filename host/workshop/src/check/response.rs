@@ -1,11 +1,11 @@
 //! What can be said of a response without knowing its equations: where it jumps, what becomes of it in
 //! smaller increments, whether its elastic operator is one.
 
+use super::margins;
 use super::mathematics::{
     ELASTIC, ITERATED, NEEDS, ROUND_OFF, UPDATE, counts, depends_on_time, flux_scale, increment,
     largest,
 };
-use super::margins;
 use super::random::Random;
 use super::specimen::{INSTANT, Specimen, is_finite, is_success};
 use super::walk::Step;

@@ -3,18 +3,20 @@
 //!
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
-use super::mathematics::{depends_on_time, ITERATED, ROUND_OFF, Slope, UPDATE, flux_scale, largest, slope};
+use super::mathematics::{
+    ITERATED, ROUND_OFF, Slope, UPDATE, depends_on_time, flux_scale, largest, slope,
+};
 use super::random::Random;
 use super::specimen::{LONG, Specimen, create_form, first_difference, hypotheses, is_success};
 use super::walk::Step;
-use super::{Check, Family, Found, Subject, Verdict, refusal, skipped};
+use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
 use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
 use law::Tangent;
 use law::adapter::{Adapter, sidecar, sidecar_of};
-use law::probe::{Form, PointStart};
+use law::probe::{Form, PointEnd, PointStart};
 use std::path::Path;
 use text::{Source, suggestion};
 
@@ -313,6 +315,7 @@ fn under_pressure(routine: &Specimen) -> Result<PointStart, Verdict> {
 }
 
 fn routine_answers(subject: &Subject) -> Found {
+    course::is_followed(subject)?;
     let mut random = Random::new(subject.seed, "answers");
     let mut all = Vec::new();
     for routine in subject.specimens_by_default(1, &mut random)? {
@@ -343,7 +346,10 @@ fn routine_answers(subject: &Subject) -> Found {
         }
         all.push(format!("{} {stiffness:.3e}", routine.hypothesis.name()));
     }
-    Ok(format!("largest entry of the stiffness: {}", all.join(", ")))
+    Ok(format!(
+        "largest entry of the stiffness: {}",
+        all.join(", ")
+    ))
 }
 
 fn routine_stays_inside(subject: &Subject) -> Found {
@@ -387,19 +393,36 @@ fn routine_stays_inside(subject: &Subject) -> Found {
 
 /// Whether it is the same law with the same parameters.
 fn is_like(other: &Specimen, routine: &Specimen) -> bool {
-    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     other.hypothesis == routine.hypothesis
         && other.law.description().id == routine.law.description().id
         && bits(&other.values) == bits(&routine.values)
+}
+
+/// What first differs between two results, in words.
+fn change(routine: &Specimen, before: &PointEnd, after: &PointEnd) -> String {
+    let words = Words::of(routine);
+    let results = [
+        (words.stress, &before.flux, &after.flux),
+        (words.state, &before.state, &after.state),
+        (words.stiffness, &before.tangent, &after.tangent),
+    ];
+    let mut all = results.into_iter();
+    all.find(|(_, before, after)| bits(before) != bits(after))
+        .map_or_else(
+            || format!("outcome {}, then {}", before.status, after.status),
+            |(name, before, after)| format!("{name} {before:?}, then {after:?}"),
+        )
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
 }
 
 fn routine_is_repeatable(subject: &Subject) -> Found {
     let mut others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
     let mut by_element = None;
     let n = each(subject, "repeatable", |routine, steps, random| {
-        let fresh = others
-            .iter_mut()
-            .find(|other| is_like(other, routine));
+        let fresh = others.iter_mut().find(|other| is_like(other, routine));
         // Backwards, so that other calls come before; some with a component that does not move.
         let mut points = starts(steps);
         points.extend(routine.points(24, random)?);
@@ -419,21 +442,7 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
             let Some(i) = first_difference(&expected, found) else {
                 continue;
             };
-            let [before, after] = [&expected[i], &found[i]];
-            let words = Words::of(routine);
-            let results = [
-                (words.stress, &before.flux, &after.flux),
-                (words.state, &before.state, &after.state),
-                (words.stiffness, &before.tangent, &after.tangent),
-            ];
-            let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-            let other = results
-                .into_iter()
-                .find(|(_, before, after)| bits(before) != bits(after));
-            let what = other.map_or_else(
-                || format!("outcome {}, then {}", before.status, after.status),
-                |(name, before, after)| format!("{name} {before:?}, then {after:?}"),
-            );
+            let what = change(routine, &expected[i], &found[i]);
             let why = format!(
                 "the same call gives another result {who}: {what}, at {:?}",
                 points[i]
@@ -446,12 +455,11 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
         };
         let there = routine.probe.integrate(&points, &form)?.points;
         if let Some(i) = first_difference(&expected, &there) {
-            let Words {
-                element, stress, ..
-            } = Words::of(routine);
             let why = format!(
-                "with another {element} {stress} {:?} becomes {:?}, at {:?}",
-                expected[i].flux, there[i].flux, points[i]
+                "with another {}: {}, at {:?}",
+                Words::of(routine).element,
+                change(routine, &expected[i], &there[i]),
+                points[i]
             );
             by_element = by_element
                 .take()
@@ -465,7 +473,9 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
 fn routine_stays_at_rest(subject: &Subject) -> Found {
     let n = each(subject, "rest", |routine, steps, _| {
         // An MFront behaviour does not say whether it depends on the time.
-        if routine.formulation.time_dependent || is_mfront(routine) && depends_on_time(routine, steps)? {
+        if routine.formulation.time_dependent
+            || is_mfront(routine) && depends_on_time(routine, steps)?
+        {
             return Ok(0);
         }
         let Words { strain, stress, .. } = Words::of(routine);
@@ -511,7 +521,7 @@ fn differ(a: &[f64], b: &[f64], bound: f64) -> bool {
 }
 
 fn time_as_declared(subject: &Subject) -> Found {
-    if adapter(&subject.path) == Some(Adapter::Mfront) {
+    if subject.foreign().map(|foreign| foreign.adapter) == Some(Adapter::Mfront) {
         return Err(skipped(
             "a behaviour of MFront does not say whether it depends on the time",
         ));

@@ -31,15 +31,15 @@ pub(super) fn replay(
     let Some(limit) = opener.trust().isolate else {
         return inside(capsule, say);
     };
+    let bytes = file::read_library(&part.path).map_err(|source| text::Error::Unreadable {
+        path: part.path.clone(),
+        source,
+    })?;
     say(&format!(
         "library {}: {}",
         part.path.display(),
         part.phase.words()
     ));
-    let bytes = file::read_library(&part.path).map_err(|source| text::Error::Unreadable {
-        path: part.path.clone(),
-        source,
-    })?;
     if hexadecimal_sha256(&bytes) != part.sha256 {
         say(&format!(
             "this is another library than that of the capsule: SHA-256 {}",
