@@ -48,8 +48,8 @@ use text::write::replace;
     reason = "switches of the command line"
 )]
 pub struct Arguments {
-    /// A library, of the contract or of a UMAT with a sidecar beside it; or the id of a law that is found
-    /// as `pilum laws` finds it.
+    /// A library, of the contract or of a UMAT with a sidecar beside it, with `--driver` of a UDSM or of MFront
+    /// behaviours too; or the id of a law that is found as `pilum laws` finds it.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
     /// Write JSON.
@@ -64,8 +64,8 @@ pub struct Arguments {
     /// Fix a parameter of the laws, where random ones are refused; may be repeated.
     #[arg(long, value_name = "ID=VALUE", value_parser = setting)]
     set: Vec<(String, f64)>,
-    /// Lead the law along the path of this driver file, with its parameters, in place of random
-    /// ones.
+    /// Lead the law along the path of this driver file, with its parameters, and the sidecar it names, in
+    /// place of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "set")]
     driver: Option<PathBuf>,
     /// Where the calls behind failures and warnings are written, for `pilum replay`; default:
