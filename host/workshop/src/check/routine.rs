@@ -1,24 +1,25 @@
-//! Abaqus user subroutines with a sidecar: does the routine do what the sidecar says, and what can go
-//! wrong in it unseen?
+//! Libraries made for other programs: does a routine do what is said of it, in a sidecar or by itself, and
+//! what can go wrong in it unseen?
 //!
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
-use super::mathematics::{
-    ITERATED, ROUND_OFF, Slope, UPDATE, depends_on_time, flux_scale, largest, slope,
-};
+mod axes;
+mod tangent;
+mod words;
+
+use super::mathematics::{ITERATED, UPDATE, depends_on_time, flux_scale, largest};
 use super::random::Random;
-use super::specimen::{LONG, Specimen, create_form, first_difference, hypotheses, is_success};
+use super::specimen::{LONG, Specimen, first_difference, is_success};
 use super::walk::Step;
 use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
-use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
-use law::Tangent;
 use law::adapter::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointEnd, PointStart};
 use std::path::Path;
 use text::{Source, suggestion};
+use words::{Words, advice, is_mfront};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -79,7 +80,7 @@ pub(super) const CHECKS: &[Check] = &[
                       transpose of it, and symmetric where the sidecar says so. Kinks are exempt; so is \
                       `tangent = \"approximate\"`.",
         needs: &["routine-is-repeatable"],
-        run: ddsdde_matches_differences,
+        run: tangent::ddsdde_matches_differences,
     },
     Check {
         id: "routine-agrees-in-the-plane",
@@ -87,7 +88,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: with fewer components the routine gives what it gives with all of them: plane \
                       strain and axisymmetry what 3d gives, interface_2d what interface_3d gives.",
         needs: &["routine-is-repeatable"],
-        run: routine_agrees_in_the_plane,
+        run: axes::routine_agrees_in_the_plane,
     },
     Check {
         id: "tangential-directions-are-alike",
@@ -95,7 +96,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: with the tangential directions of an interface turned (reversed in the plane), \
                       the traction is the same, turned (warning).",
         needs: &["routine-is-repeatable"],
-        run: tangential_directions_are_alike,
+        run: axes::tangential_directions_are_alike,
     },
 ];
 
@@ -152,67 +153,6 @@ pub(super) fn refuse_without_driver(path: &Path, has_driver: bool) -> Result<(),
          path of yours",
         path.display()
     )))
-}
-
-/// What a program calls arguments and who describes a routine of it.
-#[derive(Clone, Copy, Debug)]
-struct Words {
-    stress: &'static str,
-    strain: &'static str,
-    stiffness: &'static str,
-    state: &'static str,
-    duration: &'static str,
-    time: &'static str,
-    element: &'static str,
-    describer: &'static str,
-}
-
-impl Words {
-    fn of(routine: &Specimen) -> Self {
-        match routine.law.library().foreign().map(|f| f.adapter) {
-            Some(Adapter::Udsm) => Self {
-                stress: "Sig",
-                strain: "dEps",
-                stiffness: "D",
-                state: "StVar",
-                duration: "dTime",
-                time: "Time0",
-                element: "iEl",
-                describer: "the library",
-            },
-            Some(Adapter::Mfront) => Self {
-                stress: "the stress",
-                strain: "the increment",
-                stiffness: "K",
-                state: "internal variables",
-                duration: "dt",
-                time: "the time",
-                element: "element",
-                describer: "the library",
-            },
-            _ => Self {
-                stress: "STRESS",
-                strain: "DSTRAN",
-                stiffness: "DDSDDE",
-                state: "STATEV",
-                duration: "DTIME",
-                time: "TIME",
-                element: "NOEL",
-                describer: "the sidecar",
-            },
-        }
-    }
-}
-
-/// Whether it is a behaviour of MFront.
-fn is_mfront(routine: &Specimen) -> bool {
-    routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Mfront)
-}
-
-/// What an author of a UMAT can write into the sidecar; nothing of routines that have none.
-fn advice(routine: &Specimen, text: &'static str) -> &'static str {
-    let is_umat = routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Umat);
-    if is_umat { text } else { "" }
 }
 
 /// Refuses settings that the sidecar does not know, or whose values are outside its bounds.
@@ -567,244 +507,6 @@ fn time_as_declared(subject: &Subject) -> Found {
     if declared && !seen {
         let why = "it is said to depend on the time, and neither the length of an increment nor its time changes anything";
         return Err(Verdict::Warning(why.to_owned()));
-    }
-    Ok(format!("{n} increments"))
-}
-
-/// Steps whose tangents are compared with differences, one in so many.
-const COMPARED: usize = 3;
-
-fn ddsdde_matches_differences(subject: &Subject) -> Found {
-    let (mut n_kinks, mut n_wrong) = (0, 0);
-    let mut worst: Option<(f64, Verdict)> = None;
-    let n = each(subject, "ddsdde", |routine, steps, _| {
-        let formulation = &routine.formulation;
-        let words = Words::of(routine);
-        let n = routine.probe.n_components();
-        let mut compared = 0;
-        for step in steps.iter().step_by(COMPARED) {
-            let tangent = &step.end.tangent;
-            let scale = step.stiffness.max(largest(tangent));
-            if formulation.symmetric {
-                let entry = |i: usize, j: usize| tangent[i * n + j];
-                let pairs = (0..n * n).map(|k| (k / n, k % n));
-                let most = pairs.map(|(i, j)| (entry(i, j) - entry(j, i)).abs());
-                let most = most.fold(0.0, f64::max);
-                if most > ROUND_OFF * scale {
-                    let why = format!(
-                        "it is said to be symmetric, and {} is off by {:.1e} of the stiffness, at {:?}",
-                        words.stiffness,
-                        most / scale,
-                        step.start
-                    );
-                    return Err(routine.fails_at(&step.start, why));
-                }
-            }
-            let mut transposed = step.clone();
-            transposed.end.tangent = (0..n * n).map(|k| tangent[(k % n) * n + k / n]).collect();
-            let is_right = |step: &Step| -> Result<bool, Verdict> {
-                Ok(matches!(
-                    slope(routine, step, scale)?,
-                    Slope::Right | Slope::Left(..)
-                ))
-            };
-            let by_columns = format!(
-                "the transpose of {0} is the derivative of {1}, {0} is not: its transpose fits: \
-                 `tangent_order` in {2}, at {3:?}",
-                words.stiffness,
-                words.stress,
-                if advice(routine, "a sidecar").is_empty() {
-                    "the driver and the case"
-                } else {
-                    "the sidecar"
-                },
-                step.start
-            );
-            if formulation.tangent != Tangent::Consistent {
-                // One that is near the derivative may be off, but not by rows for columns.
-                if is_right(&transposed)? && !is_right(step)? {
-                    return Err(routine.fails_at(&step.start, by_columns));
-                }
-                continue;
-            }
-            compared += 1;
-            match slope(routine, step, scale)? {
-                Slope::Right | Slope::Left(..) => {}
-                Slope::Kink => n_kinks += 1,
-                Slope::Wrong {
-                    row,
-                    column,
-                    by_law,
-                    by_differences,
-                } => {
-                    if is_right(&transposed)? {
-                        return Err(routine.fails_at(&step.start, by_columns));
-                    }
-                    n_wrong += 1;
-                    let off = (by_law - by_differences).abs() / scale;
-                    if worst.as_ref().is_some_and(|(most, _)| *most >= off) {
-                        continue;
-                    }
-                    let names = routine.hypothesis.components();
-                    let why = format!(
-                        "{}({}, {}), {} by {}, is {by_law:.6e}, differences give {by_differences:.6e}: \
-                         wrong by {off:.1e} of the stiffness, the most of all, which a run pays for with iterations. \
-                         {}At {:?}",
-                        words.stiffness,
-                        row + 1,
-                        column + 1,
-                        names[row],
-                        names[column],
-                        advice(
-                            routine,
-                            "An elastic or otherwise approximate one is declared by `tangent = \
-                             \"approximate\"` in the sidecar. "
-                        ),
-                        step.start
-                    );
-                    worst = Some((off, routine.warns_at(&step.start, why)));
-                }
-            }
-        }
-        Ok(compared)
-    })?;
-    if let Some((_, verdict)) = worst {
-        return Err(verdict.led_by(&format!("{n_wrong} of {n} increments: ")));
-    }
-    if n == 0 {
-        return Err(skipped("the stiffness is said to be approximate"));
-    }
-    let details = format!("{n} increments, {n_kinks} at kinks");
-    if 2 * n_kinks > n {
-        let why = format!("too few were compared: {details}");
-        return Err(Verdict::Warning(why));
-    }
-    Ok(details)
-}
-
-/// The same routine with the same parameters under another hypothesis, if it offers that.
-fn under(routine: &Specimen, wanted: Hypothesis) -> Result<Option<Specimen>, Verdict> {
-    let mut all = hypotheses(&routine.law).into_iter();
-    let Some((formulation, hypothesis)) = all.find(|(_, other)| *other == wanted) else {
-        return Ok(None);
-    };
-    let form = create_form(&formulation, hypothesis, &routine.values);
-    let created = routine.law.probe(&form)?;
-    Ok(created.probe.map(|probe| Specimen {
-        law: routine.law.clone(),
-        formulation,
-        hypothesis,
-        values: routine.values.clone(),
-        probe,
-        course: None,
-        time_increment: routine.time_increment,
-        is_led_near: routine.is_led_near,
-    }))
-}
-
-fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
-    let n = each(subject, "plane", |routine, steps, _| {
-        let wanted = match routine.hypothesis {
-            Hypothesis::PlaneStrain | Hypothesis::Axisymmetric => Hypothesis::ThreeD,
-            Hypothesis::Interface2d => Hypothesis::Interface3d,
-            _ => return Ok(0),
-        };
-        let Some(larger) = under(routine, wanted)? else {
-            return Ok(0);
-        };
-        let longer = |values: &[f64]| {
-            let mut longer = values.to_vec();
-            longer.resize(larger.probe.n_components(), 0.0);
-            longer
-        };
-        let points: Vec<PointStart> = steps
-            .iter()
-            .map(|step| PointStart {
-                gradient0: longer(&step.start.gradient0),
-                gradient1: longer(&step.start.gradient1),
-                flux0: longer(&step.start.flux0),
-                state0: step.start.state0.clone(),
-            })
-            .collect();
-        let answer = larger.call(&points, raw::PILUM_REQ_FLUX)?;
-        for ((step, point), end) in steps.iter().zip(&points).zip(&answer.points) {
-            if !is_success(end.status) {
-                let why = refusal(end.status, answer.text().as_deref());
-                return Err(larger.fails_at(point, why));
-            }
-            let expected = longer(&step.end.flux);
-            if differ(&end.flux, &expected, ITERATED * flux_scale(step)) {
-                let why = format!(
-                    "{} is {:?}, under {} it is {:?}, at {:?}",
-                    Words::of(routine).stress,
-                    step.end.flux,
-                    wanted.name(),
-                    end.flux,
-                    step.start
-                );
-                return Err(routine.fails_at(&step.start, why));
-            }
-        }
-        Ok(steps.len())
-    })?;
-    if n == 0 {
-        return Err(skipped(
-            "it is written for the plane or for space, not for both",
-        ));
-    }
-    Ok(format!("{n} increments"))
-}
-
-fn tangential_directions_are_alike(subject: &Subject) -> Found {
-    let n = each(subject, "turned", |routine, steps, random| {
-        if !routine.hypothesis.is_interface() {
-            return Ok(0);
-        }
-        let mut compared = 0;
-        for _ in steps.iter().take(200) {
-            // Internal variables with a direction would have to turn as well, so every path starts fresh.
-            let origin = routine.origin(random)?;
-            let size = origin.size * random.logarithmic(0.03, 30.0);
-            let mut point = origin.start;
-            point.gradient1 = routine.direction(size, random);
-            let angle = random.between(0.5, 2.5);
-            let turn = |values: &[f64]| match *values {
-                [n, t, s] => {
-                    let (sin, cos) = f64::sin_cos(angle);
-                    vec![n, cos * t - sin * s, sin * t + cos * s]
-                }
-                _ => vec![values[0], -values[1]],
-            };
-            let turned = PointStart {
-                gradient0: turn(&point.gradient0),
-                gradient1: turn(&point.gradient1),
-                flux0: turn(&point.flux0),
-                state0: point.state0.clone(),
-            };
-            let ends = routine.call(&[point.clone(), turned], raw::PILUM_REQ_FLUX)?;
-            let [first, second] = ends.points.as_slice() else {
-                continue;
-            };
-            if !(is_success(first.status) && is_success(second.status)) {
-                continue;
-            }
-            let scale = largest(&point.flux0)
-                .max(largest(&first.flux))
-                .max(origin.stiffness * size);
-            let expected = turn(&first.flux);
-            if differ(&second.flux, &expected, ITERATED * scale) {
-                let why = format!(
-                    "the traction {:?} becomes {:?} where it should be {expected:?}, at {point:?}",
-                    first.flux, second.flux
-                );
-                return Err(routine.warns_at(&point, why));
-            }
-            compared += 1;
-        }
-        Ok(compared)
-    })?;
-    if n == 0 {
-        return Err(skipped("it is no routine of interfaces"));
     }
     Ok(format!("{n} increments"))
 }
