@@ -97,9 +97,9 @@ impl LibraryCapsule {
     /// At the place that does not fit.
     #[inline]
     pub fn of_source(source: &Source) -> Result<Option<Self>, Error> {
-        let table = source.text().parse::<toml::Table>();
-        let is_one = table.is_ok_and(|table| table.contains_key("library"));
-        if !is_one {
+        // A capsule of a call may have many points, and is not read twice.
+        let mut lines = source.text().lines();
+        if !lines.any(|line| line.trim() == "[library]") {
             return Ok(None);
         }
         let capsule: Self =
