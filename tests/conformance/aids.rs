@@ -170,6 +170,223 @@ fn a_call_that_crashes_can_be_repeated() {
     }
 }
 
+/// What a library does where no law is called: the definitions of the fixture, the check that crashes, the
+/// phase in its capsule, and what replaying that says.
+const PHASES: [(&str, &str, &str, &str, &str); 13] = [
+    (
+        "load_crashes",
+        "__attribute__((constructor)) static void begins(void) { *(volatile int *)16 = 0; }",
+        "library-opens",
+        "load",
+        "the library crashed: signal 11 (segmentation fault)",
+    ),
+    (
+        "load_exits",
+        "#include <stdlib.h>\n__attribute__((constructor)) static void begins(void) { exit(1); }",
+        "library-opens",
+        "load",
+        "the library ended its process: exit code 1",
+    ),
+    (
+        "load_hangs",
+        "__attribute__((constructor)) static void begins(void) { for (;;) { __asm__ volatile(\"\"); } }",
+        "library-opens",
+        "load",
+        "the library does not return",
+    ),
+    (
+        "entry_aborts",
+        "#define IN_ENTRY abort()",
+        "entry-is-idempotent",
+        "entry",
+        "the library crashed: signal 6 (aborted)",
+    ),
+    (
+        "entry_exits",
+        "#define IN_ENTRY exit(0)",
+        "entry-is-idempotent",
+        "entry",
+        "the library ended its process: exit code 0",
+    ),
+    (
+        "entry_hangs",
+        "#define IN_ENTRY for (;;) { __asm__ volatile(\"\"); }",
+        "entry-is-idempotent",
+        "entry",
+        "the library does not return",
+    ),
+    (
+        "description_is_nowhere",
+        "#define IN_ENTRY return (const pilum_plugin *)16",
+        "description-is-readable",
+        "describe",
+        "the library crashed: signal 11 (segmentation fault)",
+    ),
+    (
+        "destroy_null",
+        "#define IN_DESTROY ((volatile double *)instance->stiffness)[0] = 0.0",
+        "create-works",
+        "destroy_null",
+        "the library crashed: signal 11 (segmentation fault)",
+    ),
+    (
+        "destroy_exits",
+        "#define IN_DESTROY if (instance) exit(3)",
+        "create-works",
+        "destroy",
+        "the law ended its process: exit code 3",
+    ),
+    (
+        "destroy_hangs",
+        "#define IN_DESTROY while (instance) { __asm__ volatile(\"\"); }",
+        "create-works",
+        "destroy",
+        "the law does not return",
+    ),
+    (
+        "destroy_after_use",
+        "static int used;\n#define IN_INTEGRATE used = 1\n\
+         #define IN_DESTROY if (used && instance) abort()",
+        "integrate-works",
+        "destroy",
+        "the law crashed: signal 6 (aborted)",
+    ),
+    (
+        "end_aborts",
+        "#include <stdlib.h>\n__attribute__((destructor)) static void ends(void) { abort(); }",
+        "library-opens",
+        "exit",
+        "the library crashed: signal 6 (aborted)",
+    ),
+    (
+        "end_exits",
+        "#include <unistd.h>\n__attribute__((destructor)) static void ends(void) { _exit(4); }",
+        "library-opens",
+        "exit",
+        "the library ended its process: exit code 4",
+    ),
+];
+
+/// What crashes on opening, in `destroy` or at the end of the process can be repeated as calls can.
+#[test]
+fn a_crash_where_no_law_is_called_can_be_repeated() {
+    for (name, definitions, id, phase, says) in PHASES {
+        let folder = folder();
+        let Some(library) = compiled_with(definitions, name, folder.path()) else {
+            return;
+        };
+        let report = check(&library, &["--only", id, "--time-limit", "2"]);
+        assert_eq!(report.check(id)["outcome"], "crashed", "{name}");
+        let capsule = report.check(id)["capsule"].as_str();
+        let capsule = capsule.unwrap_or_else(|| panic!("{name}: {:#}", report.json));
+        let text = std::fs::read_to_string(capsule).unwrap();
+        let is_of_law = text.contains("[probe]");
+        let key = if is_of_law { "function" } else { "phase" };
+        assert!(
+            text.contains(&format!("{key} = \"{phase}\"")),
+            "{name}: {text}"
+        );
+        let sha256 = report.json["sha256"].as_str().unwrap();
+        assert!(
+            text.contains(&format!("sha256 = \"{sha256}\"")),
+            "{name}: {text}"
+        );
+        let output = pilum(&["replay", capsule]);
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(3), "{name}: {said}");
+        assert!(
+            said.contains(&format!("as recorded: `internal`: {says}")),
+            "{name}: {said}"
+        );
+        assert!(
+            said.contains(&format!("from check {id}, seed 1")),
+            "{name}: {said}"
+        );
+        // Mended, it is another library, and nothing fails.
+        compiled_with("", name, folder.path()).unwrap();
+        let output = pilum(&["replay", capsule]);
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{name}: {said}");
+        let words = if is_of_law {
+            "the call succeeds"
+        } else {
+            "nothing fails; it is recorded as `internal`"
+        };
+        assert!(said.contains(words), "{name}: {said}");
+        assert_eq!(
+            said.contains("this is another library than that of the capsule"),
+            !is_of_law,
+            "{name}: {said}"
+        );
+    }
+}
+
+/// The same of a UMAT, whose library is loaded with its first material.
+#[test]
+fn a_routine_that_crashes_on_opening_or_at_the_end_can_be_repeated() {
+    let umat = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/umat");
+    for (attribute, key, says) in [
+        (
+            "constructor",
+            "function = \"create\"",
+            "the law crashed: signal 6",
+        ),
+        (
+            "destructor",
+            "phase = \"exit\"",
+            "the library crashed: signal 6",
+        ),
+    ] {
+        let folder = folder();
+        let source = folder.path().join("rows.c");
+        let text = std::fs::read_to_string(umat.join("rows.c")).unwrap();
+        let more = format!(
+            "\n#include <stdlib.h>\n__attribute__(({attribute})) static void plant(void) {{ abort(); }}\n"
+        );
+        let visible = "#pragma GCC visibility push(default)\n";
+        std::fs::write(&source, format!("{visible}{text}{more}")).unwrap();
+        let Some(library) = crate::program::compiled_from(&source, &umat, folder.path()) else {
+            return;
+        };
+        let sidecar = library.with_extension("law.toml");
+        std::fs::copy(umat.join("rows.law.toml"), sidecar).unwrap();
+        let id = "routine-answers";
+        let report = check(&library, &["--only", id]);
+        let capsule = report.check(id)["capsule"].as_str();
+        let capsule = capsule.unwrap_or_else(|| panic!("{attribute}: {:#}", report.json));
+        let text = std::fs::read_to_string(capsule).unwrap();
+        assert!(text.contains(key), "{attribute}: {text}");
+        assert!(text.contains("adapter = \"umat\""), "{attribute}: {text}");
+        let output = pilum(&["replay", capsule]);
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(3), "{attribute}: {said}");
+        assert!(
+            said.contains(&format!("as recorded: `internal`: {says}")),
+            "{attribute}: {said}"
+        );
+    }
+}
+
+/// What is wrong with such a capsule is marked in it.
+#[test]
+fn a_capsule_of_a_library_is_read_with_care() {
+    let folder = folder();
+    let file = folder.path().join("failure.toml");
+    let good = "version = 1\n[library]\npath = \"/no/such.so\"\nsha256 = \"\"\nphase = \"load\"\n\
+                [outcome]\nstatus = \"internal\"\nmessage = \"\"\n";
+    for (from, to, says) in [
+        ("", "", "cannot read /no/such.so"),
+        ("version = 1", "version = 2", "1:11"),
+        ("load", "lode", "5:9"),
+        ("load", "destroy_null", "`law` is missing"),
+        ("path", "file", "3:1"),
+    ] {
+        std::fs::write(&file, good.replacen(from, to, 1)).unwrap();
+        let words = refused(&["replay", file.to_str().unwrap()], 1);
+        assert!(words.contains(says), "{to:?}: {words}");
+    }
+}
+
 /// What is wrong with `init_state` shows again.
 #[test]
 fn a_wrong_initial_state_can_be_repeated() {

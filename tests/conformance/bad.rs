@@ -623,6 +623,60 @@ fn a_warning_says_what_was_probably_meant() {
     }
 }
 
+/// A number of 1 kPa in a logarithm: settled by a parameter, or by a sentence that names it, and by no other
+/// sentence.
+#[test]
+fn a_reference_of_one_unit_is_settled_by_a_parameter_or_a_sentence() {
+    let logarithm = |reference: &str, more: &str| {
+        format!(
+            "#define STIFFNESS(row, column) ((row) == (column) ? instance->stiffness[0] : 0.0)\n\
+             #define AT_END travel += fabs(increment[0]) * log1p(fabs(end[0]) / {reference});\n{more}"
+        )
+    };
+    let parameter = "#define SECOND {{.struct_size = PARAMETER_SIZE, .flags = PILUM_P_OPEN_LOWER, \
+                     .id = \"reference\", .symbol = \"p_r\", .unit = \"kPa\", .doc = \"Reference.\", \
+                     .default_value = 1.0, .lower = 0.0, .upper = INFINITY, .usual_lower = 0.1, \
+                     .usual_upper = 1e3}}";
+    let id = "units-belong-together";
+    for (name, definitions, outcome, says) in [
+        (
+            "hidden",
+            logarithm("1.0", ""),
+            "warning",
+            "A reference as in ln(p/1 kPa) is best a parameter with a unit and a default; or a sentence of \
+             the description names it (`at 1 kPa`).",
+        ),
+        (
+            "other",
+            logarithm("1.0", "#define DOC \"Measured at 21 kPa, over 1 m.\""),
+            "warning",
+            "half the unit of force",
+        ),
+        (
+            "said",
+            logarithm("1.0", "#define DOC \"Travel grows with ln(1 + n/1 kPa).\""),
+            "passed",
+            "another result in other units, as is said of `fixture`: 1 kPa",
+        ),
+        (
+            "given",
+            logarithm("instance->stiffness[1]", parameter),
+            "passed",
+            "increments",
+        ),
+    ] {
+        let folder = folder();
+        let Some(library) = compiled_with(&definitions, name, folder.path()) else {
+            return;
+        };
+        let report = check(&library, &["--only", id]);
+        let finding = report.check(id);
+        assert_eq!(finding["outcome"], outcome, "{name}: {finding:#}");
+        let details = finding["details"].as_str().unwrap();
+        assert!(details.contains(says), "{name}: {details}");
+    }
+}
+
 #[test]
 fn a_wrong_tangent_is_told_by_row_and_column_with_both_values() {
     let folder = folder();

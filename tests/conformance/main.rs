@@ -6,5 +6,6 @@ mod aids;
 mod bad;
 mod good;
 mod languages;
+mod led;
 mod minors;
 mod program;

@@ -1,6 +1,10 @@
 //! A failed call of a law in a file of its own: everything the call depends on, so that it can be
 //! repeated bit for bit, without the case it comes from.
 
+mod library;
+
+pub use library::{LibraryCapsule, LibraryPart};
+
 use crate::Error;
 use crate::FormulationDescription;
 use crate::adapter::{Adapter, Externals, Order};
@@ -177,6 +181,8 @@ const REQUESTS: [(&str, Request); 4] = [
 
 /// What `create` is asked for.
 const CREATE: &str = "an instance";
+/// What `destroy` is asked for.
+const DESTROY: &str = "the end of an instance";
 
 /// The name of a request in files.
 fn name(request: Request) -> &'static str {
@@ -329,12 +335,14 @@ impl Capsule {
         let ids = law.description().parameters.iter().map(|p| p.id.clone());
         let request = match function {
             Function::Create => CREATE,
+            Function::Destroy => DESTROY,
             Function::InitState => name(Request::InitialState),
             Function::Integrate => name(Request::Update(operator(form.request))),
         };
         let is_usual = form == usual(request, form.time, form.time_increment);
-        // Those that keep no contract are called as in a run.
-        let probe = law.library().foreign().is_none().then_some(ProbePart {
+        // Those that keep no contract are called as in a run; before the first call there is none.
+        let is_own = law.library().foreign().is_none() || function == Function::Create;
+        let probe = is_own.then_some(ProbePart {
             function,
             form: (!is_usual).then_some(form),
         });

@@ -4,7 +4,7 @@
 mod suppliers;
 
 use crate::Error;
-use crate::adapter;
+use crate::adapter::{self, Adapter};
 use crate::hexadecimal_sha256;
 use abi::raw::{self, MagicBlock};
 use abi::version;
@@ -153,6 +153,22 @@ impl Inspection {
         let has = |name: &str| self.exported.iter().any(|other| other == name);
         let exports = || adapter::UMAT_SYMBOLS.into_iter().any(has);
         self.handshake.is_none() && (exports() || adapter::sidecar_of(&self.path).is_some())
+    }
+
+    /// The program it is made for, if it is no library of the contract and that can be seen from outside.
+    pub fn adapter(&self) -> Option<Adapter> {
+        if self.handshake.is_some() {
+            return None;
+        }
+        let exports = |is: fn(&str) -> bool| self.exported.iter().any(|name| is(name));
+        if self.is_umat() {
+            Some(Adapter::Umat)
+        } else if exports(|name| name.ends_with("_mfront_mkt")) {
+            Some(Adapter::Mfront)
+        } else {
+            let is_model = |name: &str| name.trim_end_matches('_').eq_ignore_ascii_case("user_mod");
+            exports(is_model).then_some(Adapter::Udsm)
+        }
     }
 
     /// Says who provides the symbols that it leaves to others, if it is for this system.

@@ -33,6 +33,7 @@ use abi::raw::{self, Batch, Formulation, Host, Instance, Law, MagicBlock, Parame
 use abi::raw::{Status, Variable, View, ViewMut};
 use abi::version::{self, FORMULATION_SIZE_1_0, LAW_SIZE_1_0, PARAMETER_SIZE_1_0};
 use abi::version::{PLUGIN_SIZE_1_0, VARIABLE_SIZE_1_0};
+use probe::kept::{self, KeptPhase, Phase};
 use std::cell::Cell;
 use std::ffi::{CStr, c_char};
 use std::mem::{MaybeUninit, size_of};
@@ -112,13 +113,16 @@ pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
 
 fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-
+    let begin =
+        |phase| kept::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string());
+    begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =
         Box::leak(Box::new(unsafe { load_image(path, image) }?));
     // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
     let magic = unsafe { library.get::<*const MagicBlock>(b"pilum_magic\0") }
         .map_err(|_| "it has no symbol `pilum_magic`: this is no Pilum law library".to_owned())?;
+    begin(Phase::Handshake)?;
     // SAFETY: as above; the block is at least 64 bytes in every version.
     let magic = unsafe { (*magic).read_unaligned() };
     version::check(&magic).map_err(|mismatch| format!("{mismatch}"))?;
@@ -129,11 +133,13 @@ fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     // SAFETY: contract, "Handshake": once the block is accepted, `pilum_entry` has this type.
     let entry = unsafe { library.get::<raw::Entry>(b"pilum_entry\0") }
         .map_err(|_| "it has no symbol `pilum_entry`".to_owned())?;
+    begin(Phase::Entry)?;
     // SAFETY: contract, "Entry": may be called with any valid host block, from any thread.
     let plugin = unsafe { entry(&raw const HOST.0) };
     if plugin.is_null() {
         return Err("it refuses this host (`pilum_entry` returned null)".to_owned());
     }
+    begin(Phase::Describe)?;
     // SAFETY: contract, "Descriptions": static.
     let plugin = unsafe { known(plugin, PLUGIN_SIZE_1_0) }
         .ok_or_else(|| "`pilum_plugin` is truncated".to_owned())?;

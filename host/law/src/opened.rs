@@ -145,7 +145,7 @@ impl LoadedLaw {
     /// Calls `destroy` with null.
     pub fn destroy_nothing(&self) {
         if let Ok(law) = self.here() {
-            probe::destroy_nothing(law);
+            probe::destroy_nothing(&self.description().id, law);
         }
     }
 

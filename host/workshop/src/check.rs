@@ -10,6 +10,7 @@ mod crashed;
 mod description;
 mod inputs;
 mod load;
+mod margins;
 mod mathematics;
 mod memory;
 mod purity;
@@ -22,9 +23,11 @@ mod walk;
 
 use crate::Error;
 use abi::raw;
+use law::adapter::{Adapter, Foreign};
 use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
-use law::probe::{NO_OUTCOME, kept};
+use law::probe::NO_OUTCOME;
+use law::probe::kept::{self, KeptPhase, Phase};
 use law::{LoadedLaw, Opener, SearchPath, Trust, hexadecimal_sha256};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -45,8 +48,8 @@ use text::write::replace;
     reason = "switches of the command line"
 )]
 pub struct Arguments {
-    /// A library, of the contract or of a UMAT with a sidecar beside it; or the id of a law that is found
-    /// as `pilum laws` finds it.
+    /// A library, of the contract or of a UMAT with a sidecar beside it, with `--driver` of a UDSM or of MFront
+    /// behaviours too; or the id of a law that is found as `pilum laws` finds it.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
     /// Write JSON.
@@ -61,8 +64,8 @@ pub struct Arguments {
     /// Fix a parameter of the laws, where random ones are refused; may be repeated.
     #[arg(long, value_name = "ID=VALUE", value_parser = setting)]
     set: Vec<(String, f64)>,
-    /// Lead the law along the path of this driver file, with its parameters, in place of random
-    /// ones.
+    /// Lead the law along the path of this driver file, with its parameters, and the sidecar it names, in
+    /// place of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "set")]
     driver: Option<PathBuf>,
     /// Where the calls behind failures and warnings are written, for `pilum replay`; default:
@@ -274,13 +277,29 @@ impl Subject {
         file::read_library(&self.path).map_err(|why| failed(format!("it cannot be read: {why}")))
     }
 
+    /// The library as a file would name it, called in this process, if it keeps no contract: that of a check
+    /// is one of its own.
+    fn foreign(&self) -> Option<Foreign> {
+        let adapter = routine::adapter(&self.path)?;
+        let of_driver = self
+            .driver
+            .as_ref()
+            .and_then(|driver| course::foreign(&self.opener, driver));
+        Some(Foreign {
+            in_process: true,
+            record: None,
+            ..of_driver.unwrap_or_else(|| Foreign {
+                adapter,
+                ..Foreign::umat(&self.path)
+            })
+        })
+    }
+
     /// The laws of the library.
     fn laws(&self) -> Result<Vec<LoadedLaw>, Verdict> {
-        let library = if routine::is_one(&self.path) {
-            self.opener
-                .open_foreign(&routine::foreign(self), |_| Ok(()))
-        } else {
-            self.opener.open(&self.path)
+        let library = match self.foreign() {
+            Some(foreign) => self.opener.open_foreign(&foreign, |_| Ok(())),
+            None => self.opener.open(&self.path),
         };
         let library = library.map_err(|why| failed(why.to_string()))?;
         let ids = library.laws().map(|law| law.id.as_str());
@@ -329,6 +348,9 @@ struct Finding {
     /// The file with the call that it is about.
     #[serde(skip_serializing_if = "Option::is_none")]
     capsule: Option<PathBuf>,
+    /// The largest of what was found, as a part of each threshold.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    nearest: BTreeMap<String, f64>,
 }
 
 #[derive(Serialize)]
@@ -384,6 +406,8 @@ pub fn run(
                 Some(kept) => replace(&kept.with_extension(ANSWERED), answer)?,
                 None => print(&format!("\n{ANSWER}{answer}\n")),
             }
+            // What is left is the end of the process.
+            kept::keep_phase(KeptPhase::new(Phase::Exit, false)).map_err(internal)?;
         }
         return Ok(());
     }
@@ -399,7 +423,7 @@ pub fn run(
         let whose = if is_routine {
             "libraries of the contract"
         } else {
-            "UMATs"
+            "UMATs, UDSMs and MFront behaviours"
         };
         return Err(Error::usage(format!(
             "--only {id}: this check is for {whose}"
@@ -407,11 +431,7 @@ pub fn run(
     }
     let arguments = &with_absolute_driver(arguments)?;
     if is_routine {
-        if arguments.driver.is_some() {
-            return Err(Error::usage(
-                "--driver leads the laws of a library of the contract; a UMAT is led by `pilum point`",
-            ));
-        }
+        routine::refuse_without_driver(&path, arguments.driver.is_some())?;
         routine::refuse_settings(&arguments.set, &path)?;
     } else if !arguments.set.is_empty() {
         refuse_settings(arguments, &path)?;
@@ -451,10 +471,10 @@ pub fn run(
     if bad.is_empty() {
         return Ok(());
     }
-    let keeps = if is_routine {
-        "is not what its sidecar says"
-    } else {
-        "does not keep the contract"
+    let keeps = match routine::adapter(&path) {
+        None => "does not keep the contract",
+        Some(Adapter::Umat) => "is not what its sidecar says",
+        Some(_) => "is not what it says of itself",
     };
     Err(Error::library(format!(
         "library {} {keeps}: {}",
@@ -689,6 +709,7 @@ fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
         details,
         replay: None,
         capsule: None,
+        nearest: BTreeMap::new(),
     }
 }
 
@@ -706,14 +727,16 @@ struct Answer {
     details: String,
     /// The call that it is about.
     capsule: Option<String>,
+    /// The largest of what was found, as a part of each threshold.
+    nearest: BTreeMap<String, f64>,
 }
 
-/// Notes where the call of a capsule comes from.
-fn stamp(capsule: &mut Capsule, check: &Check, seed: u64) {
-    let keys = [("check", check.id.to_owned()), ("seed", seed.to_string())];
-    for (key, value) in keys {
-        capsule.origin.insert(key.to_owned(), value.into());
-    }
+/// Where what is in a capsule comes from, by key.
+fn origin(check: &Check, seed: u64) -> [(&'static str, toml::Value); 2] {
+    [
+        ("check", check.id.into()),
+        ("seed", seed.to_string().into()),
+    ]
 }
 
 /// Runs one check here.
@@ -726,7 +749,9 @@ fn run_check(check: &Check, subject: &Subject) -> Answer {
     };
     let (verdict, capsule) = match found {
         Err(Verdict::At(verdict, mut capsule)) => {
-            stamp(&mut capsule, check, subject.seed);
+            let origin = origin(check, subject.seed);
+            let origin = origin.map(|(key, value)| (key.to_owned(), value));
+            capsule.origin.extend(origin);
             (Err(*verdict), Some(capsule.to_string()))
         }
         verdict => (verdict, None),
@@ -746,6 +771,7 @@ fn run_check(check: &Check, subject: &Subject) -> Answer {
         outcome,
         details,
         capsule,
+        nearest: margins::take(),
     }
 }
 
@@ -753,6 +779,7 @@ impl Answer {
     /// The line of the report, with the file for `pilum replay`.
     fn reported(self, check: &Check, arguments: &Arguments, path: &Path) -> Result<Finding, Error> {
         let mut finding = finding(check, self.outcome, self.details);
+        finding.nearest = self.nearest;
         if finding.outcome.is_bad() {
             let own: Vec<String> = own_arguments(check, arguments)
                 .iter()
@@ -856,6 +883,7 @@ fn led_in_child(
         outcome: Outcome::Crashed,
         details,
         capsule: None,
+        nearest: BTreeMap::new(),
     };
     let answer = match (answer, outcome.ending) {
         (_, Ending::TimedOut) => crashed(format!(
@@ -870,7 +898,7 @@ fn led_in_child(
                 (Outcome::Passed, Some(details)) => Answer {
                     outcome: Outcome::Failed,
                     details,
-                    capsule: None,
+                    ..answer
                 },
                 _ => answer,
             }
@@ -888,11 +916,7 @@ fn led_in_child(
     if answer.outcome == Outcome::Crashed {
         let limit = Duration::from_secs_f64(arguments.time_limit.min(10.0));
         let told = [told, vec!["--tell".into(), kept.clone().into()]].concat();
-        let found = crashed::repeated(told, &kept, limit);
-        answer.capsule = found.map(|mut capsule| {
-            stamp(&mut capsule, check, arguments.seed);
-            capsule.to_string()
-        });
+        answer.capsule = crashed::repeated(told, &kept, limit, origin(check, arguments.seed));
     }
     answer.reported(check, arguments, path)
 }

@@ -1,12 +1,13 @@
 //! Repeating the call of a capsule: what comes out, how far the increment can be followed, and
 //! whether the tangent is the derivative of the update.
 
+pub(crate) mod library;
 pub(crate) mod probed;
 
 use crate::Error;
 use abi::status::Outcome;
 use law::adapter::Foreign;
-use law::capsule::{Capsule, OutcomePart, status};
+use law::capsule::{Capsule, LibraryCapsule, OutcomePart, status};
 use law::{
     BatchFailure, End, Law, LoadedLaw, Opener, Operator, PointCall, Request, SearchPath, Start,
     Strided, words,
@@ -14,6 +15,7 @@ use law::{
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use text::Source;
 
 /// Smallest fraction of the increment that is tried.
 const SMALLEST: f64 = 1.0 / (1 << 20) as f64;
@@ -33,7 +35,11 @@ type Answer = (Vec<f64>, Vec<f64>, Vec<f64>);
 /// The capsule or its law cannot be used; or, after the report, the call fails as before:
 /// [`Error::CallFails`].
 pub fn replay(path: &Path, opener: &Opener, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
-    let capsule = Capsule::read(path)?;
+    let source = Source::read(path)?;
+    if let Some(capsule) = LibraryCapsule::of_source(&source)? {
+        return library::replay(path, &capsule, opener, say);
+    }
+    let capsule = Capsule::of_source(source)?;
     if capsule.probe.is_some() {
         return probed::replay(path, &capsule, opener, say);
     }
@@ -61,19 +67,20 @@ pub fn repeat(
             capsule.law.version, capsule.law.sha256
         ));
     }
-    let origin: Vec<String> = capsule
-        .origin
-        .iter()
-        .map(|(key, value)| match value {
-            toml::Value::String(text) => format!("{key} {text}"),
-            other => format!("{key} {other}"),
-        })
-        .collect();
-    say(&format!("from {}", origin.join(", ")));
+    say(&from(&capsule.origin));
     let law = build(capsule, loaded)?;
     let outcome = compare(capsule, &law, say);
     law.take_notes().iter().for_each(|note| say(note));
     outcome
+}
+
+/// Where a capsule comes from, in words.
+fn from<'a>(origin: impl IntoIterator<Item = (&'a String, &'a toml::Value)>) -> String {
+    let origin = origin.into_iter().map(|(key, value)| match value {
+        toml::Value::String(text) => format!("{key} {text}"),
+        other => format!("{key} {other}"),
+    });
+    format!("from {}", origin.collect::<Vec<_>>().join(", "))
 }
 
 /// Repeats the call and says what came out.

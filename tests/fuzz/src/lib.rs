@@ -105,6 +105,14 @@ fn sidecar(data: &[u8]) {
 
 /// A capsule that can be read is written as it was read, and replayed without its library.
 fn capsule(data: &[u8]) {
+    let of_library = source(data).and_then(|source| shown(ways_in::library_capsule(&source)));
+    if let Some(capsule) = of_library.flatten() {
+        let text = capsule.to_string();
+        let again = ways_in::library_capsule(&Source::new("again.toml", text.as_str()));
+        let again = again.ok().flatten().map(|again| again.to_string());
+        assert_eq!(again, Some(text), "is read back as another");
+        return;
+    }
     let Some(capsule) = source(data).and_then(|source| shown(ways_in::capsule(source))) else {
         return;
     };

@@ -2,7 +2,7 @@
 
 use input::case::PartInput;
 use input::{Case, Driver, Error};
-use law::capsule::Capsule;
+use law::capsule::{Capsule, LibraryCapsule};
 use law::inspect::{Inspection, inspect_bytes};
 use law::{LawDescription, Pins, SearchPath, adapter};
 use mechanics::Mesh;
@@ -81,6 +81,14 @@ pub(crate) fn lock(source: &Source) -> Result<usize, Error> {
 /// Those of [`Capsule::read`].
 pub(crate) fn capsule(source: Source) -> Result<Capsule, Error> {
     Ok(Capsule::of_source(source)?)
+}
+
+/// A capsule of what a library does where no law is called, if it is one.
+///
+/// # Errors
+/// Those of [`LibraryCapsule::of_source`].
+pub(crate) fn library_capsule(source: &Source) -> Result<Option<LibraryCapsule>, Error> {
+    Ok(LibraryCapsule::of_source(source)?)
 }
 
 /// Repeats the call of a capsule with the law of this name, wherever the capsule's library is.

@@ -13,7 +13,7 @@ use abi::Hypothesis;
 use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};
 use abi::status::most_severe;
 use abi::version;
-use kept::{Function, KeptCall};
+use kept::{Function, KeptCall, KeptPhase, Phase};
 pub use pages::Fence;
 use pages::Pages;
 use serde::{Deserialize, Serialize};
@@ -291,6 +291,18 @@ enum Held {
     Foreign(Box<dyn ForeignInstance>),
 }
 
+impl Drop for Probe {
+    fn drop(&mut self) {
+        if let Held::Own(_) = self.instance {
+            // `destroy` is called all the same if that cannot be written.
+            let _ = kept::keep(|| {
+                let names = (self.id.as_str(), self.hypothesis.name());
+                KeptCall::new(names, Function::Destroy, Form::of(0), &self.values, &[])
+            });
+        }
+    }
+}
+
 /// Arguments of `create`.
 #[derive(Clone, Copy, Debug)]
 pub struct CreateForm<'a> {
@@ -466,8 +478,14 @@ fn ended(text: String) -> Vec<u8> {
 }
 
 /// Calls `destroy` with null, which the contract allows.
-pub(crate) fn destroy_nothing(law: LawHandle) {
+pub(crate) fn destroy_nothing(id: &str, law: LawHandle) {
     if let Some(destroy) = law.known.destroy {
+        let law = Some(id.to_owned());
+        // It is called all the same if that cannot be written.
+        let _ = kept::keep_phase(KeptPhase {
+            law,
+            ..KeptPhase::new(Phase::DestroyNull, false)
+        });
         // SAFETY: contract, "create": null is allowed.
         unsafe { destroy(null_mut()) };
     }
@@ -505,11 +523,11 @@ impl Probe {
         }
     }
 
-    /// Whether the law has `init_state`.
+    /// Whether the law has `init_state`; one behind an adapter says so when it is asked.
     fn has_init_state(&self) -> bool {
         match &self.instance {
             Held::Own(own) => own.law.known.init_state.is_some(),
-            Held::Foreign(_) => false,
+            Held::Foreign(_) => true,
         }
     }
 
@@ -540,6 +558,9 @@ impl Probe {
                 state0: Vec::new(),
             })
             .collect();
+        if let Held::Foreign(instance) = &self.instance {
+            return self.start_foreign(&**instance, &starts, form);
+        }
         let answer = self.call(Function::InitState, &starts, None, form)?;
         Ok(Some(answer.0))
     }
@@ -578,7 +599,7 @@ impl Probe {
         rates: &[PointRates],
         parameter: &[f64],
     ) -> io::Result<Option<(Answer, Vec<EndRates>)>> {
-        if !self.has_init_state() {
+        if !matches!(self.instance, Held::Own(_)) || !self.has_init_state() {
             return Ok(None);
         }
         let form = Form::of(raw::PILUM_REQ_RATES);
@@ -613,7 +634,7 @@ impl Probe {
         };
         let known = &own.law.known;
         let Some(called) = (match function {
-            Function::Create => None,
+            Function::Create | Function::Destroy => None,
             Function::InitState => known.init_state,
             Function::Integrate => known.integrate,
         }) else {
@@ -722,6 +743,68 @@ impl Probe {
 }
 
 impl Probe {
+    /// Initial internal variables through an adapter. `None` if the description says all there is to say.
+    fn start_foreign(
+        &self,
+        instance: &dyn ForeignInstance,
+        starts: &[PointStart],
+        form: &Form,
+    ) -> io::Result<Option<Answer>> {
+        let rows = Strided::rows(self.n_components);
+        kept::keep(|| {
+            let names = (self.id.as_str(), self.hypothesis.name());
+            KeptCall::new(names, Function::InitState, *form, &self.values, starts)
+        })?;
+        let mut worst = (raw::PILUM_OK, String::new());
+        let mut points = Vec::new();
+        for start in starts {
+            let mut end = self.nothing_yet(0);
+            let begun = instance.init_state(Call {
+                request: 0,
+                n_points: 1,
+                n_components: self.n_components,
+                n_states: self.n_states,
+                time: form.time,
+                time_increment: form.time_increment,
+                moment: Moment::default(),
+                sites: &[],
+                gradient0: None,
+                gradient1: None,
+                flux0: (&start.flux0, rows),
+                state0: &[],
+                flux1: None,
+                state1: &mut end.state,
+                tangent: &mut [],
+                status: std::slice::from_mut(&mut end.status),
+                step_factor: std::slice::from_mut(&mut end.step_factor),
+            });
+            let Some((returned, text)) = begun else {
+                return Ok(None);
+            };
+            if most_severe(worst.0, returned) != worst.0 {
+                worst = (returned, text);
+            }
+            points.push(end);
+        }
+        Ok(Some(Answer {
+            status: worst.0,
+            message: ended(worst.1),
+            points,
+            stray: false,
+        }))
+    }
+
+    /// A point before anything is written, with so many entries of an operator.
+    fn nothing_yet(&self, n_operator: usize) -> PointEnd {
+        PointEnd {
+            status: NO_OUTCOME,
+            step_factor: f64::NAN,
+            flux: vec![f64::NAN; self.n_components],
+            state: vec![f64::NAN; self.n_states],
+            tangent: vec![f64::NAN; n_operator],
+        }
+    }
+
     /// A call through an adapter, which has arrays of its own: requests and times are those of the form. A
     /// point whose gradient at the start is zero is told that the increment is the first one; the number of
     /// the element follows from that of the first point.
@@ -751,13 +834,7 @@ impl Probe {
                 element: (form.first_point + 1) as u32,
                 ..Site::default()
             };
-            let mut end = PointEnd {
-                status: NO_OUTCOME,
-                step_factor: f64::NAN,
-                flux: vec![f64::NAN; c],
-                state: vec![f64::NAN; self.n_states],
-                tangent: vec![f64::NAN; if wants_tangent { c * c } else { 0 }],
-            };
+            let mut end = self.nothing_yet(if wants_tangent { c * c } else { 0 });
             let (returned, text) = instance.integrate(Call {
                 request,
                 n_points: 1,
@@ -878,8 +955,14 @@ pub fn open(path: &Path) -> Result<(), String> {
     symbols(path).map(|_| ())
 }
 
+/// Notes what is about to be done with a library that is loaded from its file.
+fn begin(phase: Phase) -> Result<(), String> {
+    kept::keep_phase(KeptPhase::new(phase, true)).map_err(|error| error.to_string())
+}
+
 /// The library, never unloaded.
 fn symbols(path: &Path) -> Result<&'static libloading::Library, String> {
+    begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library = unsafe { load(path) }.map_err(|error| {
         std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string)
@@ -895,6 +978,7 @@ pub fn shake_hands(path: &Path) -> Result<(), String> {
     // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
     let magic = unsafe { symbols(path)?.get::<*const MagicBlock>(b"pilum_magic\0") }
         .map_err(|_| "there is no symbol `pilum_magic`".to_owned())?;
+    begin(Phase::Handshake)?;
     // SAFETY: as above; the block is at least 64 bytes in every version.
     let magic = unsafe { (*magic).read_unaligned() };
     version::check(&magic).map_err(|mismatch| mismatch.to_string())
@@ -917,6 +1001,7 @@ pub fn enter(path: &Path) -> Result<[usize; 3], String> {
         // SAFETY: as above.
         Ok(unsafe { entry(host) }.addr())
     };
+    begin(Phase::Entry)?;
     let (first, second) = (call(), call());
     let third = std::thread::spawn(other)
         .join()

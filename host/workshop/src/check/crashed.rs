@@ -1,14 +1,15 @@
-//! The call that a check has crashed in, found once it is over.
+//! What a check has crashed in, found once it is over: a call, or a phase of the library.
 
 use super::Subject;
 use crate::Error;
-use crate::replay::probed;
-use law::capsule::{Capsule, status};
+use crate::replay::{library, probed};
+use law::capsule::{Capsule, LibraryCapsule, status};
 use law::child::{self, Work};
-use law::probe::kept::KeptCall;
+use law::probe::kept::{Kept, KeptCall, KeptPhase};
 use std::ffi::OsString;
 use std::path::Path;
 use std::time::Duration;
+use text::Source;
 use text::write::replace;
 
 /// Points of a batch that are tried one by one.
@@ -16,38 +17,57 @@ const ONE_BY_ONE: usize = 128;
 /// How long the process takes that reads what was kept.
 const READING: Duration = Duration::from_secs(30);
 
-/// Makes the call that was made last a capsule beside its file: what it lacks is the outcome.
+/// Makes what was begun last a capsule beside its file: what it lacks is the outcome.
 ///
 /// # Errors
 /// It cannot be written.
 pub(super) fn tell(subject: &Subject, kept: &Path) -> Result<(), Error> {
-    match capsule(subject, kept) {
+    let capsule = match Kept::last(kept) {
+        Some(Kept::Call(call)) => of_call(subject, &call).map(|capsule| capsule.to_string()),
+        // Nothing of the library runs here: it may crash in that.
+        Some(Kept::Phase(phase)) => of_phase(subject, phase).map(|capsule| capsule.to_string()),
+        None => None,
+    };
+    match capsule {
         Some(text) => Ok(replace(&kept.with_extension("toml"), text)?),
         None => Ok(()),
     }
 }
 
-fn capsule(subject: &Subject, kept: &Path) -> Option<String> {
-    let call = KeptCall::last(kept)?;
+fn of_call(subject: &Subject, call: &KeptCall) -> Option<Capsule> {
     let laws = subject.laws().ok()?;
     let law = laws.iter().find(|law| law.description().id == call.law)?;
     let mut hypotheses = super::specimen::hypotheses(law).into_iter();
     let (formulation, hypothesis) = hypotheses.find(|(_, h)| h.name() == call.hypothesis)?;
-    let with = (hypothesis, call.parameters());
-    let capsule = Capsule::of_probe(
+    Capsule::of_probe(
         law,
         &formulation,
-        (with.0, &with.1),
+        (hypothesis, &call.parameters()),
         (call.function, call.form),
         &call.points(),
         &[],
-    );
-    Some(capsule?.to_string())
+    )
 }
 
-/// The capsule of the last call, made as small as it can be: of one point that crashes alone, or else of
-/// its whole batch. `None` if it does not crash again.
-pub(super) fn repeated(tell: Vec<OsString>, kept: &Path, limit: Duration) -> Option<Capsule> {
+fn of_phase(subject: &Subject, phase: KeptPhase) -> Option<LibraryCapsule> {
+    let sha256 = law::hexadecimal_sha256(&subject.bytes().ok()?);
+    let foreign = subject.foreign();
+    Some(LibraryCapsule::new(
+        &subject.path,
+        sha256,
+        phase,
+        foreign.as_ref(),
+    ))
+}
+
+/// The text of a capsule of what was begun last, if that crashes once more by itself. `origin` says where
+/// it happened, by key.
+pub(super) fn repeated(
+    tell: Vec<OsString>,
+    kept: &Path,
+    limit: Duration,
+    origin: [(&str, toml::Value); 2],
+) -> Option<String> {
     let work = Work {
         arguments: tell,
         folder: None,
@@ -56,7 +76,26 @@ pub(super) fn repeated(tell: Vec<OsString>, kept: &Path, limit: Duration) -> Opt
     };
     child::run(&work).ok()?;
     let scratch = &kept.with_extension("toml");
-    let whole = Capsule::read(scratch).ok()?;
+    let source = Source::read(scratch).ok()?;
+    let origin = origin.map(|(key, value)| (key.to_owned(), value));
+    let internal = status(abi::status::Outcome::Internal).to_owned();
+    if let Some(mut capsule) = LibraryCapsule::of_source(&source).ok()? {
+        capsule.outcome.message = library::run(scratch, limit).ok()?.1?;
+        capsule.outcome.status = internal;
+        capsule.origin.extend(origin);
+        return Some(capsule.to_string());
+    }
+    let (mut capsule, message) = smallest(source, scratch, limit)?;
+    capsule.outcome.message = message;
+    capsule.outcome.status = internal;
+    capsule.origin.extend(origin);
+    Some(capsule.to_string())
+}
+
+/// The capsule of a call, made as small as it can be, of one point that crashes alone, or else of its
+/// whole batch; and how it crashes. `None` if it does not.
+fn smallest(source: Source, scratch: &Path, limit: Duration) -> Option<(Capsule, String)> {
+    let whole = Capsule::of_source(source).ok()?;
     let crash = |capsule: &Capsule| {
         capsule.write(scratch).ok()?;
         probed::run(scratch, limit).ok()?.1
@@ -66,8 +105,6 @@ pub(super) fn repeated(tell: Vec<OsString>, kept: &Path, limit: Duration) -> Opt
     let single = (whole.n_points() > 1)
         .then(|| singles.find_map(|one| Some((crash(&one)?, one))))
         .flatten();
-    let (message, mut capsule) = single.unwrap_or((of_whole, whole));
-    status(abi::status::Outcome::Internal).clone_into(&mut capsule.outcome.status);
-    capsule.outcome.message = message;
-    Some(capsule)
+    let (message, capsule) = single.unwrap_or((of_whole, whole));
+    Some((capsule, message))
 }

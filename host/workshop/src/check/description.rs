@@ -1,6 +1,7 @@
 //! Is what the library says about its laws readable, complete and true?
 
-use super::{Check, Family, Found, Subject, Verdict};
+use super::{Check, Family, Found, Subject, Verdict, skipped};
+use law::adapter::Adapter;
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -54,7 +55,18 @@ fn description_is_readable(subject: &Subject) -> Found {
     Ok(names.join(", "))
 }
 
+/// Passes over what a UDSM and a behaviour of MFront cannot say.
+fn can_be_said(subject: &Subject) -> Result<(), Verdict> {
+    match subject.foreign().map(|foreign| foreign.adapter) {
+        None | Some(Adapter::Umat) => Ok(()),
+        Some(Adapter::Udsm | Adapter::Mfront) => Err(skipped(
+            "its program has no units or sentences for such libraries, or not for all that they have",
+        )),
+    }
+}
+
 fn description_is_complete(subject: &Subject) -> Found {
+    can_be_said(subject)?;
     let mut gaps = Vec::new();
     for law in subject.laws()? {
         let d = law.description();
@@ -98,6 +110,7 @@ fn description_is_complete(subject: &Subject) -> Found {
 }
 
 fn units_are_known(subject: &Subject) -> Found {
+    can_be_said(subject)?;
     let mut strange = Vec::new();
     for law in subject.laws()? {
         let d = law.description();

@@ -24,8 +24,9 @@ pub(super) const CHECKS: &[Check] = &[
         family: Family::Mathematics,
         description: "With all numbers in units of force, length or time that are half as large, a law \
                       says the same in these: no number in it has a unit that no parameter has, as a \
-                      tolerance in kPa has (warning, since a law may have such numbers, as a pressure of \
-                      1 kPa in a logarithm).",
+                      tolerance in kPa has (warning). Settled by a parameter with this unit and a default, or \
+                      by a sentence of the description that names the number, as 1 kPa in a logarithm: then \
+                      the check passes, and says so.",
         needs: NEEDS,
         run: units_belong_together,
     },
@@ -156,6 +157,9 @@ fn parameters_matter(subject: &Subject) -> Found {
 struct Smaller {
     /// What becomes smaller.
     what: &'static str,
+    /// A mistake with it, and the sentence that says that a number is meant.
+    example: &'static str,
+    statement: &'static str,
     force: f64,
     length: f64,
     time: f64,
@@ -166,18 +170,24 @@ struct Smaller {
 const SMALLER: [Smaller; 3] = [
     Smaller {
         what: "force",
+        example: "in kPa",
+        statement: "at 1 kPa",
         force: 2.0,
         length: 1.0,
         time: 1.0,
     },
     Smaller {
         what: "length",
+        example: "in m",
+        statement: "at 1 m",
         force: 4.0,
         length: 2.0,
         time: 1.0,
     },
     Smaller {
         what: "time",
+        example: "in s",
+        statement: "at 1 s",
         force: 1.0,
         length: 1.0,
         time: 2.0,
@@ -219,14 +229,27 @@ impl Smaller {
 fn units_belong_together(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "units");
     let (mut n, mut unknown) = (0, 0);
+    let mut meant: Vec<String> = Vec::new();
     for specimen in subject.specimens_by_default(3, &mut random)? {
         let steps = specimen.paths(24, &mut random)?.steps;
         for smaller in SMALLER {
-            match in_smaller_units(&specimen, &steps, smaller)? {
-                Some(compared) => n += compared,
-                None => unknown += 1,
+            match in_smaller_units(&specimen, &steps, smaller) {
+                Ok(Some(compared)) => n += compared,
+                Ok(None) => unknown += 1,
+                Err(verdict) => {
+                    let stated = stated(&specimen, smaller).ok_or(verdict)?;
+                    if !meant.contains(&stated) {
+                        meant.push(stated);
+                    }
+                }
             }
         }
+    }
+    if !meant.is_empty() {
+        return Ok(format!(
+            "{n} increments; another result in other units, as is said of {}",
+            meant.join("; ")
+        ));
     }
     if n == 0 {
         return Err(skipped(if unknown > 0 {
@@ -236,6 +259,38 @@ fn units_belong_together(subject: &Subject) -> Found {
         }));
     }
     Ok(format!("{n} increments"))
+}
+
+/// The sentence of the description that names a number one with a unit that becomes smaller, as "at 1 kPa":
+/// whose it is, and the number. It is meant then.
+fn stated(specimen: &Specimen, smaller: Smaller) -> Option<String> {
+    let law = specimen.law.description();
+    let of_law = [(&law.id, &law.doc)].into_iter();
+    let parameters = law.parameters.iter().map(|p| (&p.id, &p.doc));
+    let variables = specimen.formulation.internal_variables.iter();
+    let all = of_law
+        .chain(parameters)
+        .chain(variables.map(|v| (&v.id, &v.doc)));
+    let mut named = all.filter_map(|(id, doc)| Some((id, unit_number(doc, smaller)?)));
+    named.next().map(|(id, number)| format!("`{id}`: {number}"))
+}
+
+/// The first number one with a unit that becomes smaller.
+fn unit_number(sentence: &str, smaller: Smaller) -> Option<String> {
+    let words: Vec<&str> = sentence.split_whitespace().collect();
+    words.windows(2).find_map(|pair| {
+        let number = pair[0].trim_start_matches(['(', '/', '=', '[']);
+        let unit = pair[1].trim_end_matches(['.', ',', ';', ':', ')', ']', '!', '?']);
+        // `p/1 kPa` too, but no other number.
+        let is_one = number.strip_suffix('1').is_some_and(|before| {
+            let last = before.chars().next_back();
+            last.is_none_or(|c| !c.is_ascii_digit() && !['.', '-', ','].contains(&c))
+        });
+        let counts = smaller
+            .of(unit)
+            .is_some_and(|factor| factor.log2().abs() > 0.1);
+        (is_one && counts).then(|| format!("1 {unit}"))
+    })
 }
 
 /// Compares steps with the same in smaller units; nothing where no parameter and no internal variable has
@@ -304,9 +359,13 @@ impl Scaled<'_> {
     fn words(&self, what: &str) -> String {
         format!(
             "{}: with all numbers in half the unit of {}, {what}: is there a number in the law whose unit \
-             no parameter has?",
+             no parameter has? A tolerance {} is a mistake: let it be a part of what is compared. A reference as in \
+             ln(p/1 kPa) is best a parameter with a unit and a default; or a sentence of the description names it \
+             (`{}`).",
             self.specimen.name(),
-            self.smaller.what
+            self.smaller.what,
+            self.smaller.example,
+            self.smaller.statement
         )
     }
 
@@ -413,7 +472,27 @@ const STATE: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {
-    use super::SMALLER;
+    use super::{SMALLER, unit_number};
+
+    #[test]
+    fn a_number_one_with_a_unit_is_found_in_a_sentence() {
+        let [force, length, time] = SMALLER;
+        for (sentence, counts) in [
+            ("Specific volume at 1 kPa.", [true, false, false]),
+            ("v = N − λ ln(p/1 kPa).", [true, false, false]),
+            (
+                "Slip, in parts of 1 m, of rates (1 m/s).",
+                [false, true, true],
+            ),
+            ("Rate of 1 1/s.", [false, false, true]),
+            ("Pressure up to 21 kPa, 0.1 kPa or -1 kPa.", [false; 3]),
+            ("One kPa, or 1 of them.", [false; 3]),
+            ("An angle of 1 deg.", [false; 3]),
+        ] {
+            let found = [force, length, time].map(|s| unit_number(sentence, s).is_some());
+            assert_eq!(found, counts, "{sentence}");
+        }
+    }
 
     #[test]
     fn units_scale_as_they_are_written() {

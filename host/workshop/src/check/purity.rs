@@ -1,13 +1,14 @@
 //! Is an update a function of its arguments, and of nothing else?
 
+mod arguments;
+mod earlier;
+mod environment;
+
 use super::random::Random;
-use super::specimen::{Function, Specimen, create_form, first_difference, is_same, is_success};
+use super::specimen::{Function, Specimen, first_difference, is_same};
 use super::{Check, Family, Found, Subject, Verdict, skipped};
 use abi::raw;
-use law::probe::{Form, Order, PointEnd, PointStart, Probe, process};
-use std::ffi::OsString;
-use std::hint::black_box;
-use std::path::PathBuf;
+use law::probe::{Form, Order, PointEnd, PointStart};
 use std::time::Instant;
 
 pub(super) const CHECKS: &[Check] = &[
@@ -45,7 +46,7 @@ pub(super) const CHECKS: &[Check] = &[
                       and whatever number the first point has (warning, where without the consistent \
                       tangent no more than the last bits differ).",
         needs: &["repeatable"],
-        run: independent_of_request,
+        run: arguments::independent_of_request,
     },
     Check {
         id: "independent-of-time",
@@ -54,7 +55,7 @@ pub(super) const CHECKS: &[Check] = &[
                       parameter or internal variable has a unit of time, however long it takes, 0 too (warning, since a \
                       law may age).",
         needs: &["repeatable"],
-        run: independent_of_time,
+        run: arguments::independent_of_time,
     },
     Check {
         id: "independent-of-layout",
@@ -78,7 +79,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "An instance gives the same bits while others with other parameters are \
                       created, used and destroyed.",
         needs: &["repeatable"],
-        run: instances_are_independent,
+        run: earlier::instances_are_independent,
     },
     Check {
         id: "independent-of-earlier-calls",
@@ -87,7 +88,7 @@ pub(super) const CHECKS: &[Check] = &[
                       parameter, request or the time increment, by a half or by 10⁻⁹, and in an \
                       instance that stands where another one stood.",
         needs: &["instances-are-independent"],
-        run: independent_of_earlier_calls,
+        run: earlier::independent_of_earlier_calls,
     },
     Check {
         id: "environment-is-left-alone",
@@ -97,21 +98,21 @@ pub(super) const CHECKS: &[Check] = &[
                       environment are as before; no process was started, no thread and no open file \
                       is left behind, and none is closed.",
         needs: &["integrate-works"],
-        run: environment_is_left_alone,
+        run: environment::environment_is_left_alone,
     },
     Check {
         id: "prints-nothing",
         family: Family::Purity,
         description: "Nothing is written to the standard output or the error stream.",
         needs: &["integrate-works"],
-        run: drive,
+        run: environment::drive,
     },
     Check {
         id: "writes-no-files",
         family: Family::Purity,
         description: "No file is left in the working directory.",
         needs: &["integrate-works"],
-        run: drive,
+        run: environment::drive,
     },
 ];
 
@@ -295,140 +296,6 @@ fn independent_of_layout(subject: &Subject) -> Found {
     })
 }
 
-fn independent_of_request(subject: &Subject) -> Found {
-    let forms: [(u32, u64); 4] = [
-        (raw::PILUM_REQ_FLUX, 0),
-        (raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC, 0),
-        (UPDATE, 1),
-        (UPDATE, 1 << 40),
-    ];
-    let mut rounded: Option<Verdict> = None;
-    for (request, first_point) in forms {
-        compare(subject, "request", |called, points, _| {
-            let form = Form {
-                first_point,
-                ..called.specimen.form(request)
-            };
-            let expected = called.update(points)?;
-            let mut ends = called.specimen.ask(called.function, points, &form)?;
-            for ((end, expected), point) in ends.iter_mut().zip(expected).zip(points) {
-                let last_bits = called.function == Function::Integrate && first_point == 0;
-                if let (true, Some(by)) = (last_bits, rounding(point, end, &expected)) {
-                    if by > 0.0 {
-                        let verdict = Verdict::Warning(format!(
-                            "{}: without the consistent tangent the flux {:?} is {:?}, {by:.0} units of \
-                             rounding apart: are there two versions of the update? At {point:?}",
-                            called.specimen.name(),
-                            expected.flux,
-                            end.flux
-                        ));
-                        rounded.get_or_insert_with(|| called.specimen.recorded(point, verdict));
-                    }
-                    *end = expected;
-                } else {
-                    end.tangent = expected.tangent;
-                }
-            }
-            Ok(ends)
-        })?;
-    }
-    rounded.map_or(Ok(String::new()), Err)
-}
-
-/// The most units of rounding, of the terms in play, that two versions of one update may be apart.
-const ROUNDINGS: f64 = 64.0;
-
-/// How many units of rounding two results are apart, if no more than that; none if they succeed not
-/// both.
-fn rounding(start: &PointStart, a: &PointEnd, b: &PointEnd) -> Option<f64> {
-    if !(is_success(a.status) && a.status == b.status) {
-        return None;
-    }
-    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let moved = start.gradient1.iter().zip(&start.gradient0);
-    let moved = moved.fold(0.0_f64, |most, (end, begin)| most.max((end - begin).abs()));
-    // `b` has the tangent.
-    let flux = largest(&start.flux0)
-        .max(largest(&b.flux))
-        .max(largest(&b.tangent) * moved);
-    let apart = |a: f64, b: f64, scale: f64| {
-        if a.to_bits() == b.to_bits() {
-            0.0
-        } else {
-            (a - b).abs() / (f64::EPSILON * scale)
-        }
-    };
-    let fluxes = a.flux.iter().zip(&b.flux).map(|(a, b)| apart(*a, *b, flux));
-    let states = a.state.iter().zip(&b.state).zip(&start.state0);
-    let states = states.map(|((a, b), begin)| {
-        let scale = a.abs().max(b.abs()).max(begin.abs()).max(moved);
-        apart(*a, *b, scale)
-    });
-    let all: Vec<f64> = fluxes.chain(states).collect();
-    let most = all.iter().copied().fold(0.0, f64::max);
-    (all.iter().all(|by| *by <= ROUNDINGS)).then_some(most)
-}
-
-/// Times at which an increment may begin, and lengths of it.
-const TIMES: [f64; 2] = [0.125, 1e5];
-const LENGTHS: [f64; 3] = [0.0, 1e-3, 1e4];
-
-fn independent_of_time(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "time");
-    let mut n = 0;
-    for specimen in &subject.specimens(3, &mut random)? {
-        let points = specimen.points(48, &mut random)?;
-        let parameters = specimen.law.description().parameters.iter();
-        let variables = specimen.formulation.internal_variables.iter();
-        let mut units = parameters
-            .map(|p| &p.unit)
-            .chain(variables.map(|v| &v.unit));
-        let may_depend = units.any(|unit| has_time(unit));
-        for function in Function::BOTH {
-            let called = Called { specimen, function };
-            let ordinary = specimen.form(UPDATE);
-            let expected = called.update(&points)?;
-            let began = TIMES.map(|time| (format!("at time {time}"), Form { time, ..ordinary }));
-            let lengths = LENGTHS.map(|time_increment| {
-                let form = Form {
-                    time_increment,
-                    ..ordinary
-                };
-                (format!("over a time of {time_increment}"), form)
-            });
-            let lengths = lengths.into_iter().filter(|_| !may_depend);
-            for (when, form) in began.into_iter().chain(lengths) {
-                let found = specimen.ask(function, &points, &form)?;
-                n += found.len();
-                let Some(i) = first_difference(&expected, &found) else {
-                    continue;
-                };
-                let why = format!(
-                    "{}: `{}` gives flux {:?} and internal variables {:?}, {when} {:?} and {:?}, \
-                     at {:?}; a law that depends on how long an increment takes has a parameter with \
-                     a unit of time",
-                    specimen.name(),
-                    function.name(),
-                    expected[i].flux,
-                    expected[i].state,
-                    found[i].flux,
-                    found[i].state,
-                    points[i]
-                );
-                return Err(specimen.recorded(&points[i], Verdict::Warning(why)));
-            }
-        }
-    }
-    Ok(format!("{n} points"))
-}
-
-/// Whether a unit has one of time in it.
-fn has_time(unit: &str) -> bool {
-    unit.split(['/', '·', '*', ' '])
-        .filter_map(|factor| factor.split('^').next())
-        .any(|name| ["s", "h", "d"].contains(&name))
-}
-
 fn independent_of_thread(subject: &Subject) -> Found {
     compare(subject, "thread", |called, points, _| {
         // Slow laws meet each other in fewer calls.
@@ -457,363 +324,4 @@ fn independent_of_thread(subject: &Subject) -> Found {
         let chosen = if first_differs { 0 } else { odd.unwrap_or(0) };
         Ok(all.into_iter().nth(chosen).unwrap_or_default())
     })
-}
-
-fn instances_are_independent(subject: &Subject) -> Found {
-    let others = subject.specimens(3, &mut Random::new(subject.seed, "others"))?;
-    compare(subject, "instances", |called, points, _| {
-        let specimen = called.specimen;
-        for other in &others {
-            let form = create_form(&other.formulation, other.hypothesis, &other.values);
-            let created = other.law.probe(&form)?;
-            if other.hypothesis == specimen.hypothesis
-                && other.law.description().id == specimen.law.description().id
-                && let Some(probe) = &created.probe
-            {
-                on(probe, called.function, points, UPDATE)?;
-            }
-        }
-        called.update(points)
-    })
-}
-
-/// What another instance makes of the points.
-fn on(
-    probe: &Probe,
-    function: Function,
-    points: &[PointStart],
-    request: u32,
-) -> Result<Vec<PointEnd>, Verdict> {
-    let answer = match function {
-        Function::Integrate => Some(probe.integrate(points, &Form::of(request))?),
-        Function::InitState => {
-            let fluxes: Vec<Vec<f64>> = points.iter().map(|point| point.flux0.clone()).collect();
-            probe.init_state(&fluxes, &Form::of(0))?
-        }
-    };
-    Ok(answer.map_or(Vec::new(), |answer| answer.points))
-}
-
-/// A change of one input of a call; other inputs stay.
-type Change = fn(&mut PointStart, f64);
-
-const CHANGES: [(&str, Change); 4] = [
-    ("gradient0", |point, part| {
-        let ends = point.gradient1.iter();
-        for (start, end) in point.gradient0.iter_mut().zip(ends) {
-            *start += part * (end - *start);
-        }
-    }),
-    ("gradient1", |point, part| {
-        let starts = point.gradient0.iter();
-        for (end, start) in point.gradient1.iter_mut().zip(starts) {
-            *end -= part * (*end - start);
-        }
-    }),
-    ("flux0", |point, part| {
-        point.flux0.iter_mut().for_each(|flux| *flux *= 1.0 - part);
-    }),
-    ("state0", |point, part| {
-        let states = point.state0.iter_mut();
-        states.for_each(|state| *state *= 1.0 - part);
-    }),
-];
-
-/// Parts by which inputs are changed: far more than any tolerance, and less than most.
-const PARTS: [f64; 2] = [0.5, 1e-9];
-
-fn independent_of_earlier_calls(subject: &Subject) -> Found {
-    const N: usize = 8;
-    let mut random = Random::new(subject.seed, "earlier calls");
-    let mut n = 0;
-    for specimen in &subject.specimens(2, &mut random)? {
-        let points = specimen.points(2 * N, &mut random)?;
-        for (i, point) in points.iter().enumerate().take(N) {
-            let unlike = &points[(i + points.len() / 2) % points.len()];
-            for function in Function::BOTH {
-                n += after_alike(&Called { specimen, function }, point, unlike)?;
-                after_other_instances(subject, &Called { specimen, function }, point, unlike)?;
-            }
-        }
-    }
-    Ok(format!("{n} calls"))
-}
-
-/// Compares calls after an unlike one with the same after one that differs in a single thing.
-fn after_alike(
-    called: &Called<'_>,
-    point: &PointStart,
-    unlike: &PointStart,
-) -> Result<usize, Verdict> {
-    let Called { specimen, function } = called;
-    let one = |start: &PointStart, form: &Form| {
-        specimen.ask(*function, std::slice::from_ref(start), form)
-    };
-    let form = specimen.form(UPDATE);
-    let mut calls = Vec::new();
-    for part in PARTS {
-        for (what, change) in CHANGES {
-            let mut changed = point.clone();
-            change(&mut changed, part);
-            calls.push((format!("`{what}`"), changed, form));
-        }
-        let slower = Form {
-            time_increment: form.time_increment * (1.0 - part),
-            ..form
-        };
-        calls.push(("the time increment".to_owned(), point.clone(), slower));
-    }
-    for request in [
-        raw::PILUM_REQ_FLUX,
-        raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-    ] {
-        let other = Form { request, ..form };
-        calls.push(("the request".to_owned(), point.clone(), other));
-    }
-    for (what, start, form_of_it) in &calls {
-        one(unlike, &form)?;
-        let expected = one(start, form_of_it)?;
-        one(unlike, &form)?;
-        one(point, &form)?;
-        let found = one(start, form_of_it)?;
-        if first_difference(&expected, &found).is_some() {
-            let why = format!(
-                "`{}` gives another result after a call that differs in {what} alone: \
-                 flux {:?} and internal variables {:?}, else {:?} and {:?}, at {start:?}",
-                function.name(),
-                found[0].flux,
-                found[0].state,
-                expected[0].flux,
-                expected[0].state
-            );
-            return Err(if *function == Function::InitState {
-                let before = [point.flux0.clone()];
-                specimen.fails_to_start(
-                    std::slice::from_ref(&start.flux0),
-                    form_of_it,
-                    &before,
-                    why,
-                )
-            } else {
-                specimen.fails_at(start, why)
-            });
-        }
-    }
-    Ok(calls.len())
-}
-
-/// The same with instances that differ in one parameter, and with one that stands where another
-/// one stood.
-fn after_other_instances(
-    subject: &Subject,
-    called: &Called<'_>,
-    point: &PointStart,
-    unlike: &PointStart,
-) -> Result<(), Verdict> {
-    let Called { specimen, function } = called;
-    let one = |probe: &Probe, start: &PointStart| {
-        on(probe, *function, std::slice::from_ref(start), UPDATE)
-    };
-    let create = |values: &[f64]| {
-        let form = create_form(&specimen.formulation, specimen.hypothesis, values);
-        Ok::<_, Verdict>(specimen.law.probe(&form)?.probe)
-    };
-    // One whose parameters all differ makes a law forget what it kept of the others.
-    let parameters = specimen.law.description().parameters.iter().enumerate();
-    let varied: Vec<usize> = parameters
-        .filter(|(i, p)| {
-            let is_fixed = subject.settings.iter().any(|(id, _)| *id == p.id);
-            !is_fixed && p.choices.is_empty() && specimen.values[*i].is_finite()
-        })
-        .map(|(i, _)| i)
-        .collect();
-    let with = |some: &[usize]| -> Vec<f64> {
-        let mut values = specimen.values.clone();
-        for &i in some {
-            values[i] *= 1.0 - 1e-3;
-        }
-        values
-    };
-    let unlike_all = create(&with(&varied))?;
-    let forget = || one(unlike_all.as_ref().unwrap_or(&specimen.probe), unlike);
-    for &i in &varied {
-        let parameter = &specimen.law.description().parameters[i];
-        let Some(other) = create(&with(&[i]))? else {
-            continue;
-        };
-        forget()?;
-        let expected = one(&other, point)?;
-        forget()?;
-        one(&specimen.probe, point)?;
-        let found = one(&other, point)?;
-        // Where the first one stood.
-        forget()?;
-        one(&other, point)?;
-        let again = in_place_of(other, || create(&specimen.values))?;
-        let there = again.map(|again| one(&again, point)).transpose()?;
-        forget()?;
-        let own = one(&specimen.probe, point)?;
-        let what = if first_difference(&expected, &found).is_some() {
-            format!(
-                "after the same call of an instance that differs in `{}` alone",
-                parameter.id
-            )
-        } else if there.is_some_and(|there| first_difference(&own, &there).is_some()) {
-            "in an instance that stands where another one stood".to_owned()
-        } else {
-            continue;
-        };
-        let why = format!(
-            "`{}` gives another result {what}, at {point:?}",
-            function.name()
-        );
-        return Err(if *function == Function::InitState {
-            let fluxes = std::slice::from_ref(&point.flux0);
-            specimen.fails_to_start(fluxes, &specimen.form(0), &[], why)
-        } else {
-            specimen.fails_at(point, why)
-        });
-    }
-    Ok(())
-}
-
-/// Instances that are made until one stands where another one stood.
-const PLACES: usize = 256;
-
-/// An instance that stands where this one stands, which is destroyed; nothing if none comes to stand there.
-fn in_place_of(
-    other: Probe,
-    create: impl Fn() -> Result<Option<Probe>, Verdict>,
-) -> Result<Option<Probe>, Verdict> {
-    let address = other.address();
-    drop(other);
-    // Each takes a free place, and keeps it while the right one is looked for.
-    let mut elsewhere = Vec::new();
-    while elsewhere.len() < PLACES {
-        match create()? {
-            Some(again) if again.address() == address => return Ok(Some(again)),
-            Some(again) => elsewhere.push(again),
-            None => break,
-        }
-    }
-    Ok(None)
-}
-
-/// What a law could change about numbers and the process.
-#[derive(PartialEq, Debug)]
-struct Environment {
-    rounded: [u64; 4],
-    subnormal: u64,
-    folder: Option<PathBuf>,
-    signals: Vec<usize>,
-    arithmetic: u32,
-    locale: String,
-    has_alarm: bool,
-    /// Limits, and of the status what masks signals and files, where the system tells.
-    limits: Option<String>,
-    masks: Vec<String>,
-    variables: Vec<(OsString, OsString)>,
-    process: u32,
-    had_children: bool,
-    /// Where the system tells.
-    threads: Option<usize>,
-    files: Option<usize>,
-}
-
-impl Environment {
-    fn now() -> Self {
-        let one = black_box(1.0_f64);
-        let little = black_box(0.75 * f64::EPSILON);
-        let less = black_box(0.25 * f64::EPSILON);
-        let entries = |folder: &str| Some(std::fs::read_dir(folder).ok()?.count());
-        Self {
-            // Each direction of rounding gives another four numbers.
-            rounded: [one + little, one + less, -one - little, -one - less].map(f64::to_bits),
-            subnormal: (black_box(f64::MIN_POSITIVE) * black_box(0.5)).to_bits(),
-            folder: std::env::current_dir().ok(),
-            signals: process::signal_handlers(),
-            arithmetic: process::arithmetic(),
-            locale: process::locale(),
-            has_alarm: process::alarm(),
-            limits: std::fs::read_to_string("/proc/self/limits").ok(),
-            masks: std::fs::read_to_string("/proc/thread-self/status")
-                .unwrap_or_default()
-                .lines()
-                .filter(|line| line.starts_with("Umask:") || line.starts_with("SigBlk:"))
-                .map(str::to_owned)
-                .collect(),
-            variables: std::env::vars_os().collect(),
-            process: std::process::id(),
-            had_children: process::has_had_children(),
-            threads: entries("/proc/self/task"),
-            files: entries("/proc/self/fd"),
-        }
-    }
-
-    /// What is not as it was.
-    fn changed(&self, after: &Self) -> Option<String> {
-        let more = |before: Option<usize>, after: Option<usize>| {
-            let more = after?.checked_sub(before?)?;
-            (more > 0).then_some(more)
-        };
-        let what = if self.folder != after.folder {
-            "the working directory has changed"
-        } else if self.subnormal != after.subnormal {
-            "the treatment of subnormal numbers has changed"
-        } else if self.rounded != after.rounded {
-            "the rounding mode has changed"
-        } else if self.arithmetic != after.arithmetic {
-            "what the processor does on exceptions of arithmetic has changed"
-        } else if self.locale != after.locale {
-            return Some(format!("the locale is {} now", after.locale));
-        } else if self.has_alarm != after.has_alarm {
-            "an alarm is set"
-        } else if self.limits != after.limits {
-            "the limits of the process have changed"
-        } else if self.masks != after.masks {
-            "the mask of signals or of new files has changed"
-        } else if self.process != after.process || self.had_children != after.had_children {
-            "a process was started"
-        } else if let Some(number) = (1..)
-            .zip(self.signals.iter().zip(&after.signals))
-            .find_map(|(number, (before, after))| (before != after).then_some(number))
-        {
-            return Some(format!("the handler of signal {number} has changed"));
-        } else if self.variables != after.variables {
-            "the variables of the environment have changed"
-        } else if let Some(n) = more(self.threads, after.threads) {
-            return Some(format!("threads are left behind: {n}"));
-        } else if let Some(n) = more(self.files, after.files) {
-            return Some(format!("open files are left behind: {n}"));
-        } else if let Some(n) = more(after.files, self.files) {
-            return Some(format!("files that it has not opened are closed: {n}"));
-        } else {
-            return None;
-        };
-        Some(what.to_owned())
-    }
-}
-
-fn environment_is_left_alone(subject: &Subject) -> Found {
-    let mut before = Environment::now();
-    // The program itself may keep the file of a library that it has opened.
-    subject.laws()?;
-    before.files = Environment::now().files;
-    drive(subject)?;
-    match before.changed(&Environment::now()) {
-        None => Ok(String::new()),
-        Some(what) => Err(super::failed(what)),
-    }
-}
-
-/// Uses all functions, with failures too.
-fn drive(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "drive");
-    for specimen in subject.specimens(2, &mut random)? {
-        specimen.paths(20, &mut random)?;
-        let mut points = specimen.points(3, &mut random)?;
-        points[0].gradient1[0] = f64::NAN;
-        specimen.call(&points, UPDATE)?;
-    }
-    Ok(String::new())
 }

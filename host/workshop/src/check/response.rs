@@ -1,6 +1,7 @@
 //! What can be said of a response without knowing its equations: where it jumps, what becomes of it in
 //! smaller increments, whether its elastic operator is one.
 
+use super::margins;
 use super::mathematics::{
     ELASTIC, ITERATED, NEEDS, ROUND_OFF, UPDATE, counts, depends_on_time, flux_scale, increment,
     largest,
@@ -316,13 +317,19 @@ fn response_is_continuous(subject: &Subject) -> Found {
         }
         for piece in &pieces {
             let jump = piece.jump() / flux_scale(piece.step);
-            if jump <= JUMP || piece.switches(&specimen) {
+            if piece.switches(&specimen) {
+                continue;
+            }
+            if jump <= JUMP {
+                margins::note("jump", jump / JUMP);
                 continue;
             }
             if piece.is_between_substeps(&specimen)? {
+                margins::note("substeps", jump / SUBSTEPS);
                 rough = rough.max(jump);
                 continue;
             }
+            margins::note("jump", jump / JUMP);
             let [(at, a), (_, b)] = &piece.ends;
             let start = part(piece.step, 1.0);
             let why = format!(

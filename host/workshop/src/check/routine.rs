@@ -1,28 +1,32 @@
-//! Abaqus user subroutines with a sidecar: does the routine do what the sidecar says, and what can go
-//! wrong in it unseen?
+//! Libraries made for other programs: does a routine do what is said of it, in a sidecar or by itself, and
+//! what can go wrong in it unseen?
 //!
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
-use super::mathematics::{ITERATED, ROUND_OFF, Slope, UPDATE, flux_scale, largest, slope};
+mod axes;
+mod tangent;
+mod words;
+
+use super::mathematics::{ITERATED, UPDATE, depends_on_time, flux_scale, largest};
 use super::random::Random;
 use super::specimen::{LONG, Specimen, first_difference, is_success};
 use super::walk::Step;
-use super::{Check, Family, Found, Subject, Verdict, refusal, skipped};
+use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
-use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
-use law::Tangent;
-use law::adapter::{Foreign, sidecar, sidecar_of};
-use law::probe::{Form, PointStart};
+use law::adapter::{Adapter, sidecar, sidecar_of};
+use law::probe::{Form, PointEnd, PointStart};
 use std::path::Path;
 use text::{Source, suggestion};
+use words::{Words, advice, is_mfront};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "sidecar-is-read",
         family: Family::Routine,
-        description: "UMAT: the sidecar beside the library is there and makes sense.",
+        description: "UMAT: the sidecar beside the library, or that of the driver, is there and makes sense. (What is \
+                      asked of a UMAT here is asked of a UDSM and of MFront behaviours, too, along a driver.)",
         needs: &["file-is-a-library"],
         run: sidecar_is_read,
     },
@@ -76,7 +80,7 @@ pub(super) const CHECKS: &[Check] = &[
                       transpose of it, and symmetric where the sidecar says so. Kinks are exempt; so is \
                       `tangent = \"approximate\"`.",
         needs: &["routine-is-repeatable"],
-        run: ddsdde_matches_differences,
+        run: tangent::ddsdde_matches_differences,
     },
     Check {
         id: "routine-agrees-in-the-plane",
@@ -84,7 +88,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: with fewer components the routine gives what it gives with all of them: plane \
                       strain and axisymmetry what 3d gives, interface_2d what interface_3d gives.",
         needs: &["routine-is-repeatable"],
-        run: routine_agrees_in_the_plane,
+        run: axes::routine_agrees_in_the_plane,
     },
     Check {
         id: "tangential-directions-are-alike",
@@ -92,7 +96,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: with the tangential directions of an interface turned (reversed in the plane), \
                       the traction is the same, turned (warning).",
         needs: &["routine-is-repeatable"],
-        run: tangential_directions_are_alike,
+        run: axes::tangential_directions_are_alike,
     },
 ];
 
@@ -124,9 +128,31 @@ const SLOWER: f64 = 1e3;
 const LATER: f64 = 1e5;
 const ELSEWHERE: u64 = 39;
 
-/// Whether a library is a UMAT and none of the contract. Nothing of it runs.
+/// What a library is made for, if not for the contract. Nothing of it runs.
+pub(super) fn adapter(path: &Path) -> Option<Adapter> {
+    law::inspect::inspect(path).ok()?.adapter()
+}
+
+/// Whether a library is made for another program.
 pub(super) fn is_one(path: &Path) -> bool {
-    law::inspect::inspect(path).is_ok_and(|inspection| inspection.is_umat())
+    adapter(path).is_some()
+}
+
+/// Refuses a library whose description has no ranges that parameters could be drawn from.
+///
+/// # Errors
+/// [`text::Error::Usage`].
+pub(super) fn refuse_without_driver(path: &Path, has_driver: bool) -> Result<(), Error> {
+    let what = match adapter(path) {
+        Some(Adapter::Udsm) if !has_driver => "a UDSM of PLAXIS",
+        Some(Adapter::Mfront) if !has_driver => "a library of MFront behaviours",
+        _ => return Ok(()),
+    };
+    Err(Error::usage(format!(
+        "{} is {what}, which says nothing of the ranges of its parameters: `--driver FILE` checks it along a \
+         path of yours",
+        path.display()
+    )))
 }
 
 /// Refuses settings that the sidecar does not know, or whose values are outside its bounds.
@@ -151,14 +177,6 @@ pub(super) fn refuse_settings(settings: &[(String, f64)], path: &Path) -> Result
         }
     }
     Ok(())
-}
-
-/// The library as a file would name it, called in this process: that of a check is one of its own.
-pub(super) fn foreign(subject: &Subject) -> Foreign {
-    Foreign {
-        in_process: true,
-        ..Foreign::umat(&subject.path)
-    }
 }
 
 /// What a check of responses says of a routine: it is not led far if its calls take long, and a failure of
@@ -220,21 +238,33 @@ fn sidecar_is_read(subject: &Subject) -> Found {
 /// Compression of a first call, kPa.
 const PRESSURE: f64 = 100.0;
 
+/// A point that is compressed and has not moved.
+fn under_pressure(routine: &Specimen) -> Result<PointStart, Verdict> {
+    let flux0 = routine.under_pressure(PRESSURE);
+    let state0 = match routine.initial_state(&flux0)? {
+        Ok(state0) => state0,
+        Err(why) => return Err(routine.fails(why)),
+    };
+    let zero = vec![0.0; flux0.len()];
+    Ok(PointStart {
+        gradient0: zero.clone(),
+        gradient1: zero,
+        flux0,
+        state0,
+    })
+}
+
 fn routine_answers(subject: &Subject) -> Found {
+    course::is_followed(subject)?;
     let mut random = Random::new(subject.seed, "answers");
     let mut all = Vec::new();
     for routine in subject.specimens_by_default(1, &mut random)? {
-        let flux = routine.under_pressure(PRESSURE);
-        let state0 = match routine.initial_state(&flux)? {
-            Ok(state0) => state0,
-            Err(why) => return Err(routine.fails(why)),
-        };
-        let zero = vec![0.0; flux.len()];
-        let start = PointStart {
-            gradient0: zero.clone(),
-            gradient1: zero,
-            flux0: flux,
-            state0,
+        let start = match routine.course.iter().flatten().next() {
+            Some(first) => PointStart {
+                gradient1: first.gradient0.clone(),
+                ..first.clone()
+            },
+            None => under_pressure(&routine)?,
         };
         let answer = routine.call(std::slice::from_ref(&start), UPDATE)?;
         if !is_success(answer.status) {
@@ -243,15 +273,23 @@ fn routine_answers(subject: &Subject) -> Found {
         }
         let stiffness = largest(&answer.points[0].tangent);
         if stiffness <= 0.0 {
-            return Err(routine.fails_at(
-                &start,
-                "DDSDDE of a call without any strain is zero: the routine leaves it unset, and without it there is no \
-                 iteration; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar",
-            ));
+            let why = format!(
+                "{} of a call without any strain is zero: the routine leaves it unset, and without it there is no \
+                 iteration{}",
+                Words::of(&routine).stiffness,
+                advice(
+                    &routine,
+                    "; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar"
+                )
+            );
+            return Err(routine.fails_at(&start, why));
         }
         all.push(format!("{} {stiffness:.3e}", routine.hypothesis.name()));
     }
-    Ok(format!("largest entry of DDSDDE: {}", all.join(", ")))
+    Ok(format!(
+        "largest entry of the stiffness: {}",
+        all.join(", ")
+    ))
 }
 
 fn routine_stays_inside(subject: &Subject) -> Found {
@@ -293,13 +331,38 @@ fn routine_stays_inside(subject: &Subject) -> Found {
     }
 }
 
+/// Whether it is the same law with the same parameters.
+fn is_like(other: &Specimen, routine: &Specimen) -> bool {
+    other.hypothesis == routine.hypothesis
+        && other.law.description().id == routine.law.description().id
+        && bits(&other.values) == bits(&routine.values)
+}
+
+/// What first differs between two results, in words.
+fn change(routine: &Specimen, before: &PointEnd, after: &PointEnd) -> String {
+    let words = Words::of(routine);
+    let results = [
+        (words.stress, &before.flux, &after.flux),
+        (words.state, &before.state, &after.state),
+        (words.stiffness, &before.tangent, &after.tangent),
+    ];
+    let mut all = results.into_iter();
+    all.find(|(_, before, after)| bits(before) != bits(after))
+        .map_or_else(
+            || format!("outcome {}, then {}", before.status, after.status),
+            |(name, before, after)| format!("{name} {before:?}, then {after:?}"),
+        )
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
 fn routine_is_repeatable(subject: &Subject) -> Found {
     let mut others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
     let mut by_element = None;
     let n = each(subject, "repeatable", |routine, steps, random| {
-        let fresh = others
-            .iter_mut()
-            .find(|other| other.hypothesis == routine.hypothesis);
+        let fresh = others.iter_mut().find(|other| is_like(other, routine));
         // Backwards, so that other calls come before; some with a component that does not move.
         let mut points = starts(steps);
         points.extend(routine.points(24, random)?);
@@ -319,20 +382,7 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
             let Some(i) = first_difference(&expected, found) else {
                 continue;
             };
-            let [before, after] = [&expected[i], &found[i]];
-            let results = [
-                ("STRESS", &before.flux, &after.flux),
-                ("STATEV", &before.state, &after.state),
-                ("DDSDDE", &before.tangent, &after.tangent),
-            ];
-            let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-            let other = results
-                .into_iter()
-                .find(|(_, before, after)| bits(before) != bits(after));
-            let what = other.map_or_else(
-                || format!("outcome {}, then {}", before.status, after.status),
-                |(name, before, after)| format!("{name} {before:?}, then {after:?}"),
-            );
+            let what = change(routine, &expected[i], &found[i]);
             let why = format!(
                 "the same call gives another result {who}: {what}, at {:?}",
                 points[i]
@@ -346,8 +396,10 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
         let there = routine.probe.integrate(&points, &form)?.points;
         if let Some(i) = first_difference(&expected, &there) {
             let why = format!(
-                "with another NOEL STRESS {:?} becomes {:?}, at {:?}",
-                expected[i].flux, there[i].flux, points[i]
+                "with another {}: {}, at {:?}",
+                Words::of(routine).element,
+                change(routine, &expected[i], &there[i]),
+                points[i]
             );
             by_element = by_element
                 .take()
@@ -360,9 +412,13 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
 
 fn routine_stays_at_rest(subject: &Subject) -> Found {
     let n = each(subject, "rest", |routine, steps, _| {
-        if routine.formulation.time_dependent {
+        // An MFront behaviour does not say whether it depends on the time.
+        if routine.formulation.time_dependent
+            || is_mfront(routine) && depends_on_time(routine, steps)?
+        {
             return Ok(0);
         }
+        let Words { strain, stress, .. } = Words::of(routine);
         let still: Vec<PointStart> = steps
             .iter()
             .map(|step| PointStart {
@@ -376,13 +432,17 @@ fn routine_stays_at_rest(subject: &Subject) -> Found {
         for ((step, point), end) in steps.iter().zip(&still).zip(&answer.points) {
             if !is_success(end.status) {
                 let why = refusal(end.status, answer.text().as_deref());
-                return Err(routine.fails_at(point, format!("DSTRAN = 0 is refused: {why}")));
+                return Err(routine.fails_at(point, format!("{strain} = 0 is refused: {why}")));
             }
             if differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step)) {
                 let why = format!(
-                    "DSTRAN = 0 changes STRESS {:?} to {:?}; what the time does is declared by \
-                     `time_dependent = true` in the sidecar",
-                    step.end.flux, end.flux
+                    "{strain} = 0 changes {stress} {:?} to {:?}{}",
+                    step.end.flux,
+                    end.flux,
+                    advice(
+                        routine,
+                        "; what the time does is declared by `time_dependent = true` in the sidecar"
+                    )
                 );
                 return Err(routine.fails_at(point, why));
             }
@@ -401,8 +461,14 @@ fn differ(a: &[f64], b: &[f64], bound: f64) -> bool {
 }
 
 fn time_as_declared(subject: &Subject) -> Found {
+    if subject.foreign().map(|foreign| foreign.adapter) == Some(Adapter::Mfront) {
+        return Err(skipped(
+            "a behaviour of MFront does not say whether it depends on the time",
+        ));
+    }
     let (mut declared, mut seen) = (false, false);
     let n = each(subject, "time", |routine, steps, _| {
+        let words = Words::of(routine);
         let is_declared = routine.formulation.time_dependent;
         declared |= is_declared;
         let starts = starts(steps);
@@ -412,7 +478,7 @@ fn time_as_declared(subject: &Subject) -> Found {
             ..routine.form(raw::PILUM_REQ_FLUX)
         };
         let later = routine.probe.integrate(&starts, &later)?.points;
-        for (ends, what) in [(&slower, "DTIME"), (&later, "TIME")] {
+        for (ends, what) in [(&slower, words.duration), (&later, words.time)] {
             for (step, end) in steps.iter().zip(ends) {
                 let depends = is_success(end.status)
                     && differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
@@ -421,9 +487,16 @@ fn time_as_declared(subject: &Subject) -> Found {
                     return Err(routine.warns_at(
                         &step.start,
                         format!(
-                            "with another {what} STRESS {:?} becomes {:?}: say `time_dependent = true` in \
-                             the sidecar, so that phases and segments without a `time` are told of",
-                            step.end.flux, end.flux
+                            "with another {what} {} {:?} becomes {:?}, which {} does not say{}",
+                            words.stress,
+                            step.end.flux,
+                            end.flux,
+                            words.describer,
+                            advice(
+                                routine,
+                                ": say `time_dependent = true` in the sidecar, so that phases and segments \
+                                 without a `time` are told of"
+                            )
                         ),
                     ));
                 }
@@ -432,212 +505,8 @@ fn time_as_declared(subject: &Subject) -> Found {
         Ok(steps.len())
     })?;
     if declared && !seen {
-        let why = "`time_dependent = true`, and DTIME changes nothing, nor does TIME";
+        let why = "it is said to depend on the time, and neither the length of an increment nor its time changes anything";
         return Err(Verdict::Warning(why.to_owned()));
-    }
-    Ok(format!("{n} increments"))
-}
-
-/// Steps whose tangents are compared with differences, one in so many.
-const COMPARED: usize = 3;
-
-fn ddsdde_matches_differences(subject: &Subject) -> Found {
-    let (mut n_kinks, mut n_wrong) = (0, 0);
-    let mut worst: Option<(f64, Verdict)> = None;
-    let n = each(subject, "ddsdde", |routine, steps, _| {
-        let formulation = &routine.formulation;
-        let n = routine.probe.n_components();
-        let mut compared = 0;
-        for step in steps.iter().step_by(COMPARED) {
-            let tangent = &step.end.tangent;
-            let scale = step.stiffness.max(largest(tangent));
-            if formulation.symmetric {
-                let entry = |i: usize, j: usize| tangent[i * n + j];
-                let pairs = (0..n * n).map(|k| (k / n, k % n));
-                let most = pairs.map(|(i, j)| (entry(i, j) - entry(j, i)).abs());
-                let most = most.fold(0.0, f64::max);
-                if most > ROUND_OFF * scale {
-                    let why = format!(
-                        "`symmetric = true`, and DDSDDE is off by {:.1e} of the stiffness, at {:?}",
-                        most / scale,
-                        step.start
-                    );
-                    return Err(routine.fails_at(&step.start, why));
-                }
-            }
-            let mut transposed = step.clone();
-            transposed.end.tangent = (0..n * n).map(|k| tangent[(k % n) * n + k / n]).collect();
-            let is_right = |step: &Step| -> Result<bool, Verdict> {
-                Ok(matches!(
-                    slope(routine, step, scale)?,
-                    Slope::Right | Slope::Left(..)
-                ))
-            };
-            let by_columns = format!(
-                "the transpose of DDSDDE is the derivative of STRESS, DDSDDE is not: its transpose fits: \
-                 `tangent_order` in the sidecar, at {:?}",
-                step.start
-            );
-            if formulation.tangent != Tangent::Consistent {
-                // One that is near the derivative may be off, but not by rows for columns.
-                if is_right(&transposed)? && !is_right(step)? {
-                    return Err(routine.fails_at(&step.start, by_columns));
-                }
-                continue;
-            }
-            compared += 1;
-            match slope(routine, step, scale)? {
-                Slope::Right | Slope::Left(..) => {}
-                Slope::Kink => n_kinks += 1,
-                Slope::Wrong {
-                    row,
-                    column,
-                    by_law,
-                    by_differences,
-                } => {
-                    if is_right(&transposed)? {
-                        return Err(routine.fails_at(&step.start, by_columns));
-                    }
-                    n_wrong += 1;
-                    let off = (by_law - by_differences).abs() / scale;
-                    if worst.as_ref().is_some_and(|(most, _)| *most >= off) {
-                        continue;
-                    }
-                    let names = routine.hypothesis.components();
-                    let why = format!(
-                        "DDSDDE({}, {}), {} by {}, is {by_law:.6e}, differences give {by_differences:.6e}: \
-                         wrong by {off:.1e} of the stiffness, the most of all, which a run pays for with iterations. \
-                         An elastic or otherwise approximate one is declared by `tangent = \
-                         \"approximate\"` in the sidecar. At {:?}",
-                        row + 1,
-                        column + 1,
-                        names[row],
-                        names[column],
-                        step.start
-                    );
-                    worst = Some((off, routine.warns_at(&step.start, why)));
-                }
-            }
-        }
-        Ok(compared)
-    })?;
-    if let Some((_, verdict)) = worst {
-        return Err(verdict.led_by(&format!("{n_wrong} of {n} increments: ")));
-    }
-    if n == 0 {
-        return Err(skipped("the sidecar says `tangent = \"approximate\"`"));
-    }
-    let details = format!("{n} increments, {n_kinks} at kinks");
-    if 2 * n_kinks > n {
-        let why = format!("too few were compared: {details}");
-        return Err(Verdict::Warning(why));
-    }
-    Ok(details)
-}
-
-fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
-    let all = subject.specimens_by_default(1, &mut Random::new(subject.seed, "larger"))?;
-    let n = each(subject, "plane", |routine, steps, _| {
-        let wanted = match routine.hypothesis {
-            Hypothesis::PlaneStrain | Hypothesis::Axisymmetric => Hypothesis::ThreeD,
-            Hypothesis::Interface2d => Hypothesis::Interface3d,
-            _ => return Ok(0),
-        };
-        let Some(larger) = all.iter().find(|other| other.hypothesis == wanted) else {
-            return Ok(0);
-        };
-        let longer = |values: &[f64]| {
-            let mut longer = values.to_vec();
-            longer.resize(larger.probe.n_components(), 0.0);
-            longer
-        };
-        let points: Vec<PointStart> = steps
-            .iter()
-            .map(|step| PointStart {
-                gradient0: longer(&step.start.gradient0),
-                gradient1: longer(&step.start.gradient1),
-                flux0: longer(&step.start.flux0),
-                state0: step.start.state0.clone(),
-            })
-            .collect();
-        let answer = larger.call(&points, raw::PILUM_REQ_FLUX)?;
-        for ((step, point), end) in steps.iter().zip(&points).zip(&answer.points) {
-            if !is_success(end.status) {
-                let why = refusal(end.status, answer.text().as_deref());
-                return Err(larger.fails_at(point, why));
-            }
-            let expected = longer(&step.end.flux);
-            if differ(&end.flux, &expected, ITERATED * flux_scale(step)) {
-                let why = format!(
-                    "STRESS is {:?}, under {} it is {:?}, at {:?}",
-                    step.end.flux,
-                    wanted.name(),
-                    end.flux,
-                    step.start
-                );
-                return Err(routine.fails_at(&step.start, why));
-            }
-        }
-        Ok(steps.len())
-    })?;
-    if n == 0 {
-        return Err(skipped(
-            "it is written for the plane or for space, not for both",
-        ));
-    }
-    Ok(format!("{n} increments"))
-}
-
-fn tangential_directions_are_alike(subject: &Subject) -> Found {
-    let n = each(subject, "turned", |routine, steps, random| {
-        if !routine.hypothesis.is_interface() {
-            return Ok(0);
-        }
-        let mut compared = 0;
-        for _ in steps.iter().take(200) {
-            // Internal variables with a direction would have to turn as well, so every path starts fresh.
-            let origin = routine.origin(random)?;
-            let size = origin.size * random.logarithmic(0.03, 30.0);
-            let mut point = origin.start;
-            point.gradient1 = routine.direction(size, random);
-            let angle = random.between(0.5, 2.5);
-            let turn = |values: &[f64]| match *values {
-                [n, t, s] => {
-                    let (sin, cos) = f64::sin_cos(angle);
-                    vec![n, cos * t - sin * s, sin * t + cos * s]
-                }
-                _ => vec![values[0], -values[1]],
-            };
-            let turned = PointStart {
-                gradient0: turn(&point.gradient0),
-                gradient1: turn(&point.gradient1),
-                flux0: turn(&point.flux0),
-                state0: point.state0.clone(),
-            };
-            let ends = routine.call(&[point.clone(), turned], raw::PILUM_REQ_FLUX)?;
-            let [first, second] = ends.points.as_slice() else {
-                continue;
-            };
-            if !(is_success(first.status) && is_success(second.status)) {
-                continue;
-            }
-            let scale = largest(&point.flux0)
-                .max(largest(&first.flux))
-                .max(origin.stiffness * size);
-            let expected = turn(&first.flux);
-            if differ(&second.flux, &expected, ITERATED * scale) {
-                let why = format!(
-                    "the traction {:?} becomes {:?} where it should be {expected:?}, at {point:?}",
-                    first.flux, second.flux
-                );
-                return Err(routine.warns_at(&point, why));
-            }
-            compared += 1;
-        }
-        Ok(compared)
-    })?;
-    if n == 0 {
-        return Err(skipped("it is no routine of interfaces"));
     }
     Ok(format!("{n} increments"))
 }

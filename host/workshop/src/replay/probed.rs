@@ -103,19 +103,26 @@ pub(crate) fn run(path: &Path, limit: Duration) -> Result<(String, Option<String
     let crash = match outcome.ending {
         Ending::TimedOut => Some(STUCK.to_owned()),
         Ending::Signal(_) => Some(format!("the law crashed: {}", outcome.ending)),
-        // The program says why it could not come as far as the call.
-        Ending::Exited(1) if !returned => {
-            let why = String::from_utf8_lossy(&outcome.stderr);
-            return Err(Error::usage(
-                why.trim_start_matches("error: ").trim().to_owned(),
-            ));
-        }
         Ending::Exited(_) if !returned => {
+            // The program says why it could not come as far as the call.
+            if let Some(why) = refusal_of(&outcome) {
+                return Err(Error::usage(why));
+            }
             Some(format!("the law ended its process: {}", outcome.ending))
         }
         Ending::Exited(_) => None,
     };
     Ok((said, crash))
+}
+
+/// Why the program refused, in its words; `None` if it was the library that ended the process.
+pub(super) fn refusal_of(outcome: &child::Outcome) -> Option<String> {
+    let said = String::from_utf8_lossy(&outcome.stderr);
+    let is_ours = matches!(outcome.ending, Ending::Exited(code) if code != 0);
+    let lines: Vec<&str> = said.lines().collect();
+    let first = lines.iter().position(|line| line.starts_with("error: "));
+    let why = lines[first.filter(|_| is_ours)?..].join("\n");
+    Some(why.trim_start_matches("error: ").trim().to_owned())
 }
 
 /// What is said where nothing is wrong.
@@ -176,6 +183,21 @@ pub(super) fn inside(
         return Ok(());
     }
     let form = capsule.form();
+    if function == Function::Destroy {
+        let is_of_start = points.iter().all(|point| point.gradient1.is_empty());
+        let before = if is_of_start {
+            Function::InitState
+        } else {
+            Function::Integrate
+        };
+        if !points.is_empty() {
+            called(&probe, before, &points, &form).map_err(internal)?;
+        }
+        drop(probe);
+        say(RETURNED);
+        say(FAULTLESS);
+        return Ok(());
+    }
     let call = |points: &[PointStart]| called(&probe, function, points, &form).map_err(internal);
     let Some(first) = call(&points)? else {
         return Err(Error::library(format!(
@@ -258,11 +280,6 @@ pub(super) fn replay(
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
     if let Some(limit) = opener.trust().isolate {
-        let from: Vec<String> = capsule
-            .origin
-            .iter()
-            .map(|(k, v)| format!("{k} {v}"))
-            .collect();
         let law = &capsule.law;
         say(&format!(
             "law `{}` {} of {}, {}",
@@ -271,7 +288,7 @@ pub(super) fn replay(
             law.library.display(),
             law.hypothesis
         ));
-        say(&format!("from {}", from.join(", ").replace('"', "")));
+        say(&super::from(&capsule.origin));
         return outside(path, capsule, limit, say);
     }
     // Nothing is tried in a child first: what happens is to happen here.

@@ -1,5 +1,5 @@
 //! Calls that are written down before they are made, so that the last one is known however the process
-//! ends.
+//! ends; and what else runs of a library, on opening and at the end.
 
 use super::{Form, PointStart};
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 // Of the whole process by nature: it is the process that ends.
-static FILE: OnceLock<Mutex<File>> = OnceLock::new();
+static KEPT: OnceLock<Mutex<Keeper>> = OnceLock::new();
 /// Digits that tell how long the text behind them is; what is behind that is of earlier calls.
 const DIGITS: usize = 12;
 
@@ -23,6 +23,90 @@ pub enum Function {
     InitState,
     /// It carries points over an increment.
     Integrate,
+    /// It frees what `create` has made.
+    Destroy,
+}
+
+/// What runs of a library where no points are carried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// The system loads it, with its initialisers.
+    Load,
+    /// `pilum_magic` is read.
+    Handshake,
+    /// `pilum_entry` is called.
+    Entry,
+    /// What that has returned is read.
+    Describe,
+    /// `destroy` gets null.
+    DestroyNull,
+    /// The process ends, with what the library has put off until then.
+    Exit,
+}
+
+impl Phase {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Load => "load",
+            Self::Handshake => "handshake",
+            Self::Entry => "entry",
+            Self::Describe => "describe",
+            Self::DestroyNull => "destroy_null",
+            Self::Exit => "exit",
+        }
+    }
+
+    /// What is done there, in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Load => "loading it",
+            Self::Handshake => "reading `pilum_magic`",
+            Self::Entry => "calling `pilum_entry`",
+            Self::Describe => "reading the description",
+            Self::DestroyNull => "calling `destroy` with null",
+            Self::Exit => "ending the process",
+        }
+    }
+}
+
+/// A phase that has begun.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KeptPhase {
+    /// Which one.
+    pub phase: Phase,
+    /// The library is loaded from its file and not from the bytes that were hashed.
+    pub from_file: bool,
+    /// The law whose function is called.
+    pub law: Option<String>,
+}
+
+impl KeptPhase {
+    /// A phase that is no law's.
+    pub fn new(phase: Phase, from_file: bool) -> Self {
+        Self {
+            phase,
+            from_file,
+            law: None,
+        }
+    }
+}
+
+/// What was begun last.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub enum Kept {
+    /// A call of a law.
+    Call(KeptCall),
+    /// Something else.
+    Phase(KeptPhase),
+}
+
+/// Where it is written, and the call for points that was made last.
+#[derive(Debug)]
+struct Keeper {
+    file: File,
+    last: Option<KeptCall>,
 }
 
 /// A call of a law, to the last bit.
@@ -62,12 +146,10 @@ impl KeptCall {
         }
     }
 
-    /// The call that was made last; `None` if there is none.
-    pub fn last(path: &Path) -> Option<Self> {
-        let bytes = std::fs::read(path).ok()?;
-        let (length, rest) = bytes.split_at_checked(DIGITS)?;
-        let length: usize = std::str::from_utf8(length).ok()?.parse().ok()?;
-        serde_json::from_slice(rest.get(..length)?).ok()
+    /// Whether it is one of the same instance, as far as that can be seen.
+    fn is_of(&self, other: &Self) -> bool {
+        let own = (&self.law, &self.hypothesis, &self.parameters);
+        own == (&other.law, &other.hypothesis, &other.parameters)
     }
 
     /// Values of the parameters.
@@ -93,21 +175,64 @@ fn numbers(bits: &[u64]) -> Vec<f64> {
     bits.iter().map(|bits| f64::from_bits(*bits)).collect()
 }
 
-/// Has calls of probes be written to this file from now on, each over the one before.
-pub fn keep_in(file: File) {
-    let _ = FILE.set(Mutex::new(file));
+impl Kept {
+    /// What was begun last; `None` if nothing was.
+    pub fn last(path: &Path) -> Option<Self> {
+        let bytes = std::fs::read(path).ok()?;
+        let (length, rest) = bytes.split_at_checked(DIGITS)?;
+        let length: usize = std::str::from_utf8(length).ok()?.parse().ok()?;
+        serde_json::from_slice(rest.get(..length)?).ok()
+    }
 }
 
-/// Writes a call that is about to be made, if calls are kept.
+/// Has calls of probes be written to this file from now on, each over the one before.
+pub fn keep_in(file: File) {
+    let _ = KEPT.set(Mutex::new(Keeper { file, last: None }));
+}
+
+/// Writes a call that is about to be made, if calls are kept. That of `destroy` has the points of the call
+/// before, if its instance was asked for any.
 ///
 /// # Errors
 /// It cannot be written.
 pub fn keep(call: impl FnOnce() -> KeptCall) -> io::Result<()> {
-    let Some(file) = FILE.get() else {
+    let Some(keeper) = KEPT.get() else {
         return Ok(());
     };
-    let text = serde_json::to_string(&call())?;
-    let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-    file.rewind()?;
-    file.write_all(format!("{:0DIGITS$}{text}", text.len()).as_bytes())
+    let mut keeper = keeper.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut call = call();
+    if let (Function::Destroy, Some(last)) = (call.function, keeper.last.take())
+        && call.is_of(&last)
+    {
+        (call.form, call.points) = (last.form, last.points);
+    }
+    let kept = Kept::Call(call);
+    keeper.write(&kept)?;
+    if let Kept::Call(call) = kept
+        && matches!(call.function, Function::InitState | Function::Integrate)
+    {
+        keeper.last = Some(call);
+    }
+    Ok(())
+}
+
+/// Writes a phase that is about to begin, if calls are kept.
+///
+/// # Errors
+/// It cannot be written.
+pub fn keep_phase(phase: KeptPhase) -> io::Result<()> {
+    let Some(keeper) = KEPT.get() else {
+        return Ok(());
+    };
+    let mut keeper = keeper.lock().unwrap_or_else(PoisonError::into_inner);
+    keeper.write(&Kept::Phase(phase))
+}
+
+impl Keeper {
+    fn write(&mut self, kept: &Kept) -> io::Result<()> {
+        let text = serde_json::to_string(kept)?;
+        self.file.rewind()?;
+        self.file
+            .write_all(format!("{:0DIGITS$}{text}", text.len()).as_bytes())
+    }
 }

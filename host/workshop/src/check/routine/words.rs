@@ -1,0 +1,65 @@
+//! What other programs call the arguments of a routine, and what an author can do about it.
+
+use crate::check::specimen::Specimen;
+use law::adapter::Adapter;
+
+/// What a program calls arguments and who describes a routine of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Words {
+    pub(super) stress: &'static str,
+    pub(super) strain: &'static str,
+    pub(super) stiffness: &'static str,
+    pub(super) state: &'static str,
+    pub(super) duration: &'static str,
+    pub(super) time: &'static str,
+    pub(super) element: &'static str,
+    pub(super) describer: &'static str,
+}
+
+impl Words {
+    pub(super) fn of(routine: &Specimen) -> Self {
+        match routine.law.library().foreign().map(|f| f.adapter) {
+            Some(Adapter::Udsm) => Self {
+                stress: "Sig",
+                strain: "dEps",
+                stiffness: "D",
+                state: "StVar",
+                duration: "dTime",
+                time: "Time0",
+                element: "iEl",
+                describer: "the library",
+            },
+            Some(Adapter::Mfront) => Self {
+                stress: "the stress",
+                strain: "the increment",
+                stiffness: "K",
+                state: "internal variables",
+                duration: "dt",
+                time: "the time",
+                element: "element",
+                describer: "the library",
+            },
+            _ => Self {
+                stress: "STRESS",
+                strain: "DSTRAN",
+                stiffness: "DDSDDE",
+                state: "STATEV",
+                duration: "DTIME",
+                time: "TIME",
+                element: "NOEL",
+                describer: "the sidecar",
+            },
+        }
+    }
+}
+
+/// Whether it is a behaviour of MFront.
+pub(super) fn is_mfront(routine: &Specimen) -> bool {
+    routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Mfront)
+}
+
+/// What an author of a UMAT can write into the sidecar; nothing of routines that have none.
+pub(super) fn advice(routine: &Specimen, text: &'static str) -> &'static str {
+    let is_umat = routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Umat);
+    if is_umat { text } else { "" }
+}
