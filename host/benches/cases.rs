@@ -205,7 +205,10 @@ impl Chamber {
     fn condense(&self) -> (LinearDomain, System) {
         let Model { groups, ties, .. } = &self.model;
         let lines = mesh_lines(&self.mesh.nodes);
-        let linear: Vec<bool> = groups.iter().map(mechanics::group::Group::is_linear).collect();
+        let linear: Vec<bool> = groups
+            .iter()
+            .map(mechanics::group::Group::is_linear)
+            .collect();
         let of = (groups.as_slice(), linear.as_slice());
         let condensed = LinearDomain::new(of, &self.prescribed, ties, &lines, true, None);
         condensed.expect("supported").expect("linear groups")
