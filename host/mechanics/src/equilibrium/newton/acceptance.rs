@@ -15,6 +15,8 @@
 //! factor of ten ([`FORCES`]) leaves room for them, and costs at most one digit of what the
 //! tolerance means. Where the forces rise farther in one step, the criterion is only stricter.
 
+use super::round_off::ROUND_OFF;
+
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 pub(super) const EXACT: f64 = 1e-3;
@@ -104,10 +106,13 @@ pub(super) struct Measures {
 }
 
 impl Measures {
-    /// Whether the residual is so small that the correction says nothing more.
+    /// Whether the residual is so small that the correction says nothing more. That may be round-off of the forces
+    /// in play, where the tolerance is near it: of a body that has no reason to move the increment is round-off, too,
+    /// and does not measure corrections.
     pub(super) fn is_exact(&self, criteria: Criteria) -> bool {
+        let exact = (EXACT * criteria.force).max(ROUND_OFF.min(criteria.force));
         !criteria.is_stale
-            && self.residual <= EXACT * criteria.force
+            && self.residual <= exact
             && self.beyond <= MOVES
             && !self.is_away
     }
@@ -192,6 +197,24 @@ mod tests {
         assert_relative_eq!(change.relative, 1.0);
         assert!(measures(1e-13, change).is_equilibrium(CRITERIA));
         assert!(!measures(1e-11, change).is_equilibrium(CRITERIA));
+    }
+
+    #[test]
+    fn a_tolerance_near_round_off_does_not_ask_round_off_to_settle() {
+        let tight = Criteria {
+            force: 1e-13,
+            ..CRITERIA
+        };
+        // Nothing was to move: an increment of 1e-19 m, and corrections as large.
+        let change = Change::of(1e-19, 1e-19, 0.0);
+        assert!(measures(4e-16, change).is_equilibrium(tight));
+        assert!(!measures(5e-14, change).is_equilibrium(tight));
+        // What is above the tolerance stays above it.
+        let tighter = Criteria {
+            force: 1e-16,
+            ..CRITERIA
+        };
+        assert!(!measures(4e-16, change).is_equilibrium(tighter));
     }
 
     #[test]
