@@ -1,4 +1,4 @@
-//! A layer that unloads to no stress at all.
+//! A layer that unloads to no stress at all, and a model in which nothing is to move.
 //!
 //! Goal        the end of unloading does not depend on which way up the model stands
 //! Geometry    a thin layer between two slabs, in the middle of the left part of a body
@@ -6,7 +6,7 @@
 //! Law         elastic; mepi in the layer, whose stiffness vanishes with its traction
 //! Asserts     both ways up: no force is left at the end
 
-use crate::setup::{Results, run};
+use crate::setup::{Results, assert_close, run};
 
 /// The body, or its mirror image in a horizontal plane.
 fn body(mirrored: bool) -> String {
@@ -86,4 +86,65 @@ fn both_ways_up_no_force_is_left() {
         pushed.push(force);
     }
     assert!((pushed[0] / pushed[1] - 1.0).abs() < 1e-8, "{pushed:?}");
+}
+
+/// A pile in sand that yields, under the stress that both have: in equilibrium before anything moves. What moves is
+/// round-off.
+const NOTHING: &str = r#"
+analysis = "axisymmetric"
+[mesh]
+columns = [{ n = 2, to = 0.25 }, { n = 4, to = 4.0 }]
+rows = [{ n = 2, to = 1.0 }]
+region = [{ group = "sand" }, { group = "pile", r = [0.0, 0.25] }]
+[mesh.lines]
+axis = { r = 0.0 }
+shaft = { r = 0.25 }
+wall = { r = 4.0 }
+ends = { z = 0.0 }
+head = { z = 1.0, r = [0.0, 0.25] }
+top = { z = 1.0, r = [0.25, 4.0] }
+[laws]
+sand = { law = "mohr_coulomb", parameters = { young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 35.0, dilatancy_angle = 5.0 } }
+concrete = { law = "elastic", parameters = { young_modulus = 30e6, poisson_ratio = 0.2 } }
+joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_stiffness = 1e5, cohesion = 0.0, friction_angle = 35.0, dilatancy_angle = 0.0 } }
+[groups]
+sand = { formulation = "solid", law = "sand", initial_stress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 } }
+pile = { formulation = "solid", law = "concrete", initial_stress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 } }
+joint = { formulation = "zero_thickness", line = "shaft", law = "joint" }
+[[supports]]
+line = "axis"
+fixed = ["r"]
+[[supports]]
+line = "wall"
+fixed = ["r"]
+[[supports]]
+line = "ends"
+fixed = ["z"]
+[[supports]]
+line = "top"
+fixed = ["z"]
+[[phase]]
+name = "nothing"
+increments = 3
+pressure = [{ line = "head", value = 100.0 }]
+[probes]
+u = { line = "head", quantity = "displacement_z" }
+sigma = { group = "joint", quantity = "traction_n", reduce = "min" }
+"#;
+
+/// Residuals of about 2e-16 are left, below tolerances of 1e-9 to 1e-13; corrections are as large as the increment.
+#[test]
+fn what_does_not_move_is_in_equilibrium_at_any_tolerance() {
+    for tolerance in ["1e-9", "1e-12", "1e-13"] {
+        for method in ["newton", "modified_newton", "initial_stress"] {
+            let solver =
+                format!("[solver]\nforce_tolerance = {tolerance}\nmethod = \"{method}\"\n");
+            let results = run(&format!("{NOTHING}{solver}"));
+            assert_close("u", results.last("u"), 0.0, 1.0, 1e-15);
+            assert_close("sigma", results.last("sigma"), -100.0, 1e-12, 100.0);
+            assert_eq!(results.observer.warnings.len(), 0, "{solver}");
+            let iterations = results.history("iterations");
+            assert!(iterations.iter().all(|n| *n <= 1.0), "{iterations:?}");
+        }
+    }
 }

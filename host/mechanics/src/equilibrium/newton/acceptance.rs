@@ -111,10 +111,7 @@ impl Measures {
     /// and does not measure corrections.
     pub(super) fn is_exact(&self, criteria: Criteria) -> bool {
         let exact = (EXACT * criteria.force).max(ROUND_OFF.min(criteria.force));
-        !criteria.is_stale
-            && self.residual <= exact
-            && self.beyond <= MOVES
-            && !self.is_away
+        !criteria.is_stale && self.residual <= exact && self.beyond <= MOVES && !self.is_away
     }
 
     /// Whether the body is in equilibrium.
