@@ -6,6 +6,10 @@ use crate::wanted::Reduce;
 use mechanics::group::Group;
 use mechanics::simulation::Snapshot;
 
+/// Strains, and displacements as shares of the mesh's extent, below this are held against it: where nothing moves, all that
+/// there is of them is round-off. What counts as zero beside it is 2e-16, the last bit of a strain of one.
+const STILL: f64 = f64::EPSILON / 1e-8;
+
 /// The largest magnitudes in a state, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sizes {
@@ -23,7 +27,20 @@ impl Sizes {
     /// Of a whole state.
     pub fn of(snapshot: &Snapshot<'_>) -> Self {
         let n_dofs = snapshot.displacement.len();
-        let mut sizes = Self::default();
+        let nodes = &snapshot.mesh.nodes;
+        let extent = [0, 1].map(|c| {
+            let (low, high) = nodes
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), node| {
+                    (low.min(node[c]), high.max(node[c]))
+                });
+            high - low
+        });
+        let mut sizes = Self {
+            length: STILL * extent[0].max(extent[1]).max(0.0),
+            strain: STILL,
+            ..Self::default()
+        };
         let raise = |size: &mut f64, values: &[f64]| {
             *size = values
                 .iter()
