@@ -497,3 +497,22 @@ fn a_program_whose_file_is_gone_goes_on() {
     let said = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{said} {output:?}");
 }
+
+/// A law that has panicked is not called again; what finds it so says that it fails, and does not pass over it.
+#[test]
+fn a_law_that_gave_up_in_an_earlier_call_fails() {
+    const GIVES_UP: &str = "static int gave_up;\n#define IN_INTEGRATE gave_up = 1\n\
+                            #define AT_INIT if (gave_up) return PILUM_E_INTERNAL; travel = 0.0";
+    let folder = folder();
+    let Some(library) = compiled_with(GIVES_UP, "fixture", folder.path()) else {
+        return;
+    };
+    let id = "results-are-finite";
+    let report = check(&library, &["--only", id]);
+    assert_eq!(report.with(&["failed"]), [id], "{:#}", report.json);
+    let details = report.check(id)["details"].as_str().unwrap();
+    assert!(
+        details.contains("`init_state` gave PILUM_E_INTERNAL"),
+        "{details}"
+    );
+}
