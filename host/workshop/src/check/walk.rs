@@ -164,7 +164,11 @@ impl Specimen {
                 } else {
                     status
                 };
-                Err(refusal(status, answer.text().as_deref()))
+                let why = refusal(status, answer.text().as_deref());
+                if status == raw::PILUM_E_INTERNAL {
+                    return Err(self.fails(why));
+                }
+                Err(why)
             },
         )
     }
