@@ -277,13 +277,14 @@ fn creep_depends_on_no_unit_mirror_or_numbering() {
 }
 
 /// Where steps of the load find no equilibrium, short steps of creep lead to the end of the increment by
-/// themselves, and only there: alone, the load leads no further with so few halvings.
+/// themselves, and only there: alone, the load leads no further without halvings.
 #[test]
 fn creep_leads_where_steps_of_the_load_fail() {
     let of = |control: &str| {
         let text = punch(OWN, control);
         let set = format!("control = \"{control}\"\n");
-        text.replace(&set, &format!("{set}max_halvings = 1\n"))
+        let few = "max_halvings = 0\n";
+        text.replace(&set, &format!("{set}{few}"))
     };
     let (auto, load) = (run(&of("auto")), fail(&of("load")));
     assert_eq!(load.error.exit_code(), 2);
@@ -298,6 +299,22 @@ fn creep_leads_where_steps_of_the_load_fail() {
     let halved = run(&punch(OWN, "load"));
     let end = |results: &Finished| results.in_phase("lift", "head")[0];
     assert_close("head", end(&auto), end(&halved), 0.05, end(&halved));
+}
+
+/// Relaxation leads away from iterates whose tangent is singular, too: without it shorter steps do not.
+#[test]
+fn relaxation_leads_away_from_singular_tangents() {
+    let of = |relaxation: bool| {
+        let set = "control = \"load\"\n";
+        let few = format!("max_halvings = 1\nrelaxation = {relaxation}\n");
+        punch(OWN, "load").replace(set, &format!("{set}{few}"))
+    };
+    let (without, with) = (fail(&of(false)), run(&of(true)));
+    let why = without.error.to_string();
+    assert!(why.contains("singular"), "{why}");
+    let halved = run(&punch(OWN, "load"));
+    let end = |results: &Finished| results.in_phase("lift", "head")[0];
+    assert_close("head", end(&with), end(&halved), 0.05, end(&halved));
 }
 
 #[test]

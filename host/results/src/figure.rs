@@ -427,9 +427,36 @@ fn range(values: impl Iterator<Item = f64>, margin: f64) -> std::ops::Range<f64>
     } else {
         low - margin * width
     };
-    low..if high > low {
+    let high = if high > low {
         high + margin * width
     } else {
         high + width
+    };
+    even(low, width)..even(high, width)
+}
+
+/// An end of a range, made even where it nearly is: whether the axis has a number there does not hang on last digits.
+fn even(end: f64, width: f64) -> f64 {
+    let unit = 10_f64.powf(width.log10().floor() - 2.0);
+    let even = (end / unit).round() * unit;
+    if (end - even).abs() < 0.01 * unit {
+        even
+    } else {
+        end
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[expect(clippy::float_cmp, reason = "made even, or left as they are")]
+    fn an_end_that_is_nearly_even_has_its_number() {
+        let high = |to: f64| range([0.0, to].into_iter(), 0.0).end;
+        assert_eq!(high(1_999.999_95), 2_000.0);
+        assert_eq!(high(2_000.000_04), 2_000.0);
+        assert_eq!(high(1_996.0), 1_996.0);
+        assert_eq!(high(2.002e-7), 2.002e-7);
     }
 }

@@ -91,7 +91,7 @@ impl Control for LoadControl {
             Some(guess) => newton.completed(guess, &self.task.prescribed),
             None => match newton.predict(&self.task) {
                 // What lies ahead may have a stiffness all the same.
-                Err(failure) if failure.is_singular() && self.creep.is_at_hand() => {
+                Err(failure) if failure.is_singular() && self.is_at_hand() => {
                     self.is_singular = true;
                     let still = vec![0.0; self.task.external.len()];
                     newton.completed(still, &self.task.prescribed)
@@ -154,7 +154,7 @@ impl Control for LoadControl {
             return Ok(state);
         }
         match self.corrected(newton, state, iterations) {
-            Err(failure) if failure.is_singular() && self.creep.is_at_hand() => {
+            Err(failure) if failure.is_singular() && self.is_at_hand() => {
                 if self.has_settled(newton, state) {
                     return Err(failure);
                 }
@@ -242,6 +242,11 @@ impl Control for LoadControl {
 }
 
 impl LoadControl {
+    /// Whether a motion may lead away from a state that no correction can be computed for.
+    fn is_at_hand(&self) -> bool {
+        self.creep.is_at_hand() || self.relaxation.is_at_hand()
+    }
+
     /// The state that a motion leads to where Newton iterations get on no further. `None` where they do.
     fn relieved(
         &mut self,
@@ -267,9 +272,9 @@ impl LoadControl {
             return Ok(Some(at((increment, balance))));
         }
         let from = &state.increment;
-        let relaxed = self
-            .relaxation
-            .relieve(newton, &self.task, from, iterations)?;
+        let relaxed =
+            self.relaxation
+                .relieve(newton, &self.task, (from, is_singular), iterations)?;
         Ok(relaxed.map(at))
     }
 

@@ -115,8 +115,14 @@ impl Relaxation {
         matches!(self.course, Course::InVain)
     }
 
-    /// Where Newton iterations stand still, the state that they go on from: a relaxed one or, if
-    /// there is none, that of the first standstill. `None` where they get on.
+    /// Whether it may lead away from a state that no correction can be computed for.
+    pub(super) fn is_at_hand(&self) -> bool {
+        matches!(self.course, Course::Ready)
+    }
+
+    /// Where Newton iterations stand still, or at a state that no correction can be computed for (`is_singular`), the
+    /// state that they go on from: a relaxed one or, if there is none, that of the first standstill. `None` where they
+    /// get on, and where nothing leads away from a singular state.
     ///
     /// # Errors
     /// The step is stopped, or a law fails.
@@ -124,11 +130,12 @@ impl Relaxation {
         &mut self,
         newton: &mut Newton<'_>,
         task: &Task,
-        increment: &[f64],
+        (increment, is_singular): (&[f64], bool),
         iterations: &mut Vec<Iteration>,
     ) -> Result<Option<(Vec<f64>, Balance)>, StepFailure> {
         let series = self.series(iterations);
-        if matches!(self.course, Course::Off | Course::InVain) || !stands_still(series) {
+        let is_due = is_singular || stands_still(series);
+        if matches!(self.course, Course::Off | Course::InVain) || !is_due {
             return Ok(None);
         }
         if matches!(self.course, Course::Ready) {
@@ -150,8 +157,11 @@ impl Relaxation {
             motion.steps = 0;
         }
         newton.may_go_on()?;
-        // Newton iterations go on where they stood, for as many as are left to them.
         self.course = Course::InVain;
+        if is_singular {
+            return Ok(None);
+        }
+        // Newton iterations go on where they stood, for as many as are left to them.
         let (increment, so_many) = std::mem::take(&mut self.standstill);
         let balance = newton.evaluate(&increment, task, Operator::Consistent)?;
         self.first = iterations.len() - so_many;
