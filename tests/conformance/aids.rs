@@ -447,3 +447,72 @@ fn a_check_can_be_run_under_a_debugger() {
     assert!(said.contains("passed   create-works"), "{said}");
     assert_eq!(only("integrate-works").status.code(), None);
 }
+
+/// The line of the sidecar, and the keys that there are; what every hypothesis has is told once.
+#[test]
+fn a_sidecar_that_cannot_be_read_is_told_with_its_line() {
+    let umat = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/umat");
+    let folder = folder();
+    let Some(library) = crate::program::compiled_from(&umat.join("rows.c"), &umat, folder.path())
+    else {
+        return;
+    };
+    let good = std::fs::read_to_string(umat.join("rows.law.toml")).unwrap();
+    let sidecar = library.with_extension("law.toml");
+    let wrong = format!("{good}\n[[state]]\nid = \"slip\"\n");
+    let line = wrong.lines().position(|line| line == "[[state]]").unwrap() + 1;
+    std::fs::write(&sidecar, wrong).unwrap();
+    let id = "sidecar-is-read";
+    let report = check(&library, &["--only", id]);
+    let details = report.check(id)["details"].as_str().unwrap();
+    assert!(
+        details.contains(&format!("law.toml:{line}: unknown key `state`; ")),
+        "{details}"
+    );
+    let silent = format!("{good}\n[[internal]]\nid = \"slip\"\nunit = \"-\"\ndoc = \"\"\n");
+    std::fs::write(&sidecar, silent).unwrap();
+    let id = "description-is-complete";
+    let report = check(&library, &["--only", id]);
+    let details = report.check(id)["details"].as_str().unwrap();
+    let gap = "the doc of internal variable `slip`";
+    assert_eq!(details.matches(gap).count(), 1, "{details}");
+}
+
+/// A build may replace the program while it runs.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_program_whose_file_is_gone_goes_on() {
+    let folder = folder();
+    let Some(library) = compiled_with(SOFT, "fixture", folder.path()) else {
+        return;
+    };
+    let script = "cp \"$0\" gone && exec 3< gone && rm gone && exec /proc/self/fd/3 check \"$1\" --only repeatable";
+    let output = std::process::Command::new("sh")
+        .args(["-c", script])
+        .arg(crate::program::program())
+        .arg(&library)
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{said} {output:?}");
+}
+
+/// A law that has panicked is not called again; what finds it so says that it fails, and does not pass over it.
+#[test]
+fn a_law_that_gave_up_in_an_earlier_call_fails() {
+    const GIVES_UP: &str = "static int gave_up;\n#define IN_INTEGRATE gave_up = 1\n\
+                            #define AT_INIT if (gave_up) return PILUM_E_INTERNAL; travel = 0.0";
+    let folder = folder();
+    let Some(library) = compiled_with(GIVES_UP, "fixture", folder.path()) else {
+        return;
+    };
+    let id = "results-are-finite";
+    let report = check(&library, &["--only", id]);
+    assert_eq!(report.with(&["failed"]), [id], "{:#}", report.json);
+    let details = report.check(id)["details"].as_str().unwrap();
+    assert!(
+        details.contains("`init_state` gave PILUM_E_INTERNAL"),
+        "{details}"
+    );
+}

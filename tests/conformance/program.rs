@@ -16,6 +16,11 @@ fn deps() -> PathBuf {
         .to_owned()
 }
 
+/// The program.
+pub(crate) fn program() -> PathBuf {
+    deps().parent().unwrap().join(format!("pilum{EXE_SUFFIX}"))
+}
+
 /// Runs the program.
 pub(crate) fn pilum(arguments: &[&str]) -> Output {
     pilum_in(Path::new(env!("CARGO_TARGET_TMPDIR")), arguments)
@@ -23,7 +28,7 @@ pub(crate) fn pilum(arguments: &[&str]) -> Output {
 
 /// Runs the program in a folder.
 pub(crate) fn pilum_in(folder: &Path, arguments: &[&str]) -> Output {
-    let program = deps().parent().unwrap().join(format!("pilum{EXE_SUFFIX}"));
+    let program = program();
     assert!(
         program.is_file(),
         "{} is missing: `cargo build --release` builds it",

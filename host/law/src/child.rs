@@ -104,13 +104,25 @@ pub(crate) fn program() -> io::Result<PathBuf> {
         .map_or_else(std::env::current_exe, Ok)
 }
 
+/// The same, to be started: where its file was replaced or removed meanwhile, as by a build, this process's image
+/// takes its place.
+///
+/// # Errors
+/// As [`program`].
+pub(crate) fn to_start() -> io::Result<PathBuf> {
+    let program = program()?;
+    let image = PathBuf::from("/proc/self/exe");
+    let is_gone = PROGRAM.get().is_none() && !program.is_file() && image.exists();
+    Ok(if is_gone { image } else { program })
+}
+
 /// Runs this program once more and waits for its end. It has no input, and is gone with all
 /// processes of its group when this function returns.
 ///
 /// # Errors
 /// The child cannot be started or waited for.
 pub fn run(work: &Work) -> io::Result<Outcome> {
-    let mut command = Command::new(program()?);
+    let mut command = Command::new(to_start()?);
     command
         .args(&work.arguments)
         .env_remove(MEMORY)

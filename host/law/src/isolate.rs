@@ -140,7 +140,7 @@ impl Worker {
         file.set_len((FIRST_WORDS * size_of::<u64>()) as u64)
             .map_err(failed)?;
         let shared = file.try_clone().map_err(failed)?;
-        let mut command = Command::new(child::program().map_err(failed)?);
+        let mut command = Command::new(child::to_start().map_err(failed)?);
         if std::env::var_os(UNBUFFERED).is_none() {
             command.env(UNBUFFERED, "y");
         }

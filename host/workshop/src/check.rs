@@ -37,6 +37,7 @@ use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use text::InputError;
 use text::file;
 use text::suggestion;
 use text::write::replace;
@@ -301,10 +302,28 @@ impl Subject {
             Some(foreign) => self.opener.open_foreign(&foreign, |_| Ok(())),
             None => self.opener.open(&self.path),
         };
-        let library = library.map_err(|why| failed(why.to_string()))?;
+        let library = library.map_err(|why| failed(with_place(&why)))?;
         let ids = library.laws().map(|law| law.id.as_str());
         Ok(ids.filter_map(|id| library.law(id)).collect())
     }
+}
+
+/// Why a library or its sidecar cannot be used, on one line: with file and line, where there is one, and what the
+/// user could do.
+fn with_place(why: &law::Error) -> String {
+    let place = match why {
+        law::Error::Text(error) => error.place().map(InputError::line),
+        _ => None,
+    };
+    let mut words = match place {
+        Some(line) => format!("{}:{}: {why}", line.file, line.at.0),
+        None => why.to_string(),
+    };
+    if let Some(help) = why.help() {
+        words.push_str("; ");
+        words.push_str(help);
+    }
+    words
 }
 
 /// How a check ended.

@@ -2,6 +2,7 @@
 
 use super::{Check, Family, Found, Subject, Verdict, skipped};
 use law::adapter::Adapter;
+use std::collections::BTreeSet;
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -126,7 +127,6 @@ fn units_are_known(subject: &Subject) -> Found {
             }
         }
     }
-    strange.dedup();
     all_well(&strange)
 }
 
@@ -249,7 +249,6 @@ fn ranges_are_plausible(subject: &Subject) -> Found {
             }
         }
     }
-    odd.dedup();
     all_well(&odd)
 }
 
@@ -257,7 +256,14 @@ fn all_well(gaps: &[String]) -> Found {
     if gaps.is_empty() {
         Ok(String::new())
     } else {
-        Err(Verdict::Warning(gaps.join("; ")))
+        // Internal variables are described once more under every hypothesis.
+        let mut rest: BTreeSet<&String> = gaps.iter().collect();
+        let told: Vec<&str> = gaps
+            .iter()
+            .filter(|gap| rest.remove(gap))
+            .map(String::as_str)
+            .collect();
+        Err(Verdict::Warning(told.join("; ")))
     }
 }
 

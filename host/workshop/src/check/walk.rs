@@ -87,7 +87,8 @@ struct Led {
 }
 
 impl Specimen {
-    /// Internal variables of a point with this flux; in words why the law cannot start there.
+    /// Internal variables of a point with this flux; in words why the law cannot start there. A defect that it reports
+    /// of itself, as after a panic in an earlier call, is no such reason.
     pub(super) fn initial_state(&self, flux: &[f64]) -> Result<Result<Vec<f64>, String>, Verdict> {
         let answer = self.probe.init_state(&[flux.to_vec()], &self.form(0))?;
         Ok(match answer {
@@ -97,6 +98,9 @@ impl Specimen {
             }
             Some(answer) => {
                 let why = refusal(answer.status, answer.text().as_deref());
+                if answer.status == raw::PILUM_E_INTERNAL {
+                    return Err(self.fails(format!("`init_state` gave {why}")));
+                }
                 let state = answer.points.into_iter().next().map(|point| point.state);
                 state
                     .filter(|_| answer.status == raw::PILUM_OK)
@@ -160,7 +164,11 @@ impl Specimen {
                 } else {
                     status
                 };
-                Err(refusal(status, answer.text().as_deref()))
+                let why = refusal(status, answer.text().as_deref());
+                if status == raw::PILUM_E_INTERNAL {
+                    return Err(self.fails(why));
+                }
+                Err(why)
             },
         )
     }
