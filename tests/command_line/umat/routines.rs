@@ -480,7 +480,7 @@ expand = true
             ],
             "time-as-declared",
             "warning",
-            "DTIME changes nothing",
+            "(DTIME) nor its time changes anything",
         ),
         (
             "elastic",

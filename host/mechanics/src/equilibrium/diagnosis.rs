@@ -13,7 +13,7 @@ use crate::problem::Formulation;
 const NOTABLE: f64 = 0.01;
 
 /// Points of a group whose tangents are looked at where none changes.
-const SAMPLES: usize = 8;
+const SAMPLES: usize = 64;
 
 /// Stresses and tangents of all points of an iterate, group by group.
 #[derive(Debug)]

@@ -505,7 +505,8 @@ fn time_as_declared(subject: &Subject) -> Found {
         Ok(steps.len())
     })?;
     if declared && !seen {
-        let why = "it is said to depend on the time, and neither the length of an increment nor its time changes anything";
+        let why = "it is said to depend on the time (`time_dependent = true` in a sidecar), and neither the length of an \
+                   increment (DTIME) nor its time changes anything";
         return Err(Verdict::Warning(why.to_owned()));
     }
     Ok(format!("{n} increments"))

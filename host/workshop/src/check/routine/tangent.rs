@@ -28,8 +28,13 @@ pub(super) fn ddsdde_matches_differences(subject: &Subject) -> Found {
                 let most = pairs.map(|(i, j)| (entry(i, j) - entry(j, i)).abs());
                 let most = most.fold(0.0, f64::max);
                 if most > ROUND_OFF * scale {
+                    let said = if advice(routine, "a sidecar").is_empty() {
+                        "it is said to be symmetric"
+                    } else {
+                        "`symmetric = true`"
+                    };
                     let why = format!(
-                        "it is said to be symmetric, and {} is off by {:.1e} of the stiffness, at {:?}",
+                        "{said}, and {} is off by {:.1e} of the stiffness, at {:?}",
                         words.stiffness,
                         most / scale,
                         step.start
