@@ -608,6 +608,36 @@ fn probes_that_are_round_off_do_not_count_and_are_named() {
     assert!(said, "{}", outcome.stdout);
 }
 
+/// Ground in equilibrium with its loads from the start moves by what rounding leaves, in all of its nodes.
+#[test]
+fn where_nothing_moves_displacements_do_not_count() {
+    let place = Place::new();
+    let text = COLUMN
+        .replace("left = { x = 0.0 }", "left = { x = 0.0 }\nright = { x = 1.0 }")
+        .replace(
+            "law = \"soil\" }\n[[supports]]",
+            "law = \"soil\", initial_stress = { 11 = -77.7, 22 = -77.7, 33 = -77.7 } }\n[[supports]]",
+        )
+        .replace(
+            "pressure = [",
+            "pressure = [{ line = \"right\", value = 77.7 }, ",
+        );
+    let (outcome, chosen) = studied(&place, text);
+    let moved = table(&place.path("out/history.csv"))
+        .iter()
+        .map(|row| number(row, "settlement").abs())
+        .fold(0.0, f64::max);
+    assert!(moved > 0.0 && moved < 1e-15, "{moved:e}");
+    assert_eq!(chosen["verdict"], "reached", "{}", outcome.stderr);
+    assert!(
+        chosen["zero"]
+            .as_array()
+            .unwrap()
+            .contains(&"settlement".into()),
+        "{chosen}"
+    );
+}
+
 /// The largest stress below a stiff punch, which has no bound at its edge.
 #[test]
 fn meshes_that_diverge_have_no_error() {
