@@ -25,9 +25,7 @@ pub use warning::Warning;
 pub use watch::{Increment, Part, Watch, When};
 
 use crate::assembly::Tie;
-use crate::equilibrium::{
-    Clock, Culprit, Guess, Newton, Reason, Reuse, Runaway, StepFailure, StepSuccess,
-};
+use crate::equilibrium::{Clock, Guess, Newton, Reason, Reuse, Runaway, StepFailure, StepSuccess};
 use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
 use crate::ground::{Acting, Loading};
 use crate::group::Group;
@@ -136,8 +134,6 @@ struct UnderWay {
 struct Progress {
     iterations: usize,
     unreliable: Option<String>,
-    /// What kept the iterations of the last step from settling of which that is known: of a shorter one it may not be.
-    culprit: Option<Culprit>,
 }
 
 impl Simulation {
@@ -520,9 +516,7 @@ impl Simulation {
                     self.take_over(success, end, place, phase, watch, &mut done)?;
                 }
                 Err(failure) if failure.is_stop() => return Err(stopped(place)),
-                Err(mut failure) => {
-                    failure.culprit = failure.culprit.or(done.culprit.take());
-                    done.culprit.clone_from(&failure.culprit);
+                Err(failure) => {
                     go_on(watch.iterations(place, end, &failure.iterations))?;
                     done.iterations += failure.iterations.len();
                     let period = (self.clock(phase.number), [start, end]);

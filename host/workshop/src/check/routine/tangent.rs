@@ -1,7 +1,7 @@
 //! Is the stiffness that a routine leaves the derivative of its stress?
 
 use super::each;
-use super::words::{Words, advice};
+use super::words::{Words, advice, has_sidecar};
 use crate::check::mathematics::{ROUND_OFF, Slope, largest, slope};
 use crate::check::specimen::Specimen;
 use crate::check::walk::Step;
@@ -28,10 +28,10 @@ pub(super) fn ddsdde_matches_differences(subject: &Subject) -> Found {
                 let most = pairs.map(|(i, j)| (entry(i, j) - entry(j, i)).abs());
                 let most = most.fold(0.0, f64::max);
                 if most > ROUND_OFF * scale {
-                    let said = if advice(routine, "a sidecar").is_empty() {
-                        "it is said to be symmetric"
-                    } else {
+                    let said = if has_sidecar(routine) {
                         "`symmetric = true`"
+                    } else {
+                        "it is said to be symmetric"
                     };
                     let why = format!(
                         "{said}, and {} is off by {:.1e} of the stiffness, at {:?}",
@@ -55,10 +55,10 @@ pub(super) fn ddsdde_matches_differences(subject: &Subject) -> Found {
                  `tangent_order` in {2}, at {3:?}",
                 words.stiffness,
                 words.stress,
-                if advice(routine, "a sidecar").is_empty() {
-                    "the driver and the case"
-                } else {
+                if has_sidecar(routine) {
                     "the sidecar"
+                } else {
+                    "the driver and the case"
                 },
                 step.start
             );

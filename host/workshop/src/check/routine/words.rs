@@ -58,8 +58,12 @@ pub(super) fn is_mfront(routine: &Specimen) -> bool {
     routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Mfront)
 }
 
+/// Whether a sidecar describes it.
+pub(super) fn has_sidecar(routine: &Specimen) -> bool {
+    routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Umat)
+}
+
 /// What an author of a UMAT can write into the sidecar; nothing of routines that have none.
 pub(super) fn advice(routine: &Specimen, text: &'static str) -> &'static str {
-    let is_umat = routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Umat);
-    if is_umat { text } else { "" }
+    if has_sidecar(routine) { text } else { "" }
 }
