@@ -535,6 +535,23 @@ pub(crate) fn is_success(status: raw::Status) -> bool {
     status == raw::PILUM_OK || status == raw::PILUM_OK_UNRELIABLE
 }
 
+/// Components of a smaller hypothesis as those of one with so many: the others are nought.
+pub(super) fn longer(values: &[f64], n: usize) -> Vec<f64> {
+    let mut longer = values.to_vec();
+    longer.resize(n, 0.0);
+    longer
+}
+
+/// The same start under that hypothesis.
+pub(super) fn enlarged(start: &PointStart, n: usize) -> PointStart {
+    PointStart {
+        gradient0: longer(&start.gradient0, n),
+        gradient1: longer(&start.gradient1, n),
+        flux0: longer(&start.flux0, n),
+        state0: start.state0.clone(),
+    }
+}
+
 /// Whether all results are finite.
 pub(crate) fn is_finite(end: &PointEnd) -> bool {
     let mut all = end.flux.iter().chain(&end.state).chain(&end.tangent);

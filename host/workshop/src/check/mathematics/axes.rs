@@ -3,7 +3,7 @@
 use super::{ELASTIC, ITERATED, ROUND_OFF, UPDATE, flux_scale, largest};
 use crate::check::margins;
 use crate::check::random::Random;
-use crate::check::specimen::{Specimen, create_form, hypotheses, is_success};
+use crate::check::specimen::{Specimen, create_form, enlarged, hypotheses, is_success};
 use crate::check::walk::{Origin, Step, sum};
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::Hypothesis;
@@ -43,19 +43,10 @@ pub(super) fn hypotheses_agree(subject: &Subject) -> Found {
             )));
         };
         let size = hypothesis.n_components();
-        let longer = |values: &[f64]| -> Vec<f64> {
-            let zeros = std::iter::repeat(0.0);
-            values.iter().copied().chain(zeros).take(size).collect()
-        };
         let steps = specimen.paths(24, &mut random)?.steps;
         let starts: Vec<PointStart> = steps
             .iter()
-            .map(|step| PointStart {
-                gradient0: longer(&step.start.gradient0),
-                gradient1: longer(&step.start.gradient1),
-                flux0: longer(&step.start.flux0),
-                state0: step.start.state0.clone(),
-            })
+            .map(|step| enlarged(&step.start, size))
             .collect();
         let ends = probe.integrate(&starts, &specimen.form(UPDATE))?.points;
         for (step, end) in steps.iter().zip(&ends) {

@@ -3,7 +3,7 @@
 use super::words::Words;
 use super::{differ, each};
 use crate::check::mathematics::{ITERATED, flux_scale, largest};
-use crate::check::specimen::{Specimen, create_form, hypotheses, is_success};
+use crate::check::specimen::{Specimen, create_form, enlarged, hypotheses, is_success, longer};
 use crate::check::{Found, Subject, Verdict, refusal, skipped};
 use abi::Hypothesis;
 use abi::raw;
@@ -39,19 +39,10 @@ pub(super) fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
         let Some(larger) = under(routine, wanted)? else {
             return Ok(0);
         };
-        let longer = |values: &[f64]| {
-            let mut longer = values.to_vec();
-            longer.resize(larger.probe.n_components(), 0.0);
-            longer
-        };
+        let size = larger.probe.n_components();
         let points: Vec<PointStart> = steps
             .iter()
-            .map(|step| PointStart {
-                gradient0: longer(&step.start.gradient0),
-                gradient1: longer(&step.start.gradient1),
-                flux0: longer(&step.start.flux0),
-                state0: step.start.state0.clone(),
-            })
+            .map(|step| enlarged(&step.start, size))
             .collect();
         let answer = larger.call(&points, raw::PILUM_REQ_FLUX)?;
         for ((step, point), end) in steps.iter().zip(&points).zip(&answer.points) {
@@ -59,7 +50,7 @@ pub(super) fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
                 let why = refusal(end.status, answer.text().as_deref());
                 return Err(larger.fails_at(point, why));
             }
-            let expected = longer(&step.end.flux);
+            let expected = longer(&step.end.flux, size);
             if differ(&end.flux, &expected, ITERATED * flux_scale(step)) {
                 let why = format!(
                     "{} is {:?}, under {} it is {:?}, at {:?}",
