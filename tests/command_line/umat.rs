@@ -5,6 +5,7 @@
     reason = "part of the tests; values that are compared are exact"
 )]
 
+mod begins;
 mod incremental_driver;
 mod mohr_coulomb;
 mod routines;

@@ -206,6 +206,7 @@ fn ids_are_stable() {
             "routine-answers",
             "routine-stays-inside",
             "routine-is-repeatable",
+            "routine-does-not-begin-again",
             "routine-stays-at-rest",
             "time-as-declared",
             "ddsdde-matches-differences",

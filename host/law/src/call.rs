@@ -2,6 +2,7 @@
 
 use crate::Strided;
 use abi::status::Outcome;
+use serde::{Deserialize, Serialize};
 
 /// Which operator a call computes beside the fluxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +42,7 @@ impl Default for Site {
 }
 
 /// Which step of the loading it is, for routines that ask.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// Phase, or segment of a driver, from 1.
     pub step: u32,

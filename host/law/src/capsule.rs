@@ -139,6 +139,18 @@ struct MomentPart {
     undrained: bool,
 }
 
+impl MomentPart {
+    fn of(moment: Moment) -> Self {
+        Self {
+            step: moment.step,
+            increment: moment.increment,
+            start: moment.step_start,
+            length: moment.step_length,
+            undrained: moment.is_undrained,
+        }
+    }
+}
+
 /// How long a phase or segment takes where nothing is said of it.
 fn one() -> f64 {
     1.0
@@ -267,13 +279,7 @@ impl Capsule {
                 request: request.to_owned(),
                 time: call.time,
                 time_increment: call.time_increment,
-                moment: foreign.map(|_| MomentPart {
-                    step: call.moment.step,
-                    increment: call.moment.increment,
-                    start: call.moment.step_start,
-                    length: call.moment.step_length,
-                    undrained: call.moment.is_undrained,
-                }),
+                moment: foreign.map(|_| MomentPart::of(call.moment)),
                 site: foreign.map(|_| SitePart {
                     position: call.site.position,
                     length: call.site.length,
@@ -342,6 +348,9 @@ impl Capsule {
         let is_usual = form == usual(request, form.time, form.time_increment);
         // Those that keep no contract are called as in a run; before the first call there is none.
         let is_own = law.library().foreign().is_none() || function == Function::Create;
+        // A routine is told which increment it is.
+        let when = points.first().filter(|_| !is_own);
+        let when = when.map(|point| form.when(point));
         let probe = is_own.then_some(ProbePart {
             function,
             form: (!is_usual).then_some(form),
@@ -358,9 +367,9 @@ impl Capsule {
             parameters: ids.zip(parameters.iter().copied()).collect(),
             call: CallPart {
                 request: request.to_owned(),
-                time: form.time,
+                time: when.map_or(form.time, |(time, _)| time),
                 time_increment: form.time_increment,
-                moment: None,
+                moment: when.map(|(_, moment)| MomentPart::of(moment)),
                 site: None,
             },
             start,

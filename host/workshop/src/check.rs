@@ -13,6 +13,7 @@ mod load;
 mod margins;
 mod mathematics;
 mod memory;
+mod place;
 mod purity;
 mod random;
 mod response;
@@ -176,6 +177,15 @@ impl Verdict {
         match self {
             Self::Skipped(why) | Self::Warning(why) | Self::Failed(why) => why,
             Self::At(inner, _) => inner.words(),
+        }
+    }
+
+    /// Whether it is a fault, and no warning.
+    fn is_failure(&self) -> bool {
+        match self {
+            Self::Skipped(_) | Self::Warning(_) => false,
+            Self::Failed(_) => true,
+            Self::At(inner, _) => inner.is_failure(),
         }
     }
 

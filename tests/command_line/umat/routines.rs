@@ -242,7 +242,11 @@ fn laws_shows_a_routine_with_a_sidecar() {
 }
 
 /// Outcomes and details of all checks of a routine, and how the program ended.
-fn checked(place: &Place, name: &str, more: &[&str]) -> (BTreeMap<String, [String; 2]>, Outcome) {
+pub(super) fn checked(
+    place: &Place,
+    name: &str,
+    more: &[&str],
+) -> (BTreeMap<String, [String; 2]>, Outcome) {
     let library = format!("lib{name}.so");
     let mut arguments = vec!["check", &library, "--json"];
     arguments.extend(more);

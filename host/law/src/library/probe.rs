@@ -44,6 +44,18 @@ pub enum Order {
     Uniform,
 }
 
+impl Order {
+    /// How, for messages.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Points => "which stands point by point",
+            Self::Components => "which stands component by component",
+            Self::Spread => "which stands with gaps",
+            Self::Uniform => "whose inputs stand once for all points",
+        }
+    }
+}
+
 /// A point at the start of an increment, and its gradient at the end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointStart {
@@ -122,6 +134,9 @@ pub struct Form {
     pub time: f64,
     /// Length of the increment in time.
     pub time_increment: f64,
+    /// Which step and increment a routine is told; else those of [`Form::when`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moment: Option<Moment>,
     /// Ask for the consistent tangent even of a law that declares none; else its elastic operator
     /// stands in, as in a run.
     pub verbatim: bool,
@@ -158,8 +173,25 @@ impl Form {
             first_point: 0,
             time: 0.0,
             time_increment: 1.0,
+            moment: None,
             verbatim: false,
         }
+    }
+
+    /// At what time an increment begins, and which one it is: as in a run the first one of all for a point whose
+    /// gradient is zero, else one like the second.
+    pub fn when(&self, start: &PointStart) -> (f64, Moment) {
+        if let Some(moment) = self.moment {
+            return (self.time, moment);
+        }
+        if start.gradient0.iter().all(|value| *value == 0.0) {
+            return (self.time, Moment::default());
+        }
+        let second = Moment {
+            increment: 2,
+            ..Moment::default()
+        };
+        (self.time + self.time_increment, second)
     }
 }
 
@@ -805,9 +837,8 @@ impl Probe {
         }
     }
 
-    /// A call through an adapter, which has arrays of its own: requests and times are those of the form. A
-    /// point whose gradient at the start is zero is told that the increment is the first one; the number of
-    /// the element follows from that of the first point.
+    /// A call through an adapter, which has arrays of its own: requests and times are those of the form; the number
+    /// of the element follows from that of the first point.
     fn call_foreign(
         &self,
         instance: &dyn ForeignInstance,
@@ -829,7 +860,7 @@ impl Probe {
         let mut worst = (raw::PILUM_OK, String::new());
         let mut points = Vec::new();
         for (i, start) in starts.iter().enumerate() {
-            let is_first = start.gradient0.iter().all(|value| *value == 0.0);
+            let (time, moment) = form.when(start);
             let site = Site {
                 element: (form.first_point + 1) as u32,
                 ..Site::default()
@@ -840,12 +871,9 @@ impl Probe {
                 n_points: 1,
                 n_components: c,
                 n_states: self.n_states,
-                time: form.time,
+                time,
                 time_increment: form.time_increment,
-                moment: Moment {
-                    increment: if is_first { 1 } else { 2 },
-                    ..Moment::default()
-                },
+                moment,
                 sites: &[site],
                 gradient0: Some((&start.gradient0, rows)),
                 gradient1: Some((&start.gradient1, rows)),

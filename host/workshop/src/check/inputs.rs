@@ -426,7 +426,11 @@ impl Scaled<'_> {
             }
             compared += 1;
             if let Some(what) = self.difference(step, start, end) {
-                let why = format!("{} Compared with {:?}", self.words(&what), step.start);
+                let why = format!(
+                    "{} Compared with {}",
+                    self.words(&what),
+                    self.specimen.at(&step.start)
+                );
                 let verdict = Verdict::Warning(why);
                 return Err(self.specimen.recorded(&step.start, verdict));
             }

@@ -79,7 +79,8 @@ fn in_form(
                 let answer = specimen.probe.integrate(&points, &form)?;
                 if answer.stray {
                     return Err(specimen.fails(format!(
-                        "something is written between the cells of an output ({order:?})"
+                        "something is written between the cells of an output, {}",
+                        order.words()
                     )));
                 }
                 n_points += points.len();
@@ -149,8 +150,8 @@ fn results_are_finite(subject: &Subject) -> Found {
                 .position(|end| is_success(end.status) && !is_finite(end));
             if let Some(i) = bad {
                 let why = format!(
-                    "with request {request}, the results at {:?} are not finite, or not written",
-                    starts[i]
+                    "with request {request}, the results at {} are not finite, or not written",
+                    specimen.at(&starts[i])
                 );
                 return Err(specimen.fails_at(&starts[i], why));
             }

@@ -179,9 +179,9 @@ fn differs(
         return specimen.fails_to_start(&fluxes, &specimen.form(0), &[], why);
     }
     let why = format!(
-        "point {i} of {}: {:?} gave flux {:?}, then {:?}",
+        "point {i} of {}: {} gave flux {:?}, then {:?}",
         points.len(),
-        points[i],
+        specimen.at(&points[i]),
         expected.flux,
         found.map(|end| end.flux.clone()).unwrap_or_default()
     );

@@ -97,7 +97,11 @@ fn elastic_operator_is_plausible(subject: &Subject) -> Found {
             }
             n += 1;
             if let Some(why) = implausible(elastic) {
-                let verdict = Verdict::Warning(format!("{}: {why}, at {point:?}", specimen.name()));
+                let verdict = Verdict::Warning(format!(
+                    "{}: {why}, at {}",
+                    specimen.name(),
+                    specimen.at(point)
+                ));
                 return Err(specimen.recorded(point, verdict));
             }
             if !is_near(elastic, consistent) {
@@ -120,10 +124,11 @@ fn elastic_operator_is_plausible(subject: &Subject) -> Found {
         {
             let why = format!(
                 "{}: no very small increment, there or back, has the elastic operator for its tangent: \
-                 {:?} and {:?}, at {point:?}",
+                 {:?} and {:?}, at {}",
                 specimen.name(),
                 elastic.tangent,
-                consistent.tangent
+                consistent.tangent,
+                specimen.at(point)
             );
             return Err(specimen.recorded(point, Verdict::Warning(why)));
         }
@@ -334,12 +339,13 @@ fn response_is_continuous(subject: &Subject) -> Found {
             let start = part(piece.step, 1.0);
             let why = format!(
                 "{}: the flux jumps from {:?} to {:?} at the fraction {at:.9} of an increment, \
-                 internal variables from {:?} to {:?}: {start:?}",
+                 internal variables from {:?} to {:?}. It goes from {}",
                 specimen.name(),
                 a.flux,
                 b.flux,
                 a.state,
-                b.state
+                b.state,
+                specimen.at(&start)
             );
             return Err(specimen.recorded(&start, Verdict::Warning(why)));
         }
@@ -402,10 +408,10 @@ fn states_are_carried_on(subject: &Subject) -> Found {
             {
                 let why = format!(
                     "{}: `{}` is {once:e} after an increment, {two:e} if it is done in two, {four:e} in \
-                     four: is it added to its value at the start? At {:?}",
+                     four: is it added to its value at the start? At {}",
                     specimen.name(),
                     specimen.formulation.internal_variables[k].id,
-                    step.start
+                    specimen.at(&step.start)
                 );
                 return Err(specimen.recorded(&step.start, Verdict::Warning(why)));
             }
@@ -481,9 +487,9 @@ fn plastic_variables_rest(subject: &Subject) -> Found {
                 let (before, after) = (step.start.state0[k], step.end.state[k]);
                 if (after - before).abs() > 1e-6 * size {
                     let why = format!(
-                        "{}: `{id}` goes from {before:e} to {after:e} in an increment that is elastic, at {:?}",
+                        "{}: `{id}` goes from {before:e} to {after:e} in an increment that is elastic, at {}",
                         specimen.name(),
-                        step.start
+                        specimen.at(&step.start)
                     );
                     return Err(specimen.recorded(&step.start, Verdict::Warning(why)));
                 }

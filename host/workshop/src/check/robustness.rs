@@ -124,7 +124,8 @@ fn huge_steps_end_well(subject: &Subject) -> Found {
                 _ => Some(format!("the outcome is {}", status_name(end.status))),
             };
             if let Some(why) = why {
-                return Err(specimen.fails_at(&huge, format!("{why}, for {huge:?}")));
+                let why = format!("{why}, for {}", specimen.at(&huge));
+                return Err(specimen.fails_at(&huge, why));
             }
         }
     }

@@ -4,6 +4,7 @@
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
 mod axes;
+mod first;
 mod tangent;
 mod words;
 
@@ -55,6 +56,15 @@ pub(super) const CHECKS: &[Check] = &[
                       too (warning, since NOEL may stand for its properties).",
         needs: &["routine-stays-inside"],
         run: routine_is_repeatable,
+    },
+    Check {
+        id: "routine-does-not-begin-again",
+        family: Family::Routine,
+        description: "UMAT: where a phase begins, with KINC = 1 and TIME(1) = 0, a routine goes on from its internal \
+                      variables: STRESS is the same, and stays so in the next increment; with KSTEP = 1 too (warning). \
+                      A routine that depends on the time is not asked for TIME(1).",
+        needs: &["routine-is-repeatable"],
+        run: first::routine_does_not_begin_again,
     },
     Check {
         id: "routine-stays-at-rest",
@@ -384,8 +394,8 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
             };
             let what = change(routine, &expected[i], &found[i]);
             let why = format!(
-                "the same call gives another result {who}: {what}, at {:?}",
-                points[i]
+                "the same call gives another result {who}: {what}, at {}",
+                routine.at(&points[i])
             );
             return Err(routine.fails_at(&points[i], why));
         }
@@ -396,10 +406,10 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
         let there = routine.probe.integrate(&points, &form)?.points;
         if let Some(i) = first_difference(&expected, &there) {
             let why = format!(
-                "with another {}: {}, at {:?}",
+                "with another {}: {}, at {}",
                 Words::of(routine).element,
                 change(routine, &expected[i], &there[i]),
-                points[i]
+                routine.at(&points[i])
             );
             by_element = by_element
                 .take()

@@ -349,15 +349,16 @@ pub(super) fn settings_fit(subject: &Subject) -> Found {
 }
 
 impl Specimen {
-    /// Law, hypothesis and parameters, for messages.
+    /// Law, hypothesis and parameters that are not the defaults, for messages.
     pub(super) fn name(&self) -> String {
         let parameters = self.law.description().parameters.iter().zip(&self.values);
         let values: Vec<String> = parameters
             .filter(|(p, value)| !value.is_nan() && p.default != Some(**value))
             .map(|(p, value)| format!("{} = {value}", p.id))
             .collect();
+        let with = if values.is_empty() { "" } else { " with " };
         format!(
-            "`{}` under {} with {}",
+            "`{}` under {}{with}{}",
             self.law.description().id,
             self.hypothesis.name(),
             values.join(", ")
@@ -432,15 +433,21 @@ impl Specimen {
 
     fn capsule(&self, start: &PointStart, why: &str) -> Option<Capsule> {
         let law = self.law.build(self.hypothesis, &self.values).ok()?;
+        let form = self.form(0);
+        // Laws of the contract are called at the time of the form, routines as in a run.
+        let (time, moment) = match self.law.library().foreign() {
+            Some(_) => form.when(start),
+            None => (form.time, Moment::default()),
+        };
         let call = PointCall {
             request: Request::Update(Operator::Consistent),
-            time: 0.0,
+            time,
             time_increment: self.time_increment,
             gradient: start.gradient0.clone(),
             gradient_end: start.gradient1.clone(),
             flux: start.flux0.clone(),
             state: start.state0.clone(),
-            moment: Moment::default(),
+            moment,
             site: Site::default(),
         };
         let failure = BatchFailure {

@@ -52,9 +52,9 @@ pub(super) fn hypotheses_agree(subject: &Subject) -> Found {
         for (step, end) in steps.iter().zip(&ends) {
             if let Some(why) = disagreement(step, end, size) {
                 let why = format!(
-                    "{} says otherwise: {why}, at {:?}",
+                    "{} says otherwise: {why}, at {}",
                     hypothesis.name(),
-                    step.start
+                    specimen.at(&step.start)
                 );
                 return Err(specimen.fails_at(&step.start, why));
             }
@@ -104,8 +104,8 @@ pub(super) fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
             )?
             .map_err(|unlike| {
                 margins::note(unlike.part.0, unlike.part.1);
-                let name = specimen.name();
-                specimen.recorded(&unlike.start, Verdict::Warning(format!("{name}: {unlike}")))
+                let why = unlike.words(&specimen);
+                specimen.recorded(&unlike.start, Verdict::Warning(why))
             })?;
         }
     }
@@ -132,19 +132,18 @@ struct Unlike {
     expected: Vec<f64>,
 }
 
-impl std::fmt::Display for Unlike {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl Unlike {
+    fn words(&self, specimen: &Specimen) -> String {
         let Self {
-            start,
             flux,
             image,
             expected,
             ..
         } = self;
-        write!(
-            f,
-            "flux {flux:?}, turned {expected:?}, is {image:?} where the increment is turned, at \
-             {start:?}"
+        format!(
+            "{}: flux {flux:?}, turned {expected:?}, is {image:?} where the increment is turned, at {}",
+            specimen.name(),
+            specimen.at(&self.start)
         )
     }
 }
@@ -296,9 +295,8 @@ pub(super) fn response_is_isotropic(subject: &Subject) -> Found {
                     )
                 });
                 let verdict = Verdict::Warning(format!(
-                    "{}: {unlike}{hint}; a law that is meant to have directions says so in its \
-                     `doc`",
-                    specimen.name()
+                    "{}{hint}; a law that is meant to have directions says so in its `doc`",
+                    unlike.words(&specimen)
                 ));
                 specimen.recorded(&unlike.start, verdict)
             })?;

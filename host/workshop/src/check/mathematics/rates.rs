@@ -113,9 +113,10 @@ fn one_direction(specimen: &Specimen, step: &Step, random: &mut Random) -> Resul
         if disagreement <= 0.1 * error {
             verdict = Err(specimen.fails(format!(
                 "rate {worst} of flux and internal variables is {:.9e}, differences say otherwise by \
-                 {error:.1e} of it, at {start:?} in the direction {direction:?}, parameters \
+                 {error:.1e} of it, at {} in the direction {direction:?}, parameters \
                  {parameter:?}",
-                found[worst]
+                found[worst],
+                specimen.at(start)
             )));
         }
     }

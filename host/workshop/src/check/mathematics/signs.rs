@@ -192,9 +192,9 @@ pub(super) fn plastic_work_is_not_negative(subject: &Subject) -> Found {
             if relative < least {
                 least = relative;
                 let verdict = Verdict::Warning(format!(
-                    "the plastic work is negative, {relative:.1e} of the work in play: {}, at {:?}",
+                    "the plastic work is negative, {relative:.1e} of the work in play: {}, at {}",
                     specimen.name(),
-                    step.start
+                    specimen.at(&step.start)
                 ));
                 worst = Some(specimen.recorded(&step.start, verdict));
             }

@@ -67,12 +67,12 @@ pub(super) fn tangent_matches_differences(subject: &Subject) -> Found {
                     let verdict = Verdict::Warning(format!(
                         "{}: row `{}`, column `{}` of the tangent is {entry:.6e}, {:.1e} of the stiffness, \
                          where the flux does not change at all: a little stiffness left for the solver? \
-                         At {:?}",
+                         At {}",
                         specimen.name(),
                         names[row],
                         names[column],
                         entry.abs() / scale,
-                        step.start
+                        specimen.at(&step.start)
                     ));
                     left = left.or_else(|| Some(specimen.recorded(&step.start, verdict)));
                 }
@@ -85,11 +85,11 @@ pub(super) fn tangent_matches_differences(subject: &Subject) -> Found {
                     let names = specimen.hypothesis.components();
                     let why = format!(
                         "row `{}`, column `{}` of the tangent is {by_law:.6e}, differences give \
-                         {by_differences:.6e}: wrong by {:.1e} of the stiffness, at {:?}",
+                         {by_differences:.6e}: wrong by {:.1e} of the stiffness, at {}",
                         names[row],
                         names[column],
                         (by_law - by_differences).abs() / scale,
-                        step.start
+                        specimen.at(&step.start)
                     );
                     return Err(specimen.fails_at(&step.start, why));
                 }
@@ -255,8 +255,10 @@ pub(super) fn tangent_symmetry_as_declared(subject: &Subject) -> Found {
                     if (lower - upper).abs() > bound {
                         let why = format!(
                             "the tangent is declared symmetric, but row `{0}`, column `{1}` is \
-                             {lower:.6e}, row `{1}`, column `{0}` {upper:.6e}, at {2:?}",
-                            names[row], names[column], step.start
+                             {lower:.6e}, row `{1}`, column `{0}` {upper:.6e}, at {2}",
+                            names[row],
+                            names[column],
+                            specimen.at(&step.start)
                         );
                         return Err(specimen.fails_at(&step.start, why));
                     }
@@ -298,13 +300,13 @@ pub(super) fn linearity_as_declared(subject: &Subject) -> Found {
                 .any(|(a, b)| (a - b).abs() > ROUND_OFF * step.stiffness);
             if off || changed {
                 let why = format!(
-                    "declared linear, but {}, at {:?}",
+                    "declared linear, but {}, at {}",
                     if off {
                         "the tangent does not predict the flux"
                     } else {
                         "the tangent changes"
                     },
-                    step.start
+                    specimen.at(&step.start)
                 );
                 return Err(specimen.fails_at(&step.start, why));
             }

@@ -30,10 +30,11 @@ pub(super) fn independent_of_request(subject: &Subject) -> Found {
                     if by > 0.0 {
                         let verdict = Verdict::Warning(format!(
                             "{}: without the consistent tangent the flux {:?} is {:?}, {by:.0} units of \
-                             rounding apart: are there two versions of the update? At {point:?}",
+                             rounding apart: are there two versions of the update? At {}",
                             called.specimen.name(),
                             expected.flux,
-                            end.flux
+                            end.flux,
+                            called.specimen.at(point)
                         ));
                         rounded.get_or_insert_with(|| called.specimen.recorded(point, verdict));
                     }
@@ -119,7 +120,7 @@ pub(super) fn independent_of_time(subject: &Subject) -> Found {
                 };
                 let why = format!(
                     "{}: `{}` gives flux {:?} and internal variables {:?}, {when} {:?} and {:?}, \
-                     at {:?}; a law that depends on how long an increment takes has a parameter with \
+                     at {}; a law that depends on how long an increment takes has a parameter with \
                      a unit of time",
                     specimen.name(),
                     function.name(),
@@ -127,7 +128,7 @@ pub(super) fn independent_of_time(subject: &Subject) -> Found {
                     expected[i].state,
                     found[i].flux,
                     found[i].state,
-                    points[i]
+                    specimen.at(&points[i])
                 );
                 return Err(specimen.recorded(&points[i], Verdict::Warning(why)));
             }

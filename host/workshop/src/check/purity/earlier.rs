@@ -127,12 +127,13 @@ fn after_alike(
         if first_difference(&expected, &found).is_some() {
             let why = format!(
                 "`{}` gives another result after a call that differs in {what} alone: \
-                 flux {:?} and internal variables {:?}, else {:?} and {:?}, at {start:?}",
+                 flux {:?} and internal variables {:?}, else {:?} and {:?}, at {}",
                 function.name(),
                 found[0].flux,
                 found[0].state,
                 expected[0].flux,
-                expected[0].state
+                expected[0].state,
+                specimen.at(start)
             );
             return Err(if *function == Function::InitState {
                 let before = [point.flux0.clone()];
@@ -212,8 +213,9 @@ fn after_other_instances(
             continue;
         };
         let why = format!(
-            "`{}` gives another result {what}, at {point:?}",
-            function.name()
+            "`{}` gives another result {what}, at {}",
+            function.name(),
+            specimen.at(point)
         );
         return Err(if *function == Function::InitState {
             let fluxes = std::slice::from_ref(&point.flux0);

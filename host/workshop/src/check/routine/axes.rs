@@ -53,12 +53,12 @@ pub(super) fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
             let expected = longer(&step.end.flux, size);
             if differ(&end.flux, &expected, ITERATED * flux_scale(step)) {
                 let why = format!(
-                    "{} is {:?}, under {} it is {:?}, at {:?}",
+                    "{} is {:?}, under {} it is {:?}, at {}",
                     Words::of(routine).stress,
                     step.end.flux,
                     wanted.name(),
                     end.flux,
-                    step.start
+                    routine.at(&step.start)
                 );
                 return Err(routine.fails_at(&step.start, why));
             }
@@ -112,8 +112,10 @@ pub(super) fn tangential_directions_are_alike(subject: &Subject) -> Found {
             let expected = turn(&first.flux);
             if differ(&second.flux, &expected, ITERATED * scale) {
                 let why = format!(
-                    "the traction {:?} becomes {:?} where it should be {expected:?}, at {point:?}",
-                    first.flux, second.flux
+                    "the traction {:?} becomes {:?} where it should be {expected:?}, at {}",
+                    first.flux,
+                    second.flux,
+                    routine.at(&point)
                 );
                 return Err(routine.warns_at(&point, why));
             }

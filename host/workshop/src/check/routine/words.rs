@@ -13,6 +13,7 @@ pub(super) struct Words {
     pub(super) duration: &'static str,
     pub(super) time: &'static str,
     pub(super) element: &'static str,
+    pub(super) increment: &'static str,
     pub(super) describer: &'static str,
 }
 
@@ -27,6 +28,7 @@ impl Words {
                 duration: "dTime",
                 time: "Time0",
                 element: "iEl",
+                increment: "iStep",
                 describer: "the library",
             },
             Some(Adapter::Mfront) => Self {
@@ -37,6 +39,7 @@ impl Words {
                 duration: "dt",
                 time: "the time",
                 element: "element",
+                increment: "the number of the increment",
                 describer: "the library",
             },
             _ => Self {
@@ -47,6 +50,7 @@ impl Words {
                 duration: "DTIME",
                 time: "TIME",
                 element: "NOEL",
+                increment: "KINC",
                 describer: "the sidecar",
             },
         }

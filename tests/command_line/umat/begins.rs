@@ -1,0 +1,55 @@
+//! Routines that begin again where a phase begins, and those that rightly begin once: `fixtures/umat/begins.f`.
+
+use super::routines::checked;
+use super::{DONE, PLUGIN_TROUBLE, place};
+
+const CHECK: &str = "routine-does-not-begin-again";
+
+#[test]
+fn routines_that_begin_again_are_named() {
+    let Some(place) = place("begins") else {
+        return;
+    };
+    for (what, expected, said) in [
+        (1, "failed", "with KINC = 1 in place of 2 STRESS ["),
+        (2, "failed", "with TIME(1) = 0 in place of 1 STRESS ["),
+        (3, "warning", "with KSTEP = 1 in place of 2 STRESS ["),
+        (4, "warning", "with KINC = 1 in place of 2 STATEV ["),
+    ] {
+        let set = format!("what={what}");
+        let (checks, outcome) = checked(&place, "begins", &["--set", &set]);
+        let [found, details] = &checks[CHECK];
+        assert_eq!(found, expected, "{what}: {details}");
+        assert!(details.contains(said), "{what}: {details}");
+        let others = checks.iter().filter(|(id, _)| *id != CHECK);
+        for (id, [found, details]) in others.filter(|(id, _)| *id != "description-is-complete") {
+            assert!(
+                ["passed", "skipped"].contains(&found.as_str()),
+                "{what}: {id} {found}: {details}"
+            );
+        }
+        let code = if expected == "failed" {
+            PLUGIN_TROUBLE
+        } else {
+            DONE
+        };
+        assert_eq!(outcome.code, Some(code), "{}", outcome.stderr);
+    }
+}
+
+/// What a routine does in the first increment of all, and with DDSDDE alone, changes no result.
+#[test]
+fn routines_that_begin_once_are_not() {
+    let Some(place) = place("begins") else {
+        return;
+    };
+    for what in [0, 5, 6, 7] {
+        let set = format!("what={what}");
+        let (checks, outcome) = checked(&place, "begins", &["--set", &set]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        for id in [CHECK, "time-as-declared", "routine-stays-at-rest"] {
+            let [found, details] = &checks[id];
+            assert_eq!(found, "passed", "{what}: {id}: {details}");
+        }
+    }
+}
