@@ -7,7 +7,7 @@ pub use library::{LibraryCapsule, LibraryPart};
 
 use crate::Error;
 use crate::FormulationDescription;
-use crate::adapter::{Adapter, Externals, Order};
+use crate::adapter::{Adapter, Externals, Foreign, Order};
 use crate::description::words;
 use crate::library::probe::kept::Function;
 use crate::library::probe::{Form, PointStart};
@@ -230,21 +230,87 @@ fn usual(request: &str, time: f64, time_increment: f64) -> Form {
     }
 }
 
+/// What capsules say of a library that keeps no contract, beside its file.
+#[derive(Clone, Debug, Default)]
+struct Made {
+    adapter: Option<Adapter>,
+    sidecar: Option<PathBuf>,
+    externals: Option<Externals>,
+    tangent_order: Option<Order>,
+}
+
+impl Made {
+    fn of(foreign: Option<&Foreign>) -> Self {
+        foreign.map_or_else(Self::default, |foreign| Self {
+            adapter: Some(foreign.adapter),
+            sidecar: foreign.sidecar.clone(),
+            externals: foreign.externals,
+            tangent_order: foreign.tangent_order,
+        })
+    }
+
+    /// The library as a file would name it, called in this process, if it keeps no contract.
+    fn foreign(self, library: &Path) -> Option<Foreign> {
+        Some(Foreign {
+            adapter: self.adapter?,
+            library: library.to_owned(),
+            sidecar: self.sidecar,
+            in_process: true,
+            record: None,
+            records_once: false,
+            externals: self.externals,
+            scratch: None,
+            tangent_order: self.tangent_order,
+        })
+    }
+}
+
+impl std::fmt::Display for Made {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let sidecar = self.sidecar.as_ref().map(|path| path.to_string_lossy());
+        for (key, value) in [
+            ("adapter", self.adapter.map(Adapter::name)),
+            ("sidecar", sidecar.as_deref()),
+            ("externals", self.externals.map(Externals::name)),
+            ("tangent_order", self.tangent_order.map(Order::name)),
+        ] {
+            if let Some(value) = value {
+                writeln!(f, "{key} = {}", text(value))?;
+            }
+        }
+        Ok(())
+    }
+}
+
 impl LawPart {
+    fn made(&self) -> Made {
+        Made {
+            adapter: self.adapter,
+            sidecar: self.sidecar.clone(),
+            externals: self.externals,
+            tangent_order: self.tangent_order,
+        }
+    }
+
+    /// The library as a file would name it, called in this process, if it keeps no contract.
+    pub fn foreign(&self) -> Option<Foreign> {
+        self.made().foreign(&self.library)
+    }
+
     fn of(law: &LoadedLaw, hypothesis: Hypothesis) -> Option<Self> {
         let description = law.description();
         let library = law.library();
-        let foreign = library.foreign();
+        let made = Made::of(library.foreign());
         Some(Self {
             id: description.id.clone(),
             version: description.version.clone(),
             hypothesis: hypothesis.name().to_owned(),
             library: std::path::absolute(library.path()).ok()?,
             sha256: library.sha256().to_owned(),
-            adapter: foreign.map(|foreign| foreign.adapter),
-            sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
-            externals: foreign.and_then(|foreign| foreign.externals),
-            tangent_order: foreign.and_then(|foreign| foreign.tangent_order),
+            adapter: made.adapter,
+            sidecar: made.sidecar,
+            externals: made.externals,
+            tangent_order: made.tangent_order,
             shear_zone: law.shear_zone(),
         })
     }
@@ -606,18 +672,7 @@ impl std::fmt::Display for Capsule {
             text(&law.library.to_string_lossy()),
             text(&law.sha256)
         )?;
-        if let Some(adapter) = law.adapter {
-            writeln!(f, "adapter = {}", text(adapter.name()))?;
-        }
-        if let Some(sidecar) = &law.sidecar {
-            writeln!(f, "sidecar = {}", text(&sidecar.to_string_lossy()))?;
-        }
-        if let Some(externals) = law.externals {
-            writeln!(f, "externals = {}", text(externals.name()))?;
-        }
-        if let Some(order) = law.tangent_order {
-            writeln!(f, "tangent_order = {}", text(order.name()))?;
-        }
+        write!(f, "{}", law.made())?;
         if let Some(zone) = law.shear_zone {
             writeln!(f, "shear_zone = {zone}")?;
         }

@@ -4,6 +4,7 @@
 //! process and be reported like any other fault. Checks are named, and a check is skipped when one
 //! that it builds on has not passed, so that a fault is reported by the check that names it.
 
+pub(crate) mod again;
 mod contract;
 mod course;
 mod crashed;
@@ -16,6 +17,7 @@ mod memory;
 mod place;
 mod purity;
 mod random;
+mod report;
 mod response;
 mod robustness;
 mod routine;
@@ -31,11 +33,11 @@ use law::probe::NO_OUTCOME;
 use law::probe::kept::{self, KeptPhase, Phase};
 use law::{LoadedLaw, Opener, SearchPath, Trust, hexadecimal_sha256};
 use rayon::prelude::*;
+use report::{Finding, Outcome, Report, finding, json, list, text};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::ffi::OsString;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use text::InputError;
@@ -93,6 +95,9 @@ pub struct Arguments {
     /// Lead a routine a short way only.
     #[arg(long, hide = true, requires = "child")]
     near: bool,
+    /// Lead the law along the increment of this capsule alone, with its parameters.
+    #[arg(long, hide = true, requires = "child", conflicts_with_all = ["set", "driver"])]
+    at: Option<PathBuf>,
     /// Write every call of the child to this file before it is made.
     #[arg(long, hide = true, requires = "child")]
     kept: Option<PathBuf>,
@@ -270,11 +275,16 @@ struct Subject {
     driver: Option<PathBuf>,
     /// A routine is led a short way only.
     near: bool,
+    /// The capsule whose increment is all that is looked at.
+    at: Option<Box<Capsule>>,
 }
 
 impl Subject {
     fn new(arguments: &Arguments, opener: &Opener, path: &Path) -> Self {
+        // One that can no longer be read was not asked for: the parent has read it.
+        let at = arguments.at.as_ref().and_then(|at| Capsule::read(at).ok());
         Self {
+            at: at.map(Box::new),
             path: path.to_owned(),
             seed: arguments.seed,
             settings: arguments.set.clone(),
@@ -291,6 +301,9 @@ impl Subject {
     /// The library as a file would name it, called in this process, if it keeps no contract: that of a check
     /// is one of its own.
     fn foreign(&self) -> Option<Foreign> {
+        if let Some(capsule) = &self.at {
+            return capsule.law.foreign();
+        }
         let adapter = routine::adapter(&self.path)?;
         let of_driver = self
             .driver
@@ -334,61 +347,6 @@ fn with_place(why: &law::Error) -> String {
         words.push_str(help);
     }
     words
-}
-
-/// How a check ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Outcome {
-    Passed,
-    Warning,
-    Failed,
-    Crashed,
-    Skipped,
-}
-
-impl Outcome {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Passed => "passed",
-            Self::Warning => "warning",
-            Self::Failed => "failed",
-            Self::Crashed => "crashed",
-            Self::Skipped => "skipped",
-        }
-    }
-
-    fn is_bad(self) -> bool {
-        matches!(self, Self::Failed | Self::Crashed)
-    }
-}
-
-/// A line of the report.
-#[derive(Clone, Debug, Serialize)]
-struct Finding {
-    id: &'static str,
-    family: Family,
-    description: &'static str,
-    outcome: Outcome,
-    details: String,
-    /// The command that runs this check alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    replay: Option<String>,
-    /// The file with the call that it is about.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    capsule: Option<PathBuf>,
-    /// The largest of what was found, as a part of each threshold.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    nearest: BTreeMap<String, f64>,
-}
-
-#[derive(Serialize)]
-struct Report<'a> {
-    library: String,
-    sha256: String,
-    seed: u64,
-    checks: &'a [Finding],
-    counts: BTreeMap<&'static str, usize>,
 }
 
 /// Checks a library and prints what it found.
@@ -473,6 +431,7 @@ pub fn run(
     } else {
         run_all(arguments, &path, is_routine)?
     };
+    report::tell_once(&mut findings);
     let mut counts = BTreeMap::new();
     for finding in &findings {
         *counts.entry(finding.outcome.name()).or_insert(0) += 1;
@@ -525,36 +484,6 @@ fn with_absolute_driver(arguments: &Arguments) -> Result<Arguments, Error> {
         own.driver = Some(whole);
     }
     Ok(own)
-}
-
-fn json(value: &impl Serialize) -> Result<String, Error> {
-    serde_json::to_string_pretty(value).map_err(|error| Error::internal(error.to_string()))
-}
-
-fn list(as_json: bool) -> Result<String, Error> {
-    #[derive(Serialize)]
-    struct Listed {
-        id: &'static str,
-        family: Family,
-        description: &'static str,
-        needs: &'static [&'static str],
-    }
-    if as_json {
-        let all: Vec<Listed> = checks()
-            .map(|check| Listed {
-                id: check.id,
-                family: check.family,
-                description: check.description,
-                needs: check.needs,
-            })
-            .collect();
-        return Ok(format!("{}\n", json(&all)?));
-    }
-    let mut text = String::new();
-    for check in checks() {
-        let _ = writeln!(text, "{}\n    {}", check.id, check.description);
-    }
-    Ok(text)
 }
 
 /// The library's file: a path as it is, a law's id where `pilum laws` finds it. Nothing is opened.
@@ -650,7 +579,10 @@ fn chosen(arguments: &Arguments, is_routine: bool) -> Vec<&'static Check> {
 
 /// The checks that this one builds on.
 fn needs(check: &Check, is_routine: bool) -> &'static [&'static str] {
-    if is_routine && routine::OF_RESPONSES.contains(&check.id) {
+    // What describes a routine is read first: what is wrong there is told once.
+    if is_routine && check.family == Family::Description {
+        &["sidecar-is-read"]
+    } else if is_routine && routine::OF_RESPONSES.contains(&check.id) {
         &["routine-is-repeatable"]
     } else {
         check.needs
@@ -673,20 +605,29 @@ fn missing(
         .copied()
 }
 
+/// The checks that were not run and whose needs were.
+fn ready(
+    chosen: &[&'static Check],
+    is_routine: bool,
+    findings: &BTreeMap<&str, Finding>,
+) -> Vec<&'static Check> {
+    let waits =
+        |id: &&str| !findings.contains_key(*id) && chosen.iter().any(|other| other.id == *id);
+    let open = chosen
+        .iter()
+        .filter(|check| !findings.contains_key(check.id));
+    open.filter(|check| !needs(check, is_routine).iter().any(waits))
+        .copied()
+        .collect()
+}
+
 /// Runs the checks, all that can at the same time.
 fn run_all(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<Finding>, Error> {
     let chosen = chosen(arguments, is_routine);
     let folder = ScratchFolder::new()?;
     let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
     loop {
-        let is_open = |check: &&&Check| !findings.contains_key(check.id);
-        let is_ready = |check: &&&Check| {
-            let waits = |id: &&str| {
-                !findings.contains_key(*id) && chosen.iter().any(|other| other.id == *id)
-            };
-            !needs(check, is_routine).iter().any(waits)
-        };
-        let ready: Vec<&&Check> = chosen.iter().filter(is_open).filter(is_ready).collect();
+        let ready = ready(&chosen, is_routine, &findings);
         if ready.is_empty() {
             break;
         }
@@ -714,7 +655,7 @@ fn run_here(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<
     });
     let mut findings: BTreeMap<&str, Finding> = BTreeMap::new();
     let chosen = chosen(arguments, is_routine);
-    for check in &chosen {
+    while let Some(check) = ready(&chosen, is_routine, &findings).first() {
         let done = if let Some(id) = missing(check, is_routine, &findings) {
             finding(check, Outcome::Skipped, format!("needs `{id}`"))
         } else {
@@ -727,19 +668,6 @@ fn run_here(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<
         .iter()
         .filter_map(|check| findings.remove(check.id))
         .collect())
-}
-
-fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
-    Finding {
-        id: check.id,
-        family: check.family,
-        description: check.description,
-        outcome,
-        details,
-        replay: None,
-        capsule: None,
-        nearest: BTreeMap::new(),
-    }
 }
 
 /// What starts the line with a child's answer, where it is printed.
@@ -758,6 +686,9 @@ struct Answer {
     capsule: Option<String>,
     /// The largest of what was found, as a part of each threshold.
     nearest: BTreeMap<String, f64>,
+    /// How the library has ended the process of the check.
+    #[serde(skip)]
+    ended: Option<String>,
 }
 
 /// Where what is in a capsule comes from, by key.
@@ -801,6 +732,7 @@ fn run_check(check: &Check, subject: &Subject) -> Answer {
         details,
         capsule,
         nearest: margins::take(),
+        ended: None,
     }
 }
 
@@ -809,6 +741,7 @@ impl Answer {
     fn reported(self, check: &Check, arguments: &Arguments, path: &Path) -> Result<Finding, Error> {
         let mut finding = finding(check, self.outcome, self.details);
         finding.nearest = self.nearest;
+        finding.ended = self.ended;
         if finding.outcome.is_bad() {
             let own: Vec<String> = own_arguments(check, arguments)
                 .iter()
@@ -847,8 +780,10 @@ fn own_arguments(check: &Check, arguments: &Arguments) -> Vec<OsString> {
     for (id, value) in &arguments.set {
         own.extend(["--set".into(), format!("{id}={value}").into()]);
     }
-    if let Some(driver) = &arguments.driver {
-        own.extend(["--driver".into(), driver.into()]);
+    for (option, file) in [("--driver", &arguments.driver), ("--at", &arguments.at)] {
+        if let Some(file) = file {
+            own.extend([option.into(), file.into()]);
+        }
     }
     own
 }
@@ -885,6 +820,16 @@ fn led_in_child(
     scratch: &ScratchFolder,
     is_near: bool,
 ) -> Result<Finding, Error> {
+    asked_in_child(check, arguments, path, scratch, is_near)?.reported(check, arguments, path)
+}
+
+fn asked_in_child(
+    check: &Check,
+    arguments: &Arguments,
+    path: &Path,
+    scratch: &ScratchFolder,
+    is_near: bool,
+) -> Result<Answer, Error> {
     let internal = |error: std::io::Error| Error::internal(error.to_string());
     let name = if is_near { "-near" } else { "" };
     let folder = scratch.inner(&format!("{}{name}", check.id));
@@ -908,8 +853,9 @@ fn led_in_child(
     let stderr = String::from_utf8_lossy(&outcome.stderr).into_owned();
     let answer = file::read_text(&kept.with_extension(ANSWERED)).ok();
     let answer = answer.and_then(|text| serde_json::from_slice::<Answer>(&text).ok());
-    let crashed = |details| Answer {
+    let crashed = |details: String| Answer {
         outcome: Outcome::Crashed,
+        ended: Some(details.clone()),
         details,
         capsule: None,
         nearest: BTreeMap::new(),
@@ -942,12 +888,12 @@ fn led_in_child(
         }
     };
     let mut answer = answer;
-    if answer.outcome == Outcome::Crashed {
+    if answer.outcome == Outcome::Crashed && arguments.at.is_none() {
         let limit = Duration::from_secs_f64(arguments.time_limit.min(10.0));
         let told = [told, vec!["--tell".into(), kept.clone().into()]].concat();
         answer.capsule = crashed::repeated(told, &kept, limit, origin(check, arguments.seed));
     }
-    answer.reported(check, arguments, path)
+    Ok(answer)
 }
 
 /// What only the parent can see of two of the checks.
@@ -998,48 +944,4 @@ impl Drop for ScratchFolder {
         // A folder that stays behind in the system's place for such folders harms nobody.
         let _ = std::fs::remove_dir_all(&self.0);
     }
-}
-
-fn text(report: &Report<'_>) -> String {
-    let mut text = format!(
-        "{}\nsha256 {}, seed {}\n",
-        report.library, report.sha256, report.seed
-    );
-    let mut family = None;
-    for finding in report.checks {
-        if family != Some(finding.family) {
-            family = Some(finding.family);
-            let _ = writeln!(text, "\n{}", format!("{:?}", finding.family).to_lowercase());
-        }
-        let name = finding.outcome.name();
-        let word = if finding.outcome.is_bad() {
-            name.to_uppercase()
-        } else {
-            name.to_owned()
-        };
-        let line = format!("  {word:9}{:32}{}", finding.id, finding.details);
-        let _ = writeln!(text, "{}", line.trim_end());
-        if let Some(replay) = &finding.replay {
-            let _ = writeln!(
-                text,
-                "           {}\n           {replay}",
-                finding.description
-            );
-        }
-        if let Some(capsule) = &finding.capsule {
-            let _ = writeln!(text, "           pilum replay {}", capsule.display());
-        }
-    }
-    let counts: Vec<String> = report
-        .counts
-        .iter()
-        .map(|(word, n)| format!("{n} {word}"))
-        .collect();
-    let _ = writeln!(
-        text,
-        "\n{} checks: {}",
-        report.counts.values().sum::<usize>(),
-        counts.join(", ")
-    );
-    text
 }

@@ -5,8 +5,8 @@ pub(crate) mod library;
 pub(crate) mod probed;
 
 use crate::Error;
+use crate::check::again;
 use abi::status::Outcome;
-use law::adapter::Foreign;
 use law::capsule::{Capsule, LibraryCapsule, OutcomePart, status};
 use law::{
     BatchFailure, End, Law, LoadedLaw, Opener, Operator, PointCall, Request, SearchPath, Start,
@@ -43,7 +43,10 @@ pub fn replay(path: &Path, opener: &Opener, say: &mut dyn FnMut(&str)) -> Result
     if capsule.probe.is_some() {
         return probed::replay(path, &capsule, opener, say);
     }
-    repeat(&capsule, &find(&capsule, opener)?, say)
+    let loaded = find(&capsule, opener)?;
+    repeat(&capsule, &loaded, say)?;
+    // The call succeeds: whether that is what a check has found wrong is for the check to say.
+    again::ask(path, &capsule, (loaded.library().path(), opener), say)
 }
 
 /// Repeats the call with this law.
@@ -133,19 +136,8 @@ fn find_own(capsule: &Capsule, opener: &Opener) -> Result<LoadedLaw, Error> {
     if !part.library.is_file() {
         return Ok(search.law(&part.id)?);
     }
-    if let Some(adapter) = part.adapter {
-        let foreign = Foreign {
-            adapter,
-            library: part.library.clone(),
-            sidecar: part.sidecar.clone(),
-            // `--isolate`, which is the default here, has the last word.
-            in_process: true,
-            record: None,
-            records_once: false,
-            externals: part.externals,
-            scratch: None,
-            tangent_order: part.tangent_order,
-        };
+    // `--isolate`, which is the default here, has the last word of where it is called.
+    if let Some(foreign) = part.foreign() {
         return Ok(search.foreign_law(&part.id, &foreign)?);
     }
     let library = opener.open(&part.library)?;

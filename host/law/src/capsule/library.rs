@@ -1,7 +1,7 @@
 //! What a library has crashed in before it could be called, or after: loading, handshake, entry,
 //! description, `destroy` of null, the end of the process.
 
-use super::{OutcomePart, place, text};
+use super::{Made, OutcomePart, place, text};
 use crate::Error;
 use crate::adapter::{Adapter, Externals, Foreign, Order};
 use crate::library::probe::kept::{KeptPhase, Phase};
@@ -50,25 +50,25 @@ pub struct LibraryPart {
 }
 
 impl LibraryPart {
+    fn made(&self) -> Made {
+        Made {
+            adapter: self.adapter,
+            sidecar: self.sidecar.clone(),
+            externals: self.externals,
+            tangent_order: self.tangent_order,
+        }
+    }
+
     /// The library as a file would name it, called in this process, if it keeps no contract.
     pub fn foreign(&self) -> Option<Foreign> {
-        Some(Foreign {
-            adapter: self.adapter?,
-            library: self.path.clone(),
-            sidecar: self.sidecar.clone(),
-            in_process: true,
-            record: None,
-            records_once: false,
-            externals: self.externals,
-            scratch: None,
-            tangent_order: self.tangent_order,
-        })
+        self.made().foreign(&self.path)
     }
 }
 
 impl LibraryCapsule {
     /// The capsule of a phase of this library, with an outcome to be filled in.
     pub fn new(path: &Path, sha256: String, kept: KeptPhase, foreign: Option<&Foreign>) -> Self {
+        let made = Made::of(foreign);
         Self {
             version: 1,
             library: LibraryPart {
@@ -77,10 +77,10 @@ impl LibraryCapsule {
                 phase: kept.phase,
                 from_file: kept.from_file,
                 law: kept.law,
-                adapter: foreign.map(|foreign| foreign.adapter),
-                sidecar: foreign.and_then(|foreign| foreign.sidecar.clone()),
-                externals: foreign.and_then(|foreign| foreign.externals),
-                tangent_order: foreign.and_then(|foreign| foreign.tangent_order),
+                adapter: made.adapter,
+                sidecar: made.sidecar,
+                externals: made.externals,
+                tangent_order: made.tangent_order,
             },
             origin: IndexMap::new(),
             outcome: OutcomePart {
@@ -133,18 +133,10 @@ impl std::fmt::Display for LibraryCapsule {
         if library.from_file {
             writeln!(f, "from_file = true")?;
         }
-        let sidecar = library.sidecar.as_ref().map(|path| path.to_string_lossy());
-        for (key, value) in [
-            ("law", library.law.as_deref()),
-            ("adapter", library.adapter.map(Adapter::name)),
-            ("sidecar", sidecar.as_deref()),
-            ("externals", library.externals.map(Externals::name)),
-            ("tangent_order", library.tangent_order.map(Order::name)),
-        ] {
-            if let Some(value) = value {
-                writeln!(f, "{key} = {}", text(value))?;
-            }
+        if let Some(law) = &library.law {
+            writeln!(f, "law = {}", text(law))?;
         }
+        write!(f, "{}", library.made())?;
         writeln!(f, "\n[where]")?;
         for (key, value) in &self.origin {
             writeln!(f, "{key} = {value}")?;

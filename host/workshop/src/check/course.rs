@@ -168,15 +168,11 @@ impl Subject {
                     driver.path().display()
                 )));
             };
+            let formulation = (formulation, law.hypothesis());
             specimens.push(Specimen {
-                law: loaded.clone(),
-                formulation,
-                hypothesis: law.hypothesis(),
-                values,
-                probe,
                 course: Some(course),
                 time_increment,
-                is_led_near: false,
+                ..Specimen::of(loaded.clone(), formulation, values, probe)
             });
         }
         Ok(specimens)

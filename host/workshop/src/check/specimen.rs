@@ -12,6 +12,7 @@ use law::{
     BatchFailure, FormulationDescription, LoadedLaw, Moment, Operator, ParameterDescription,
     PointCall, Request, Site,
 };
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use text::suggestion;
 
@@ -39,6 +40,8 @@ pub(super) struct Specimen {
     pub(super) time_increment: f64,
     /// Its paths are short: calls take long, or end the process far away.
     pub(super) is_led_near: bool,
+    /// What it said when it first called itself defective: later it may say no more than that.
+    pub(super) defect: OnceLock<String>,
 }
 
 /// Which function of a law is called.
@@ -193,6 +196,9 @@ impl Subject {
         random: &mut Random,
         how: Draw,
     ) -> Result<Vec<Specimen>, Verdict> {
+        if let Some(capsule) = &self.at {
+            return Ok(vec![self.specimen_of(capsule)?]);
+        }
         if self.driver.is_some() {
             return self.led_specimens();
         }
@@ -256,16 +262,8 @@ impl Subject {
             let values = draw_all(self, law, random, how);
             let created = law.probe(&create_form(formulation, hypothesis, &values))?;
             if let (raw::PILUM_OK, Some(probe)) = (created.status, created.probe) {
-                return Ok(Ok(Specimen {
-                    law: law.clone(),
-                    formulation: formulation.clone(),
-                    hypothesis,
-                    values,
-                    probe,
-                    course: None,
-                    time_increment: 1.0,
-                    is_led_near: false,
-                }));
+                let formulation = (formulation.clone(), hypothesis);
+                return Ok(Ok(Specimen::of(law.clone(), formulation, values, probe)));
             }
             let why = if created.status == raw::PILUM_OK {
                 "PILUM_OK (0), but no instance is written".to_owned()
@@ -326,6 +324,7 @@ pub(super) fn settings_fit(subject: &Subject) -> Found {
         opener: subject.opener.clone(),
         driver: None,
         near: false,
+        at: None,
     };
     for law in laws {
         for (formulation, hypothesis) in hypotheses(&law) {
@@ -349,6 +348,26 @@ pub(super) fn settings_fit(subject: &Subject) -> Found {
 }
 
 impl Specimen {
+    /// A law with these parameters, led along random paths.
+    pub(super) fn of(
+        law: LoadedLaw,
+        (formulation, hypothesis): (FormulationDescription, Hypothesis),
+        values: Vec<f64>,
+        probe: Probe,
+    ) -> Self {
+        Self {
+            law,
+            formulation,
+            hypothesis,
+            values,
+            probe,
+            course: None,
+            time_increment: 1.0,
+            is_led_near: false,
+            defect: OnceLock::new(),
+        }
+    }
+
     /// Law, hypothesis and parameters that are not the defaults, for messages.
     pub(super) fn name(&self) -> String {
         let parameters = self.law.description().parameters.iter().zip(&self.values);
@@ -471,7 +490,20 @@ impl Specimen {
 
     /// An ordinary call.
     pub(super) fn call(&self, starts: &[PointStart], request: u32) -> Result<Answer, Verdict> {
-        Ok(self.probe.integrate(starts, &self.form(request))?)
+        let answer = self.probe.integrate(starts, &self.form(request))?;
+        if answer.status == raw::PILUM_E_INTERNAL {
+            self.defect
+                .get_or_init(|| answer.text().unwrap_or_default());
+        }
+        Ok(answer)
+    }
+
+    /// A failure of a law that calls itself defective, with what it said when it did so first.
+    pub(super) fn fails_as_defective(&self, why: String) -> Verdict {
+        match self.defect.get().filter(|said| !why.contains(*said)) {
+            Some(said) => self.fails(format!("{why}; at first it said: {said}")),
+            None => self.fails(why),
+        }
     }
 
     /// Whether updates that double the flux take longer than they may.

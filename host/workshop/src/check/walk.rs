@@ -99,7 +99,7 @@ impl Specimen {
             Some(answer) => {
                 let why = refusal(answer.status, answer.text().as_deref());
                 if answer.status == raw::PILUM_E_INTERNAL {
-                    return Err(self.fails(format!("`init_state` gave {why}")));
+                    return Err(self.fails_as_defective(format!("`init_state` gave {why}")));
                 }
                 let state = answer.points.into_iter().next().map(|point| point.state);
                 state
@@ -166,7 +166,7 @@ impl Specimen {
                 };
                 let why = refusal(status, answer.text().as_deref());
                 if status == raw::PILUM_E_INTERNAL {
-                    return Err(self.fails(why));
+                    return Err(self.fails_as_defective(why));
                 }
                 Err(why)
             },

@@ -17,15 +17,18 @@ fn under(routine: &Specimen, wanted: Hypothesis) -> Result<Option<Specimen>, Ver
     };
     let form = create_form(&formulation, hypothesis, &routine.values);
     let created = routine.law.probe(&form)?;
-    Ok(created.probe.map(|probe| Specimen {
-        law: routine.law.clone(),
-        formulation,
-        hypothesis,
-        values: routine.values.clone(),
-        probe,
-        course: None,
-        time_increment: routine.time_increment,
-        is_led_near: routine.is_led_near,
+    Ok(created.probe.map(|probe| {
+        let values = routine.values.clone();
+        Specimen {
+            time_increment: routine.time_increment,
+            is_led_near: routine.is_led_near,
+            ..Specimen::of(
+                routine.law.clone(),
+                (formulation, hypothesis),
+                values,
+                probe,
+            )
+        }
     }))
 }
 

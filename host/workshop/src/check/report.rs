@@ -1,0 +1,178 @@
+//! What is told of checks: a line each, and what several have in common once.
+
+use super::{Check, Error, Family, checks};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// How a check ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Outcome {
+    Passed,
+    Warning,
+    Failed,
+    Crashed,
+    Skipped,
+}
+
+impl Outcome {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Warning => "warning",
+            Self::Failed => "failed",
+            Self::Crashed => "crashed",
+            Self::Skipped => "skipped",
+        }
+    }
+
+    pub(super) fn is_bad(self) -> bool {
+        matches!(self, Self::Failed | Self::Crashed)
+    }
+}
+
+/// A line of the report.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Finding {
+    pub(super) id: &'static str,
+    pub(super) family: Family,
+    pub(super) description: &'static str,
+    pub(super) outcome: Outcome,
+    pub(super) details: String,
+    /// The command that runs this check alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) replay: Option<String>,
+    /// The file with the call that it is about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) capsule: Option<PathBuf>,
+    /// The largest of what was found, as a part of each threshold.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) nearest: BTreeMap<String, f64>,
+    /// How the library has ended its process, as the details say.
+    #[serde(skip)]
+    pub(super) ended: Option<String>,
+}
+
+#[derive(Serialize)]
+pub(super) struct Report<'a> {
+    pub(super) library: String,
+    pub(super) sha256: String,
+    pub(super) seed: u64,
+    pub(super) checks: &'a [Finding],
+    pub(super) counts: BTreeMap<&'static str, usize>,
+}
+
+pub(super) fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
+    Finding {
+        id: check.id,
+        family: check.family,
+        description: check.description,
+        outcome,
+        details,
+        replay: None,
+        capsule: None,
+        nearest: BTreeMap::new(),
+        ended: None,
+    }
+}
+
+/// Tells how a library has ended its process with the first check that it has ended so, and which others those
+/// are; these refer to it.
+pub(super) fn tell_once(findings: &mut [Finding]) {
+    for first in 0..findings.len() {
+        let Some(ended) = findings[first].ended.clone() else {
+            continue;
+        };
+        let id = findings[first].id;
+        let mut others = Vec::new();
+        for other in &mut findings[first + 1..] {
+            if other.ended.as_ref() == Some(&ended) {
+                let as_there = format!("the process ended as in `{id}`");
+                other.details = other.details.replacen(&ended, &as_there, 1);
+                other.ended = None;
+                others.push(format!("`{}`", other.id));
+            }
+        }
+        if !others.is_empty() {
+            let with_others = format!("{ended} (so it did in {})", others.join(", "));
+            let details = &mut findings[first].details;
+            *details = details.replacen(&ended, &with_others, 1);
+        }
+    }
+}
+
+pub(super) fn json(value: &impl Serialize) -> Result<String, Error> {
+    serde_json::to_string_pretty(value).map_err(|error| Error::internal(error.to_string()))
+}
+
+pub(super) fn list(as_json: bool) -> Result<String, Error> {
+    #[derive(Serialize)]
+    struct Listed {
+        id: &'static str,
+        family: Family,
+        description: &'static str,
+        needs: &'static [&'static str],
+    }
+    if as_json {
+        let all: Vec<Listed> = checks()
+            .map(|check| Listed {
+                id: check.id,
+                family: check.family,
+                description: check.description,
+                needs: check.needs,
+            })
+            .collect();
+        return Ok(format!("{}\n", json(&all)?));
+    }
+    let mut text = String::new();
+    for check in checks() {
+        let _ = writeln!(text, "{}\n    {}", check.id, check.description);
+    }
+    Ok(text)
+}
+
+pub(super) fn text(report: &Report<'_>) -> String {
+    let mut text = format!(
+        "{}\nsha256 {}, seed {}\n",
+        report.library, report.sha256, report.seed
+    );
+    let mut family = None;
+    for finding in report.checks {
+        if family != Some(finding.family) {
+            family = Some(finding.family);
+            let _ = writeln!(text, "\n{}", format!("{:?}", finding.family).to_lowercase());
+        }
+        let name = finding.outcome.name();
+        let word = if finding.outcome.is_bad() {
+            name.to_uppercase()
+        } else {
+            name.to_owned()
+        };
+        let line = format!("  {word:9}{:32}{}", finding.id, finding.details);
+        let _ = writeln!(text, "{}", line.trim_end());
+        if let Some(replay) = &finding.replay {
+            let _ = writeln!(
+                text,
+                "           {}\n           {replay}",
+                finding.description
+            );
+        }
+        if let Some(capsule) = &finding.capsule {
+            let _ = writeln!(text, "           pilum replay {}", capsule.display());
+        }
+    }
+    let counts: Vec<String> = report
+        .counts
+        .iter()
+        .map(|(word, n)| format!("{n} {word}"))
+        .collect();
+    let _ = writeln!(
+        text,
+        "\n{} checks: {}",
+        report.counts.values().sum::<usize>(),
+        counts.join(", ")
+    );
+    text
+}
