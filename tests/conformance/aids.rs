@@ -87,18 +87,54 @@ fn a_wrong_call_can_be_repeated() {
     let capsule = report.check(id)["capsule"].as_str().unwrap();
     let text = std::fs::read_to_string(capsule).unwrap();
     assert!(text.contains(&format!("check = \"{id}\"")), "{text}");
+    for more in [&[][..], &["--in-process"]] {
+        let output = pilum(&[&["replay", capsule], more].concat());
+        let said = String::from_utf8(output.stdout).unwrap();
+        // As the check has ended.
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        for words in [
+            "the call succeeds; it is recorded as `ok`",
+            // Of the tangent that the law gives, 1 % is too much.
+            "at most 9.9e-3 of its largest component off",
+            "check `tangent-matches-differences` fails for this increment, as recorded",
+        ] {
+            assert!(said.contains(words), "{said}");
+        }
+    }
+    // In its place a law without the fault.
+    assert!(compiled_with("", "bad_tangent", folder.path()).is_some());
     let output = pilum(&["replay", capsule]);
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(0), "{said}");
-    assert!(
-        said.contains("the call succeeds; it is recorded as `ok`"),
-        "{said}"
-    );
-    // Of the tangent that the law gives, 1 % is too much.
-    assert!(
-        said.contains("at most 9.9e-3 of its largest component off"),
-        "{said}"
-    );
+    for words in [
+        "this is another library than that of the capsule",
+        "check `tangent-matches-differences` finds nothing wrong with this increment alone",
+        "the whole check: pilum check ",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+/// What a check warns of, replaying its call warns of too, and neither is an error.
+#[test]
+fn a_doubtful_call_can_be_repeated() {
+    for (fixture, id) in [
+        ("bad_jump", "response-is-continuous"),
+        ("bad_unit_inside", "units-belong-together"),
+        ("bad_engineering_shear", "response-is-isotropic"),
+    ] {
+        let folder = folder();
+        let Some(library) = compiled(fixture, folder.path()) else {
+            return;
+        };
+        let report = check(&library, &["--only", id]);
+        let capsule = report.check(id)["capsule"].as_str().unwrap();
+        let output = pilum(&["replay", capsule]);
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        let words = format!("check `{id}` warns of this increment");
+        assert!(said.contains(&words), "{said}");
+    }
 }
 
 /// The capsule of the one check of a fixture, and what replaying it says.
@@ -515,4 +551,29 @@ fn a_law_that_gave_up_in_an_earlier_call_fails() {
         details.contains("`init_state` gave PILUM_E_INTERNAL"),
         "{details}"
     );
+}
+
+/// Of a law that has panicked on its way, what it said then is told, and not only that it is not called again.
+#[test]
+fn the_first_words_of_a_law_that_gives_up_are_kept() {
+    // As a law in Rust ends that panics beyond some slip.
+    const PANICS: &str = "static int panicked;\n#define AT_START if (panicked) { TELL(PILUM_E_INTERNAL, i); \
+                          SAY(\"the law panicked before and is not called again\"); return PILUM_E_INTERNAL; } \
+                          if (travel > 1e-4) { panicked = 1; TELL(PILUM_E_INTERNAL, i); \
+                          SAY(\"point %d: panicked: index 7 of 5\", (int)i); return PILUM_E_INTERNAL; }";
+    let folder = folder();
+    let Some(library) = compiled_with(PANICS, "fixture", folder.path()) else {
+        return;
+    };
+    let id = "results-are-finite";
+    let report = check(&library, &["--only", id]);
+    assert_eq!(report.with(&["failed"]), [id], "{:#}", report.json);
+    let details = report.check(id)["details"].as_str().unwrap();
+    for words in [
+        "is not called again",
+        "at first it said: point",
+        "panicked: index 7 of 5",
+    ] {
+        assert!(details.contains(words), "{details}");
+    }
 }

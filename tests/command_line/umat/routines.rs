@@ -372,12 +372,65 @@ fn a_routine_that_gives_up_far_away_is_checked_nearby() {
         let [found, details] = &checks[id];
         assert_eq!(found, "warning", "{id}: {details}");
         for said in [
-            "far away the process ended",
-            "called XIT",
+            "far away the process ended as in `compression-is-negative`",
             "on short paths: ",
         ] {
             assert!(details.contains(said), "{id}: {details}");
         }
+    }
+    // How it ended is told there.
+    let [_, details] = &checks["compression-is-negative"];
+    for said in ["far away the process ended with", "called XIT"] {
+        assert!(details.contains(said), "{details}");
+    }
+}
+
+/// How a routine has ended its process is told once, with the checks that it has ended.
+#[test]
+fn what_ends_many_checks_is_told_once() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    let more = ["young_modulus=1e7", "how=1", "limit=0.05"].map(|set| format!("--set={set}"));
+    let more: Vec<&str> = more.iter().map(String::as_str).collect();
+    let (checks, outcome) = checked(&place, "stops", &more);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let told = |words: &str| {
+        let all = checks.iter();
+        all.filter(|(_, [_, details])| details.contains(words))
+            .map(|(id, _)| id.as_str())
+            .collect::<Vec<_>>()
+    };
+    let first = "compression-is-negative";
+    assert_eq!(told("exit code 3"), [first], "{checks:?}");
+    let others = told(&format!("the process ended as in `{first}`"));
+    assert!(others.len() >= 10, "{others:?}");
+    for id in others {
+        let [_, details] = &checks[first];
+        assert!(details.contains(&format!("`{id}`")), "{id}: {details}");
+    }
+}
+
+/// What is wrong with a sidecar fails the check of it, and no other.
+#[test]
+fn a_wrong_sidecar_is_told_once() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
+    place.write(
+        "elastic.law.toml",
+        sidecar.replacen("ntens = [4, 6]", "ntens = [4, 5]", 1),
+    );
+    for more in [&[][..], &["--in-process"]] {
+        let (checks, outcome) = checked(&place, "elastic", more);
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        let failed = checks
+            .iter()
+            .filter(|(_, [outcome, _])| outcome == "failed");
+        let failed: Vec<&String> = failed.map(|(id, _)| id).collect();
+        assert_eq!(failed, ["sidecar-is-read"], "{checks:?}");
+        assert_eq!(checks["units-are-known"][1], "needs `sidecar-is-read`");
     }
 }
 

@@ -82,7 +82,7 @@ fn told(check: &Check, answer: &Answer, capsule: &Capsule, say: &mut dyn FnMut(&
     // Words that were told above are not told again.
     let is_known = answer.details == capsule.outcome.message;
     let details = match answer.outcome {
-        Outcome::Passed => String::new(),
+        Outcome::Passed | Outcome::Skipped => String::new(),
         _ if is_known => ", as recorded".to_owned(),
         _ => format!(": {}", answer.details),
     };
