@@ -241,12 +241,49 @@ impl Piece<'_> {
             });
             off.fold(0.0, f64::max) > 2.0 * jump
         });
+        if !flowed {
+            return Ok(false);
+        }
         let [a, b] = [0, 1].map(|i| &self.ends[i].1.tangent);
         let unlike = a.iter().zip(b).map(|(a, b)| (a - b).abs());
         let unlike = unlike.fold(0.0, f64::max);
         // Routines often have tangents by differences, which such a jump spoils.
         let is_routine = specimen.law.library().foreign().is_some();
-        Ok(flowed && (is_routine || unlike <= ALIKE * self.step.stiffness.max(largest(a))))
+        let are_alike = unlike <= ALIKE * self.step.stiffness.max(largest(a));
+        Ok(is_routine || are_alike)
+    }
+
+    /// The half of it that is farther off the tangent.
+    fn worse_half(self, middle: (f64, PointEnd)) -> Self {
+        let Self {
+            step,
+            ends: [start, end],
+        } = self;
+        let [first, second] =
+            [[start, middle.clone()], [middle, end]].map(|ends| Self { step, ends });
+        if first.off() > second.off() {
+            first
+        } else {
+            second
+        }
+    }
+
+    /// The warning of a jump.
+    fn jumps(&self, specimen: &Specimen) -> Verdict {
+        let [(at, a), (_, b)] = &self.ends;
+        let start = part(self.step, 1.0);
+        let why = format!(
+            "{}: the flux jumps from {:?} to {:?} at the fraction {at:.9} of an increment, \
+             internal variables from {:?} to {:?}; substeps by a tolerance make jumps of its size where branches \
+             meet. It goes from {}",
+            specimen.name(),
+            a.flux,
+            b.flux,
+            a.state,
+            b.state,
+            specimen.at(&start)
+        );
+        specimen.recorded(&start, Verdict::Warning(why))
     }
 
     /// Something opens or closes in it, or an internal variable switches.
@@ -261,66 +298,53 @@ impl Piece<'_> {
     }
 }
 
+/// The pieces of increments whose flux is farthest off the tangent, halved until an end of them is left that is
+/// as short as numbers can tell.
+fn suspicious<'a>(specimen: &Specimen, steps: &[&'a Step]) -> Result<Vec<Piece<'a>>, Verdict> {
+    let whole = |step: &&Step| {
+        (0..=PIECES)
+            .map(|k| part(step, k as f64 / PIECES as f64))
+            .collect::<Vec<_>>()
+    };
+    let points: Vec<PointStart> = steps.iter().flat_map(whole).collect();
+    let ends = specimen.call(&points, UPDATE)?.points;
+    let mut pieces = Vec::new();
+    for (step, ends) in steps.iter().copied().zip(ends.chunks(PIECES + 1)) {
+        let of_step = ends.windows(2).enumerate().map(|(k, pair)| Piece {
+            step,
+            ends: [0, 1].map(|i| ((k + i) as f64 / PIECES as f64, pair[i].clone())),
+        });
+        let mut of_step: Vec<Piece<'_>> = of_step.collect();
+        of_step.sort_by(|a, b| b.off().total_cmp(&a.off()));
+        pieces.extend(of_step.into_iter().take(SUSPICIOUS));
+    }
+    for _ in 0..HALVINGS {
+        let middles = pieces
+            .iter()
+            .map(|piece| f64::midpoint(piece.ends[0].0, piece.ends[1].0));
+        let middles: Vec<f64> = middles.collect();
+        let points = pieces
+            .iter()
+            .zip(&middles)
+            .map(|(piece, at)| part(piece.step, *at));
+        let points: Vec<PointStart> = points.collect();
+        let ends = specimen.call(&points, UPDATE)?.points;
+        let halves = pieces.into_iter().zip(middles.into_iter().zip(ends));
+        pieces = halves
+            .map(|(piece, middle)| piece.worse_half(middle))
+            .collect();
+    }
+    Ok(pieces)
+}
+
 fn response_is_continuous(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "jumps");
     let (mut n, mut rough) = (0, 0.0_f64);
     for specimen in subject.specimens_by_default(4, &mut random)? {
         let steps = specimen.paths(24, &mut random)?.steps;
         let chosen: Vec<&Step> = some(&steps, 120).collect();
-        let whole = |step: &&Step| {
-            (0..=PIECES)
-                .map(|k| part(step, k as f64 / PIECES as f64))
-                .collect::<Vec<_>>()
-        };
-        let points: Vec<PointStart> = chosen.iter().flat_map(whole).collect();
-        let ends = specimen.call(&points, UPDATE)?.points;
-        let mut pieces = Vec::new();
-        for (step, ends) in chosen.iter().copied().zip(ends.chunks(PIECES + 1)) {
-            let of_step = ends.windows(2).enumerate().map(|(k, pair)| Piece {
-                step,
-                ends: [0, 1].map(|i| ((k + i) as f64 / PIECES as f64, pair[i].clone())),
-            });
-            let mut of_step: Vec<Piece<'_>> = of_step.collect();
-            of_step.sort_by(|a, b| b.off().total_cmp(&a.off()));
-            pieces.extend(of_step.into_iter().take(SUSPICIOUS));
-            n += 1;
-        }
-        for _ in 0..HALVINGS {
-            let middles = pieces
-                .iter()
-                .map(|piece| f64::midpoint(piece.ends[0].0, piece.ends[1].0));
-            let middles: Vec<f64> = middles.collect();
-            let points = pieces
-                .iter()
-                .zip(&middles)
-                .map(|(piece, at)| part(piece.step, *at));
-            let points: Vec<PointStart> = points.collect();
-            let ends = specimen.call(&points, UPDATE)?.points;
-            pieces = pieces
-                .into_iter()
-                .zip(middles.into_iter().zip(ends))
-                .map(|(piece, middle)| {
-                    let Piece {
-                        step,
-                        ends: [start, end],
-                    } = piece;
-                    let first = Piece {
-                        step,
-                        ends: [start, middle.clone()],
-                    };
-                    let second = Piece {
-                        step,
-                        ends: [middle, end],
-                    };
-                    if first.off() > second.off() {
-                        first
-                    } else {
-                        second
-                    }
-                })
-                .collect();
-        }
-        for piece in &pieces {
+        n += chosen.len();
+        for piece in &suspicious(&specimen, &chosen)? {
             let jump = piece.jump() / flux_scale(piece.step);
             if piece.switches(&specimen) {
                 continue;
@@ -335,19 +359,7 @@ fn response_is_continuous(subject: &Subject) -> Found {
                 continue;
             }
             margins::note("jump", jump / JUMP);
-            let [(at, a), (_, b)] = &piece.ends;
-            let start = part(piece.step, 1.0);
-            let why = format!(
-                "{}: the flux jumps from {:?} to {:?} at the fraction {at:.9} of an increment, \
-                 internal variables from {:?} to {:?}. It goes from {}",
-                specimen.name(),
-                a.flux,
-                b.flux,
-                a.state,
-                b.state,
-                specimen.at(&start)
-            );
-            return Err(specimen.recorded(&start, Verdict::Warning(why)));
+            return Err(piece.jumps(&specimen));
         }
     }
     if n == 0 {

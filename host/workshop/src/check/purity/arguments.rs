@@ -50,7 +50,7 @@ pub(super) fn independent_of_request(subject: &Subject) -> Found {
 }
 
 /// The most units of rounding, of the terms in play, that two versions of one update may be apart.
-const ROUNDINGS: f64 = 64.0;
+const ROUNDINGS: f64 = 16384.0;
 
 /// How many units of rounding two results are apart, if no more than that; none if they succeed not
 /// both.
