@@ -17,7 +17,7 @@ pub enum Operator {
 
 /// Where an integration point lies. Laws of the contract do not ask; routines made for other
 /// programs do.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Site {
     /// Coordinates.
     pub position: [f64; 2],

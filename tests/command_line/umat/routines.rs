@@ -438,7 +438,28 @@ fn a_wrong_sidecar_is_told_once() {
 #[expect(clippy::too_many_lines, reason = "a table of faults")]
 fn faults_of_routines_are_found_by_name() {
     // The routine, a change of its sidecar, the check that finds it, and what is said.
-    let cases: [(&str, [&str; 2], &str, &str, &str); 15] = [
+    let cases: [(&str, [&str; 2], &str, &str, &str); 18] = [
+        (
+            "doubtful",
+            ["default = 0.0\n", "default = 5.0\n"],
+            "routine-is-repeatable",
+            "warning",
+            "with another NPT: STRESS [",
+        ),
+        (
+            "doubtful",
+            ["default = 0.0\n", "default = 6.0\n"],
+            "routine-is-repeatable",
+            "warning",
+            "with another COORDS: STRESS [",
+        ),
+        (
+            "doubtful",
+            ["default = 0.0\n", "default = 7.0\n"],
+            "routine-is-repeatable",
+            "warning",
+            "with another CELENT: STRESS [",
+        ),
         (
             "doubtful",
             ["default = 0.0\n", "default = 1.0\n"],

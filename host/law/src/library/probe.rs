@@ -137,6 +137,9 @@ pub struct Form {
     /// Which step and increment a routine is told; else those of [`Form::when`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moment: Option<Moment>,
+    /// Where a routine is told that the points lie.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub site: Option<Site>,
     /// Ask for the consistent tangent even of a law that declares none; else its elastic operator
     /// stands in, as in a run.
     pub verbatim: bool,
@@ -174,6 +177,7 @@ impl Form {
             time: 0.0,
             time_increment: 1.0,
             moment: None,
+            site: None,
             verbatim: false,
         }
     }
@@ -837,8 +841,7 @@ impl Probe {
         }
     }
 
-    /// A call through an adapter, which has arrays of its own: requests and times are those of the form; the number
-    /// of the element follows from that of the first point.
+    /// A call through an adapter, which has arrays of its own: requests, times and places are those of the form.
     fn call_foreign(
         &self,
         instance: &dyn ForeignInstance,
@@ -861,10 +864,6 @@ impl Probe {
         let mut points = Vec::new();
         for (i, start) in starts.iter().enumerate() {
             let (time, moment) = form.when(start);
-            let site = Site {
-                element: (form.first_point + 1) as u32,
-                ..Site::default()
-            };
             let mut end = self.nothing_yet(if wants_tangent { c * c } else { 0 });
             let (returned, text) = instance.integrate(Call {
                 request,
@@ -874,7 +873,7 @@ impl Probe {
                 time,
                 time_increment: form.time_increment,
                 moment,
-                sites: &[site],
+                sites: &[form.site.unwrap_or_default()],
                 gradient0: Some((&start.gradient0, rows)),
                 gradient1: Some((&start.gradient1, rows)),
                 flux0: (&start.flux0, rows),

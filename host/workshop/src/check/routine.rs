@@ -16,6 +16,7 @@ use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
 use abi::raw;
 use abi::status::Outcome;
+use law::Site;
 use law::adapter::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointEnd, PointStart};
 use std::path::Path;
@@ -52,8 +53,8 @@ pub(super) const CHECKS: &[Check] = &[
         id: "routine-is-repeatable",
         family: Family::Routine,
         description: "UMAT: the same call gives the same bits after other calls, and in another image of \
-                      the library: nothing is kept in SAVE or COMMON from point to point. In another element \
-                      too (warning, since NOEL may stand for its properties).",
+                      the library: nothing is kept in SAVE or COMMON from point to point. In another place \
+                      too, by NOEL, NPT, COORDS and CELENT (warning, since they may stand for properties).",
         needs: &["routine-stays-inside"],
         run: routine_is_repeatable,
     },
@@ -134,9 +135,8 @@ pub(super) const OF_RESPONSES: [&str; 8] = [
 const N_INCREMENTS: usize = 36;
 /// What time increments differ by, to see whether they matter.
 const SLOWER: f64 = 1e3;
-/// Another time at which an increment begins, and number of a point before those of a call.
+/// Another time at which an increment begins.
 const LATER: f64 = 1e5;
-const ELSEWHERE: u64 = 39;
 
 /// What a library is made for, if not for the contract. Nothing of it runs.
 pub(super) fn adapter(path: &Path) -> Option<Adapter> {
@@ -348,6 +348,27 @@ fn is_like(other: &Specimen, routine: &Specimen) -> bool {
         && bits(&other.values) == bits(&routine.values)
 }
 
+/// Places that differ from the usual one in the number of the element, of its point, where it lies and how long
+/// it is.
+fn elsewhere() -> [Site; 4] {
+    let here = Site::default();
+    [
+        Site {
+            element: 40,
+            ..here
+        },
+        Site { point: 4, ..here },
+        Site {
+            position: [3.0, -7.0],
+            ..here
+        },
+        Site {
+            length: 0.25,
+            ..here
+        },
+    ]
+}
+
 /// What first differs between two results, in words.
 fn change(routine: &Specimen, before: &PointEnd, after: &PointEnd) -> String {
     let words = Words::of(routine);
@@ -370,7 +391,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
 
 fn routine_is_repeatable(subject: &Subject) -> Found {
     let mut others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
-    let mut by_element = None;
+    let mut by_site = None;
     let n = each(subject, "repeatable", |routine, steps, random| {
         let fresh = others.iter_mut().find(|other| is_like(other, routine));
         // Backwards, so that other calls come before; some with a component that does not move.
@@ -381,13 +402,13 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
         back.reverse();
         let mut after_others = routine.call(&back, UPDATE)?.points;
         after_others.reverse();
-        let elsewhere = match fresh {
+        let in_another_image = match fresh {
             Some(fresh) => fresh.call(&points, UPDATE)?.points,
             None => expected.clone(),
         };
         for (found, who) in [
             (&after_others, "after other calls"),
-            (&elsewhere, "in another image"),
+            (&in_another_image, "in another image"),
         ] {
             let Some(i) = first_difference(&expected, found) else {
                 continue;
@@ -399,25 +420,26 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
             );
             return Err(routine.fails_at(&points[i], why));
         }
-        let form = Form {
-            first_point: ELSEWHERE,
-            ..routine.form(UPDATE)
-        };
-        let there = routine.probe.integrate(&points, &form)?.points;
-        if let Some(i) = first_difference(&expected, &there) {
-            let why = format!(
-                "with another {}: {}, at {}",
-                Words::of(routine).element,
-                change(routine, &expected[i], &there[i]),
-                routine.at(&points[i])
-            );
-            by_element = by_element
-                .take()
-                .or_else(|| Some(routine.warns_at(&points[i], why)));
+        for (site, name) in elsewhere().into_iter().zip(Words::of(routine).site) {
+            let form = Form {
+                site: Some(site),
+                ..routine.form(UPDATE)
+            };
+            let there = routine.probe.integrate(&points, &form)?.points;
+            if let Some(i) = first_difference(&expected, &there) {
+                let why = format!(
+                    "with another {name}: {}, at {}",
+                    change(routine, &expected[i], &there[i]),
+                    routine.at(&points[i])
+                );
+                by_site = by_site
+                    .take()
+                    .or_else(|| Some(routine.warns_at(&points[i], why)));
+            }
         }
         Ok(points.len())
     })?;
-    by_element.map_or(Ok(format!("{n} increments")), Err)
+    by_site.map_or(Ok(format!("{n} increments")), Err)
 }
 
 fn routine_stays_at_rest(subject: &Subject) -> Found {
