@@ -194,6 +194,8 @@ pub struct GroupState<'g> {
     stress: Cow<'g, [f64]>,
     internal: Cow<'g, [f64]>,
     jump: Cow<'g, [f64]>,
+    /// Elastic stiffnesses of a thin layer, of the stresses that its law started from.
+    stiffness: Cow<'g, [[f64; 2]]>,
     law_calls: Cow<'g, [LawCalls]>,
     /// Tangents, where a matrix made of them is still in use.
     tangent: Option<Cow<'g, [f64]>>,
@@ -210,6 +212,7 @@ impl GroupState<'_> {
             stress: Cow::Owned(self.stress.into_owned()),
             internal: Cow::Owned(self.internal.into_owned()),
             jump: Cow::Owned(self.jump.into_owned()),
+            stiffness: Cow::Owned(self.stiffness.into_owned()),
             law_calls: Cow::Owned(self.law_calls.into_owned()),
             tangent: self.tangent.map(|tangent| Cow::Owned(tangent.into_owned())),
             pores: self.pores.map(|pores| Cow::Owned(pores.into_owned())),
@@ -354,18 +357,26 @@ impl Group {
 
     /// The committed state; with the tangents of the last evaluation if they are wanted.
     pub fn state(&self, with_tangents: bool) -> GroupState<'_> {
-        let jump = self.layer.as_ref().map(|layer| &layer.jump.committed[..]);
+        let (jump, stiffness) = self.of_layer();
         GroupState {
             law: (&self.law.name).into(),
             strain: (&self.strain.committed).into(),
             stress: (&self.stress.committed).into(),
             internal: (&self.internal.committed).into(),
-            jump: jump.unwrap_or_default().into(),
+            jump: jump.into(),
+            stiffness: stiffness.into(),
             law_calls: (&self.law_calls).into(),
             tangent: with_tangents.then(|| (&self.tangent).into()),
             pores: self.pores.as_ref().map(Cow::Borrowed),
             origin: self.origin,
         }
+    }
+
+    /// Jumps of a thin layer, and its elastic stiffnesses; nothing of other groups.
+    fn of_layer(&self) -> (&[f64], &[[f64; 2]]) {
+        self.layer.as_ref().map_or((&[], &[]), |layer| {
+            (&layer.jump.committed[..], &layer.stiffness[..])
+        })
     }
 
     /// The law that a state names, if the state is one of this group.
@@ -378,14 +389,12 @@ impl Group {
         let law = known.into_iter().find(|law| law.name == state.law);
         let law = law.cloned().ok_or_else(wrong)?;
         let n_internal = self.kinematics.n_points() * law.built.law.n_states();
-        let n_jump = self
-            .layer
-            .as_ref()
-            .map_or(0, |layer| layer.jump.committed.len());
+        let (jump, stiffness) = self.of_layer();
         if state.strain.len() != self.strain.committed.len()
             || state.stress.len() != self.stress.committed.len()
             || state.internal.len() != n_internal
-            || state.jump.len() != n_jump
+            || state.jump.len() != jump.len()
+            || state.stiffness.len() != stiffness.len()
         {
             return Err(wrong());
         }
@@ -408,6 +417,7 @@ impl Group {
         self.strain = Field::new(state.strain.into_owned());
         if let Some(layer) = &mut self.layer {
             layer.jump = Field::new(state.jump.into_owned());
+            layer.stiffness = state.stiffness.into_owned();
         }
         if let Some(tangent) = state.tangent {
             if tangent.len() != self.tangent.len() {
