@@ -70,7 +70,13 @@ pub(crate) fn mesh(
     let unreadable = |why: io::Error| Error::from(unreadable(&path, why));
     let bytes = match &input.content {
         Some(content) => Cow::Borrowed(&content[..]),
-        None => Cow::Owned(file::read_mesh(&path).map_err(unreadable)?),
+        None => {
+            let read = file::read_mesh(&path);
+            Cow::Owned(read.map_err(|why| {
+                let message = format!("cannot read {}: {why}", path.display());
+                Error::from(source.error(written.span(), message))
+            })?)
+        }
     };
     let is_of_arrays = input.content.is_some();
     let wrong = |fault: String| {
