@@ -1,7 +1,7 @@
 //! Sparse linear equations: which factorisation, and the check of solutions.
 
 use crate::Pattern;
-use crate::dense::{self, Exchanges};
+use crate::dense::{self, Exchanges, largest};
 use crate::multifrontal::{Kind, Multifrontal};
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
@@ -337,7 +337,6 @@ impl LinearSolver {
                 row_sums[row] += block.share * row_sum;
             }
         }
-        let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let scale = largest(&row_sums) * largest(x) + largest(right);
         let error = if scale > 0.0 {
             largest(&residual) / scale
