@@ -73,7 +73,7 @@ impl Newton<'_> {
     /// The matrix from the tangents that the groups hold, without the domain.
     pub(super) fn stiffness(&mut self) -> Vec<f64> {
         let start = Instant::now();
-        let mut values = Vec::new();
+        let mut values = self.solver.room();
         self.system
             .assemble_after(&mut self.matrix.elements, self.groups, &mut values);
         let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
