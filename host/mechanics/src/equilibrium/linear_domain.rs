@@ -150,9 +150,7 @@ impl LinearDomain {
         };
         let mut values = Vec::new();
         system.assemble(groups, &mut values);
-        let stiffest = values
-            .iter()
-            .fold(0.0, |most: f64, value| most.max(value.abs()));
+        let stiffest = algebra::largest(&values);
         let known = reuse
             .as_ref()
             .and_then(|reuse| reuse.find(kind, &system.pattern, &values, &kept));
