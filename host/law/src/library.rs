@@ -31,7 +31,7 @@ use super::description::LawDescription;
 use super::image::Image;
 use abi::raw::{self, Host, Law, MagicBlock};
 use abi::version::{self, PLUGIN_SIZE_1_0};
-use describe::{Allowance, describe, known, text};
+use describe::{describe, known};
 pub(crate) use instance::{Call, CallFailure, OwnedInstance};
 use instance::{NOTHING, NOWHERE};
 use probe::kept::{self, KeptPhase, Phase};
@@ -177,6 +177,7 @@ unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
 fn check_rust_layout(library: &'static libloading::Library) -> Result<(), String> {
     use abi::layout;
     use abi::raw::RustLayout;
+    use describe::{Allowance, text};
     // SAFETY: contract, "abi_stable": the symbol is a `RustLayout` where it exists.
     let Ok(block) = (unsafe { library.get::<*const RustLayout>(layout::SYMBOL.as_bytes()) }) else {
         return Ok(());

@@ -367,11 +367,24 @@ mod tests {
             }))
         };
         let same = apart(3e-13, 2e-8);
-        assert!(same.ends_with("within 3.0e-13 of its displacements and 2.0e-8 of its changes of forces"), "{same}");
+        assert!(
+            same.ends_with(
+                "within 3.0e-13 of its displacements and 2.0e-8 of its changes of forces"
+            ),
+            "{same}"
+        );
         assert!(!same.contains("others may lie near"), "{same}");
-        for other in [apart(3e-13, 2e-5), apart(2e-3, 0.0), of(Some(Neighbour::None)), of(None)] {
+        for other in [
+            apart(3e-13, 2e-5),
+            apart(2e-3, 0.0),
+            of(Some(Neighbour::None)),
+            of(None),
+        ] {
             assert!(other.contains("others may lie near"), "{other}");
-            assert!(other.contains("hold the results against each other"), "{other}");
+            assert!(
+                other.contains("hold the results against each other"),
+                "{other}"
+            );
         }
     }
 
