@@ -264,6 +264,41 @@ fn a_layer_whose_stiffness_follows_the_stress_is_gone_on_from() {
     }
 }
 
+/// A line whose ends had sunk by different amounts when it became rigid cannot be brought to one total: the message says
+/// what counts both anew, and it does.
+#[test]
+fn a_tilted_line_that_became_rigid_is_pushed_from_where_it_stands() {
+    let push = |resets: bool| {
+        let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |column, _| column);
+        name_sides(&mut mesh, [1.0, 1.0]);
+        let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
+        let of = |e: f64| {
+            let values = [("young_modulus", e), ("poisson_ratio", NU)];
+            material("elastic", Hypothesis::PlaneStrain, &values)
+        };
+        problem.groups = vec![
+            ElementGroup::new("soft", Formulation::Solid, of(E)),
+            ElementGroup::new("stiff", Formulation::Solid, of(10.0 * E)),
+        ];
+        problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
+        let mut press = Phase::new("press", 1);
+        press.pressure = vec![Pressure {
+            line: "top".to_owned(),
+            value: 100.0.into(),
+        }];
+        let mut rest = Phase::new("rest", 1);
+        rest.rigid = vec!["top".to_owned()];
+        let mut push = Phase::new("push", 1);
+        push.reset_displacements = resets;
+        push.displacement = vec![moved("top", None, Some(-0.05))];
+        problem.phases = vec![press, rest, push];
+        Simulation::new(problem).unwrap().run(&mut ())
+    };
+    let refused = push(false).unwrap_err().to_string();
+    assert!(refused.contains("`reset_displacements`"), "{refused}");
+    push(true).unwrap();
+}
+
 /// Simulations in threads of one process give what each gives alone.
 #[test]
 fn simulations_do_not_see_each_other() {
