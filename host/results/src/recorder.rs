@@ -12,6 +12,7 @@ use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Sta
 use crate::points::Points;
 use crate::probe::{Probes, Sizes};
 use crate::profile::Profile;
+use crate::report::Known;
 use crate::summary::{About, Course, Ending, Stopped, Summary};
 use crate::table::{push, push_count, push_text};
 use crate::wanted::{Output, Wanted, When};
@@ -173,6 +174,11 @@ impl Table {
         let written = self.file.append(&self.rows);
         self.rows.clear();
         written
+    }
+
+    /// Bytes in the file.
+    pub(crate) fn length(&self) -> u64 {
+        self.file.length()
     }
 
     /// Waits until everything is on the disk.
@@ -641,6 +647,13 @@ impl Recorder {
     /// Folder of the results.
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// What a report of these results need not read again.
+    pub fn known(&mut self) -> Known {
+        Known {
+            profile: self.profile.as_mut().and_then(Profile::shown),
+        }
     }
 
     /// Warnings about results that laws call inaccurate, one for each phase that has any.

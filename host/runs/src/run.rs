@@ -37,6 +37,8 @@ pub trait Observer {
     fn at_rest(&mut self, _phase: &str, _share: f64) {}
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
+    /// The run has ended, well or not; this is what its report need not read again.
+    fn written(&mut self, _known: report::Known) {}
     /// The run has ended; this is the resistance of its pile.
     fn pile(&mut self, _resistances: &Resistances) {}
     /// Who may want the run to stop: after the increment under way, or within it if that takes
@@ -326,6 +328,7 @@ fn carry_out(
         follower.observer.note(&of_mesh);
     }
     let Follower {
+        observer,
         mut results,
         keeper,
         warnings,
@@ -338,6 +341,7 @@ fn carry_out(
         &ending(outcome.as_ref().err()),
     );
     process::writes(None);
+    observer.written(results.known());
     *reuse = simulation.into_reuse();
     let is_done = outcome.is_ok();
     outcome.and(finished.map_err(Error::from))?;
