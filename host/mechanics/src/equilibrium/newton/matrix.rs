@@ -2,6 +2,7 @@
 
 use super::Newton;
 use super::failure::{Reason, StepFailure};
+use crate::assembly::Elements;
 use crate::settings::Method;
 use law::Operator;
 use rayon::prelude::*;
@@ -23,6 +24,8 @@ pub struct Matrix {
     largest: f64,
     /// The same of every body, where there are several.
     largest_by_body: Vec<f64>,
+    /// What it was added up from.
+    elements: Elements,
 }
 
 impl Matrix {
@@ -70,7 +73,8 @@ impl Newton<'_> {
     pub(super) fn stiffness(&mut self) -> Vec<f64> {
         let start = Instant::now();
         let mut values = Vec::new();
-        self.system.assemble(self.groups, &mut values);
+        self.system
+            .assemble_after(&mut self.matrix.elements, self.groups, &mut values);
         let largest = |largest: f64, value: &f64| largest.max(value.abs());
         let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
         let parts = values.par_chunks(PER_TASK);
