@@ -22,8 +22,6 @@ use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
 use mechanics::{Place, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::borrow::Borrow;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use text::Error;
@@ -234,17 +232,29 @@ impl LogFile {
     }
 
     /// All of them at once.
-    fn lines<T: Borrow<Value>>(
-        &mut self,
-        values: impl IntoIterator<Item = T>,
-    ) -> Result<(), Error> {
-        let mut text = String::new();
+    fn lines(&mut self, values: impl IntoIterator<Item = impl Serialize>) -> Result<(), Error> {
+        let mut text = Vec::new();
         for value in values {
-            // A string takes whatever is written.
-            let _ = writeln!(text, "{}", value.borrow());
+            serde_json::to_writer(&mut text, &value)
+                .map_err(|error| Error::Internal(error.to_string()))?;
+            text.push(b'\n');
         }
-        self.0.append(text.as_bytes())
+        self.0.append(&text)
     }
+}
+
+/// An iteration as the log has it, in the order of the other lines' keys.
+#[derive(Serialize)]
+struct LoggedIteration<'a> {
+    correction: Option<f64>,
+    event: &'static str,
+    increment: usize,
+    iteration: usize,
+    load_factor: f64,
+    phase: &'a str,
+    residual: f64,
+    step_length: f64,
+    viscosity: f64,
 }
 
 impl Recorder {
@@ -403,20 +413,18 @@ impl Recorder {
         lambda: f64,
         iterations: &[Iteration],
     ) -> Result<(), Error> {
-        self.log
-            .lines(iterations.iter().enumerate().map(|(number, iteration)| {
-                json!({
-                    "event": "iteration",
-                    "phase": place.phase,
-                    "increment": place.increment,
-                    "load_factor": lambda,
-                    "iteration": number,
-                    "residual": iteration.residual,
-                    "correction": iteration.correction,
-                    "step_length": iteration.step_length,
-                    "viscosity": iteration.viscosity,
-                })
-            }))
+        let lines = iterations.iter().enumerate();
+        self.log.lines(lines.map(|(number, iteration)| LoggedIteration {
+            correction: iteration.correction,
+            event: "iteration",
+            increment: place.increment,
+            iteration: number,
+            load_factor: lambda,
+            phase: &place.phase,
+            residual: iteration.residual,
+            step_length: iteration.step_length,
+            viscosity: iteration.viscosity,
+        }))
     }
 
     /// Logs a cut-back.

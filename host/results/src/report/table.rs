@@ -1,5 +1,6 @@
 //! Reading the CSV files of a run, whatever has become of them, and however long they are: row by
-//! row, never as a whole.
+//! row, never as a whole. The profiles of a run that this process has carried out come from memory
+//! ([`super::Known`]).
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
