@@ -414,17 +414,18 @@ impl Recorder {
         iterations: &[Iteration],
     ) -> Result<(), Error> {
         let lines = iterations.iter().enumerate();
-        self.log.lines(lines.map(|(number, iteration)| LoggedIteration {
-            correction: iteration.correction,
-            event: "iteration",
-            increment: place.increment,
-            iteration: number,
-            load_factor: lambda,
-            phase: &place.phase,
-            residual: iteration.residual,
-            step_length: iteration.step_length,
-            viscosity: iteration.viscosity,
-        }))
+        self.log
+            .lines(lines.map(|(number, iteration)| LoggedIteration {
+                correction: iteration.correction,
+                event: "iteration",
+                increment: place.increment,
+                iteration: number,
+                load_factor: lambda,
+                phase: &place.phase,
+                residual: iteration.residual,
+                step_length: iteration.step_length,
+                viscosity: iteration.viscosity,
+            }))
     }
 
     /// Logs a cut-back.

@@ -18,6 +18,7 @@
 //! the next complete one.
 
 mod part;
+mod product;
 mod reuse;
 
 pub use reuse::Reuse;
@@ -27,6 +28,7 @@ use crate::assembly::{System, Tie};
 use crate::group::Group;
 use algebra::{Block, Kind, Multifrontal, Pattern, Singular};
 use part::{Goal, Part};
+use product::add_product;
 use reuse::{Condensed, Numbered, Setup};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -370,14 +372,8 @@ impl LinearDomain {
 
     /// forces += S u.
     pub fn add_product(&self, displacement: &[f64], forces: &mut [f64]) {
-        let n = self.boundary.len();
-        let columns = self.stiffness().chunks_exact(n.max(1)).zip(displacement);
-        // Just after a state that is counted from, nothing has moved.
-        for (column, u) in columns.filter(|(_, u)| **u != 0.0) {
-            for (force, s) in forces.iter_mut().zip(column) {
-                *force += s * u;
-            }
-        }
+        let columns = self.stiffness().chunks_exact(self.boundary.len().max(1));
+        add_product(columns, displacement, forces);
     }
 
     /// The boundary has moved by these increments, in the order of the system's boundary.

@@ -148,7 +148,13 @@ fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
         .filter(|row| row.standing.state != State::Planned);
     let mut runs = begun.filter_map(|row| {
         let place = folder.join(&row.folder);
-        Run::read(&row.folder, &place, Known::default(), &Budget::of(rows.len().max(2))).ok()
+        Run::read(
+            &row.folder,
+            &place,
+            Known::default(),
+            &Budget::of(rows.len().max(2)),
+        )
+        .ok()
     });
     let Some(run) = runs.next() else {
         return IndexMap::new();

@@ -97,9 +97,8 @@ impl LinearDomain {
         goal: &Goal<'_>,
         displacement: &mut [f64],
     ) -> Result<Vec<f64>, DomainFailure> {
-        let increment = |origin: &Origin, part: &Part| {
-            self.increment(origin, part, goal.lambda, displacement)
-        };
+        let increment =
+            |origin: &Origin, part: &Part| self.increment(origin, part, goal.lambda, displacement);
         let Standing {
             complete, latest, ..
         } = &self.standing;
