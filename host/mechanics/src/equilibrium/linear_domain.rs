@@ -224,9 +224,7 @@ impl LinearDomain {
         };
         let mut values = Vec::new();
         system.assemble(groups, &mut values);
-        let stiffest = values
-            .iter()
-            .fold(0.0, |most: f64, value| most.max(value.abs()));
+        let stiffest = algebra::largest(&values);
         let pattern = system.forget_matrix();
         let lines = system.lines(lines);
         let matrix = Matrix {
