@@ -1,4 +1,8 @@
 //! A dense matrix times a vector, which every iteration needs.
+#![expect(
+    clippy::inline_always,
+    reason = "only what is inlined is compiled for the processor's own vector instructions"
+)]
 
 use pulp::{Arch, Simd, WithSimd};
 
