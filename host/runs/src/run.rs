@@ -57,7 +57,8 @@ pub struct Options {
     pub checkpoints: Option<Duration>,
     /// A run that has come to its end leaves no checkpoint that says so.
     pub ends_without: bool,
-    /// A report is written while the run goes on, if that takes more than a second.
+    /// A report is written while the run goes on, if that takes more than a second, and one at its end by this
+    /// process.
     pub reports: bool,
 }
 
@@ -278,7 +279,7 @@ fn carry_out(
         None
     };
     let mut warnings = Vec::new();
-    let results = if let Some(checkpoint) = found {
+    let mut results = if let Some(checkpoint) = found {
         let Some(state) = checkpoint.run else {
             checkpoint.results.check(folder)?;
             observer.resumed(None);
@@ -305,6 +306,9 @@ fn carry_out(
         warnings.extend(all);
         Recorder::create(folder, wanted, &about, &simulation)?
     };
+    if !options.reports {
+        results.makes_no_report();
+    }
     process::writes(Some(folder));
     let mut follower = Follower {
         stop: observer.stop(),
