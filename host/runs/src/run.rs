@@ -325,12 +325,7 @@ fn carry_out(
         follower.say(warning);
     }
     let outcome = outcome.map_err(|error| explained(case, &simulation, error, &mut follower));
-    if let Some(resistances) = follower.results.resistances() {
-        follower.observer.pile(&resistances);
-    }
-    if let Some(of_mesh) = follower.results.mesh_error() {
-        follower.observer.note(&of_mesh);
-    }
+    follower.tell_results();
     let Follower {
         observer,
         mut results,
@@ -373,6 +368,16 @@ impl Follower<'_> {
     fn say(&mut self, message: &str) {
         self.warnings.push(message.to_owned());
         self.observer.warning(message);
+    }
+
+    /// Tells what has come out: the resistances of a pile, the error of the mesh.
+    fn tell_results(&mut self) {
+        if let Some(resistances) = self.results.resistances() {
+            self.observer.pile(&resistances);
+        }
+        if let Some(of_mesh) = self.results.mesh_error() {
+            self.observer.note(&of_mesh);
+        }
     }
 
     /// Wants no more after a fault.
