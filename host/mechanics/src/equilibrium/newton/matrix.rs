@@ -4,7 +4,7 @@ use super::Newton;
 use super::failure::{Reason, StepFailure};
 use crate::assembly::Elements;
 use crate::settings::Method;
-use algebra::largest;
+use algebra::{LinearSolver, largest};
 use law::Operator;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -27,6 +27,8 @@ pub struct Matrix {
     largest_by_body: Vec<f64>,
     /// What it was added up from.
     elements: Elements,
+    /// The same equations once more, for what is asked beside the iterations.
+    pub(super) beside: Option<LinearSolver>,
 }
 
 impl Matrix {
