@@ -619,26 +619,19 @@ impl ElementMap {
 fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> Vec<u32> {
     let n = dofs.len();
     let mut slots = vec![u32::MAX; n * n];
-    for (j, &column) in dofs.iter().enumerate() {
-        let Some(column) = equation[column] else {
-            continue;
-        };
-        let start = pattern.column_start[column];
-        let rows = pattern.column(column);
-        // The components of a node mostly stand one after the other.
-        let mut next = 0;
-        for (i, &row) in dofs.iter().enumerate() {
-            let Some(row) = equation[row].map(|row| row as u32) else {
-                continue;
-            };
-            let at = if rows.get(next) == Some(&row) {
-                Ok(next)
-            } else {
-                rows.binary_search(&row)
-            };
-            if let Ok(at) = at {
+    // In the order of the rows of a column, so that one pass through it meets them all.
+    let mut sorted: Vec<(u32, usize)> = (0..n)
+        .filter_map(|i| Some((equation[dofs[i]]? as u32, i)))
+        .collect();
+    sorted.sort_unstable();
+    for &(column, j) in &sorted {
+        let start = pattern.column_start[column as usize];
+        let rows = pattern.column(column as usize);
+        let mut at = 0;
+        for &(row, i) in &sorted {
+            at += rows[at..].iter().take_while(|&&other| other < row).count();
+            if rows.get(at) == Some(&row) {
                 slots[i * n + j] = start + at as u32;
-                next = at + 1;
             }
         }
     }

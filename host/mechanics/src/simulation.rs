@@ -133,7 +133,8 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn reusing(problem: Problem, reuse: Reuse) -> Result<Self, Error> {
+    pub fn reusing(problem: Problem, mut reuse: Reuse) -> Result<Self, Error> {
+        reuse.begin_run();
         let Model {
             groups,
             ties,
