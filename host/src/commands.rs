@@ -288,7 +288,9 @@ fn stop_on_signals() -> Result<Stop, Error> {
 
 /// Starts the threads that a run works with; as many as there are processors, if it is not said.
 fn start_threads(n: Option<u16>) -> Result<(), Error> {
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(n.map_or(0, usize::from));
+    let threads = rayon::ThreadPoolBuilder::new()
+        .use_current_thread()
+        .num_threads(n.map_or(0, usize::from));
     threads
         .build_global()
         .map_err(|why| cannot_start("the threads of the run", &why))

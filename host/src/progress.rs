@@ -5,6 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use law::Stop;
 use mechanics::Place;
 use results::pile::Resistances;
+use results::report::Known;
 use runs::run::Observer;
 use runs::supervision;
 use std::io::{IsTerminal, Write as _};
@@ -19,6 +20,8 @@ pub(crate) struct Progress {
     cut_backs: usize,
     /// A phase has begun, so there is a folder with results.
     pub(crate) has_begun: bool,
+    /// What the report need not read again.
+    pub(crate) known: Known,
 }
 
 impl Progress {
@@ -29,6 +32,7 @@ impl Progress {
             bar: None,
             cut_backs: 0,
             has_begun: false,
+            known: Known::default(),
         }
     }
 
@@ -112,6 +116,10 @@ impl Observer for Progress {
             Some(place) => self.say(&format!("resumed after {place}")),
             None => self.say("done already"),
         }
+    }
+
+    fn written(&mut self, known: Known) {
+        self.known = known;
     }
 
     fn pile(&mut self, resistances: &Resistances) {

@@ -5,22 +5,25 @@ use runs::supervision;
 use std::io::Write as _;
 use std::sync::{Mutex, PoisonError};
 
-/// A line on the error stream. That it cannot be written does not end a run, but is said of it in
-/// the end.
+/// A line on the error stream, written at once: that stream has no buffer. That it cannot be written does not
+/// end a run, but is said of it in the end.
 macro_rules! say {
     ($($text:tt)*) => {
-        $crate::say::unsaid({
-            use std::io::Write as _;
-            writeln!(std::io::stderr(), $($text)*)
-        })
+        $crate::say::line(format!($($text)*))
     };
+}
+
+/// See [`say!`].
+pub(crate) fn line(mut text: String) {
+    text.push('\n');
+    unsaid(std::io::stderr().write_all(text.as_bytes()));
 }
 
 /// Why the error stream took no more.
 static UNSAID: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
 /// Keeps why a line could not be written. Whoever reads a pipe may have read enough.
-pub(crate) fn unsaid(written: std::io::Result<()>) {
+fn unsaid(written: std::io::Result<()>) {
     if let Err(why) = written
         && why.kind() != std::io::ErrorKind::BrokenPipe
     {

@@ -27,13 +27,10 @@ const UNSAFE: [(&str, &str); 10] = [
         "host/runs/src/memory.rs",
         "the allocator, which ends the program with a message",
     ),
-    (
-        "host/law/src/library.rs",
-        "opening libraries and calling them",
-    ),
+    ("host/law/src/library.rs", "opening libraries"),
     (
         "host/law/src/library",
-        "foreign routines, memory shared with workers, calls of `pilum check`",
+        "descriptions and calls of laws, foreign routines, memory shared with workers, calls of `pilum check`",
     ),
     (
         "tests/fixtures/contract_1_0",

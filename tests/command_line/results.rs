@@ -126,6 +126,58 @@ fn keeps_what_was_reached_when_there_is_no_equilibrium() {
     assert!(report.contains("<span class=\"status failed\">no equilibrium</span>"));
 }
 
+/// A report takes profiles from the memory of the process that wrote them: the page is the one that is made of
+/// the files.
+#[test]
+fn the_report_of_a_run_is_that_of_its_files() {
+    let every: Edit = ("profile = \"phases\"", "profile = \"increments\"");
+    // A layer that is gone in the second phase leaves increments that are no profile of all points.
+    let two_layers: [Edit; 6] = [
+        every,
+        (
+            "  { n = 1, to = 1.0 },\n",
+            "  { n = 1, to = 0.5 },\n  { n = 1, to = 0.51 },\n  { n = 1, to = 1.0 },\n",
+        ),
+        (
+            "[mesh.lines]",
+            "[[mesh.region]]\ngroup = \"seam\"\nx = [0.5, 0.51]\n\n[mesh.lines]",
+        ),
+        (
+            "[groups.layer]",
+            "[groups.seam]\nformulation = \"thin_layer\"\nlaw = \"joint\"\n\n[groups.layer]",
+        ),
+        (
+            "name = \"push\"\n",
+            "name = \"push, \\\"hard\\\"\"\ndeactivate = [\"seam\"]\n",
+        ),
+        ("title = \"A block", "title = \"Two layers, a block"),
+    ];
+    let cases = [
+        (edited(&[every]), DONE, "increments"),
+        (
+            edited(&two_layers),
+            DONE,
+            "profile.csv: 2 of 4 increments are not complete and left out",
+        ),
+        (
+            sliding().replace(every.0, every.1),
+            NO_EQUILIBRIUM,
+            "no equilibrium",
+        ),
+    ];
+    for (text, code, shown) in cases {
+        let place = Place::new();
+        let outcome = place.run_case(text);
+        assert_eq!(outcome.code, Some(code), "{}", outcome.stderr);
+        let read = || std::fs::read_to_string(place.path("out/report.html")).unwrap();
+        let of_run = read();
+        assert!(of_run.contains(shown), "{shown}");
+        assert!(of_run.contains("traction_n"), "no profiles");
+        assert_eq!(place.run(&["report", "out"]).code, Some(DONE));
+        assert!(of_run == read(), "another page is made of the files");
+    }
+}
+
 /// A study before a run that finds no equilibrium leaves nothing in the folder that would pass for its result.
 #[test]
 fn a_study_that_fails_leaves_no_results_of_an_earlier_run() {

@@ -411,6 +411,35 @@ fn reads_other_ways_of_writing_the_same() {
     assert_eq!(history(&sections), expected);
 }
 
+/// A byte order mark shifts no place, and a key behind it is named whole.
+#[test]
+fn places_are_right_behind_a_byte_order_mark() {
+    let place = Place::new();
+    let outcome = place.run_case("\u{feff}title = 3\n");
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    let expected = "`title`: found the number 3, expected a text";
+    assert!(outcome.stderr.contains(expected), "{}", outcome.stderr);
+    assert!(
+        outcome.stderr.contains("case.toml:1:9"),
+        "{}",
+        outcome.stderr
+    );
+    // A base with a mark, and a file on top that has one too.
+    place.write("base.toml", format!("\u{feff}{CASE}"));
+    let outcome = place.run_case("\u{feff}base = \"base.toml\"\nnonsense = 1\n");
+    assert_eq!(outcome.code, Some(BAD_INPUT));
+    assert!(
+        outcome.stderr.contains("unknown key `nonsense`"),
+        "{}",
+        outcome.stderr
+    );
+    assert!(
+        outcome.stderr.contains("case.toml:2:1"),
+        "{}",
+        outcome.stderr
+    );
+}
+
 #[test]
 fn places_are_right_with_windows_line_endings() {
     let place = Place::new();

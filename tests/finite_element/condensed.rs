@@ -157,6 +157,38 @@ fn a_phase_whose_interface_iterates_uses_the_factors_of_the_one_before() {
     assert_eq!(factorisations(folder.path()), [2, 1, 2]);
 }
 
+/// Phases on the same unknowns: the linear part of the one before is taken only where nothing in it has changed.
+#[test]
+fn ground_that_is_another_from_a_phase_on_is_condensed_anew() {
+    let variants = "[laws.stiff]\nlaw = \"elastic\"\nparameters = { young_modulus = 68e3, poisson_ratio = 0.3 }\n\
+                    [[phase]]\nname = \"on\"\nincrements = 2\n\
+                    [[phase]]\nname = \"stiffer\"\nincrements = 2\nlaws = { sand = \"stiff\" }\n\
+                    displacement = [{ line = \"pile_head\", z = -0.0012 }]\n\
+                    [[variant]]\nname = \"condensed\"\nsolver.equations = \"condensed\"\n\
+                    [[variant]]\nname = \"sparse\"\nsolver.equations = \"sparse\"\n";
+    let runs: Vec<_> = chamber("chamber_mesh1", variants)
+        .iter()
+        .map(|case| {
+            let folder = tempfile::tempdir().unwrap();
+            let (mut observer, mut reuse) = (Silent::default(), Reuse::default());
+            let options = Options::default();
+            run_reusing(case, folder.path(), &mut observer, &mut reuse, options).unwrap();
+            table(&folder.path().join("history.csv"))
+        })
+        .collect();
+    let last = |run: usize| runs[run].last().unwrap()["q_t"].parse::<f64>().unwrap();
+    assert!(runs[0].len() == runs[1].len() && runs[0].len() == 20);
+    assert!(
+        (last(0) - last(1)).abs() <= 1e-9 * last(1).abs(),
+        "{} and {}",
+        last(0),
+        last(1)
+    );
+    // More than the ground as it was.
+    let before: f64 = runs[1][17]["q_t"].parse().unwrap();
+    assert!(last(1) > 1.01 * before, "{before}, then {}", last(1));
+}
+
 /// A column on a linear thin layer with mean strain: its mid-thickness nodes are tied. Beside it one
 /// that yields, so that the linear groups are condensed.
 const TIED: &str = r#"

@@ -4,7 +4,10 @@
 #   tests/fuzz/run.sh [SECONDS [TARGET [LIBFUZZER OPTION …]]]
 #   tests/fuzz/run.sh 0 TARGET FILE        one input again
 #   SANITIZE=1 tests/fuzz/run.sh …         under AddressSanitizer
+#   RUNS=10000 tests/fuzz/run.sh …         so many inputs of each target from a fixed seed instead
 #
+# What is run before every merge takes a fixed seed: whether a change is green should not depend on luck (hash
+# maps still count from where they like). To look for what nobody has seen yet, give it seconds.
 # What it finds stands in target/fuzz/findings, inputs that reach new code in target/fuzz/corpus; the
 # committed corpus is read and never changed. Exit code 1 if anything was found.
 set -eu
@@ -35,13 +38,17 @@ if [ $# -gt 0 ] && [ -f "$1" ]; then
 fi
 bad=0
 total=0
+length="-max_total_time=$seconds"
+[ -z "${RUNS:-}" ] || length="-runs=$RUNS -seed=1"
 for target in $targets; do
-  mkdir -p "$folder/corpus/$target"
+  corpus=$folder/corpus/$target
+  [ -z "${RUNS:-}" ] || corpus=$folder/fixed/$target
+  rm -rf "$folder/fixed" && mkdir -p "$corpus"
   log=$folder/$target.log
   status=0
-  PILUM_FUZZ=$target $folder/bin/fuzz $limits -max_total_time="$seconds" -max_len=8192 \
+  PILUM_FUZZ=$target $folder/bin/fuzz $limits $length -max_len=8192 \
     -artifact_prefix="$folder/findings/$target-" -dict=tests/fuzz/words.dict -print_final_stats=1 \
-    "$@" "$folder/corpus/$target" "tests/fuzz/corpus/$target" >"$log" 2>&1 </dev/null || status=$?
+    "$@" "$corpus" "tests/fuzz/corpus/$target" >"$log" 2>&1 </dev/null || status=$?
   number() { sed -n "s/^stat::$1: *//p" "$log" | tail -n 1; }
   runs=$(number number_of_executed_units)
   edges=$(sed -n 's/.* cov: \([0-9]*\).*/\1/p' "$log" | tail -n 1)

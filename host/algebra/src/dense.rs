@@ -14,6 +14,20 @@ pub(crate) struct Exchanges {
     inverse: Vec<usize>,
 }
 
+/// Largest absolute value, looked for in eight places at once; values that are no numbers do not count.
+pub fn largest(values: &[f64]) -> f64 {
+    let (eights, rest) = values.as_chunks::<8>();
+    let larger = |most: f64, value: f64| if value > most { value } else { most };
+    let mut most = [0.0; 8];
+    for eight in eights {
+        for (most, value) in most.iter_mut().zip(eight) {
+            *most = larger(*most, value.abs());
+        }
+    }
+    let all = most.into_iter().chain(rest.iter().map(|value| value.abs()));
+    all.fold(0.0, larger)
+}
+
 /// Factorises a square matrix in place.
 ///
 /// # Errors

@@ -16,6 +16,7 @@ mod multifrontal;
 mod order;
 mod pattern;
 
+pub use dense::largest;
 pub use linear::{Block, LinearSolver, Singular};
 pub use multifrontal::{Gathered, Kind, Multifrontal};
 pub use order::mesh_lines;

@@ -1,7 +1,7 @@
 //! Sparse linear equations: which factorisation, and the check of solutions.
 
 use crate::Pattern;
-use crate::dense::{self, Exchanges};
+use crate::dense::{self, Exchanges, largest};
 use crate::multifrontal::{Kind, Multifrontal};
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
@@ -61,6 +61,8 @@ pub struct LinearSolver {
     /// Row exchanges among the equations of the block, which are eliminated last.
     exchanges: Exchanges,
     values: Vec<f64>,
+    /// Room that the values of the matrix before the last one took.
+    room: Vec<f64>,
     /// The last matrix has been factorised by the multifrontal method.
     factorised: bool,
     /// A solution with the last matrix was accurate at once; those that follow are not checked.
@@ -132,6 +134,7 @@ impl LinearSolver {
             block,
             exchanges: Exchanges::default(),
             values: Vec::new(),
+            room: Vec::new(),
             factorised: false,
             proven: false,
             row_exchanges: None,
@@ -148,6 +151,12 @@ impl LinearSolver {
     /// Floating-point operations of a factorisation, by the analysis; the block's not among them.
     pub fn operations(&self) -> f64 {
         self.multifrontal.operations()
+    }
+
+    /// Room for the values of the next matrix. Memory that is new every time has to be given by the system,
+    /// page by page, which takes as long as adding the elements up.
+    pub fn room(&mut self) -> Vec<f64> {
+        std::mem::take(&mut self.room)
     }
 
     /// Factorises the matrix with these values, the block as it is.
@@ -177,6 +186,7 @@ impl LinearSolver {
         }
         self.factorisations += 1;
         self.factorised = self.factorise_fast(&before).is_ok();
+        self.room = before;
         if self.factorised {
             Ok(())
         } else {
@@ -337,7 +347,6 @@ impl LinearSolver {
                 row_sums[row] += block.share * row_sum;
             }
         }
-        let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let scale = largest(&row_sums) * largest(x) + largest(right);
         let error = if scale > 0.0 {
             largest(&residual) / scale

@@ -21,6 +21,7 @@ mod analysis;
 mod factorisation;
 mod kernels;
 mod solution;
+mod substitution;
 mod supernodes;
 mod updates;
 

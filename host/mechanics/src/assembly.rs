@@ -355,35 +355,55 @@ impl System {
 
     /// The tangent matrix from the groups' tangents.
     pub fn assemble(&self, groups: &[Group], values: &mut Vec<f64>) {
+        self.clear(values);
+        for (group, maps) in groups.iter().zip(&self.elements) {
+            for (round, maps) in maps.chunks(ROUND * PIECE).enumerate() {
+                let mut pieces: Vec<Piece> = maps.chunks(PIECE).map(|_| Piece::default()).collect();
+                self.add_up(group, ROUND * PIECE * round, maps, &mut pieces, values);
+            }
+        }
+    }
+
+    /// As [`Self::assemble`], for the same bits with less work: matrices of elements whose tangents
+    /// are those of the last time are still there. `kept` is one of this system alone.
+    pub fn assemble_after(&self, kept: &mut Elements, groups: &[Group], values: &mut Vec<f64>) {
+        self.clear(values);
+        kept.pieces.resize_with(groups.len(), Vec::new);
+        for ((group, maps), pieces) in groups.iter().zip(&self.elements).zip(&mut kept.pieces) {
+            pieces.resize_with(maps.len().div_ceil(PIECE), Piece::kept);
+            self.add_up(group, 0, maps, pieces, values);
+        }
+    }
+
+    fn clear(&self, values: &mut Vec<f64>) {
         values.clear();
         values.resize(self.pattern.rows.len(), 0.0);
-        for (group, maps) in groups.iter().zip(&self.elements) {
-            // Elements share entries: they are added in one order, whoever computed them.
-            for (round, maps) in maps.chunks(ROUND * PIECE).enumerate() {
-                let compute = |(piece, maps): (usize, &[ElementMap])| {
-                    let mut matrices = Vec::new();
-                    let mut matrix = ElementMatrix::default();
-                    for (e, map) in (ROUND * PIECE * round + PIECE * piece..).zip(maps) {
-                        matrices.extend_from_slice(matrix.of(group, e, map));
-                    }
-                    matrices
-                };
-                let is_shared = maps.len() > PIECE;
-                let pieces: Vec<Vec<f64>> = if is_shared {
-                    maps.par_chunks(PIECE).enumerate().map(compute).collect()
-                } else {
-                    vec![compute((0, maps))]
-                };
-                let add = |part: Part<'_>| part.add(maps, &pieces);
-                if is_shared {
-                    self.parts(values)
-                        .into_par_iter()
-                        .with_max_len(1)
-                        .for_each(add);
-                } else {
-                    add(Part { start: 0, values });
-                }
-            }
+    }
+
+    /// Adds the matrices of the elements of a group from the `first` on. Elements share entries: they are
+    /// added in one order, whoever computed them.
+    fn add_up(
+        &self,
+        group: &Group,
+        first: usize,
+        maps: &[ElementMap],
+        pieces: &mut [Piece],
+        values: &mut [f64],
+    ) {
+        let is_shared = maps.len() > PIECE;
+        let each = pieces.par_iter_mut().zip(maps.par_chunks(PIECE));
+        // What is not worth sharing is one piece, which no other thread is woken for.
+        each.with_min_len(if is_shared { 1 } else { usize::MAX })
+            .enumerate()
+            .for_each(|(piece, (kept, maps))| kept.renew(group, first + PIECE * piece, maps));
+        let add = |part: Part<'_>| part.add(maps, pieces);
+        if is_shared {
+            self.parts(values)
+                .into_par_iter()
+                .with_max_len(1)
+                .for_each(add);
+        } else {
+            add(Part { start: 0, values });
         }
     }
 
@@ -436,10 +456,10 @@ struct Part<'v> {
 
 impl Part<'_> {
     /// Adds the matrices of elements, one after the other, which stand in pieces.
-    fn add(self, maps: &[ElementMap], pieces: &[Vec<f64>]) {
+    fn add(self, maps: &[ElementMap], pieces: &[Piece]) {
         let end = self.start + self.values.len() as u32;
-        for (maps, matrices) in maps.chunks(PIECE).zip(pieces) {
-            let mut rest = matrices.as_slice();
+        for (maps, piece) in maps.chunks(PIECE).zip(pieces) {
+            let mut rest = piece.matrices.as_slice();
             for map in maps {
                 let (matrix, others) = rest.split_at(map.slots.len());
                 rest = others;
@@ -454,6 +474,60 @@ impl Part<'_> {
                         *sum += value;
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Matrices of the elements of a [`System`], for the next time they are added up.
+#[derive(Debug, Default)]
+pub struct Elements {
+    /// Of every group.
+    pieces: Vec<Vec<Piece>>,
+}
+
+/// Those of some elements, one after the other.
+#[derive(Debug, Default)]
+struct Piece {
+    matrices: Vec<f64>,
+    /// The tangents they were computed from, if they are kept.
+    tangents: Option<Vec<f64>>,
+}
+
+impl Piece {
+    fn kept() -> Self {
+        Self {
+            tangents: Some(Vec::new()),
+            ..Self::default()
+        }
+    }
+
+    /// Computes the matrices of the elements from the `first` on whose tangents have changed.
+    fn renew(&mut self, group: &Group, first: usize, maps: &[ElementMap]) {
+        let mut matrix = ElementMatrix::default();
+        if self.matrices.is_empty() {
+            for (e, map) in (first..).zip(maps) {
+                self.matrices.extend_from_slice(matrix.of(group, e, map));
+                if let Some(tangents) = &mut self.tangents {
+                    tangents.extend_from_slice(group.element_tangents(e));
+                }
+            }
+            return;
+        }
+        let mut matrices = self.matrices.as_mut_slice();
+        let mut tangents = self.tangents.as_deref_mut().unwrap_or_default();
+        for (e, map) in (first..).zip(maps) {
+            let now = group.element_tangents(e);
+            let (own, before);
+            (own, matrices) = matrices.split_at_mut(map.slots.len());
+            (before, tangents) = tangents.split_at_mut(now.len());
+            if before
+                .iter()
+                .zip(now)
+                .any(|(a, b)| a.to_bits() != b.to_bits())
+            {
+                before.copy_from_slice(now);
+                own.copy_from_slice(matrix.of(group, e, map));
             }
         }
     }
@@ -545,26 +619,19 @@ impl ElementMap {
 fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> Vec<u32> {
     let n = dofs.len();
     let mut slots = vec![u32::MAX; n * n];
-    for (j, &column) in dofs.iter().enumerate() {
-        let Some(column) = equation[column] else {
-            continue;
-        };
-        let start = pattern.column_start[column];
-        let rows = pattern.column(column);
-        // The components of a node mostly stand one after the other.
-        let mut next = 0;
-        for (i, &row) in dofs.iter().enumerate() {
-            let Some(row) = equation[row].map(|row| row as u32) else {
-                continue;
-            };
-            let at = if rows.get(next) == Some(&row) {
-                Ok(next)
-            } else {
-                rows.binary_search(&row)
-            };
-            if let Ok(at) = at {
+    // In the order of the rows of a column, so that one pass through it meets them all.
+    let mut sorted: Vec<(u32, usize)> = (0..n)
+        .filter_map(|i| Some((equation[dofs[i]]? as u32, i)))
+        .collect();
+    sorted.sort_unstable();
+    for &(column, j) in &sorted {
+        let start = pattern.column_start[column as usize];
+        let rows = pattern.column(column as usize);
+        let mut at = 0;
+        for &(row, i) in &sorted {
+            at += rows[at..].iter().take_while(|&&other| other < row).count();
+            if rows.get(at) == Some(&row) {
                 slots[i * n + j] = start + at as u32;
-                next = at + 1;
             }
         }
     }

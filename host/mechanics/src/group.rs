@@ -9,6 +9,7 @@ mod differences;
 mod layer;
 mod look;
 mod operator;
+mod state;
 mod takeover;
 mod tangent;
 mod varying;
@@ -16,6 +17,7 @@ mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
 pub use look::{Deviation, Notice, Went};
+pub use state::GroupState;
 pub use tangent::Fault;
 
 use crate::element::Kinematics;
@@ -26,7 +28,6 @@ use law::Law;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
 use layer::Layer;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::ops::Range;
 pub use takeover::TakeOver;
 use varying::Varying;
@@ -185,39 +186,6 @@ impl std::fmt::Display for Parted {
     }
 }
 
-/// What a group carries from one increment to the next.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct GroupState<'g> {
-    /// Name of the law in the case file.
-    law: Cow<'g, str>,
-    strain: Cow<'g, [f64]>,
-    stress: Cow<'g, [f64]>,
-    internal: Cow<'g, [f64]>,
-    jump: Cow<'g, [f64]>,
-    law_calls: Cow<'g, [LawCalls]>,
-    /// Tangents, where a matrix made of them is still in use.
-    tangent: Option<Cow<'g, [f64]>>,
-    pores: Option<Cow<'g, Pores>>,
-    origin: Origin,
-}
-
-impl GroupState<'_> {
-    /// A copy that borrows nothing from the group.
-    pub fn into_owned(self) -> GroupState<'static> {
-        GroupState {
-            law: Cow::Owned(self.law.into_owned()),
-            strain: Cow::Owned(self.strain.into_owned()),
-            stress: Cow::Owned(self.stress.into_owned()),
-            internal: Cow::Owned(self.internal.into_owned()),
-            jump: Cow::Owned(self.jump.into_owned()),
-            law_calls: Cow::Owned(self.law_calls.into_owned()),
-            tangent: self.tangent.map(|tangent| Cow::Owned(tangent.into_owned())),
-            pores: self.pores.map(|pores| Cow::Owned(pores.into_owned())),
-            origin: self.origin,
-        }
-    }
-}
-
 /// A group of elements.
 #[derive(Debug)]
 pub struct Group {
@@ -350,75 +318,6 @@ impl Group {
             position: self.kinematics.position(first),
             opening: widest.fold(f64::NEG_INFINITY, f64::max),
         })
-    }
-
-    /// The committed state; with the tangents of the last evaluation if they are wanted.
-    pub fn state(&self, with_tangents: bool) -> GroupState<'_> {
-        let jump = self.layer.as_ref().map(|layer| &layer.jump.committed[..]);
-        GroupState {
-            law: (&self.law.name).into(),
-            strain: (&self.strain.committed).into(),
-            stress: (&self.stress.committed).into(),
-            internal: (&self.internal.committed).into(),
-            jump: jump.unwrap_or_default().into(),
-            law_calls: (&self.law_calls).into(),
-            tangent: with_tangents.then(|| (&self.tangent).into()),
-            pores: self.pores.as_ref().map(Cow::Borrowed),
-            origin: self.origin,
-        }
-    }
-
-    /// The law that a state names, if the state is one of this group.
-    ///
-    /// # Errors
-    /// It is not, in words.
-    pub fn check(&self, state: &GroupState<'_>, laws: &[Material]) -> Result<Material, String> {
-        let wrong = || format!("the state is not that of group `{}`", self.name);
-        let known = laws.iter().chain([&self.law]);
-        let law = known.into_iter().find(|law| law.name == state.law);
-        let law = law.cloned().ok_or_else(wrong)?;
-        let n_internal = self.kinematics.n_points() * law.built.law.n_states();
-        let n_jump = self
-            .layer
-            .as_ref()
-            .map_or(0, |layer| layer.jump.committed.len());
-        if state.strain.len() != self.strain.committed.len()
-            || state.stress.len() != self.stress.committed.len()
-            || state.internal.len() != n_internal
-            || state.jump.len() != n_jump
-        {
-            return Err(wrong());
-        }
-        Ok(law)
-    }
-
-    /// Takes over a state that [`Self::state`] gave, with the law it names (`laws`: those that the
-    /// group carries in the course of the case).
-    ///
-    /// # Errors
-    /// The state is not that of this group, or its law has no elastic operator.
-    pub fn restore(&mut self, state: GroupState<'_>, laws: &[Material]) -> Result<(), String> {
-        let law = self.check(&state, laws)?;
-        self.stress = Field::new(state.stress.into_owned());
-        self.pores = state.pores.map(Cow::into_owned);
-        self.start_law(law, Some(state.internal.to_vec()))
-            .map_err(|failure| failure.to_string())?;
-        // Initial values that the case file gives held at the start of the law only.
-        self.internal = Field::new(state.internal.into_owned());
-        self.strain = Field::new(state.strain.into_owned());
-        if let Some(layer) = &mut self.layer {
-            layer.jump = Field::new(state.jump.into_owned());
-        }
-        if let Some(tangent) = state.tangent {
-            if tangent.len() != self.tangent.len() {
-                return Err(format!("the state is not that of group `{}`", self.name));
-            }
-            self.tangent = tangent.into_owned();
-        }
-        self.law_calls = state.law_calls.into_owned();
-        self.origin = state.origin;
-        self.forget_trial();
-        Ok(())
     }
 
     /// A group that is there from now on, free of strain, with this stress in axes of its elements. Its

@@ -4,55 +4,44 @@
 mod beyond;
 mod complete;
 mod creeping;
+mod ending;
 mod history;
 mod loads;
-mod neighbour;
+mod motion;
 mod path;
 mod phase;
 mod record;
 mod start;
 mod state;
 mod statics;
+mod steps;
 mod tangents;
 mod ties;
 mod warning;
 mod watch;
 
-pub use neighbour::Neighbour;
+pub use motion::Neighbour;
 pub use record::PhaseRecord;
 pub use state::State;
 pub use warning::Warning;
 pub use watch::{Increment, Part, Watch, When};
 
 use crate::assembly::Tie;
-use crate::equilibrium::{Clock, Guess, Newton, Reason, Reuse, Runaway, StepFailure, StepSuccess};
-use crate::error::{Error, NoEquilibrium, Place, RunawayAt};
+use crate::equilibrium::{Clock, Reuse};
+use crate::error::{Error, Place};
 use crate::ground::{Acting, Loading};
 use crate::group::Group;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::problem::{Axis, Material, Problem};
-use crate::settings::{Control, Method, Settings};
+use crate::problem::{Material, Problem};
+use crate::settings::{Method, Settings};
 use beyond::Beyond;
-use creeping::Lead;
 use history::History;
 use law::{Moment, Stop, custody};
-use path::PathEnd;
 use phase::PhaseEquations;
 use state::PhaseCourse;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-
-/// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
-/// be halved so often.
-const PATIENCE: f64 = 0.2;
-/// Fastest growth of steps after a cut-back.
-const REGROWTH: f64 = 2.0;
-/// Share of the method's own limit of iterations up to which a step counts as easy, so that the
-/// next one may be larger.
-const EASY: f64 = 0.34;
-/// Smallest and largest reduction of a step at a cut-back.
-const CUT: [f64; 2] = [0.1, 0.5];
 
 /// What there is to see of a state of equilibrium.
 #[derive(Clone, Copy, Debug)]
@@ -129,13 +118,6 @@ struct UnderWay {
     record: PhaseRecord,
 }
 
-/// Results of an increment on its way.
-#[derive(Debug, Default)]
-struct Progress {
-    iterations: usize,
-    unreliable: Option<String>,
-}
-
 impl Simulation {
     /// A problem before its first phase, checked.
     ///
@@ -151,7 +133,8 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn reusing(problem: Problem, reuse: Reuse) -> Result<Self, Error> {
+    pub fn reusing(problem: Problem, mut reuse: Reuse) -> Result<Self, Error> {
+        reuse.begin_run();
         let Model {
             groups,
             ties,
@@ -457,309 +440,6 @@ impl Simulation {
             let time = self.clock(phase.number).at(lambda);
             watch.last_equilibrium(place, lambda, time, &self.snapshot());
         }
-    }
-
-    /// Steps up to the end of an increment, one of `n`; as many as it takes.
-    fn reach(
-        &mut self,
-        place: &Place,
-        n: usize,
-        phase: &mut UnderWay,
-        watch: &mut dyn Watch,
-    ) -> Result<Progress, Error> {
-        let settings = self.settings();
-        let easy = EASY * settings.method.max_iterations() as f64;
-        let smallest = 1.0 / n as f64 / f64::powi(2.0, settings.max_halvings as i32);
-        let target = if place.increment == n {
-            1.0
-        } else {
-            place.increment as f64 / n as f64
-        };
-        let mut done = Progress::default();
-        let mut lead = Lead::new(&settings);
-        while phase.course.lambda < target {
-            if phase.course.lambda >= phase.course.loads.leg[1] {
-                self.turn(place, phase)?;
-            }
-            let target = target.min(phase.course.loads.leg[1]);
-            let (start, mut step) = (phase.course.lambda, phase.course.step);
-            if lead.creeps() {
-                step = step.min(creeping::LONGEST / n as f64);
-            }
-            // A remainder that is hardly longer than the step is taken at once.
-            let end = if target - start <= 1.0001 * step {
-                target
-            } else {
-                start + step
-            };
-            let length = end - start;
-            let guess = phase.course.history.guess(length);
-            let attempt = self.attempt(phase, lead.control, [start, end], guess);
-            match self.without_leap(attempt, phase, length) {
-                Ok(success) => {
-                    let period = (self.clock(phase.number), [start, end]);
-                    self.look_after(&success, period, watch);
-                    if success.relaxed {
-                        self.note_motion(
-                            &success,
-                            [start, end],
-                            lead.control,
-                            (place, phase),
-                            watch,
-                        );
-                    }
-                    lead.goes_on();
-                    // A motion takes many iterations, and steps of any length.
-                    if success.was_motion || success.iterations.len() as f64 <= easy {
-                        phase.course.step = (REGROWTH * step).min(1.0 / n as f64);
-                    }
-                    self.take_over(success, end, place, phase, watch, &mut done)?;
-                }
-                Err(failure) if failure.is_stop() => return Err(stopped(place)),
-                Err(failure) => {
-                    go_on(watch.iterations(place, end, &failure.iterations))?;
-                    done.iterations += failure.iterations.len();
-                    let period = (self.clock(phase.number), [start, end]);
-                    if self.look_after_failure(&failure, period, watch) {
-                        continue;
-                    }
-                    phase.record.cut_backs += 1;
-                    let factor = failure.factor().unwrap_or(CUT[1]).clamp(CUT[0], CUT[1]);
-                    let step = factor * length;
-                    phase.course.step = step;
-                    go_on(watch.cut_back(place, end, step, &failure.reason))?;
-                    let follows = settings.control == Control::ArcLength
-                        && phase.course.history.latest().is_some();
-                    let is_small = step < smallest.max(PATIENCE / n as f64);
-                    let is_out = step < smallest;
-                    let stays = lead.stays(is_out, step * n as f64);
-                    let turns = !stays && lead.turns(&failure, is_out);
-                    if failure.defect().is_some() {
-                        return Err(self.cannot_go_on(phase, place, start, failure));
-                    } else if follows && is_small {
-                        let goal = [n as f64, target];
-                        let end = self.follow_path(place, goal, phase, watch, &mut done)?;
-                        if let PathEnd::Stopped(failure, highest) = end {
-                            return Err(self.cannot_go_on(phase, place, highest, *failure));
-                        }
-                    } else if turns && lead.creeps() {
-                        if !lead.was_in_vain() {
-                            phase.course.step = creeping::LONGEST / n as f64;
-                        }
-                        if phase.record.crept_from.is_none() {
-                            phase.record.crept_from = Some(place.increment);
-                            watch.warning(&Warning::Creeps(place.clone()));
-                        }
-                    } else if is_out && !stays {
-                        return Err(self.cannot_go_on(phase, place, start, failure));
-                    }
-                }
-            }
-        }
-        Ok(done)
-    }
-
-    /// Counts a motion that led to equilibrium, and speaks of the first one of its kind; the phase's end says how
-    /// many there were.
-    fn note_motion(
-        &mut self,
-        success: &StepSuccess,
-        step: [f64; 2],
-        control: Control,
-        (place, phase): (&Place, &mut UnderWay),
-        watch: &mut dyn Watch,
-    ) {
-        phase.record.relaxed += 1;
-        if control == Control::Creep {
-            phase.record.crept += 1;
-            if phase.record.crept == 1 && self.problem.settings.control == Control::Creep {
-                watch.warning(&Warning::Crept(place.clone()));
-            }
-        } else if phase.record.relaxed - phase.record.crept == 1 {
-            let by_creep = self.neighbour(phase, success, step);
-            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
-        }
-    }
-
-    /// Goes on to the next leg of the phase's course, from a complete state.
-    fn turn(&mut self, place: &Place, phase: &mut UnderWay) -> Result<(), Error> {
-        let lambda = phase.course.lambda;
-        self.complete(phase, None)
-            .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
-        if self.next_leg(phase.number, &mut phase.course)
-            && let Some(domain) = &mut phase.equations.domain
-        {
-            domain.start(&self.groups, &phase.course.loads, &self.displacement);
-        }
-        Ok(())
-    }
-
-    /// Takes over a step that reached equilibrium at load factor λ, with all that is to be said of
-    /// it.
-    fn take_over(
-        &mut self,
-        success: StepSuccess,
-        lambda: f64,
-        place: &Place,
-        phase: &mut UnderWay,
-        watch: &mut dyn Watch,
-        done: &mut Progress,
-    ) -> Result<(), Error> {
-        let iterations = success.iterations.len();
-        // Whoever wants no more has the state of this equilibrium: creep has committed its way to it.
-        let flow = watch.iterations(place, lambda, &success.iterations);
-        done.iterations += iterations;
-        let record = &mut phase.record;
-        let is_met = success.round_off <= self.problem.settings.force_tolerance;
-        if success.round_off > 0.0 && is_met {
-            let last = success.iterations.last().and_then(|last| last.correction);
-            let above = last.filter(|left| *left > self.settings().displacement_tolerance);
-            record.unsettled = record.unsettled.max(above.unwrap_or(0.0));
-        }
-        record.round_off = record.round_off.max(success.round_off);
-        if success.tolerated > 0.0 {
-            record.tolerated += 1;
-            record.tolerated_residual = record.tolerated_residual.max(success.tolerated);
-            let scale = success.scales.iter().copied().fold(0.0, f64::max);
-            let force = success.tolerated * scale;
-            record.tolerated_force = record.tolerated_force.max(force);
-            if record.tolerated == 1 {
-                watch.warning(&Warning::Tolerated {
-                    place: place.clone(),
-                    residual: success.tolerated,
-                    force,
-                    tolerance: self.problem.settings.force_tolerance,
-                });
-            }
-        }
-        if let Some(open) = &success.open
-            && open.correction > self.problem.settings.displacement_tolerance
-        {
-            record.by_force += 1;
-            record.open = record.open.and(open);
-        }
-        if let Some(why) = &success.unreliable {
-            record.unreliable += 1;
-            done.unreliable.get_or_insert_with(|| why.clone());
-        }
-        self.accept(&success, phase, lambda);
-        let course = &mut phase.course;
-        course.history.add(lambda - course.lambda, success);
-        course.lambda = lambda;
-        go_on(flow)?;
-        if self.problem.settings.control == Control::ArcLength {
-            self.hand_out_step(place, phase, iterations, watch)?;
-        }
-        Ok(())
-    }
-
-    /// The error of a phase that ends at load factor λ.
-    fn cannot_go_on(
-        &self,
-        phase: &UnderWay,
-        place: &Place,
-        lambda: f64,
-        failure: StepFailure,
-    ) -> Error {
-        if let Some(defect) = failure.defect() {
-            return Error::Law {
-                place: place.clone(),
-                failure: Box::new(defect.clone()),
-                however_small: false,
-            };
-        }
-        let broken = failure.failed().filter(|point| {
-            let mut groups = self.groups.iter();
-            let group = groups.find(|group| group.name == point.group);
-            group.is_some_and(|group| group.law.built.law.breaks_down(&point.failure))
-        });
-        if let Some(broken) = broken {
-            return Error::Law {
-                place: place.clone(),
-                failure: Box::new(broken.clone()),
-                however_small: true,
-            };
-        }
-        let runaway = failure.runaway.map(|runaway| self.runaway_at(runaway));
-        Error::NoEquilibrium(Box::new(NoEquilibrium {
-            runaway,
-            ..self.stopped_at(phase, place, lambda, failure)
-        }))
-    }
-
-    /// No equilibrium of a phase beyond load factor λ.
-    fn stopped_at(
-        &self,
-        phase: &UnderWay,
-        place: &Place,
-        lambda: f64,
-        failure: StepFailure,
-    ) -> NoEquilibrium {
-        let of = self.problem.phases[phase.number].increments;
-        NoEquilibrium {
-            place: place.clone(),
-            reached: lambda * of as f64,
-            of,
-            control: if phase.record.crept_from.is_some() {
-                Control::Creep
-            } else {
-                self.problem.settings.control
-            },
-            failure,
-            runaway: None,
-        }
-    }
-
-    /// The same where a step is found not to be complete.
-    fn incomplete(&self, phase: &UnderWay, place: &Place, lambda: f64, reason: Reason) -> Error {
-        let none = self.stopped_at(phase, place, lambda, reason.into());
-        Error::NoEquilibrium(Box::new(none))
-    }
-
-    /// Where a displacement ran away.
-    fn runaway_at(&self, Runaway { dof, increment }: Runaway) -> RunawayAt {
-        let node = dof / 2;
-        let of_node = |group: &&Group| {
-            let mut elements = 0..group.kinematics.n_elements();
-            elements.any(|element| group.kinematics.nodes(element).contains(&node))
-        };
-        let groups = self.groups.iter().filter(of_node);
-        RunawayAt {
-            axis: if dof.is_multiple_of(2) {
-                Axis::X
-            } else {
-                Axis::Y
-            },
-            increment,
-            node: self.problem.mesh.nodes[node],
-            groups: groups.map(|group| group.name.clone()).collect(),
-        }
-    }
-
-    /// One step; from a guess if there is one, else from the tangent.
-    fn attempt(
-        &mut self,
-        phase: &mut UnderWay,
-        control: Control,
-        [from, to]: [f64; 2],
-        guess: Option<Guess>,
-    ) -> Result<StepSuccess, StepFailure> {
-        let settings = Settings {
-            control,
-            ..self.settings()
-        };
-        let clock = self.clock(phase.number);
-        let equations = &mut phase.equations;
-        let mut newton = Newton::new(
-            (&equations.system, &equations.places),
-            equations.domain.as_ref(),
-            (&mut equations.solver, &mut equations.matrix),
-            &mut self.groups,
-            &settings,
-            &mut phase.record.costs,
-        );
-        newton = newton.stopped_by(&self.stop);
-        newton.step(&phase.course.loads, [from, to], clock, guess)
     }
 }
 

@@ -10,7 +10,8 @@
 use law::{Hypothesis, SearchPath};
 use mechanics::mesh::{Along, Solid};
 use mechanics::problem::{
-    Analysis, Axis, Displacement, ElementGroup, Formulation, Phase, Pressure, Support,
+    Analysis, Axis, Displacement, ElementGroup, Formulation, InitialStress, Phase, Pressure,
+    Support,
 };
 use mechanics::{Error, Material, Mesh, Problem, Simulation};
 
@@ -213,6 +214,89 @@ fn a_state_is_gone_on_from_twice() {
     // A state of another mesh is no state of this one.
     let mut finer = Simulation::new(sliding(triangles, 30.0)).unwrap();
     assert!(matches!(finer.go_to(state), Err(Error::OtherState(_))));
+}
+
+/// A thin layer keeps the elastic stiffnesses of the stress that its law started from, and so does a state of it:
+/// those of the stress where it was left would be others.
+#[test]
+fn a_layer_whose_stiffness_follows_the_stress_is_gone_on_from() {
+    let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 0.5, 0.51, 1.0], |_, row| {
+        usize::from(row == 1)
+    });
+    name_sides(&mut mesh, [1.0, 1.0]);
+    let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
+    let values = [
+        ("normal_stiffness", 1e6),
+        ("stiffness_number", 2e3),
+        ("stiffness_exponent", 0.5),
+        ("failure_ratio", 0.9),
+        ("adhesion", 1.0),
+        ("friction_angle", 30.0),
+    ];
+    let joint = material("hyperbolic_joint", Hypothesis::Interface2d, &values);
+    let mut layer = ElementGroup::new("layer", Formulation::ThinLayer, joint);
+    let solid = elastic(Hypothesis::PlaneStrain);
+    let mut blocks = ElementGroup::new("blocks", Formulation::Solid, solid);
+    for group in [&mut layer, &mut blocks] {
+        group.initial_stress = Some(InitialStress::Constant([0.0, -20.0, 0.0, 0.0]));
+    }
+    problem.groups = vec![blocks, layer];
+    problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
+    let mut press = Phase::new("press", 2);
+    press.pressure = vec![Pressure {
+        line: "top".to_owned(),
+        value: 200.0.into(),
+    }];
+    press.displacement = vec![moved("top", Some(0.0), None)];
+    let mut push = Phase::new("push", 3);
+    push.displacement = vec![moved("top", Some(1e-3), None)];
+    problem.phases = vec![press, push];
+    let mut whole = Simulation::new(problem.clone()).unwrap();
+    let expected = curve(&mut whole);
+    for increments in 1..5 {
+        let mut first = Simulation::new(problem.clone()).unwrap();
+        for _ in 0..increments {
+            first.step().unwrap();
+        }
+        let mut second = Simulation::new(problem.clone()).unwrap();
+        second.go_to(first.state().unwrap()).unwrap();
+        assert_eq!(curve(&mut second), expected[increments..], "{increments}");
+    }
+}
+
+/// A line whose ends had sunk by different amounts when it became rigid cannot be brought to one total: the message says
+/// what counts both anew, and it does.
+#[test]
+fn a_tilted_line_that_became_rigid_is_pushed_from_where_it_stands() {
+    let push = |resets: bool| {
+        let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |column, _| column);
+        name_sides(&mut mesh, [1.0, 1.0]);
+        let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
+        let of = |e: f64| {
+            let values = [("young_modulus", e), ("poisson_ratio", NU)];
+            material("elastic", Hypothesis::PlaneStrain, &values)
+        };
+        problem.groups = vec![
+            ElementGroup::new("soft", Formulation::Solid, of(E)),
+            ElementGroup::new("stiff", Formulation::Solid, of(10.0 * E)),
+        ];
+        problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
+        let mut press = Phase::new("press", 1);
+        press.pressure = vec![Pressure {
+            line: "top".to_owned(),
+            value: 100.0.into(),
+        }];
+        let mut rest = Phase::new("rest", 1);
+        rest.rigid = vec!["top".to_owned()];
+        let mut push = Phase::new("push", 1);
+        push.reset_displacements = resets;
+        push.displacement = vec![moved("top", None, Some(-0.05))];
+        problem.phases = vec![press, rest, push];
+        Simulation::new(problem).unwrap().run(&mut ())
+    };
+    let refused = push(false).unwrap_err().to_string();
+    assert!(refused.contains("`reset_displacements`"), "{refused}");
+    push(true).unwrap();
 }
 
 /// Simulations in threads of one process give what each gives alone.

@@ -10,6 +10,7 @@ use mechanics::Place;
 use mechanics::equilibrium::Reuse;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use results::report::Known;
 use results::{Figures, remove_comparison, report};
 use runs::run::{Observer, Options, check};
 use runs::trade_off::run_accurately;
@@ -28,6 +29,8 @@ struct Follower<'c> {
     caller: &'c Caller<Event>,
     cut_backs: usize,
     has_begun: bool,
+    /// What the report need not read again.
+    known: Known,
 }
 
 impl Observer for Follower<'_> {
@@ -52,6 +55,10 @@ impl Observer for Follower<'_> {
 
     fn resumed(&mut self, _from: Option<&Place>) {
         self.has_begun = true;
+    }
+
+    fn written(&mut self, known: Known) {
+        self.known = known;
     }
 
     fn stop(&self) -> Stop {
@@ -145,11 +152,11 @@ fn run_all(
             caller,
             cut_backs: 0,
             has_begun: false,
+            known: Known::default(),
         };
         let outcome = run_accurately(case, &folder, &mut follower, &mut reuse, options);
         if follower.has_begun {
-            let folders = [folder.clone()];
-            report::write(&folders, &report::default_path(&folders))?;
+            report::write_of(&folder, follower.known)?;
         }
         let figures = outcome?;
         drawn.extend(case.variant.clone().map(|variant| (variant, figures)));

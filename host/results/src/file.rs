@@ -162,6 +162,11 @@ impl Appended {
         Ok(self)
     }
 
+    /// Bytes of whole entries in the file.
+    pub(crate) fn length(&self) -> u64 {
+        self.length
+    }
+
     fn extent(&self) -> Extent {
         Extent {
             length: self.length,

@@ -3,6 +3,7 @@
 use crate::file::Extent;
 use crate::pressures::Pressure;
 use crate::recorder::{Cell, Table, internal_variables};
+use crate::report::{Point, Profiles};
 use crate::table::{push, push_count, push_text};
 use crate::wanted::When;
 use mechanics::group::Group;
@@ -23,6 +24,8 @@ pub(crate) struct Profile {
     /// What is the same in every increment: group, element, point and position of every point, as cells; by
     /// group, as soon as one is written.
     places: Vec<Vec<Vec<u8>>>,
+    /// What a report shows of the table; `None` if an earlier run wrote a part of it.
+    shown: Option<Profiles>,
 }
 
 impl Profile {
@@ -57,9 +60,12 @@ impl Profile {
             .into_iter()
             .chain(has_water.then(|| Pressure::Pore.name()))
             .chain(variables.iter().map(String::as_str));
+        let shown = columns.clone().filter(|column| Profiles::shows(column));
+        let shown = shown.map(str::to_owned).collect();
         let table = Table::begin(folder.join("profile.csv"), columns, from)?;
         Ok(Some(Self {
             table,
+            shown: from.is_none().then(|| Profiles::of_one(shown)),
             has_water,
             variables,
             places: vec![Vec::new(); simulation.groups().len()],
@@ -67,6 +73,11 @@ impl Profile {
     }
 
     pub(crate) fn write(&mut self, place: &Place, snapshot: &Snapshot<'_>) -> Result<(), Error> {
+        let mut values = Vec::new();
+        let mut n_rows = 0;
+        if let Some(shown) = &mut self.shown {
+            shown.begin(&place.phase);
+        }
         let groups = snapshot.groups.iter().enumerate();
         for (number, group) in groups.filter(|(_, group)| group.is_active) {
             if self.places[number].is_empty() && group.jump_and_traction(0).is_some() {
@@ -82,7 +93,7 @@ impl Profile {
                     Cell::Count(place.increment),
                     Cell::Written(cells),
                 ];
-                let values = [jump[0], jump[1], traction[0], traction[1]].map(Some);
+                let of_point = [jump[0], jump[1], traction[0], traction[1]].map(Some);
                 let pressure = self
                     .has_water
                     .then(|| Pressure::Pore.at(snapshot, number, point));
@@ -90,21 +101,53 @@ impl Profile {
                     .variables
                     .iter()
                     .map(|id| group.internal_variable(point, id));
-                let numbers = values.into_iter().chain(pressure).chain(internal);
-                self.table
-                    .row(place.into_iter().chain(numbers.map(Cell::Number)));
+                let first = values.len();
+                values.extend(of_point.into_iter().chain(pressure).chain(internal));
+                let numbers = values[first..].iter().copied().map(Cell::Number);
+                self.table.row(place.into_iter().chain(numbers));
+                n_rows += 1;
+                if let Some(shown) = self.shown.as_mut().filter(|shown| shown.wants_points()) {
+                    shown.add_point(Some(point_of(group, point)));
+                }
             }
+        }
+        if let Some(shown) = &mut self.shown {
+            let numbers = values.iter().map(|value| value.unwrap_or(f64::NAN));
+            shown.end(place.increment, n_rows, numbers.collect());
         }
         self.table.flush()
     }
+
+    /// What a report shows of the table, with the table's length; what is written from here on is not in it.
+    pub(crate) fn shown(&mut self) -> Option<(u64, Profiles)> {
+        let shown = self.shown.take()?;
+        Some((self.table.length(), shown))
+    }
+}
+
+/// A point as a report knows it.
+fn point_of(group: &Group, point: usize) -> Point {
+    let position = group.kinematics.position(point);
+    let (element, _) = group.kinematics.place_of(point);
+    Point {
+        group: group.name.clone(),
+        element: element + 1,
+        s: along(group, element, position),
+        position,
+    }
+}
+
+/// Place along an interface.
+fn along(group: &Group, element: usize, [x, y]: [f64; 2]) -> f64 {
+    let along = group.kinematics.axes(element).along;
+    along[0] * x + along[1] * y
 }
 
 /// What is the same in every row of a point: its group, its element, its number there, where it is.
 fn cells_of(group: &Group, point: usize) -> Vec<u8> {
     let [x, y] = group.kinematics.position(point);
     let (element, within) = group.kinematics.place_of(point);
-    let along = group.kinematics.axes(element).along;
-    let s = along[0] * x + along[1] * y;
+    let s = along(group, element, [x, y]);
     let mut cells = Vec::new();
     push_text(&mut cells, &group.name);
     for count in [element + 1, within + 1] {

@@ -12,6 +12,7 @@ use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Sta
 use crate::points::Points;
 use crate::probe::{Probes, Sizes};
 use crate::profile::Profile;
+use crate::report::Known;
 use crate::summary::{About, Course, Ending, Stopped, Summary};
 use crate::table::{push, push_count, push_text};
 use crate::wanted::{Output, Wanted, When};
@@ -21,8 +22,6 @@ use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
 use mechanics::{Place, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::borrow::Borrow;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use text::Error;
@@ -175,6 +174,11 @@ impl Table {
         written
     }
 
+    /// Bytes in the file.
+    pub(crate) fn length(&self) -> u64 {
+        self.file.length()
+    }
+
     /// Waits until everything is on the disk.
     pub(crate) fn sync(&self) -> Result<Extent, Error> {
         self.file.sync()
@@ -228,17 +232,29 @@ impl LogFile {
     }
 
     /// All of them at once.
-    fn lines<T: Borrow<Value>>(
-        &mut self,
-        values: impl IntoIterator<Item = T>,
-    ) -> Result<(), Error> {
-        let mut text = String::new();
+    fn lines(&mut self, values: impl IntoIterator<Item = impl Serialize>) -> Result<(), Error> {
+        let mut text = Vec::new();
         for value in values {
-            // A string takes whatever is written.
-            let _ = writeln!(text, "{}", value.borrow());
+            serde_json::to_writer(&mut text, &value)
+                .map_err(|error| Error::Internal(error.to_string()))?;
+            text.push(b'\n');
         }
-        self.0.append(text.as_bytes())
+        self.0.append(&text)
     }
+}
+
+/// An iteration as the log has it, in the order of the other lines' keys.
+#[derive(Serialize)]
+struct LoggedIteration<'a> {
+    correction: Option<f64>,
+    event: &'static str,
+    increment: usize,
+    iteration: usize,
+    load_factor: f64,
+    phase: &'a str,
+    residual: f64,
+    step_length: f64,
+    viscosity: f64,
 }
 
 impl Recorder {
@@ -397,19 +413,18 @@ impl Recorder {
         lambda: f64,
         iterations: &[Iteration],
     ) -> Result<(), Error> {
+        let lines = iterations.iter().enumerate();
         self.log
-            .lines(iterations.iter().enumerate().map(|(number, iteration)| {
-                json!({
-                    "event": "iteration",
-                    "phase": place.phase,
-                    "increment": place.increment,
-                    "load_factor": lambda,
-                    "iteration": number,
-                    "residual": iteration.residual,
-                    "correction": iteration.correction,
-                    "step_length": iteration.step_length,
-                    "viscosity": iteration.viscosity,
-                })
+            .lines(lines.map(|(number, iteration)| LoggedIteration {
+                correction: iteration.correction,
+                event: "iteration",
+                increment: place.increment,
+                iteration: number,
+                load_factor: lambda,
+                phase: &place.phase,
+                residual: iteration.residual,
+                step_length: iteration.step_length,
+                viscosity: iteration.viscosity,
             }))
     }
 
@@ -641,6 +656,18 @@ impl Recorder {
     /// Folder of the results.
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// Keeps nothing for a report: this process makes none.
+    pub fn makes_no_report(&mut self) {
+        self.known();
+    }
+
+    /// What a report of these results need not read again.
+    pub fn known(&mut self) -> Known {
+        Known {
+            profile: self.profile.as_mut().and_then(Profile::shown),
+        }
     }
 
     /// Warnings about results that laws call inaccurate, one for each phase that has any.

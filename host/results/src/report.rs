@@ -21,6 +21,7 @@ mod study;
 mod table;
 
 pub use page::STYLE;
+pub(crate) use profile::{Point, Profiles};
 use text::Error;
 use text::write::replace_whole;
 
@@ -46,6 +47,14 @@ pub fn default_path(folders: &[PathBuf]) -> PathBuf {
         [first, ..] => first.parent().unwrap_or(first).join(FILE),
         [] => PathBuf::from(FILE),
     }
+}
+
+/// What a process has written into a results folder and still knows: a report of it does not read that again,
+/// which for the profiles of `cases/chamber_mesh1` is a tenth of the instructions of the whole run.
+#[derive(Debug, Default)]
+pub struct Known {
+    /// Length of `profile.csv`, and what is shown of it.
+    pub(crate) profile: Option<(u64, Profiles)>,
 }
 
 /// The report of a run, or of a study, that is under way: written anew at most once a second, and so seldom
@@ -85,7 +94,7 @@ impl Running {
             study::render(&self.folder, now)?
         } else {
             page::render(
-                &read(std::slice::from_ref(&self.folder))?,
+                &read(std::slice::from_ref(&self.folder), None)?,
                 &self.folder,
                 now,
             )?
@@ -143,12 +152,13 @@ fn study_among(folders: &[PathBuf]) -> Result<Option<&Path>, Error> {
     }
 }
 
-/// The runs in these folders.
-fn read(folders: &[PathBuf]) -> Result<Vec<Run>, Error> {
+/// The runs in these folders; of a single one may be `known` what it wrote.
+fn read(folders: &[PathBuf], known: Option<Known>) -> Result<Vec<Run>, Error> {
     let budget = Budget::of(folders.len());
+    let mut known = known.filter(|_| folders.len() == 1).unwrap_or_default();
     let named = record::names(folders).into_iter().zip(folders);
     named
-        .map(|(name, folder)| Run::read(&name, folder, &budget))
+        .map(|(name, folder)| Run::read(&name, folder, std::mem::take(&mut known), &budget))
         .collect()
 }
 
@@ -159,6 +169,19 @@ fn read(folders: &[PathBuf]) -> Result<Vec<Run>, Error> {
 /// [`Error::Usage`] without a folder, or if one has no results; [`Error::Unreadable`] if one has no `history.csv`,
 /// [`Error::Input`] if that is not the history of a run; [`Error::Unwritable`].
 pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
+    write_as(folders, out, None)
+}
+
+/// Writes the report of a run into its folder, as [`write()`], by the process that wrote the results.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_of(folder: &Path, known: Known) -> Result<PathBuf, Error> {
+    let folders = [folder.to_owned()];
+    write_as(&folders, &default_path(&folders), Some(known))
+}
+
+fn write_as(folders: &[PathBuf], out: &Path, known: Option<Known>) -> Result<PathBuf, Error> {
     if folders.is_empty() {
         return Err(Error::Usage("name at least one results folder".to_owned()));
     }
@@ -191,7 +214,7 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
     std::fs::create_dir_all(parent).map_err(unwritable)?;
     let text = match study {
         Some(folder) => study::render(folder, None)?,
-        None => page::render(&read(folders)?, parent, None)?,
+        None => page::render(&read(folders, known)?, parent, None)?,
     };
     // A name that was asked for is followed, as a shell does.
     if is_ours {

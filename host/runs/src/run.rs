@@ -37,6 +37,8 @@ pub trait Observer {
     fn at_rest(&mut self, _phase: &str, _share: f64) {}
     /// An earlier run is gone on with after this increment; `None`: it had come to its end.
     fn resumed(&mut self, _from: Option<&Place>) {}
+    /// The run has ended, well or not; this is what its report need not read again.
+    fn written(&mut self, _known: report::Known) {}
     /// The run has ended; this is the resistance of its pile.
     fn pile(&mut self, _resistances: &Resistances) {}
     /// Who may want the run to stop: after the increment under way, or within it if that takes
@@ -55,7 +57,8 @@ pub struct Options {
     pub checkpoints: Option<Duration>,
     /// A run that has come to its end leaves no checkpoint that says so.
     pub ends_without: bool,
-    /// A report is written while the run goes on, if that takes more than a second.
+    /// A report is written while the run goes on, if that takes more than a second, and one at its end by this
+    /// process.
     pub reports: bool,
 }
 
@@ -276,7 +279,7 @@ fn carry_out(
         None
     };
     let mut warnings = Vec::new();
-    let results = if let Some(checkpoint) = found {
+    let mut results = if let Some(checkpoint) = found {
         let Some(state) = checkpoint.run else {
             checkpoint.results.check(folder)?;
             observer.resumed(None);
@@ -303,6 +306,9 @@ fn carry_out(
         warnings.extend(all);
         Recorder::create(folder, wanted, &about, &simulation)?
     };
+    if !options.reports {
+        results.makes_no_report();
+    }
     process::writes(Some(folder));
     let mut follower = Follower {
         stop: observer.stop(),
@@ -319,13 +325,9 @@ fn carry_out(
         follower.say(warning);
     }
     let outcome = outcome.map_err(|error| explained(case, &simulation, error, &mut follower));
-    if let Some(resistances) = follower.results.resistances() {
-        follower.observer.pile(&resistances);
-    }
-    if let Some(of_mesh) = follower.results.mesh_error() {
-        follower.observer.note(&of_mesh);
-    }
+    follower.tell_results();
     let Follower {
+        observer,
         mut results,
         keeper,
         warnings,
@@ -338,6 +340,7 @@ fn carry_out(
         &ending(outcome.as_ref().err()),
     );
     process::writes(None);
+    observer.written(results.known());
     *reuse = simulation.into_reuse();
     let is_done = outcome.is_ok();
     outcome.and(finished.map_err(Error::from))?;
@@ -365,6 +368,16 @@ impl Follower<'_> {
     fn say(&mut self, message: &str) {
         self.warnings.push(message.to_owned());
         self.observer.warning(message);
+    }
+
+    /// Tells what has come out: the resistances of a pile, the error of the mesh.
+    fn tell_results(&mut self) {
+        if let Some(resistances) = self.results.resistances() {
+            self.observer.pile(&resistances);
+        }
+        if let Some(of_mesh) = self.results.mesh_error() {
+            self.observer.note(&of_mesh);
+        }
     }
 
     /// Wants no more after a fault.

@@ -73,8 +73,9 @@ pub(super) fn run_cases(
         }
         let is_stopped = outcome.as_ref().is_err_and(Error::is_stop);
         if has_results {
-            if let Err(error) = write_report(std::slice::from_ref(&folder), None) {
-                keep_last(&mut reports, error);
+            match report::write_of(&folder, progress.known) {
+                Ok(written) => say_written(&written),
+                Err(error) => keep_last(&mut reports, error.into()),
             }
             folders.push(folder);
         }
@@ -153,7 +154,10 @@ fn keep_last(outcome: &mut Result<(), Error>, error: Error) {
 /// Writes the report of a run, or the comparison of several.
 pub(super) fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
     let out = out.unwrap_or_else(|| report::default_path(folders));
-    let written = report::write(folders, &out)?;
-    let _ = writeln!(supervision::stdout(), "report in {}", written.display());
+    say_written(&report::write(folders, &out)?);
     Ok(())
+}
+
+fn say_written(report: &Path) {
+    let _ = writeln!(supervision::stdout(), "report in {}", report.display());
 }

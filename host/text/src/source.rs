@@ -43,13 +43,16 @@ impl Source {
         Ok(Self::new(path, text))
     }
 
-    /// Takes a text as if it came from a file of this name.
+    /// Takes a text as if it came from a file of this name. A byte order mark is no part of it:
+    /// columns count without, and it may stand in the middle once another file comes before.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<Arc<str>>) -> Self {
         let path = path.into();
+        let text = text.into();
+        let unmarked = text.strip_prefix('\u{feff}').map(Arc::from);
         Self {
             files: vec![(0, path.clone())],
             path,
-            text: text.into(),
+            text: unmarked.unwrap_or(text),
             n_settings: 0,
             is_in_memory: false,
             has_settings_in_memory: false,

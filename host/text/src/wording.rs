@@ -230,8 +230,8 @@ fn duplicate(source: &Source, span: Range<usize>) -> InputError {
 fn key_before(text: &str, value: usize) -> Option<&str> {
     let before = text.get(..value)?.trim_end().strip_suffix('=')?.trim_end();
     let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
-    let start = before.rfind(|c| !is_part(c)).map_or(0, |i| i + 1);
-    (start < before.len()).then(|| &before[start..])
+    let key = &before[before.trim_end_matches(is_part).len()..];
+    (!key.is_empty()).then_some(key)
 }
 
 fn found_in_words(found: &str) -> String {

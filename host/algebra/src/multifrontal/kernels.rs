@@ -18,6 +18,7 @@ pub(super) const WORTHWHILE: f64 = 4e6;
 const PIECE: usize = 256;
 
 /// a·b, added up in eight sums that can be worked on at once.
+#[inline]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a, of_a) = a.as_chunks::<8>();
     let (b, of_b) = b.as_chunks::<8>();

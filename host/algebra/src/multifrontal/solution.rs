@@ -1,8 +1,9 @@
 //! Solutions with the factors, one right-hand side at a time.
 
 use super::analysis::{Analysis, Branch};
-use super::kernels::{dot, packed};
+use super::substitution::{Down, Up};
 use super::{Kind, Multifrontal};
+use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -97,20 +98,12 @@ impl Multifrontal {
             }
         }
         own.resize(n, 0.0);
-        for j in 0..k {
-            let start = match self.analysis.kind {
-                Kind::Symmetric => packed(n, j),
-                Kind::Unsymmetric => j * n + j,
-            };
-            let column = &front.values[start..start + n - j];
-            if self.analysis.kind == Kind::Symmetric {
-                own[j] /= column[0];
-            }
-            let x = own[j];
-            for (value, l) in own[j + 1..].iter_mut().zip(&column[1..]) {
-                *value -= l * x;
-            }
-        }
+        Arch::new().dispatch(Down {
+            kind: self.analysis.kind,
+            values: &front.values,
+            own: own.as_mut_slice(),
+            k,
+        });
         pivots.copy_from_slice(&own[..k]);
     }
 
@@ -172,35 +165,12 @@ impl Multifrontal {
 
     /// Values of the pivots of a front from those of the rows below them.
     fn backward_front(&self, number: usize, own: &mut [f64], below: &[f64]) {
-        let front = self.front(number);
-        let k = own.len();
-        let n = k + below.len();
-        match self.analysis.kind {
-            Kind::Symmetric => {
-                for j in (0..k).rev() {
-                    let column = &front.values[packed(n, j)..packed(n, j + 1)];
-                    let from_below = dot(&column[k - j..], below);
-                    let from_own = dot(&column[1..k - j], &own[j + 1..]);
-                    own[j] = (own[j] - from_below - from_own) / column[0];
-                }
-            }
-            Kind::Unsymmetric => {
-                let (l, u) = front.values.split_at(n * k);
-                for (column, value) in u.chunks_exact(k).zip(below) {
-                    for (own, u) in own.iter_mut().zip(column) {
-                        *own -= u * value;
-                    }
-                }
-                for j in (0..k).rev() {
-                    let column = &l[j * n..j * n + k];
-                    own[j] /= column[j];
-                    let value = own[j];
-                    for (own, u) in own[..j].iter_mut().zip(column) {
-                        *own -= u * value;
-                    }
-                }
-            }
-        }
+        Arch::new().dispatch(Up {
+            kind: self.analysis.kind,
+            values: &self.front(number).values,
+            own,
+            below,
+        });
     }
 }
 

@@ -18,6 +18,7 @@
 //! the next complete one.
 
 mod part;
+mod product;
 mod reuse;
 
 pub use reuse::Reuse;
@@ -25,9 +26,10 @@ pub use reuse::Reuse;
 use super::newton::{DomainFailure, Loads};
 use crate::assembly::{System, Tie};
 use crate::group::Group;
-use algebra::{Block, Kind, Multifrontal, Singular};
+use algebra::{Block, Kind, Multifrontal, Pattern, Singular};
 use part::{Goal, Part};
-use reuse::Condensed;
+use product::add_product;
+use reuse::{Condensed, Numbered, Setup};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -69,7 +71,7 @@ pub struct Standing {
 /// The linear part of a model during one phase.
 #[derive(Debug)]
 pub struct LinearDomain {
-    system: System,
+    system: Arc<System>,
     factors: Arc<Multifrontal>,
     /// Whether the factors were made for this phase.
     pub factorised: bool,
@@ -92,12 +94,78 @@ pub struct LinearDomain {
     whole: Option<Part>,
 }
 
+/// Of every unknown of a system, whether the rest shares it.
+fn kept(system: &System, rest: &System) -> Vec<bool> {
+    let mut kept = vec![false; system.n_equations()];
+    let shared = rest.boundary().iter();
+    for equation in shared.filter_map(|&dof| system.equation(dof)) {
+        kept[equation] = true;
+    }
+    kept
+}
+
+/// A matrix that is to be condensed.
+struct Matrix {
+    kind: Kind,
+    pattern: Arc<Pattern>,
+    values: Vec<f64>,
+}
+
+impl Matrix {
+    /// Its factors but for the unknowns that are kept, on these mesh lines; whether they were made now.
+    fn condensed_onto(
+        self,
+        kept: &[bool],
+        lines: &[[u32; 2]],
+        mut reuse: Option<&mut Reuse>,
+    ) -> Result<(Arc<Multifrontal>, bool), Singular> {
+        let Self {
+            kind,
+            pattern,
+            values,
+        } = self;
+        let known = reuse
+            .as_ref()
+            .and_then(|reuse| reuse.find(kind, &pattern, &values, kept));
+        if let Some(reuse) = &mut reuse {
+            reuse.forget();
+        }
+        if let Some(factors) = known {
+            return Ok((factors, false));
+        }
+        let mut factors = Multifrontal::new(&pattern, kind, kept, Some(lines))?;
+        if let Some(reuse) = &reuse {
+            reuse.announce(factors.bytes(), "factorising the linear groups");
+        }
+        let gathered = factors.gather(&values);
+        // Where nothing may find the matrix, it is given up before its factors need the room.
+        let remembered = reuse
+            .filter(|reuse| reuse.may_recur())
+            .map(|reuse| (reuse, pattern, values));
+        factors.factorise_gathered(&gathered)?;
+        drop(gathered);
+        let factors = Arc::new(factors);
+        if let Some((reuse, pattern, values)) = remembered {
+            reuse.remember(Condensed {
+                kind,
+                pattern,
+                values,
+                kept: kept.to_vec(),
+                factors: Arc::clone(&factors),
+            });
+        }
+        Ok((factors, true))
+    }
+}
+
 /// Whether condensation pays: the linear part is the larger one, and its boundary small.
 ///
 /// The dense equations of the boundary must not cost more than the sparse ones they replace.
-fn pays(n_interior: usize, n_boundary: usize, n_rest: usize) -> bool {
+fn pays(system: &System, rest: &System) -> bool {
+    let n_boundary = rest.boundary().len();
+    let n_interior = system.n_equations() - n_boundary;
     let dense = 5.0 * f64::sqrt(n_interior as f64);
-    n_interior > n_rest && n_boundary as f64 <= dense
+    n_interior > rest.n_equations() && n_boundary as f64 <= dense
 }
 
 impl LinearDomain {
@@ -114,6 +182,22 @@ impl LinearDomain {
         always: bool,
         mut reuse: Option<&mut Reuse>,
     ) -> Result<Option<(Self, System)>, Singular> {
+        let setup = Setup::of((groups, condensed), prescribed, ties);
+        let is_other = |number: usize, group: &Group| group.is_active && !condensed[number];
+        let rest = |system: &System| System::new(groups, is_other, prescribed, ties, Some(system));
+        let same = reuse.as_ref().and_then(|reuse| reuse.same(&setup));
+        if let Some(numbered) = same {
+            let rest = rest(&numbered.system);
+            if !always && !pays(&numbered.system, &rest) {
+                return Ok(None);
+            }
+            if numbered.kept == kept(&numbered.system, &rest) {
+                if let Some(reuse) = reuse {
+                    reuse.forget();
+                }
+                return Ok(Some((Self::of(numbered, false), rest)));
+            }
+        }
         let mut system = System::new(
             groups,
             |number, group| group.is_active && condensed[number],
@@ -124,21 +208,11 @@ impl LinearDomain {
         if system.n_equations() == 0 {
             return Ok(None);
         }
-        let is_other = |number: usize, group: &Group| group.is_active && !condensed[number];
-        let rest = System::new(groups, is_other, prescribed, ties, Some(&system));
-        let n_boundary = rest.boundary().len();
-        let n_interior = system.n_equations() - n_boundary;
-        if !always && !pays(n_interior, n_boundary, rest.n_equations()) {
+        let rest = rest(&system);
+        if !always && !pays(&system, &rest) {
             return Ok(None);
         }
-        let mut kept = vec![false; system.n_equations()];
-        for equation in rest
-            .boundary()
-            .iter()
-            .filter_map(|&dof| system.equation(dof))
-        {
-            kept[equation] = true;
-        }
+        let kept = kept(&system, &rest);
         let symmetric = groups
             .iter()
             .zip(condensed)
@@ -150,48 +224,39 @@ impl LinearDomain {
         };
         let mut values = Vec::new();
         system.assemble(groups, &mut values);
-        let stiffest = values
-            .iter()
-            .fold(0.0, |most: f64, value| most.max(value.abs()));
-        let known = reuse
-            .as_ref()
-            .and_then(|reuse| reuse.find(kind, &system.pattern, &values, &kept));
-        if let Some(reuse) = &mut reuse {
-            reuse.forget();
-        }
+        let stiffest = algebra::largest(&values);
         let pattern = system.forget_matrix();
-        let factorised = known.is_none();
-        let factors = if let Some(factors) = known {
-            factors
-        } else {
-            let lines = system.lines(lines);
-            let mut factors = Multifrontal::new(&pattern, kind, &kept, Some(&lines))?;
-            if let Some(reuse) = &reuse {
-                reuse.announce(factors.bytes(), "factorising the linear groups");
-            }
-            let gathered = factors.gather(&values);
-            // Where nothing may find the matrix, it is given up before its factors need the room.
-            let remembered = reuse
-                .filter(|reuse| reuse.may_recur())
-                .map(|reuse| (reuse, pattern, values));
-            factors.factorise_gathered(&gathered)?;
-            drop(gathered);
-            let factors = Arc::new(factors);
-            if let Some((reuse, pattern, values)) = remembered {
-                reuse.remember(Condensed {
-                    kind,
-                    pattern,
-                    values,
-                    kept: kept.clone(),
-                    factors: Arc::clone(&factors),
-                });
-            }
-            factors
+        let lines = system.lines(lines);
+        let matrix = Matrix {
+            kind,
+            pattern,
+            values,
         };
+        let (factors, factorised) = matrix.condensed_onto(&kept, &lines, reuse.as_deref_mut())?;
+        let numbered = Numbered {
+            system: Arc::new(system),
+            kept,
+            factors,
+            stiffest,
+        };
+        if let Some(reuse) = reuse {
+            reuse.keep(setup, &numbered);
+        }
+        Ok(Some((Self::of(numbered, factorised), rest)))
+    }
+
+    /// With its unknowns and its factors; whether those were made for this phase.
+    fn of(numbered: Numbered, factorised: bool) -> Self {
+        let Numbered {
+            system,
+            kept,
+            factors,
+            stiffest,
+        } = numbered;
         let free = system.free();
         let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();
         let largest = |largest: f64, value: &f64| largest.max(value.abs());
-        let domain = Self {
+        Self {
             stiffest,
             largest: factors.schur().iter().fold(0.0, largest),
             standing: Standing::default(),
@@ -204,8 +269,7 @@ impl LinearDomain {
             system,
             y: Vec::new(),
             condensed: Vec::new(),
-        };
-        Ok(Some((domain, rest)))
+        }
     }
 
     /// The domain as a dense block in the equations of the rest.
@@ -306,14 +370,8 @@ impl LinearDomain {
 
     /// forces += S u.
     pub fn add_product(&self, displacement: &[f64], forces: &mut [f64]) {
-        let n = self.boundary.len();
-        let columns = self.stiffness().chunks_exact(n.max(1)).zip(displacement);
-        // Just after a state that is counted from, nothing has moved.
-        for (column, u) in columns.filter(|(_, u)| **u != 0.0) {
-            for (force, s) in forces.iter_mut().zip(column) {
-                *force += s * u;
-            }
-        }
+        let columns = self.stiffness().chunks_exact(self.boundary.len().max(1));
+        add_product(columns, displacement, forces);
     }
 
     /// The boundary has moved by these increments, in the order of the system's boundary.
@@ -349,8 +407,8 @@ impl LinearDomain {
             scale: loads.scale,
             tolerance,
         };
-        self.choose_part(looked_at);
-        if let Some(part) = self.part.take() {
+        let is_part = self.choose_part(looked_at);
+        if is_part && let Some(part) = self.part.take() {
             let reached = self.settle(&part, groups, &goal, displacement);
             let numbers = part.groups.clone();
             self.part = Some(part);

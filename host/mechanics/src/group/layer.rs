@@ -24,8 +24,8 @@ pub(super) struct Layer {
     thickness: Vec<f64>,
     in_plane: InPlane,
     points_per_element: usize,
-    /// K_n, K_t of every point.
-    stiffness: Vec<[f64; 2]>,
+    /// K_n, K_t of every point, of the stress that the law started from.
+    pub(super) stiffness: Vec<[f64; 2]>,
 }
 
 /// Constants of one point.

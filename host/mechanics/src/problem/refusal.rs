@@ -485,7 +485,8 @@ impl fmt::Display for Cause {
             Self::MovesAlike([x, y], [a, b]) => write!(
                 f,
                 "the node at ({x}, {y}) moves alike with others that are prescribed differently: by \
-                 {a} and {b} m in this phase"
+                 {a} and {b} m in this phase; if they were apart before they became one, `reset_displacements` in \
+                 this phase counts both from here"
             ),
             Self::TwoGroups(name) => write!(f, "two groups are called `{name}`"),
             Self::GivenTwice(what, group) => {

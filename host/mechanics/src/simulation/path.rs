@@ -1,7 +1,8 @@
 //! Arc-length control: along the path of equilibrium to the load that could not be reached by load
 //! increments.
 
-use super::{EASY, Progress, Simulation, UnderWay, Warning, Watch, When, go_on, stopped};
+use super::steps::{EASY, Progress};
+use super::{Simulation, UnderWay, Warning, Watch, When, go_on, stopped};
 use crate::equilibrium::{Guess, Measure, Newton, Reason, StepFailure, StepSuccess};
 use crate::error::{Error, Place};
 use crate::settings::{Control, Method, Settings};

@@ -36,6 +36,10 @@ impl Simulation {
         };
         let cannot_start = |failure| Error::CannotStart(Box::new(failure));
         let start = self.loading[1].clone();
+        if !phase.activate.is_empty() {
+            // Faces that were one part: each has its own share of what acts on them.
+            self.force = start.forces(&self.problem, &self.groups);
+        }
         self.loading = [start.clone(), start.changed_by(&phase)];
         let beside: Vec<Vec<f64>> = phase
             .activate

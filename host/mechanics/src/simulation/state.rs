@@ -25,6 +25,7 @@ pub struct State<'s> {
     /// Time at the start of the phase.
     time: f64,
     largest_force: f64,
+    largest_forces: Cow<'s, [f64]>,
     course: Cow<'s, PhaseCourse>,
 }
 
@@ -85,6 +86,7 @@ impl State<'_> {
             reaction: Cow::Owned(self.reaction.into_owned()),
             time: self.time,
             largest_force: self.largest_force,
+            largest_forces: Cow::Owned(self.largest_forces.into_owned()),
             course: Cow::Owned(self.course.into_owned()),
         }
     }
@@ -133,6 +135,7 @@ impl Simulation {
             reaction: (&self.reaction).into(),
             time: self.time,
             largest_force: self.largest_force,
+            largest_forces: (&self.largest_forces).into(),
             course: Cow::Borrowed(&phase.course),
         })
     }
@@ -148,6 +151,7 @@ impl Simulation {
             &state.displacement[..],
             &state.force,
             &state.reaction,
+            &state.largest_forces,
             &course.loads.force_start,
         ];
         let is_other = state.phase >= self.problem.phases.len()
@@ -191,7 +195,7 @@ impl Simulation {
         self.has_failed = false;
         self.time = state.time;
         self.largest_force = state.largest_force;
-        self.largest_forces.clone_from(&state.course.loads.largest);
+        self.largest_forces = state.largest_forces.into_owned();
         self.groups.iter_mut().for_each(Group::forget_trial);
         self.note_bodies(state.phase, &state.course);
         self.resume_phase(state.phase, state.course.into_owned())

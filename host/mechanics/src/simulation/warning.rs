@@ -274,11 +274,30 @@ fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, crept: usize
     write!(f, "phase `{phase}`: {} in all", told.join(", "))
 }
 
+/// Two ways that lead a step no further from each other than this, as shares of what it changes, lead to one equilibrium.
+const SAME: f64 = 1e-6;
+
 fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour>) -> fmt::Result {
     write!(
         f,
-        "{place}: Newton iterations came to a standstill; viscous relaxation led to the next equilibrium; others may \
-         lie near, and which one is found depends on the course of the relaxation"
+        "{place}: Newton iterations came to a standstill; viscous relaxation led to the next equilibrium"
+    )?;
+    let other = "from its tangent, by creep where need be, the same step leads to";
+    if let Some(Neighbour::Apart {
+        displacements,
+        forces,
+    }) = by_creep
+        && displacements.max(forces) <= SAME
+    {
+        return write!(
+            f,
+            ": {other} the same one, within {displacements:.1e} of its displacements and {forces:.1e} of its changes of \
+             forces"
+        );
+    }
+    write!(
+        f,
+        "; others may lie near, and which one is found depends on the course of the relaxation"
     )?;
     match by_creep {
         Some(Neighbour::Apart {
@@ -286,13 +305,10 @@ fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour
             forces,
         }) => write!(
             f,
-            ": from its tangent, by creep where need be, the same step leads to one that is {displacements:.1e} of its \
-             displacements and {forces:.1e} of its changes of forces away"
+            ": {other} one that is {displacements:.1e} of its displacements and {forces:.1e} of its changes of forces \
+             away"
         )?,
-        Some(Neighbour::None) => write!(
-            f,
-            ": from its tangent, by creep where need be, the same step leads to none"
-        )?,
+        Some(Neighbour::None) => write!(f, ": {other} none")?,
         None => {}
     }
     write!(
@@ -339,6 +355,37 @@ mod tests {
             "{said}"
         );
         assert!(said.contains("3.0e-6 of the increment"), "{said}");
+    }
+
+    #[test]
+    fn another_equilibrium_is_spoken_of_where_another_way_leads_to_one() {
+        let of = |by_creep| Warning::Relaxed(Place::default(), by_creep).to_string();
+        let apart = |displacements, forces| {
+            of(Some(Neighbour::Apart {
+                displacements,
+                forces,
+            }))
+        };
+        let same = apart(3e-13, 2e-8);
+        assert!(
+            same.ends_with(
+                "within 3.0e-13 of its displacements and 2.0e-8 of its changes of forces"
+            ),
+            "{same}"
+        );
+        assert!(!same.contains("others may lie near"), "{same}");
+        for other in [
+            apart(3e-13, 2e-5),
+            apart(2e-3, 0.0),
+            of(Some(Neighbour::None)),
+            of(None),
+        ] {
+            assert!(other.contains("others may lie near"), "{other}");
+            assert!(
+                other.contains("hold the results against each other"),
+                "{other}"
+            );
+        }
     }
 
     #[test]

@@ -65,11 +65,12 @@ pub(super) struct Place {
 
 /// A point of the profile.
 #[derive(Clone, Debug, PartialEq)]
-struct Point {
-    group: String,
-    element: usize,
-    position: [f64; 2],
-    s: f64,
+pub(crate) struct Point {
+    pub(crate) group: String,
+    /// Number of its element, from 1.
+    pub(crate) element: usize,
+    pub(crate) position: [f64; 2],
+    pub(crate) s: f64,
 }
 
 /// An increment on its way into the page.
@@ -159,67 +160,108 @@ impl Blocks {
 }
 
 /// The rows of a table by increments.
-struct Profiles {
+#[derive(Debug)]
+pub(crate) struct Profiles {
+    /// Names of the quantities.
+    columns: Vec<String>,
     phases: Vec<String>,
     /// Those of the first increment; `None` if they cannot be read.
     points: Option<Vec<Point>>,
+    /// There was an increment before.
+    has_points: bool,
     blocks: Blocks,
+    /// Numbers that may go into the page.
+    most: usize,
 }
 
 impl Profiles {
-    /// Reads the values of these columns.
+    /// Profiles of these quantities on a page of one run.
+    pub(crate) fn of_one(columns: Vec<String>) -> Self {
+        Self::new(columns, &Budget::of(1))
+    }
+
+    fn new(columns: Vec<String>, budget: &Budget) -> Self {
+        Self {
+            blocks: Blocks {
+                width: columns.len(),
+                ..Blocks::default()
+            },
+            columns,
+            phases: Vec::new(),
+            points: Some(Vec::new()),
+            has_points: false,
+            most: budget.profile,
+        }
+    }
+
+    /// Whether a column is a quantity.
+    pub(crate) fn shows(column: &str) -> bool {
+        !COLUMNS.contains(&column)
+    }
+
+    /// An increment begins, of this phase.
+    pub(crate) fn begin(&mut self, phase: &str) {
+        if self.phases.last().is_none_or(|last| last != phase) {
+            self.phases.push(phase.to_owned());
+        }
+    }
+
+    /// Whether points are still to be told: those of the first increment are those of all.
+    pub(crate) fn wants_points(&self) -> bool {
+        !self.has_points
+    }
+
+    /// A point of the first increment; `None` if it cannot be read.
+    pub(crate) fn add_point(&mut self, point: Option<Point>) {
+        match (&mut self.points, point) {
+            (Some(points), Some(point)) => points.push(point),
+            _ => self.points = None,
+        }
+    }
+
+    /// The increment that was begun ends, with the values of so many rows.
+    pub(crate) fn end(&mut self, increment: usize, n_rows: usize, values: Vec<f64>) {
+        if n_rows == 0 {
+            return;
+        }
+        let n_points = self.points.as_ref().map_or(0, Vec::len);
+        if !self.has_points {
+            let size = (n_points * self.blocks.width).max(1);
+            self.blocks.most = AHEAD * (self.most / size).max(1);
+            self.has_points = true;
+        }
+        if n_rows == n_points {
+            let phase = self.phases.len().saturating_sub(1);
+            self.blocks.add(phase, increment, values);
+        } else {
+            self.blocks.n_broken += 1;
+        }
+    }
+
+    /// Reads the values of all quantities.
     ///
     /// # Errors
     /// As [`Table::rows`].
-    fn read(
-        table: Table,
-        at: [usize; COLUMNS.len()],
-        columns: &[usize],
-        budget: &Budget,
-        notes: &mut Vec<String>,
-    ) -> Result<Self, Error> {
+    fn read(table: Table, budget: &Budget, notes: &mut Vec<String>) -> Result<Self, Error> {
+        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
         let [phase_at, increment_at, ..] = at;
-        let mut phases: Vec<String> = Vec::new();
-        // The first increment says which points there are.
-        let mut points: Option<Vec<Point>> = Some(Vec::new());
-        let mut blocks = Blocks {
-            width: columns.len(),
-            ..Blocks::default()
-        };
+        let names = table.columns().iter().enumerate();
+        let (columns, names): (Vec<usize>, Vec<String>) = names
+            .filter(|(_, name)| Self::shows(name))
+            .map(|(column, name)| (column, name.clone()))
+            .unzip();
+        let mut profiles = Self::new(names, budget);
         let mut key: (Vec<u8>, Vec<u8>) = Default::default();
         let mut increment = 0;
         let mut values: Vec<f64> = Vec::new();
-        let (mut n_rows, mut is_first) = (0, true);
-        let mut end = |values: &mut Vec<f64>,
-                       n_rows: usize,
-                       place: (usize, usize),
-                       points: &Option<Vec<Point>>,
-                       is_first: bool| {
-            let n_points = points.as_ref().map_or(0, Vec::len);
-            if is_first {
-                let size = (n_points * blocks.width).max(1);
-                blocks.most = AHEAD * (budget.profile / size).max(1);
-            }
-            if n_rows == n_points {
-                let next = Vec::with_capacity(values.len());
-                blocks.add(place.0, place.1, std::mem::replace(values, next));
-            } else {
-                blocks.n_broken += 1;
-                values.clear();
-            }
-        };
+        let mut n_rows = 0;
         table.rows(notes, |row| {
             let is_new = key.0 != row.bytes(phase_at) || key.1 != row.bytes(increment_at);
             if is_new || n_rows == 0 {
-                if n_rows > 0 {
-                    let place = (phases.len() - 1, increment);
-                    end(&mut values, n_rows, place, &points, is_first);
-                    is_first = false;
-                }
+                let next = Vec::with_capacity(values.len());
+                profiles.end(increment, n_rows, std::mem::replace(&mut values, next));
                 n_rows = 0;
-                if phases.last().map(String::as_bytes) != Some(row.bytes(phase_at)) {
-                    phases.push(row.text(phase_at));
-                }
+                profiles.begin(&row.text(phase_at));
                 key.0.clear();
                 key.0.extend_from_slice(row.bytes(phase_at));
                 key.1.clear();
@@ -227,28 +269,13 @@ impl Profiles {
                 increment = row.count(increment_at).unwrap_or_default();
             }
             n_rows += 1;
-            if is_first && let Some(known) = &mut points {
-                match point(row, at) {
-                    Some(point) => known.push(point),
-                    None => points = None,
-                }
+            if profiles.wants_points() {
+                profiles.add_point(point(row, at));
             }
             values.extend(columns.iter().map(|&column| row.number(column)));
         })?;
-        if n_rows > 0 {
-            end(
-                &mut values,
-                n_rows,
-                (phases.len() - 1, increment),
-                &points,
-                is_first,
-            );
-        }
-        Ok(Self {
-            phases,
-            points,
-            blocks,
-        })
+        profiles.end(increment, n_rows, values);
+        Ok(profiles)
     }
 }
 
@@ -264,22 +291,21 @@ impl Profile {
         notes: &mut Vec<String>,
     ) -> Result<Option<Self>, Error> {
         let table = Table::open(path, &COLUMNS)?;
-        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
-        let columns: Vec<usize> = (0..table.columns().len())
-            .filter(|&column| !COLUMNS.contains(&table.columns()[column].as_str()))
-            .collect();
-        let names: Vec<String> = columns
-            .iter()
-            .map(|&column| table.columns()[column].clone())
-            .collect();
+        let profiles = Profiles::read(table, budget, notes)?;
+        Ok(Self::of(profiles, times, notes))
+    }
+
+    /// What is shown of a table. `None` if that is nothing.
+    pub(super) fn of(profiles: Profiles, times: &Times, notes: &mut Vec<String>) -> Option<Self> {
         let Profiles {
+            columns,
             phases,
             points,
             blocks,
-        } = Profiles::read(table, at, &columns, budget, notes)?;
-        let Some(points) = points.filter(|points| !points.is_empty()) else {
-            return Ok(None);
-        };
+            most,
+            ..
+        } = profiles;
+        let points = points.filter(|points| !points.is_empty())?;
         if blocks.n_broken > 0 {
             notes.push(format!(
                 "profile.csv: {} of {} increments are not complete and left out",
@@ -288,14 +314,14 @@ impl Profile {
             ));
         }
         let size = points.len() * columns.len();
-        if size > budget.profile {
+        if size > most {
             notes.push(format!(
                 "profile.csv is not shown: {size} numbers for every increment are too many for \
                  this page"
             ));
-            return Ok(None);
+            return None;
         }
-        let most = budget.profile / size.max(1);
+        let most = most / size.max(1);
         let extreme = if blocks.kept.len() > most {
             blocks.extreme()
         } else {
@@ -330,12 +356,12 @@ impl Profile {
         });
         let values =
             (0..width).map(|column| shown.iter().map(|block| values_at(column, block)).collect());
-        Ok(Some(Self {
+        Some(Self {
             increments: places.collect(),
             values: values.collect(),
-            columns: names,
+            columns,
             groups,
-        }))
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! A results folder, read back.
 
+use super::Known;
 use super::budget::Budget;
 use super::fields::Fields;
 use super::log::Log;
@@ -17,6 +18,7 @@ use mechanics::Simulation;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
+use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use text::Error;
 
@@ -219,26 +221,20 @@ fn shown_rows(columns: &[Vec<f64>], n: usize, most: usize, ends: &[usize]) -> Ve
 }
 
 impl Run {
-    /// Reads a folder, which the page calls so.
+    /// Reads a folder, which the page calls so, but for what is known of it.
     ///
     /// # Errors
     /// As [`super::write`].
-    pub(super) fn read(name: &str, folder: &Path, budget: &Budget) -> Result<Self, Error> {
+    pub(super) fn read(
+        name: &str,
+        folder: &Path,
+        known: Known,
+        budget: &Budget,
+    ) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let history = History::read(&folder.join("history.csv"), budget, &mut notes)?;
         let summary = summary(folder, &mut notes);
-        let profile_path = folder.join("profile.csv");
-        let profile = profile_path
-            .is_file()
-            .then(|| Profile::read(&profile_path, &history.times, budget, &mut notes));
-        let profile = match profile {
-            None => None,
-            Some(Ok(profile)) => profile,
-            Some(Err(error)) => {
-                notes.push(format!("profile.csv: {error}; left out"));
-                None
-            }
-        };
+        let profile = profile(folder, known, &history.times, budget, &mut notes);
         let pile_path = folder.join("pile.csv");
         let pile = pile_path
             .is_file()
@@ -380,6 +376,26 @@ impl Run {
         units.retain(|_, unit| !unit.is_empty());
         units
     }
+}
+
+/// The values along interfaces, if there are any: what is known, if that is what the file holds by its length.
+fn profile(
+    folder: &Path,
+    known: Known,
+    times: &Times,
+    budget: &Budget,
+    notes: &mut Vec<String>,
+) -> Option<Profile> {
+    let path = folder.join("profile.csv");
+    let found = path.metadata().ok().filter(Metadata::is_file)?;
+    let known = known.profile.filter(|(length, _)| *length == found.len());
+    if let Some((_, profiles)) = known {
+        return Profile::of(profiles, times, notes);
+    }
+    Profile::read(&path, times, budget, notes).unwrap_or_else(|error| {
+        notes.push(format!("profile.csv: {error}; left out"));
+        None
+    })
 }
 
 fn summary(folder: &Path, notes: &mut Vec<String>) -> Value {

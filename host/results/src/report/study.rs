@@ -1,6 +1,7 @@
 //! The report of a study: what its parameters do to what counts, and every curve in the colour of a
 //! parameter.
 
+use super::Known;
 use super::budget::Budget;
 use super::page::{STYLE, running};
 use super::results::Run;
@@ -147,7 +148,13 @@ fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
         .filter(|row| row.standing.state != State::Planned);
     let mut runs = begun.filter_map(|row| {
         let place = folder.join(&row.folder);
-        Run::read(&row.folder, &place, &Budget::of(rows.len().max(2))).ok()
+        Run::read(
+            &row.folder,
+            &place,
+            Known::default(),
+            &Budget::of(rows.len().max(2)),
+        )
+        .ok()
     });
     let Some(run) = runs.next() else {
         return IndexMap::new();

@@ -45,12 +45,11 @@ pub(super) struct Goal<'g> {
 }
 
 impl LinearDomain {
-    /// The part that is looked at; none if it is all of the domain, or another one than that which
-    /// the latest state is of.
-    pub(super) fn choose_part(&mut self, looked_at: Option<LookedAt<'_>>) {
+    /// Whether a part is looked at, which is there from then on: not if it is all of the domain, or another
+    /// one than that which the latest state is of.
+    pub(super) fn choose_part(&mut self, looked_at: Option<LookedAt<'_>>) -> bool {
         let Some(LookedAt { groups, dofs }) = looked_at else {
-            self.part = None;
-            return;
+            return false;
         };
         let of_latest = self.standing.part.as_deref();
         if of_latest.is_some_and(|latest| latest != groups) {
@@ -60,6 +59,7 @@ impl LinearDomain {
             let others = numbered.any(|(number, in_part)| !in_part && self.system.includes(number));
             self.part = others.then(|| self.of_groups(groups, dofs));
         }
+        self.part.is_some()
     }
 
     pub(super) fn of_groups(&self, groups: &[bool], dofs: &[usize]) -> Part {
@@ -97,14 +97,18 @@ impl LinearDomain {
         goal: &Goal<'_>,
         displacement: &mut [f64],
     ) -> Result<Vec<f64>, DomainFailure> {
-        let increment = |origin: &Origin| self.increment(origin, part, goal.lambda, displacement);
+        let increment =
+            |origin: &Origin, part: &Part| self.increment(origin, part, goal.lambda, displacement);
         let Standing {
             complete, latest, ..
         } = &self.standing;
         let is_looked_at = self.of_latest(part);
+        // Only groups of the part that was looked at count from the latest state.
+        let known = self.part.as_ref().filter(|known| self.of_latest(known));
+        let of_latest = known.unwrap_or(part);
         let mut since = Since {
-            complete: (!is_looked_at).then(|| increment(complete)),
-            latest: self.standing.part.as_ref().map(|_| increment(latest)),
+            complete: (!is_looked_at).then(|| increment(complete, part)),
+            latest: (self.standing.part.as_ref()).map(|_| increment(latest, of_latest)),
         };
         let free = self.system.free();
         let still = vec![0.0; self.boundary.len()];

@@ -1,5 +1,7 @@
 //! Factors of linear parts, remembered for those that follow.
 
+use crate::assembly::{System, Tie};
+use crate::group::Group;
 use algebra::{Kind, Multifrontal, Pattern};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -19,6 +21,53 @@ pub struct Reuse {
     pub announces: Option<fn(u64, &'static str)>,
     /// Nor, in the present one, another phase.
     pub(crate) is_last_phase: bool,
+    /// The latest of the present run.
+    latest: Option<Latest>,
+}
+
+/// A linear part of the present run.
+#[derive(Debug)]
+struct Latest {
+    setup: Setup,
+    numbered: Numbered,
+}
+
+/// What the matrix of a linear part follows from, on one mesh.
+#[derive(Debug, PartialEq)]
+pub(super) struct Setup {
+    /// Bits of the tangents of every group that belongs to it: they are the same at all its points.
+    tangents: Vec<Option<Vec<u64>>>,
+    prescribed: Vec<bool>,
+    ties: Vec<Tie>,
+}
+
+impl Setup {
+    pub(super) fn of(
+        (groups, condensed): (&[Group], &[bool]),
+        prescribed: &[bool],
+        ties: &[Tie],
+    ) -> Self {
+        let tangents = groups.iter().zip(condensed).map(|(group, condensed)| {
+            let bits = group.tangents().iter().map(|value| value.to_bits());
+            (*condensed && group.is_active).then(|| bits.collect())
+        });
+        Self {
+            tangents: tangents.collect(),
+            prescribed: prescribed.to_vec(),
+            ties: ties.to_vec(),
+        }
+    }
+}
+
+/// A linear part with its unknowns, and its factors.
+#[derive(Clone, Debug)]
+pub(super) struct Numbered {
+    pub(super) system: Arc<System>,
+    /// Of every unknown, whether it is on the boundary.
+    pub(super) kept: Vec<bool>,
+    pub(super) factors: Arc<Multifrontal>,
+    /// Largest entry of the matrix.
+    pub(super) stiffest: f64,
 }
 
 /// A matrix and what became of it.
@@ -48,6 +97,27 @@ impl Reuse {
     pub(crate) fn forget(&mut self) {
         if !self.may_recur() {
             self.known.clear();
+            self.latest = None;
+        }
+    }
+
+    /// Another run begins: what follows has another mesh, as far as is known here.
+    pub(crate) fn begin_run(&mut self) {
+        self.latest = None;
+    }
+
+    /// The linear part of an earlier phase of this run, if it is set up alike: neither its matrix nor its
+    /// unknowns are made again.
+    pub(super) fn same(&self, setup: &Setup) -> Option<Numbered> {
+        let latest = self.latest.as_ref()?;
+        (latest.setup == *setup).then(|| latest.numbered.clone())
+    }
+
+    /// Keeps a linear part for the phases that follow.
+    pub(super) fn keep(&mut self, setup: Setup, numbered: &Numbered) {
+        if self.may_recur() {
+            let numbered = numbered.clone();
+            self.latest = Some(Latest { setup, numbered });
         }
     }
 

@@ -2,8 +2,8 @@
 //!
 //! Found out when it is asked for. In ordinary steps the loads or the last equilibrium already
 //! exceed a tenth of the forces in play, and nothing more is computed. Where they do not (a start
-//! without stress, a load that grows tenfold), the step is answered elastically once: a matrix of
-//! its own, so that what the iterations hold factorised stays as it is.
+//! without stress, a load that grows tenfold), the step is answered elastically once: with equations
+//! of its own, so that what the iterations hold factorised stays as it is.
 
 use super::Newton;
 use super::acceptance::{Change, Forces, MOVES};
@@ -13,6 +13,9 @@ use crate::assembly::norms;
 use crate::group::Group;
 use algebra::LinearSolver;
 use law::Operator;
+
+/// Bytes of a factorisation that stays beside that of the iterations.
+const MOST_BESIDE: u64 = 1 << 28;
 
 /// What is known of it in the present step; by body.
 #[derive(Debug, Default)]
@@ -244,7 +247,7 @@ impl Newton<'_> {
     }
 
     fn answer(&mut self, operator: Operator, task: &Task) -> Option<Elastic> {
-        let (mut solver, mut internal) = self.solver_at_start(operator, task.period).ok()?;
+        let (mut solver, mut internal) = self.factorise_at_start(operator, task.period).ok()?;
         if self.domain.is_some() {
             for (&place, force) in self.places.boundary.iter().zip(&self.domain_forces) {
                 internal[place] += force;
@@ -259,7 +262,9 @@ impl Newton<'_> {
         let right: Vec<f64> = free
             .map(|(&place, coupling)| task.external[place] - internal[place] - coupling)
             .collect();
-        let solution = solver.solve(&right).ok()?;
+        let solution = solver.solve(&right);
+        self.put_aside(solver);
+        let solution = solution.ok()?;
         let mut increment = task.prescribed.clone();
         for (&place, value) in self.places.free.iter().zip(solution) {
             increment[place] = value;
@@ -283,8 +288,9 @@ impl Newton<'_> {
         })
     }
 
-    /// Equations with the tangents at the start of a step, and the internal forces there.
-    fn solver_at_start(
+    /// Factorises the tangents at the start of a step beside the matrix that is held. Returns the
+    /// internal forces there.
+    fn factorise_at_start(
         &mut self,
         operator: Operator,
         period: (f64, f64),
@@ -294,28 +300,42 @@ impl Newton<'_> {
         let mut internal = self.places.take(&mut self.force);
         outcome.map_err(|_| Singularity::Unknown)?;
         self.places.fold(&mut internal);
-        let mut values = Vec::new();
-        self.system.assemble(self.groups, &mut values);
         let pattern = &self.system.pattern;
-        let solver = match self.domain {
-            Some(domain) => LinearSolver::with_block(pattern, None, domain.block(self.system)),
-            None => LinearSolver::new(pattern, false, None),
-        };
-        let mut solver = solver.map_err(|_| Singularity::Free)?;
-        solver.factorise(values).map_err(|_| Singularity::Free)?;
+        let mut solver = match (self.matrix.beside.take(), self.domain) {
+            (Some(solver), _) => Ok(solver),
+            (None, Some(domain)) => {
+                LinearSolver::with_block(pattern, None, domain.block(self.system))
+            }
+            (None, None) => LinearSolver::new(pattern, false, None),
+        }
+        .map_err(|_| Singularity::Free)?;
+        let mut values = solver.room();
+        self.system.assemble(self.groups, &mut values);
+        let outcome = solver.factorise(values);
+        outcome.map_err(|_| Singularity::Free)?;
         Ok((solver, internal))
+    }
+
+    /// Keeps the equations beside those of the iterations for the next time, if they are not large.
+    fn put_aside(&mut self, solver: LinearSolver) {
+        if solver.bytes() <= MOST_BESIDE {
+            self.matrix.beside = Some(solver);
+        }
     }
 
     /// What a singular tangent matrix says of the model: whether it is held elastically, at the
     /// start of the step.
     pub(super) fn singularity(&mut self, period: (f64, f64)) -> Singularity {
-        match self.solver_at_start(Operator::Elastic, period) {
+        match self.factorise_at_start(Operator::Elastic, period) {
             Err(singularity) => singularity,
             Ok((mut solver, _)) => {
                 let right = vec![1.0; self.places.free.len()];
-                match solver.solve(&right) {
-                    Ok(_) => Singularity::Limit,
-                    Err(_) => Singularity::Free,
+                let is_held = solver.solve(&right).is_ok();
+                self.put_aside(solver);
+                if is_held {
+                    Singularity::Limit
+                } else {
+                    Singularity::Free
                 }
             }
         }

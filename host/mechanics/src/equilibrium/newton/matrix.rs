@@ -2,7 +2,9 @@
 
 use super::Newton;
 use super::failure::{Reason, StepFailure};
+use crate::assembly::Elements;
 use crate::settings::Method;
+use algebra::{LinearSolver, largest};
 use law::Operator;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -23,6 +25,10 @@ pub struct Matrix {
     largest: f64,
     /// The same of every body, where there are several.
     largest_by_body: Vec<f64>,
+    /// What it was added up from.
+    elements: Elements,
+    /// The same equations once more, for what is asked beside the iterations.
+    pub(super) beside: Option<LinearSolver>,
 }
 
 impl Matrix {
@@ -69,26 +75,25 @@ impl Newton<'_> {
     /// The matrix from the tangents that the groups hold, without the domain.
     pub(super) fn stiffness(&mut self) -> Vec<f64> {
         let start = Instant::now();
-        let mut values = Vec::new();
-        self.system.assemble(self.groups, &mut values);
-        let largest = |largest: f64, value: &f64| largest.max(value.abs());
+        let mut values = self.solver.room();
+        self.system
+            .assemble_after(&mut self.matrix.elements, self.groups, &mut values);
         let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
-        let parts = values.par_chunks(PER_TASK);
-        let of_parts = parts.map(|values| values.iter().fold(of_domain, largest));
+        let of_parts = values.par_chunks(PER_TASK).map(largest);
         self.matrix.largest = of_parts.reduce(|| of_domain, f64::max);
         let bodies = &self.places.bodies;
         if !bodies.of_equation.is_empty() {
-            let mut by_body = vec![0.0; bodies.n];
+            let mut by_body = vec![0.0_f64; bodies.n];
             for (column, &body) in bodies.of_equation.iter().enumerate() {
                 let column = &values[self.system.pattern.places(column)];
-                by_body[body as usize] = column.iter().fold(by_body[body as usize], largest);
+                by_body[body as usize] = by_body[body as usize].max(largest(column));
             }
             if let Some(domain) = self.domain {
                 let n = self.places.boundary.len();
                 let columns = domain.stiffness().chunks_exact(n.max(1));
                 for (&place, column) in self.places.boundary.iter().zip(columns) {
                     let body = bodies.of_place[place] as usize;
-                    by_body[body] = column.iter().fold(by_body[body], largest);
+                    by_body[body] = by_body[body].max(largest(column));
                 }
             }
             self.matrix.largest_by_body = by_body;

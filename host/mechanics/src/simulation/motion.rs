@@ -1,10 +1,12 @@
-//! How far from each other two ways lead that a step may take: where relaxation has found an equilibrium, Newton
-//! iterations from the tangent, and creep where they stand still, may find another one.
+//! Motions that led to equilibrium, viscous relaxation or creep: they are counted, the first of each kind is told, and it
+//! is measured how far from each other two ways lead that a step may take: where relaxation has found an equilibrium,
+//! Newton iterations from the tangent, and creep where they stand still, may find another one.
 
 use super::phase::PhaseEquations;
-use super::{Simulation, UnderWay};
+use super::{Simulation, UnderWay, Warning, Watch};
 use crate::assembly::fold;
 use crate::equilibrium::{Costs, Matrix, Newton, StepSuccess, norm};
+use crate::error::Place;
 use crate::group::{Aside, Group};
 use crate::settings::{Control, Settings};
 
@@ -24,8 +26,30 @@ pub enum Neighbour {
 }
 
 impl Simulation {
+    /// Counts a motion that led to equilibrium, and speaks of the first one of its kind; the phase's end says how
+    /// many there were.
+    pub(super) fn note_motion(
+        &mut self,
+        success: &StepSuccess,
+        step: [f64; 2],
+        control: Control,
+        (place, phase): (&Place, &mut UnderWay),
+        watch: &mut dyn Watch,
+    ) {
+        phase.record.relaxed += 1;
+        if control == Control::Creep {
+            phase.record.crept += 1;
+            if phase.record.crept == 1 && self.problem.settings.control == Control::Creep {
+                watch.warning(&Warning::Crept(place.clone()));
+            }
+        } else if phase.record.relaxed - phase.record.crept == 1 {
+            let by_creep = self.neighbour(phase, success, step);
+            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
+        }
+    }
+
     /// Where a step leads so that ended in `success`, whose trial state is left as it is. `None` if it was stopped.
-    pub(super) fn neighbour(
+    fn neighbour(
         &mut self,
         phase: &UnderWay,
         success: &StepSuccess,
