@@ -97,7 +97,7 @@ impl KeptPhase {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Kept {
     /// A call of a law.
-    Call(KeptCall),
+    Call(Box<KeptCall>),
     /// Something else.
     Phase(KeptPhase),
 }
@@ -206,12 +206,12 @@ pub fn keep(call: impl FnOnce() -> KeptCall) -> io::Result<()> {
     {
         (call.form, call.points) = (last.form, last.points);
     }
-    let kept = Kept::Call(call);
+    let kept = Kept::Call(Box::new(call));
     keeper.write(&kept)?;
     if let Kept::Call(call) = kept
         && matches!(call.function, Function::InitState | Function::Integrate)
     {
-        keeper.last = Some(call);
+        keeper.last = Some(*call);
     }
     Ok(())
 }
