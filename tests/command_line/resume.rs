@@ -107,7 +107,7 @@ fn killed_and_resumed(text: &str, rows: usize, kills: u32) {
     let started = Instant::now();
     let outcome = undisturbed.run(&["run", "block.toml", "--out", "out", "--checkpoint", "0"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let length = started.elapsed();
+    let mut length = started.elapsed().as_secs_f64();
     let expected = results(&undisturbed.path("out"));
 
     let place = Place::new();
@@ -125,12 +125,17 @@ fn killed_and_resumed(text: &str, rows: usize, kills: u32) {
     for kill in 0..kills {
         // A scatter of moments, the same every time.
         let share = f64::from(kill.wrapping_mul(2_654_435_769)) / f64::from(u32::MAX);
+        let is_new = !place.path("out").exists();
         let mut child = place.start(&run);
-        std::thread::sleep(Duration::from_secs_f64(0.9 * share * length.as_secs_f64()));
+        std::thread::sleep(Duration::from_secs_f64(0.9 * share * length));
         child.kill().unwrap();
         child.wait().unwrap();
         on_the_way += usize::from((1..rows).contains(&whole_rows(&place)));
         if whole_rows(&place) == rows {
+            // The run whose time was taken had other tests beside it.
+            if is_new {
+                length *= 0.9 * share;
+            }
             // Resumed often enough to have come to its end: the next run starts anew.
             // The process that did the work may take a moment to follow the one that was killed, and
             // writes until then, by path: a checkpoint would come into the next run's folder. It holds
