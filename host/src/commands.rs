@@ -286,7 +286,8 @@ fn stop_on_signals() -> Result<Stop, Error> {
     Ok(stop)
 }
 
-/// Starts the threads that a run works with; as many as there are processors, if it is not said.
+/// Starts the threads that a run works with; as many as there are processors, if it is not said. The calling
+/// thread is one of them, so no other may ask them for anything: with one thread nobody would answer.
 fn start_threads(n: Option<u16>) -> Result<(), Error> {
     let threads = rayon::ThreadPoolBuilder::new()
         .use_current_thread()

@@ -111,11 +111,12 @@ impl Profile {
                 }
             }
         }
+        self.table.flush()?;
         if let Some(shown) = &mut self.shown {
             let numbers = values.iter().map(|value| value.unwrap_or(f64::NAN));
             shown.end(place.increment, n_rows, numbers.collect());
         }
-        self.table.flush()
+        Ok(())
     }
 
     /// What a report shows of the table, with the table's length; what is written from here on is not in it.

@@ -3,7 +3,7 @@
 use crate::first_root::last_that;
 use crate::interface::{Constants, Interface, State};
 use crate::return_mapping::{Flow, Increment, Sample};
-use crate::substeps::{Path, ROUNDING, Sliding};
+use crate::substeps::{Path, Sliding};
 use abi::reclosure::InContact;
 use abi::substepping::Scheme;
 use abi::{Failure, InterfacePoint, InterfaceResponse, Tangent};
@@ -91,10 +91,6 @@ fn close_or_slide(
     let Constants { K_n, K_t, .. } = *constants;
     let hardening = &constants.hardening;
     let xi = state.plastic_slip;
-    if scheme != Scheme::Implicit && has_drifted(constants, xi, contact) {
-        let (state, contact) = taken_back(constants, state, contact)?;
-        return close_or_slide(constants, scheme, state, &contact, tangent);
-    }
     // Elastic trial, Eq. (6).
     let sigma_trial = contact.sigma + K_n * contact.contraction;
     let tau_trial = contact.tau + K_t * contact.slip;
@@ -162,53 +158,6 @@ fn close_or_slide(
     }
 }
 
-/// Whether a stress lies off (9) by more than rounding, as explicit steps leave it, and initial ones.
-fn has_drifted(constants: &Constants, xi: f64, contact: &Contact) -> bool {
-    let hardening = &constants.hardening;
-    let mu = hardening.friction(hardening.branch(xi), xi).value;
-    contact.sigma > 0.0 && contact.tau.abs() > mu * contact.sigma * (1.0 + ROUNDING)
-}
-
-/// What has drifted is taken back to (9) before the increment, whether that flows or not.
-#[cold]
-fn taken_back(
-    constants: &Constants,
-    state: State,
-    contact: &Contact,
-) -> Result<(State, Contact), Failure> {
-    let path = Path {
-        constants,
-        contraction: 0.0,
-        slip: 0.0,
-    };
-    let at = path.on_surface(start(state, contact))?;
-    let state = slid(state, at.xi - state.plastic_slip, at.contraction);
-    let contact = Contact {
-        sigma: at.sigma,
-        tau: at.tau,
-        ..*contact
-    };
-    // Where it cannot be taken back, it is not tried again.
-    if has_drifted(constants, at.xi, &contact) {
-        return Err(Failure::Domain(
-            "the stress at the start cannot be returned to the yield surface",
-        ));
-    }
-    Ok((state, contact))
-}
-
-/// Where substeps begin.
-fn start(state: State, contact: &Contact) -> Sliding {
-    Sliding {
-        sigma: contact.sigma,
-        tau: contact.tau,
-        xi: state.plastic_slip,
-        contraction: 0.0,
-        done: 0.0,
-        loses_contact: false,
-    }
-}
-
 /// The flow by substeps. Where it loses contact, the rest of the increment is left to the implicit
 /// scheme, which knows how contact is lost.
 #[cold]
@@ -223,7 +172,15 @@ fn substeps(
         contraction: contact.contraction,
         slip: contact.slip,
     };
-    let end = path.follow(&start(state, contact), scheme)?;
+    let start = Sliding {
+        sigma: contact.sigma,
+        tau: contact.tau,
+        xi: state.plastic_slip,
+        contraction: 0.0,
+        done: 0.0,
+        loses_contact: false,
+    };
+    let end = path.follow(&start, scheme)?;
     let state = State {
         plastic_contraction: state.plastic_contraction + end.contraction,
         plastic_slip: end.xi,

@@ -11,9 +11,6 @@ use crate::interface::Constants;
 use abi::Failure;
 use abi::substepping::{Attempt, Scheme, error_controlled};
 
-/// How far off the surface is on it: more than `on_surface` leaves.
-pub(crate) const ROUNDING: f64 = 1e-13;
-
 /// A straight increment in contact, compression and contraction positive.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Path<'a> {
@@ -86,6 +83,8 @@ impl Path<'_> {
 
     /// The fraction of the increment after which Eq. (9) is violated. F is convex along the path.
     fn yield_fraction(&self, start: &Sliding) -> f64 {
+        // More than `on_surface` leaves.
+        const ROUNDING: f64 = 1e-13;
         let mu = self.friction(start.xi).value;
         let admissible = |fraction: f64| {
             let Sliding { sigma, tau, .. } = self.elastic(start, fraction);
@@ -228,7 +227,7 @@ impl Path<'_> {
     }
 
     /// Newton's method back to the surface from outside, along the flow at fixed displacement.
-    pub(crate) fn on_surface(&self, mut at: Sliding) -> Result<Sliding, Failure> {
+    fn on_surface(&self, mut at: Sliding) -> Result<Sliding, Failure> {
         for _ in 0..MAX_CORRECTIONS {
             let rates = self.rates(&at)?;
             let outside = at.tau.abs() - rates.mu.value * at.sigma;

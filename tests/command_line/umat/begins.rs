@@ -53,3 +53,38 @@ fn routines_that_begin_once_are_not() {
         }
     }
 }
+
+/// What is kept from call to call shows when the same call is made twice after another step.
+#[test]
+fn a_step_kept_from_the_last_call_is_named() {
+    let Some(place) = place("begins") else {
+        return;
+    };
+    let (checks, outcome) = checked(&place, "begins", &["--set", "what=8"]);
+    let [found, details] = &checks[CHECK];
+    assert_eq!(found, "failed", "{details}");
+    let said = "when it is repeated: something is kept from call to call (SAVE, COMMON)";
+    assert!(details.contains(said), "{details}");
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+}
+
+/// A routine that depends on the time may depend on that of the step, which is said all the same.
+#[test]
+fn the_time_of_a_step_is_asked_for_where_the_time_counts() {
+    let Some(place) = place("begins") else {
+        return;
+    };
+    let sidecar = std::fs::read_to_string(place.path("begins.law.toml")).unwrap();
+    place.write(
+        "begins.law.toml",
+        format!("time_dependent = true\n{sidecar}"),
+    );
+    let (checks, outcome) = checked(&place, "begins", &["--set", "what=2"]);
+    let [found, details] = &checks[CHECK];
+    assert_eq!(found, "warning", "{details}");
+    assert!(
+        details.contains("with TIME(1) = 0 in place of 1 STRESS ["),
+        "{details}"
+    );
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+}

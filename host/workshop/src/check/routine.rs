@@ -512,7 +512,10 @@ fn time_as_declared(subject: &Subject) -> Found {
         let later = routine.probe.integrate(&starts, &later)?.points;
         for (ends, what) in [(&slower, words.duration), (&later, words.time)] {
             for (step, end) in steps.iter().zip(ends) {
-                let depends = is_success(end.status)
+                // What begins at TIME(2) = 0 does not at another one.
+                let begins = step.start.gradient0.iter().all(|value| *value == 0.0);
+                let depends = !(begins && what == words.time)
+                    && is_success(end.status)
                     && differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
                 seen |= depends;
                 if depends && !is_declared {

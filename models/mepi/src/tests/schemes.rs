@@ -215,44 +215,6 @@ fn an_initial_stress_outside_the_surface_is_returned_to_it() {
     }
 }
 
-/// Whatever the next increment does, it begins on the surface: a little unloading, nothing, and a little flow come
-/// to the same stress.
-#[test]
-fn drift_is_taken_back_by_unloading_too() {
-    let law = explicit(10.0);
-    let mut walker = Walker::new(&law, 100.0);
-    walker.step([0.0, 2e-3]);
-    let strength = |walker: &Walker<'_, Mepi>| {
-        Truth::hardening(TABLE_4, 100.0).mu(walker.state.plastic_slip) * walker.sigma()
-    };
-    assert!((walker.tau() / strength(&walker) - 1.0).abs() > 1e-4);
-    let after = |slip: f64| {
-        let mut next = walker.clone();
-        next.step([0.0, slip]);
-        assert!(
-            (next.tau() / strength(&next) - 1.0).abs() < 1e-7,
-            "{slip}: {} {}",
-            next.tau(),
-            strength(&next)
-        );
-        next.tau()
-    };
-    let rest = after(0.0);
-    for slip in [-1e-12, 1e-12] {
-        assert!((after(slip) / rest - 1.0).abs() < 1e-7, "{slip}");
-    }
-    // Far back it is elastic from there on, by diag(K_n, K_t).
-    let far = after_far(&walker, -1e-4);
-    let farther = after_far(&walker, -2e-4);
-    assert!(((rest - far) / (far - farther) - 1.0).abs() < 1e-7);
-}
-
-fn after_far(walker: &Walker<'_, Mepi>, slip: f64) -> f64 {
-    let mut next = walker.clone();
-    next.step([0.0, slip]);
-    next.tau()
-}
-
 #[test]
 fn the_published_jump_takes_the_implicit_scheme() {
     let refused = MepiSoftening::new(mepi_softening::Parameters {

@@ -318,7 +318,7 @@ impl Newton<'_> {
 
     /// Keeps the equations beside those of the iterations for the next time, if they are not large.
     fn put_aside(&mut self, solver: LinearSolver) {
-        if solver.bytes() <= MOST_BESIDE {
+        if solver.bytes() <= MOST_BESIDE && !solver.has_fallen_back() {
             self.matrix.beside = Some(solver);
         }
     }

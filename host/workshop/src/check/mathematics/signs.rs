@@ -20,30 +20,42 @@ pub(super) fn compression_is_negative(subject: &Subject) -> Found {
             return Err(skipped("the path is the author's"));
         }
         for pressure in [10.0, 100.0, 1000.0] {
-            let sheared = |pressure: f64| -> Result<Option<(PointStart, f64)>, Verdict> {
-                let flux = specimen.under_pressure(pressure);
-                let Ok(origin) = specimen.started(flux)? else {
-                    return Ok(None);
-                };
-                sheared_far(&specimen, origin).map(Some)
+            let origin = |pressure: f64| specimen.started(specimen.under_pressure(pressure));
+            let (compressed, pulled) = (origin(pressure)?.ok(), origin(-pressure)?.ok());
+            let sizes =
+                [&compressed, &pulled].map(|origin| origin.as_ref().map_or(0.0, |o| o.size));
+            // The same way for both: where dilation is held, shear stresses grow with its length.
+            let sheared = |origin: Option<Origin>| {
+                let size = sizes[0].max(sizes[1]);
+                origin
+                    .map(|origin| sheared_far(&specimen, origin, size))
+                    .transpose()
             };
-            let (compressed, pulled) = (sheared(pressure)?, sheared(-pressure)?);
-            let why = match (&compressed, &pulled) {
-                (None, Some(_)) => format!(
-                    "it starts from a tension of {pressure} kPa, but not from as much compression"
-                ),
-                (Some((_, compressed)), Some((_, pulled))) if *pulled > STRONGER * compressed => {
-                    format!(
-                        "under a tension of {pressure} kPa it carries a shear stress of \
-                         {pulled:.6e} kPa, under as much compression {compressed:.6e}"
-                    )
+            let (compressed, pulled) = (sheared(compressed)?, sheared(pulled)?);
+            let found = match (compressed, pulled) {
+                (None, Some(pulled)) => pulled.into_iter().next().map(|(start, _)| {
+                    let why = format!(
+                        "it starts from a tension of {pressure} kPa, but not from as much compression"
+                    );
+                    (start, why)
+                }),
+                (Some(compressed), Some(pulled)) => {
+                    let mut pairs = compressed.into_iter().zip(pulled);
+                    let stronger = pairs.find(|((_, c), (_, p))| *p > STRONGER * c);
+                    stronger.map(|((_, compressed), (start, pulled))| {
+                        let why = format!(
+                            "under a tension of {pressure} kPa it carries a shear stress of \
+                             {pulled:.6e} kPa, under as much compression {compressed:.6e}"
+                        );
+                        (start, why)
+                    })
                 }
-                _ => String::new(),
+                _ => None,
             };
-            if let (false, Some((start, _))) = (why.is_empty(), &pulled) {
+            if let Some((start, why)) = found {
                 let name = specimen.name();
                 let why = format!("{name}: {why}; compression is negative here");
-                return Err(specimen.recorded(start, Verdict::Warning(why)));
+                return Err(specimen.recorded(&start, Verdict::Warning(why)));
             }
             n += 1;
         }
@@ -51,16 +63,16 @@ pub(super) fn compression_is_negative(subject: &Subject) -> Found {
     Ok(format!("{n} pressures"))
 }
 
-/// Shears a point, at constant other gradients, far beyond its elastic range: the largest shear stress,
-/// and the increment that led there.
-fn sheared_far(specimen: &Specimen, origin: Origin) -> Result<(PointStart, f64), Verdict> {
-    let Origin {
-        start: mut point,
-        size,
-        ..
-    } = origin;
+/// Shears a point, at constant other gradients, far beyond its elastic range, which has this size: every
+/// increment, and the largest shear stress up to there.
+fn sheared_far(
+    specimen: &Specimen,
+    origin: Origin,
+    size: f64,
+) -> Result<Vec<(PointStart, f64)>, Verdict> {
+    let mut point = origin.start;
     let shear = specimen.n_normal();
-    let mut most = (point.clone(), 0.0_f64);
+    let mut way: Vec<(PointStart, f64)> = Vec::new();
     let mut length = 0.03 * size;
     while length < 1e3 * size {
         point.gradient1[shear] += length;
@@ -70,15 +82,14 @@ fn sheared_far(specimen: &Specimen, origin: Origin) -> Result<(PointStart, f64),
         let Some(end) = ends.pop().filter(|end| is_success(end.status)) else {
             break;
         };
-        if end.flux[shear].abs() > most.1 {
-            most = (point.clone(), end.flux[shear].abs());
-        }
+        let before = way.last().map_or(0.0, |(_, most)| *most);
+        way.push((point.clone(), before.max(end.flux[shear].abs())));
         point.gradient0.clone_from(&point.gradient1);
         point.flux0 = end.flux;
         point.state0 = end.state;
         length *= 1.5;
     }
-    Ok(most)
+    Ok(way)
 }
 
 /// What sine, cosine and tangent repeat after, in degrees that are taken for radians, and in radians

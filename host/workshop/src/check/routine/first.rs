@@ -19,6 +19,8 @@ struct Other {
     moment: Moment,
     /// Every phase and every segment begins with it; else the first one alone has it.
     is_frequent: bool,
+    /// The routine says that it may matter.
+    is_declared: bool,
 }
 
 /// What a routine is told in the second increment of a second step: at what time, and which one it is.
@@ -47,27 +49,27 @@ fn others(routine: &Specimen) -> Vec<Other> {
         time,
         moment: first,
         is_frequent: true,
+        is_declared: false,
     }];
     if !has_sidecar(routine) {
         return all;
     }
-    // What depends on the time may well be another at another one.
-    if !routine.formulation.time_dependent {
-        all.push(Other {
-            what: format!("TIME(1) = 0 in place of {}", routine.time_increment),
-            time,
-            moment: Moment {
-                step_start: time,
-                ..moment
-            },
-            is_frequent: true,
-        });
-    }
+    all.push(Other {
+        what: format!("TIME(1) = 0 in place of {}", routine.time_increment),
+        time,
+        moment: Moment {
+            step_start: time,
+            ..moment
+        },
+        is_frequent: true,
+        is_declared: routine.formulation.time_dependent,
+    });
     all.push(Other {
         what: "KSTEP = 1 in place of 2".to_owned(),
         time,
         moment: Moment { step: 1, ..moment },
         is_frequent: false,
+        is_declared: false,
     });
     all
 }
@@ -114,13 +116,13 @@ fn matters(
     }))
 }
 
-/// What another moment changes: a failure, or a warning that others may replace.
+/// What another moment changes: a failure, or a warning that others may replace; whether it changes stresses.
 fn judged(
     routine: &Specimen,
     step: &Step,
     other: &Other,
     [usual, found]: [&PointEnd; 2],
-) -> Result<Option<Verdict>, Verdict> {
+) -> Result<Option<(Verdict, bool)>, Verdict> {
     let Words { stress, state, .. } = Words::of(routine);
     let of_flux = is_success(usual.status) != is_success(found.status)
         || differ(&usual.flux, &found.flux, ITERATED * flux_scale(step));
@@ -129,6 +131,9 @@ fn judged(
         return Ok(None);
     }
     let counts = of_flux || matters(routine, step, usual, found)?;
+    if other.is_declared && !counts {
+        return Ok(None);
+    }
     let change = if !is_success(found.status) {
         "the routine fails".to_owned()
     } else if of_flux {
@@ -158,16 +163,52 @@ fn judged(
         },
         routine.at(&step.start)
     );
-    let verdict = if counts && other.is_frequent {
+    let verdict = if counts && other.is_frequent && !other.is_declared {
         routine.fails_at(&step.start, why)
     } else {
         routine.warns_at(&step.start, why)
     };
-    Ok(Some(verdict))
+    Ok(Some((verdict, counts)))
+}
+
+/// How many increments are asked one by one.
+const ALONE: usize = 4;
+
+/// Whether the first call after another moment is the same as when it is repeated: the two differ by what is
+/// kept in SAVE. Of the last increments, where most has happened, each alone.
+fn remembers(routine: &Specimen, steps: &[&Step], other: &Other) -> Result<(), Verdict> {
+    let Words { stress, state, .. } = Words::of(routine);
+    for step in steps.iter().rev().take(ALONE) {
+        let call = |at: (f64, Moment)| {
+            let start = std::slice::from_ref(&step.start);
+            let answer = routine.probe.integrate(start, &form(routine, at))?;
+            Ok::<_, Verdict>(answer.points)
+        };
+        call((other.time, other.moment))?;
+        let [first, repeated] = [call(later(routine))?, call(later(routine))?];
+        let (first, repeated) = (&first[0], &repeated[0]);
+        let (what, first, repeated) = if bits(&first.flux) == bits(&repeated.flux) {
+            (state, &first.state, &repeated.state)
+        } else {
+            (stress, &first.flux, &repeated.flux)
+        };
+        if bits(first) != bits(repeated) {
+            return Err(routine.fails_at(
+                &step.start,
+                format!(
+                    "after a call with {} the usual one leaves {what} {first:?}, and {repeated:?} when it is \
+                     repeated: something is kept from call to call (SAVE, COMMON), at {}",
+                    other.what,
+                    routine.at(&step.start)
+                ),
+            ));
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn routine_does_not_begin_again(subject: &Subject) -> Found {
-    let mut doubtful = None;
+    let mut doubtful: Option<(Verdict, bool)> = None;
     let n = each(subject, "first", |routine, steps, _| {
         if is_mfront(routine) {
             return Ok(0);
@@ -184,16 +225,22 @@ pub(super) fn routine_does_not_begin_again(subject: &Subject) -> Found {
                 if !is_success(usual.status) {
                     continue;
                 }
-                match judged(routine, step, &other, [usual, found])? {
-                    Some(verdict) if verdict.is_failure() => return Err(verdict),
-                    Some(verdict) => doubtful = doubtful.take().or(Some(verdict)),
-                    None => {}
+                let Some((verdict, counts)) = judged(routine, step, &other, [usual, found])? else {
+                    continue;
+                };
+                if verdict.is_failure() {
+                    return Err(verdict);
+                }
+                // The first one; of those that change stresses, if there are any.
+                if doubtful.as_ref().is_none_or(|(_, known)| counts && !known) {
+                    doubtful = Some((verdict, counts));
                 }
             }
+            remembers(routine, &steps, &other)?;
         }
         Ok(steps.len())
     })?;
-    if let Some(verdict) = doubtful {
+    if let Some((verdict, _)) = doubtful {
         return Err(verdict);
     }
     if n == 0 {
