@@ -153,8 +153,8 @@ impl LinearSolver {
         self.multifrontal.operations()
     }
 
-    /// Room for the values of the next matrix. Memory that is new every time has to be given by the system,
-    /// page by page, which takes as long as adding the elements up.
+    /// Room for the values of the next matrix: memory that is new every time is given by the system page by
+    /// page (4 % of the CPU time of `bonded_pile` on `m20k`).
     pub fn room(&mut self) -> Vec<f64> {
         std::mem::take(&mut self.room)
     }

@@ -63,7 +63,8 @@ pub(super) const CHECKS: &[Check] = &[
         family: Family::Routine,
         description: "UMAT: where a phase begins, with KINC = 1 and TIME(1) = 0, a routine goes on from its internal \
                       variables: STRESS is the same, and stays so in the next increment; with KSTEP = 1 too (warning). \
-                      A routine that depends on the time is not asked for TIME(1).",
+                      Where a routine depends on the time, TIME(1) is a warning. After a call of another step the usual \
+                      one, made twice, gives the same both times.",
         needs: &["routine-is-repeatable"],
         run: first::routine_does_not_begin_again,
     },

@@ -288,8 +288,8 @@ impl Newton<'_> {
         })
     }
 
-    /// Factorises the tangents at the start of a step beside the matrix that is held. Returns the
-    /// internal forces there.
+    /// Factorises the tangents at the start of a step beside the matrix that is held: the equations, and
+    /// the internal forces there.
     fn factorise_at_start(
         &mut self,
         operator: Operator,

@@ -22,16 +22,12 @@ pub(super) fn compression_is_negative(subject: &Subject) -> Found {
         for pressure in [10.0, 100.0, 1000.0] {
             let origin = |pressure: f64| specimen.started(specimen.under_pressure(pressure));
             let (compressed, pulled) = (origin(pressure)?.ok(), origin(-pressure)?.ok());
-            let sizes =
-                [&compressed, &pulled].map(|origin| origin.as_ref().map_or(0.0, |o| o.size));
             // The same way for both: where dilation is held, shear stresses grow with its length.
-            let sheared = |origin: Option<Origin>| {
-                let size = sizes[0].max(sizes[1]);
-                origin
-                    .map(|origin| sheared_far(&specimen, origin, size))
-                    .transpose()
-            };
-            let (compressed, pulled) = (sheared(compressed)?, sheared(pulled)?);
+            let both = compressed.iter().chain(&pulled);
+            let size = both.fold(0.0_f64, |most, origin| most.max(origin.size));
+            let sheared = |origin| sheared_far(&specimen, origin, size);
+            let compressed = compressed.map(sheared).transpose()?;
+            let pulled = pulled.map(sheared).transpose()?;
             let found = match (compressed, pulled) {
                 (None, Some(pulled)) => pulled.into_iter().next().map(|(start, _)| {
                     let why = format!(
