@@ -2,7 +2,7 @@
 
 use crate::Pattern;
 use crate::dense::{self, Exchanges, largest};
-use crate::multifrontal::{Kind, Multifrontal};
+use crate::multifrontal::{Before, Kind, Multifrontal};
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -22,8 +22,6 @@ pub struct Block {
     factors: Arc<Multifrontal>,
     /// Sums of the absolute values of its rows.
     row_sums: Vec<f64>,
-    /// Its share in the matrix that was factorised last.
-    share: f64,
 }
 
 impl Block {
@@ -39,7 +37,6 @@ impl Block {
             equations,
             factors: Arc::clone(factors),
             row_sums,
-            share: 1.0,
         }
     }
 
@@ -164,19 +161,27 @@ impl LinearSolver {
     /// # Errors
     /// [`Singular`].
     pub fn factorise(&mut self, values: Vec<f64>) -> Result<(), Singular> {
-        self.factorise_with(values, 1.0)
+        let before = std::mem::replace(&mut self.values, values);
+        let outcome = self.factorise_after(&Before::Values(&before));
+        self.room = before;
+        outcome
     }
 
-    /// Factorises the matrix with these values and a multiple of the block.
+    /// As [`Self::factorise`], for the same bits with less work: the values differ from those of the last
+    /// matrix at most where row and column belong to equations that have `changed`.
     ///
     /// # Errors
     /// [`Singular`].
-    pub fn factorise_with(&mut self, values: Vec<f64>, share: f64) -> Result<(), Singular> {
-        let before = std::mem::replace(&mut self.values, values);
-        self.proven = false;
-        if let Some(block) = &mut self.block {
-            block.share = share;
+    pub fn factorise_changed(&mut self, values: &[f64], changed: &[bool]) -> Result<(), Singular> {
+        for (column, _) in changed.iter().enumerate().filter(|(_, changed)| **changed) {
+            let places = self.pattern.places(column);
+            self.values[places.clone()].copy_from_slice(&values[places]);
         }
+        self.factorise_after(&Before::But(changed))
+    }
+
+    fn factorise_after(&mut self, before: &Before<'_>) -> Result<(), Singular> {
+        self.proven = false;
         if let Some(other) = &mut self.row_exchanges {
             other.factors = None;
         }
@@ -185,8 +190,7 @@ impl LinearSolver {
             return Ok(());
         }
         self.factorisations += 1;
-        self.factorised = self.factorise_fast(&before).is_ok();
-        self.room = before;
+        self.factorised = self.factorise_fast(before).is_ok();
         if self.factorised {
             Ok(())
         } else {
@@ -205,14 +209,12 @@ impl LinearSolver {
     }
 
     /// Factorises with row exchanges inside supernodes only, and among the equations of the block.
-    /// `before` are the values of the last matrix.
-    fn factorise_fast(&mut self, before: &[f64]) -> Result<(), Singular> {
+    fn factorise_fast(&mut self, before: &Before<'_>) -> Result<(), Singular> {
         let Some(block) = &self.block else {
             return self.multifrontal.factorise_after(before, &self.values);
         };
-        let values = block.values().iter().map(|value| block.share * value);
         self.multifrontal
-            .factorise_onto(values, before, &self.values)?;
+            .factorise_onto(block.values(), before, &self.values)?;
         let n = block.equations.len();
         let matrix = MatMut::from_column_major_slice_mut(self.multifrontal.schur_mut(), n, n);
         dense::factorise(matrix, &mut self.exchanges)
@@ -260,7 +262,7 @@ impl LinearSolver {
                 && equation == column
             {
                 for (&row, value) in block.equations.iter().zip(of_block) {
-                    *entries.entry(row as u32).or_default() += block.share * value;
+                    *entries.entry(row as u32).or_default() += value;
                 }
                 next = columns.next();
             }
@@ -343,8 +345,8 @@ impl LinearSolver {
                 }
             }
             for ((&row, product), row_sum) in at.zip(product).zip(&block.row_sums) {
-                residual[row] -= block.share * product;
-                row_sums[row] += block.share * row_sum;
+                residual[row] -= product;
+                row_sums[row] += row_sum;
             }
         }
         let scale = largest(&row_sums) * largest(x) + largest(right);
@@ -429,9 +431,7 @@ mod tests {
             rows: vec![0, 1, 0, 1, 2],
         };
         let mut solver = LinearSolver::with_block(&Arc::new(pattern), None, block).unwrap();
-        solver
-            .factorise_with(vec![pivot, 2.0, 2.0, 0.5, 0.25], 2.0)
-            .unwrap();
+        solver.factorise(vec![pivot, 2.0, 2.0, 0.5, 0.25]).unwrap();
         // Twice for the solution that is checked and one that need not be.
         let x = solver.solve(&[1.0, 2.0, 3.0]).unwrap();
         assert_eq!(solver.solve(&[1.0, 2.0, 3.0]).unwrap(), x);
@@ -442,11 +442,11 @@ mod tests {
     fn solves_beside_a_block() {
         for (pivot, fallbacks) in [(5.0, 0), (0.0, 1)] {
             let (x, fallen_back) = beside_a_block(pivot);
-            // Twice S = [[3 − 1/4, −1/4], [−1/4, 3 − 1/4]], and the entries beside it.
+            // S = [[3 − 1/4, −1/4], [−1/4, 3 − 1/4]], and the entries beside it.
             let a = [
                 [pivot, 2.0, 0.0],
-                [2.0, 5.5 + 0.5, -0.5],
-                [0.0, -0.5, 5.5 + 0.25],
+                [2.0, 2.75 + 0.5, -0.25],
+                [0.0, -0.25, 2.75 + 0.25],
             ];
             for (row, b) in a.iter().zip([1.0, 2.0, 3.0]) {
                 let product: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();

@@ -5,20 +5,15 @@
 //! or tied: a combination of others, as the mid-thickness nodes of a thin layer with mean strain.
 
 mod bodies;
+mod elements;
 
 pub use bodies::{Bodies, SHARED, norms};
+pub use elements::Elements;
 
 use crate::group::Group;
 use algebra::Pattern;
-use rayon::prelude::*;
+use elements::ElementMatrix;
 use std::sync::Arc;
-
-/// Elements that one thread takes at a time.
-const PIECE: usize = 256;
-/// Pieces that are computed before their matrices are added up.
-const ROUND: usize = 16;
-/// Parts of the columns that are added up at the same time.
-const PARTS: usize = 4;
 
 /// A degree of freedom that follows others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -353,74 +348,6 @@ impl System {
         fold(&self.ties, force);
     }
 
-    /// The tangent matrix from the groups' tangents.
-    pub fn assemble(&self, groups: &[Group], values: &mut Vec<f64>) {
-        self.clear(values);
-        for (group, maps) in groups.iter().zip(&self.elements) {
-            for (round, maps) in maps.chunks(ROUND * PIECE).enumerate() {
-                let mut pieces: Vec<Piece> = maps.chunks(PIECE).map(|_| Piece::default()).collect();
-                self.add_up(group, ROUND * PIECE * round, maps, &mut pieces, values);
-            }
-        }
-    }
-
-    /// As [`Self::assemble`], for the same bits with less work: matrices of elements whose tangents
-    /// are those of the last time are still there. `kept` is one of this system alone.
-    pub fn assemble_after(&self, kept: &mut Elements, groups: &[Group], values: &mut Vec<f64>) {
-        self.clear(values);
-        kept.pieces.resize_with(groups.len(), Vec::new);
-        for ((group, maps), pieces) in groups.iter().zip(&self.elements).zip(&mut kept.pieces) {
-            pieces.resize_with(maps.len().div_ceil(PIECE), Piece::kept);
-            self.add_up(group, 0, maps, pieces, values);
-        }
-    }
-
-    fn clear(&self, values: &mut Vec<f64>) {
-        values.clear();
-        values.resize(self.pattern.rows.len(), 0.0);
-    }
-
-    /// Adds the matrices of the elements of a group from the `first` on. Elements share entries: they are
-    /// added in one order, whoever computed them.
-    fn add_up(
-        &self,
-        group: &Group,
-        first: usize,
-        maps: &[ElementMap],
-        pieces: &mut [Piece],
-        values: &mut [f64],
-    ) {
-        let is_shared = maps.len() > PIECE;
-        let each = pieces.par_iter_mut().zip(maps.par_chunks(PIECE));
-        // What is not worth sharing is one piece, which no other thread is woken for.
-        each.with_min_len(if is_shared { 1 } else { usize::MAX })
-            .enumerate()
-            .for_each(|(piece, (kept, maps))| kept.renew(group, first + PIECE * piece, maps));
-        let add = |part: Part<'_>| part.add(maps, pieces);
-        if is_shared {
-            self.parts(values)
-                .into_par_iter()
-                .with_max_len(1)
-                .for_each(add);
-        } else {
-            add(Part { start: 0, values });
-        }
-    }
-
-    /// The values of the matrix in parts of some columns.
-    fn parts<'v>(&self, mut values: &'v mut [f64]) -> Vec<Part<'v>> {
-        let starts = &self.pattern.column_start;
-        let mut start = 0;
-        let mut parts = Vec::with_capacity(PARTS);
-        for part in 1..=PARTS {
-            let end = starts[part * self.free.len() / PARTS];
-            let (own, rest) = values.split_at_mut((end - start) as usize);
-            parts.push(Part { start, values: own });
-            (start, values) = (end, rest);
-        }
-        parts
-    }
-
     /// Adds the forces that increments of prescribed displacements cause at constant tangent to
     /// `forces`, by equation.
     pub fn prescribed_forces(&self, groups: &[Group], increment: &[f64], forces: &mut [f64]) {
@@ -442,137 +369,6 @@ impl System {
                         }
                     }
                 }
-            }
-        }
-    }
-}
-
-/// Part of the values of a matrix.
-struct Part<'v> {
-    /// Position of the first one.
-    start: u32,
-    values: &'v mut [f64],
-}
-
-impl Part<'_> {
-    /// Adds the matrices of elements, one after the other, which stand in pieces.
-    fn add(self, maps: &[ElementMap], pieces: &[Piece]) {
-        let end = self.start + self.values.len() as u32;
-        for (maps, piece) in maps.chunks(PIECE).zip(pieces) {
-            let mut rest = piece.matrices.as_slice();
-            for map in maps {
-                let (matrix, others) = rest.split_at(map.slots.len());
-                rest = others;
-                let [first, last] = map.span;
-                if first >= end || last < self.start {
-                    continue;
-                }
-                for (slot, value) in map.slots.iter().zip(matrix) {
-                    // Positions before this part wrap around, as those of no equation do.
-                    let at = slot.wrapping_sub(self.start) as usize;
-                    if let Some(sum) = self.values.get_mut(at) {
-                        *sum += value;
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Matrices of the elements of a [`System`], for the next time they are added up.
-#[derive(Debug, Default)]
-pub struct Elements {
-    /// Of every group.
-    pieces: Vec<Vec<Piece>>,
-}
-
-/// Those of some elements, one after the other.
-#[derive(Debug, Default)]
-struct Piece {
-    matrices: Vec<f64>,
-    /// The tangents they were computed from, if they are kept.
-    tangents: Option<Vec<f64>>,
-}
-
-impl Piece {
-    fn kept() -> Self {
-        Self {
-            tangents: Some(Vec::new()),
-            ..Self::default()
-        }
-    }
-
-    /// Computes the matrices of the elements from the `first` on whose tangents have changed.
-    fn renew(&mut self, group: &Group, first: usize, maps: &[ElementMap]) {
-        let mut matrix = ElementMatrix::default();
-        if self.matrices.is_empty() {
-            for (e, map) in (first..).zip(maps) {
-                self.matrices.extend_from_slice(matrix.of(group, e, map));
-                if let Some(tangents) = &mut self.tangents {
-                    tangents.extend_from_slice(group.element_tangents(e));
-                }
-            }
-            return;
-        }
-        let mut matrices = self.matrices.as_mut_slice();
-        let mut tangents = self.tangents.as_deref_mut().unwrap_or_default();
-        for (e, map) in (first..).zip(maps) {
-            let now = group.element_tangents(e);
-            let (own, before);
-            (own, matrices) = matrices.split_at_mut(map.slots.len());
-            (before, tangents) = tangents.split_at_mut(now.len());
-            if before
-                .iter()
-                .zip(now)
-                .any(|(a, b)| a.to_bits() != b.to_bits())
-            {
-                before.copy_from_slice(now);
-                own.copy_from_slice(matrix.of(group, e, map));
-            }
-        }
-    }
-}
-
-/// Room for the matrix of one element.
-#[derive(Default)]
-struct ElementMatrix {
-    own: Vec<f64>,
-    tied: Vec<f64>,
-}
-
-impl ElementMatrix {
-    /// An element's tangent matrix by the degrees of freedom of its map, row-major.
-    fn of(&mut self, group: &Group, element: usize, map: &ElementMap) -> &[f64] {
-        let n_own = 2 * group.kinematics.nodes(element).len();
-        self.own.resize(n_own * n_own, 0.0);
-        let tangents = group.element_tangents(element);
-        group.kinematics.stiffness(element, tangents, &mut self.own);
-        match &map.transform {
-            None => &self.own,
-            Some(transform) => {
-                congruent(&self.own, transform, n_own, map.dofs.len(), &mut self.tied);
-                &self.tied
-            }
-        }
-    }
-}
-
-/// Tᵀ K T, with K n×n and T n×m, both row-major.
-fn congruent(k: &[f64], t: &[f64], n: usize, m: usize, out: &mut Vec<f64>) {
-    let mut kt = vec![0.0; n * m];
-    for i in 0..n {
-        for l in 0..n {
-            for j in 0..m {
-                kt[i * m + j] += k[i * n + l] * t[l * m + j];
-            }
-        }
-    }
-    out.clear();
-    out.resize(m * m, 0.0);
-    for l in 0..n {
-        for i in 0..m {
-            for j in 0..m {
-                out[i * m + j] += t[l * m + i] * kt[l * m + j];
             }
         }
     }
@@ -636,31 +432,4 @@ fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> 
         }
     }
     slots
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_congruent_product_keeps_the_energy() {
-        // uᵀKu with u = T v equals vᵀ(TᵀKT)v.
-        let k = [4.0, 1.0, 2.0, 3.0];
-        let t = [1.0, 0.5, -1.0, 0.0, 2.0, 1.0];
-        let v = [1.0, 2.0, 3.0];
-        let mut out = Vec::new();
-        congruent(&k, &t, 2, 3, &mut out);
-        let u: Vec<f64> = (0..2)
-            .map(|i| (0..3).map(|j| t[i * 3 + j] * v[j]).sum())
-            .collect();
-        let own: f64 = (0..2)
-            .flat_map(|i| (0..2).map(move |j| (i, j)))
-            .map(|(i, j)| u[i] * k[i * 2 + j] * u[j])
-            .sum();
-        let reduced: f64 = (0..3)
-            .flat_map(|i| (0..3).map(move |j| (i, j)))
-            .map(|(i, j)| v[i] * out[i * 3 + j] * v[j])
-            .sum();
-        assert!((own - reduced).abs() < 1e-13 * own.abs());
-    }
 }

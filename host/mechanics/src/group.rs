@@ -667,6 +667,11 @@ impl Group {
         &self.tangent[first * n * n..(first + points.len()) * n * n]
     }
 
+    /// The tangents of every element's points, if they are the same at all of them.
+    pub fn constant_tangents(&self) -> Option<&[f64]> {
+        self.tangents_are_constant.then_some(&self.tangent)
+    }
+
     /// Tangents as of the last evaluation that computed them.
     pub fn tangents(&self) -> &[f64] {
         &self.tangent

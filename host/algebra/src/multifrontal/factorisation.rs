@@ -3,7 +3,7 @@
 use super::analysis::{Analysis, Shape};
 use super::kernels::{WORTHWHILE, factorise_symmetric, factorise_unsymmetric, pack};
 use super::updates::{OnPivots, OnRest, Pile, Update};
-use super::{Front, Gathered, Kind, Multifrontal};
+use super::{Before, Front, Gathered, Kind, Multifrontal};
 use crate::Singular;
 use crate::dense::Exchanges;
 use pulp::Arch;
@@ -48,15 +48,14 @@ impl Multifrontal {
     /// # Errors
     /// [`Singular`]: a pivot vanishes, or a symmetric matrix is not positive definite.
     pub fn factorise(&mut self, values: &[f64]) -> Result<(), Singular> {
-        self.factorise_after(&[], values)
+        self.factorise_after(&Before::Values(&[]), values)
     }
 
-    /// As [`Self::factorise`], for the same bits with less work: `before` are the values of the
-    /// last matrix.
+    /// As [`Self::factorise`], for the same bits with less work.
     ///
     /// # Errors
     /// As [`Self::factorise`].
-    pub fn factorise_after(&mut self, before: &[f64], values: &[f64]) -> Result<(), Singular> {
+    pub fn factorise_after(&mut self, before: &Before<'_>, values: &[f64]) -> Result<(), Singular> {
         self.clear_schur();
         self.add_kept(values);
         self.eliminate_all(before, Values::OfPattern(values))
@@ -69,12 +68,12 @@ impl Multifrontal {
     /// As [`Self::factorise`].
     pub fn factorise_onto(
         &mut self,
-        block: impl Iterator<Item = f64>,
-        before: &[f64],
+        block: &[f64],
+        before: &Before<'_>,
         values: &[f64],
     ) -> Result<(), Singular> {
         self.schur.clear();
-        self.schur.extend(block);
+        self.schur.extend_from_slice(block);
         self.add_kept(values);
         self.eliminate_all(before, Values::OfPattern(values))
     }
@@ -94,7 +93,7 @@ impl Multifrontal {
     /// # Errors
     /// As [`Self::factorise`].
     pub fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
-        self.eliminate_all(&[], Values::OfFronts(&values.0))?;
+        self.eliminate_all(&Before::Values(&[]), Values::OfFronts(&values.0))?;
         self.analysis.targets = Vec::new();
         self.analysis.runs = Vec::new();
         self.memory = Mutex::default();
@@ -114,22 +113,42 @@ impl Multifrontal {
         }
     }
 
-    /// What becomes of every front after a matrix with the values `before`.
-    fn tasks(&mut self, before: &[f64], values: Values<'_>) -> Vec<Task> {
+    /// Of every front, whether its entries are those of the last matrix.
+    fn unchanged(&self, before: &Before<'_>, values: &[f64]) -> Vec<bool> {
         let (shapes, sources) = (&self.analysis.fronts, &self.analysis.sources);
+        match before {
+            Before::Values(before) if before.len() == values.len() => {
+                let is_same =
+                    |&at: &u32| before[at as usize].to_bits() == values[at as usize].to_bits();
+                let stays = shapes
+                    .par_iter()
+                    .with_min_len(PER_TASK)
+                    .map(|shape| sources[shape.entries.clone()].iter().all(is_same));
+                stays.collect()
+            }
+            Before::Values(_) => vec![false; shapes.len()],
+            // An entry of a front has a pivot for its row or its column.
+            Before::But(changed) => {
+                let stays = |shape: &Shape| {
+                    let pivots = &self.analysis.order[shape.pivots.clone()];
+                    pivots.iter().all(|&equation| !changed[equation as usize])
+                };
+                shapes.iter().map(stays).collect()
+            }
+        }
+    }
+
+    /// What becomes of every front after the last matrix.
+    fn tasks(&mut self, before: &Before<'_>, values: Values<'_>) -> Vec<Task> {
+        let shapes = &self.analysis.fronts;
         let mut tasks = vec![Task::Compute; shapes.len()];
         let Values::OfPattern(values) = values else {
             return tasks;
         };
-        if !self.is_complete || before.len() != values.len() {
+        if !self.is_complete {
             return tasks;
         }
-        let is_same = |&at: &u32| before[at as usize].to_bits() == values[at as usize].to_bits();
-        let stays = shapes
-            .par_iter()
-            .with_min_len(PER_TASK)
-            .map(|shape| sources[shape.entries.clone()].iter().all(is_same));
-        let stays: Vec<bool> = stays.collect();
+        let stays = self.unchanged(before, values);
         // Children come before their parents.
         for (front, shape) in shapes.iter().enumerate() {
             if stays[front] && shape.children.iter().all(|&c| tasks[c] == Task::TakeOver) {
@@ -161,7 +180,7 @@ impl Multifrontal {
         tasks
     }
 
-    fn eliminate_all(&mut self, before: &[f64], values: Values<'_>) -> Result<(), Singular> {
+    fn eliminate_all(&mut self, before: &Before<'_>, values: Values<'_>) -> Result<(), Singular> {
         let tasks = self.tasks(before, values);
         self.is_complete = false;
         self.computed = tasks.iter().filter(|&&task| task != Task::TakeOver).count();

@@ -188,8 +188,7 @@ impl<'a> Newton<'a> {
     /// # Errors
     /// It is singular.
     pub fn restore_matrix(&mut self) -> Result<(), StepFailure> {
-        let values = self.stiffness();
-        self.factorise(values, 1.0)?;
+        self.factorise_tangents()?;
         self.matrix.hold();
         Ok(())
     }

@@ -238,14 +238,14 @@ impl Newton<'_> {
     fn start_creep(&mut self, task: &Task, guess: Option<&[f64]>) -> Result<Motion, StepFailure> {
         let still = vec![0.0; task.external.len()];
         let before = self.evaluate(&still, task, Operator::Elastic)?;
-        let elastic = self.stiffness();
+        let elastic = self.stiffness().to_vec();
         let coupling = self.coupling(&task.prescribed);
         let pairs = coupling.iter().zip(&before.residual);
         let given = pairs.map(|(coupling, change)| coupling - change).collect();
         let increment = if let Some(guess) = guess {
             guess.to_vec()
         } else {
-            self.factorise(elastic.clone(), 1.0)?;
+            self.factorise(elastic.clone())?;
             self.answer_to(&before.residual, task)?
         };
         Ok(Motion {

@@ -100,8 +100,7 @@ impl Newton<'_> {
             self.evaluate(increment, task, operator)
                 .map_err(StepFailure::from)?;
         }
-        let values = self.stiffness();
-        self.factorise(values, 1.0)?;
+        self.factorise_tangents()?;
         self.matrix.hold();
         self.kept.renewed = true;
         self.kept.stalls = false;

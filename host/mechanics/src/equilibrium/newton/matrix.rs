@@ -4,13 +4,24 @@ use super::Newton;
 use super::failure::{Reason, StepFailure};
 use crate::assembly::Elements;
 use crate::settings::Method;
-use algebra::{LinearSolver, largest};
+use algebra::{LinearSolver, Singular, largest};
 use law::Operator;
-use rayon::prelude::*;
 use std::time::Instant;
 
 /// Entries that one thread looks at, at a time.
 pub(super) const PER_TASK: usize = 1 << 16;
+
+/// What the sum of the groups' tangents is to the solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Sum {
+    /// Another matrix than its last one.
+    #[default]
+    Another,
+    /// Its last matrix.
+    Last,
+    /// It was its last matrix before tangents were added up once more.
+    Next,
+}
 
 /// What the solver of a phase holds factorised.
 #[derive(Debug, Default)]
@@ -25,8 +36,9 @@ pub struct Matrix {
     largest: f64,
     /// The same of every body, where there are several.
     largest_by_body: Vec<f64>,
-    /// What it was added up from.
+    /// The sum of the groups' tangents.
     elements: Elements,
+    sum: Sum,
     /// The same equations once more, for what is asked beside the iterations.
     pub(super) beside: Option<LinearSolver>,
 }
@@ -51,6 +63,11 @@ impl Matrix {
         known.copied().unwrap_or(self.largest)
     }
 
+    /// The matrix from the last tangents that were added up.
+    pub(super) fn tangents(&self) -> &[f64] {
+        self.elements.values()
+    }
+
     pub(super) fn hold(&mut self) {
         self.held = true;
         self.has_tangents = true;
@@ -73,20 +90,23 @@ impl Newton<'_> {
     }
 
     /// The matrix from the tangents that the groups hold, without the domain.
-    pub(super) fn stiffness(&mut self) -> Vec<f64> {
+    pub(super) fn stiffness(&mut self) -> &[f64] {
         let start = Instant::now();
-        let mut values = self.solver.room();
+        let matrix = &mut *self.matrix;
         self.system
-            .assemble_after(&mut self.matrix.elements, self.groups, &mut values);
+            .assemble_after(&mut matrix.elements, self.groups);
+        matrix.sum = match matrix.sum {
+            Sum::Last => Sum::Next,
+            _ => Sum::Another,
+        };
+        let columns = matrix.elements.largest();
         let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
-        let of_parts = values.par_chunks(PER_TASK).map(largest);
-        self.matrix.largest = of_parts.reduce(|| of_domain, f64::max);
+        matrix.largest = of_domain.max(largest(columns));
         let bodies = &self.places.bodies;
         if !bodies.of_equation.is_empty() {
             let mut by_body = vec![0.0_f64; bodies.n];
-            for (column, &body) in bodies.of_equation.iter().enumerate() {
-                let column = &values[self.system.pattern.places(column)];
-                by_body[body as usize] = by_body[body as usize].max(largest(column));
+            for (&of_column, &body) in columns.iter().zip(&bodies.of_equation) {
+                by_body[body as usize] = by_body[body as usize].max(of_column);
             }
             if let Some(domain) = self.domain {
                 let n = self.places.boundary.len();
@@ -96,20 +116,51 @@ impl Newton<'_> {
                     by_body[body] = by_body[body].max(largest(column));
                 }
             }
-            self.matrix.largest_by_body = by_body;
+            matrix.largest_by_body = by_body;
         }
         self.costs.assembly += start.elapsed();
-        values
+        matrix.elements.values()
     }
 
-    /// Factorises a matrix with a multiple of the domain's stiffness.
+    /// Factorises the matrix from the tangents that the groups hold.
     ///
     /// # Errors
     /// It is singular.
-    pub(super) fn factorise(&mut self, values: Vec<f64>, share: f64) -> Result<(), StepFailure> {
+    pub(super) fn factorise_tangents(&mut self) -> Result<(), StepFailure> {
+        self.stiffness();
         let start = Instant::now();
+        let elements = &self.matrix.elements;
+        let outcome = if self.matrix.sum == Sum::Next {
+            self.solver
+                .factorise_changed(elements.values(), elements.changed())
+        } else {
+            let mut values = self.solver.room();
+            values.clear();
+            values.extend_from_slice(elements.values());
+            self.solver.factorise(values)
+        };
+        self.factorised(start, outcome)?;
+        self.matrix.sum = Sum::Last;
+        Ok(())
+    }
+
+    /// Factorises a matrix that follows from tangents that the groups held.
+    ///
+    /// # Errors
+    /// It is singular.
+    pub(super) fn factorise(&mut self, values: Vec<f64>) -> Result<(), StepFailure> {
+        let start = Instant::now();
+        let outcome = self.solver.factorise(values);
+        self.factorised(start, outcome)
+    }
+
+    fn factorised(
+        &mut self,
+        start: Instant,
+        outcome: Result<(), Singular>,
+    ) -> Result<(), StepFailure> {
         self.matrix.held = false;
-        let outcome = self.solver.factorise_with(values, share);
+        self.matrix.sum = Sum::Another;
         self.costs.equations += start.elapsed();
         self.costs.factorisations += 1;
         outcome.map_err(|_| Reason::Singular(None).into())

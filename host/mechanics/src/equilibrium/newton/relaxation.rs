@@ -191,8 +191,8 @@ impl Newton<'_> {
     fn start_motion(&mut self, task: &Task) -> Option<Motion> {
         let still = vec![0.0; task.external.len()];
         let before = self.evaluate(&still, task, Operator::Elastic).ok()?;
-        let elastic = self.stiffness();
-        self.factorise(elastic.clone(), 1.0).ok()?;
+        self.factorise_tangents().ok()?;
+        let elastic = self.matrix.tangents().to_vec();
         Some(Motion {
             elastic,
             increment: self.answer_to(&before.residual, task).ok()?,
@@ -248,7 +248,9 @@ impl Newton<'_> {
         (viscosity, elastic): (f64, &[f64]),
     ) -> Result<Vec<f64>, StepFailure> {
         let share = 1.0 / (1.0 + viscosity);
-        let mut values = self.stiffness();
+        let mut values = self.solver.room();
+        values.clear();
+        values.extend_from_slice(self.stiffness());
         let parts = values.par_chunks_mut(PER_TASK);
         parts
             .zip(elastic.par_chunks(PER_TASK))
@@ -259,7 +261,7 @@ impl Newton<'_> {
                     }
                 }
             });
-        self.factorise(values, 1.0)?;
+        self.factorise(values)?;
         let residual: Vec<f64> = residual.iter().map(|r| share * r).collect();
         self.solve(&residual, None)
     }

@@ -137,8 +137,7 @@ impl Newton<'_> {
         let still = vec![0.0; increment.len()];
         let operator = self.operator();
         let settled = self.evaluate(&still, task, operator).is_ok() && {
-            let values = self.stiffness();
-            self.factorise(values, 1.0).is_ok() && {
+            self.factorise_tangents().is_ok() && {
                 self.matrix.hold();
                 self.solve(&balance.residual, None).is_ok_and(|correction| {
                     self.changes = self.changes(&correction, increment);
