@@ -329,10 +329,10 @@ impl LinearSolver {
         Ok(x)
     }
 
-    /// b − A x, and the backward error ‖b − A x‖ / (‖A‖‖x‖ + ‖b‖) in maximum norms.
+    /// b − A x, and the backward error ‖b − A x‖ / (‖A‖‖x‖ + ‖b‖) in maximum norms, or a larger value that is
+    /// small enough, too.
     fn residual(&self, right: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
-        let terms = |value: f64, column: usize| [value * x[column], value.abs()];
-        let [product, mut row_sums] = self.pattern.add_up(&self.values, terms);
+        let product = self.pattern.multiply(&self.values, x);
         let both = right.iter().zip(product);
         let mut residual: Vec<f64> = both.map(|(right, product)| right - product).collect();
         if let Some(block) = &self.block {
@@ -344,19 +344,33 @@ impl LinearSolver {
                     *sum += value * x[column];
                 }
             }
-            for ((&row, product), row_sum) in at.zip(product).zip(&block.row_sums) {
+            for (&row, product) in at.zip(product) {
                 residual[row] -= product;
+            }
+        }
+        if !residual.iter().chain(x).all(|v| v.is_finite()) {
+            return (residual, f64::NAN);
+        }
+        let (left, right) = (largest(&residual), largest(right));
+        // The matrix's norm costs as much as the product, and is seldom needed.
+        let mut scale = right;
+        if left > BACKWARD_ERROR * scale {
+            scale += self.norm() * largest(x);
+        }
+        let error = if scale > 0.0 { left / scale } else { 0.0 };
+        (residual, error)
+    }
+
+    /// Largest sum of the absolute values of a row.
+    fn norm(&self) -> f64 {
+        let sizes = |value: f64, _| [value.abs()];
+        let [mut row_sums] = self.pattern.add_up(&self.values, sizes);
+        if let Some(block) = &self.block {
+            for (&row, row_sum) in block.equations.iter().zip(&block.row_sums) {
                 row_sums[row] += row_sum;
             }
         }
-        let scale = largest(&row_sums) * largest(x) + largest(right);
-        let error = if scale > 0.0 {
-            largest(&residual) / scale
-        } else {
-            0.0
-        };
-        let finite = residual.iter().chain(x).all(|v| v.is_finite());
-        (residual, if finite { error } else { f64::NAN })
+        largest(&row_sums)
     }
 }
 
