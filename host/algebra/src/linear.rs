@@ -312,7 +312,10 @@ impl LinearSolver {
 
     fn solve_once(&self, right: &[f64]) -> Result<Vec<f64>, Singular> {
         if self.factorised {
-            let (y, mut kept) = self.multifrontal.forward(right, None);
+            // Where nothing is to be answered, nothing is to be eliminated.
+            let wanted: Vec<bool> = right.iter().map(|value| value.abs() > 0.0).collect();
+            let fronts = self.multifrontal.fronts_of(&wanted);
+            let (y, mut kept) = self.multifrontal.forward(right, Some(&fronts));
             if self.block.is_some() {
                 kept = dense::solve(self.multifrontal.schur(), &self.exchanges, &kept);
             }

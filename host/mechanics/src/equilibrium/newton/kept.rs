@@ -137,7 +137,7 @@ impl Newton<'_> {
             return Ok(None);
         }
         let correction = Correction {
-            increment: self.solve(&state.balance.residual, None)?,
+            increment: self.correction_of(&state.balance)?,
             rise: 0.0,
         };
         let operator = self.operator();

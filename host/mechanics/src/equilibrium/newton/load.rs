@@ -77,7 +77,7 @@ impl LoadControl {
         newton: &mut Newton<'_>,
         state: &State,
     ) -> Result<Correction, StepFailure> {
-        let correction = newton.solve(&state.balance.residual, None)?;
+        let correction = newton.correction_of(&state.balance)?;
         Ok(Correction {
             increment: match &mut self.acceleration {
                 Some(acceleration) => acceleration.improve(correction),

@@ -2,6 +2,7 @@
 
 use super::Newton;
 use super::failure::{Reason, StepFailure};
+use super::residual::Balance;
 use crate::assembly::Elements;
 use crate::settings::Method;
 use algebra::{LinearSolver, Singular, largest};
@@ -10,6 +11,9 @@ use std::time::Instant;
 
 /// Entries that one thread looks at, at a time.
 pub(super) const PER_TASK: usize = 1 << 16;
+
+/// Share of what is tolerated out of balance that corrections may leave.
+const LEFT: f64 = 1e-3;
 
 /// What the sum of the groups' tangents is to the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -175,6 +179,28 @@ impl Newton<'_> {
         system.prescribed_forces(self.groups, increment, &mut coupling);
         self.costs.assembly += start.elapsed();
         coupling
+    }
+
+    /// The correction that takes away what is out of balance, with the matrix there is, by place.
+    ///
+    /// Entries of the residual that all together are far below what is tolerated are left: where ground
+    /// stays elastic the first corrections leave no others, and the solver has less to eliminate.
+    ///
+    /// # Errors
+    /// The matrix is singular.
+    pub(super) fn correction_of(&mut self, balance: &Balance) -> Result<Vec<f64>, StepFailure> {
+        let of_equation = &self.places.bodies.of_equation;
+        let share = LEFT * self.settings.force_tolerance / (balance.residual.len() as f64).sqrt();
+        let left: Vec<f64> = balance.scales.iter().map(|scale| share * scale).collect();
+        let entries = balance.residual.iter().enumerate();
+        let residual: Vec<f64> = entries
+            .map(|(equation, &entry)| {
+                let body = of_equation.get(equation).map_or(0, |&body| body as usize);
+                let is_left = left.get(body).is_some_and(|left| entry.abs() <= *left);
+                if is_left { 0.0 } else { entry }
+            })
+            .collect();
+        self.solve(&residual, None)
     }
 
     /// Solves K δ = residual − K_fp Δp with the factorised matrix.
