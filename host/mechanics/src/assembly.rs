@@ -375,6 +375,32 @@ impl System {
         }
     }
 
+    /// Whether its matrix is always the same: all groups that take part are linear.
+    pub fn is_constant(&self, groups: &[Group]) -> bool {
+        let mut included = (groups.iter().enumerate()).filter(|(number, _)| self.includes(*number));
+        included.all(|(_, group)| group.is_linear())
+    }
+
+    /// Bytes of the [`Elements`] that the system keeps from one matrix to the next, if there is a next one:
+    /// matrices, and tangents that may change.
+    pub fn bytes_of_elements(&self, groups: &[Group]) -> u64 {
+        if self.is_constant(groups) {
+            return 0;
+        }
+        let of_group = |(group, maps): (&Group, &Vec<ElementMap>)| {
+            let matrices: usize = maps.iter().map(|map| map.slots.len()).sum();
+            let times = if group.is_linear() {
+                maps.len().div_ceil(PIECE)
+            } else {
+                usize::from(!maps.is_empty())
+            };
+            let tangents = times * group.tangents().len();
+            matrices + tangents
+        };
+        let numbers: usize = groups.iter().zip(&self.elements).map(of_group).sum();
+        (numbers * size_of::<f64>()) as u64
+    }
+
     fn clear(&self, values: &mut Vec<f64>) {
         values.clear();
         values.resize(self.pattern.rows.len(), 0.0);
@@ -486,6 +512,17 @@ pub struct Elements {
     pieces: Vec<Vec<Piece>>,
 }
 
+impl Elements {
+    /// Bytes of what is kept.
+    pub fn bytes(&self) -> u64 {
+        let of_piece = |piece: &Piece| {
+            let tangents = piece.tangents.as_deref().unwrap_or_default();
+            size_of_val(&*piece.matrices) + size_of_val(tangents)
+        };
+        self.pieces.iter().flatten().map(of_piece).sum::<usize>() as u64
+    }
+}
+
 /// Those of some elements, one after the other.
 #[derive(Debug, Default)]
 struct Piece {
@@ -504,6 +541,9 @@ impl Piece {
 
     /// Computes the matrices of the elements from the `first` on whose tangents have changed.
     fn renew(&mut self, group: &Group, first: usize, maps: &[ElementMap]) {
+        if group.is_linear() {
+            return self.renew_by_one(group, first, maps);
+        }
         let mut matrix = ElementMatrix::default();
         if self.matrices.is_empty() {
             for (e, map) in (first..).zip(maps) {
@@ -521,16 +561,35 @@ impl Piece {
             let (own, before);
             (own, matrices) = matrices.split_at_mut(map.slots.len());
             (before, tangents) = tangents.split_at_mut(now.len());
-            if before
-                .iter()
-                .zip(now)
-                .any(|(a, b)| a.to_bits() != b.to_bits())
-            {
+            if !is_same(before, now) {
                 before.copy_from_slice(now);
                 own.copy_from_slice(matrix.of(group, e, map));
             }
         }
     }
+
+    /// The same in a group whose points have one tangent, which is kept once.
+    fn renew_by_one(&mut self, group: &Group, first: usize, maps: &[ElementMap]) {
+        let now = group.tangents();
+        let before = self.tangents.as_deref().unwrap_or_default();
+        if !self.matrices.is_empty() && is_same(before, now) {
+            return;
+        }
+        self.matrices.clear();
+        let mut matrix = ElementMatrix::default();
+        for (e, map) in (first..).zip(maps) {
+            self.matrices.extend_from_slice(matrix.of(group, e, map));
+        }
+        if let Some(tangents) = &mut self.tangents {
+            now.clone_into(tangents);
+        }
+    }
+}
+
+/// Whether tangents are the same to the bit.
+fn is_same(before: &[f64], now: &[f64]) -> bool {
+    let before = before.iter().map(|value| value.to_bits());
+    before.eq(now.iter().map(|value| value.to_bits()))
 }
 
 /// Room for the matrix of one element.

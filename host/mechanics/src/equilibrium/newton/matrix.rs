@@ -29,7 +29,12 @@ pub struct Matrix {
     elements: Elements,
     /// The same equations once more, for what is asked beside the iterations.
     pub(super) beside: Option<LinearSolver>,
+    /// Who is told beforehand how many bytes these take.
+    announces: Option<Announces>,
 }
+
+/// Takes how many bytes a large piece of work needs, and what it is.
+type Announces = fn(u64, &'static str);
 
 impl Matrix {
     /// That of a run that goes on.
@@ -37,6 +42,22 @@ impl Matrix {
         Self {
             largest,
             ..Self::default()
+        }
+    }
+
+    /// Tells this function what large pieces of memory are needed later.
+    #[must_use]
+    pub fn announcing(self, announces: Option<Announces>) -> Self {
+        Self { announces, ..self }
+    }
+
+    /// Says that the equations are about to be factorised once more, for what is asked beside the iterations.
+    pub(super) fn announce_beside(&self, bytes: u64) {
+        if let Some(announces) = self.announces {
+            announces(
+                bytes,
+                "factorising the equations beside those of the iterations",
+            );
         }
     }
 
@@ -76,8 +97,13 @@ impl Newton<'_> {
     pub(super) fn stiffness(&mut self) -> Vec<f64> {
         let start = Instant::now();
         let mut values = self.solver.room();
-        self.system
-            .assemble_after(&mut self.matrix.elements, self.groups, &mut values);
+        if self.matrix.is_constant {
+            // It is not added up again.
+            self.system.assemble(self.groups, &mut values);
+        } else {
+            self.system
+                .assemble_after(&mut self.matrix.elements, self.groups, &mut values);
+        }
         let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
         let of_parts = values.par_chunks(PER_TASK).map(largest);
         self.matrix.largest = of_parts.reduce(|| of_domain, f64::max);

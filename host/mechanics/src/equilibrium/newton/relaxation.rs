@@ -102,7 +102,7 @@ impl Relaxation {
     /// The last series of Newton iterations, with the state that it started from. A relaxed state
     /// is allowed as many as the first one was.
     pub(super) fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
-        &iterations[self.first..]
+        iterations.get(self.first..).unwrap_or_default()
     }
 
     /// Whether it led to the present state.
