@@ -114,6 +114,10 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
             "`control = \"auto\"` in [solver], which relaxes and creeps where the load leads no further, and \
              `control = \"creep\"` were not tried",
         ],
+        reason if !none.may_move && may_have_another_way(reason) => vec![
+            "`method = \"auto\"` with `relaxation = true` in [solver], with which relaxation and creep lead on where iterations \
+             stand still, was not tried",
+        ],
         Reason::Unmet(Iterations::Newton(_, Some(_)), _) => vec![
             creep.unwrap_or("other increments may lead on"),
             "`convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, where \
@@ -290,8 +294,8 @@ mod tests {
     const BY_CREEP: &str = "`control = \"creep\"`";
     const LIMIT: Reason = Reason::Singular(Some((Singularity::Limit, 0.7)));
 
-    fn help(control: Control, reason: Reason) -> String {
-        after_no_equilibrium(&NoEquilibrium {
+    fn none(control: Control, reason: Reason) -> NoEquilibrium {
+        NoEquilibrium {
             place: Place {
                 phase: "push".to_owned(),
                 increment: 3,
@@ -299,9 +303,14 @@ mod tests {
             reached: 2.5,
             of: 10,
             control,
+            may_move: true,
             failure: reason.into(),
             runaway: None,
-        })
+        }
+    }
+
+    fn help(control: Control, reason: Reason) -> String {
+        after_no_equilibrium(&none(control, reason))
     }
 
     fn unmet(iterations: Iterations) -> Reason {
@@ -329,6 +338,24 @@ mod tests {
         let written = "results up to the last whole increment";
         assert!(help(Control::Creep, LIMIT).starts_with(written));
         assert!(help(Control::Auto, Reason::NoState).starts_with(written));
+    }
+
+    /// `modified_newton` and the like, and `relaxation = false`.
+    #[test]
+    fn settings_without_relaxation_propose_it() {
+        let still = |reason| {
+            after_no_equilibrium(&NoEquilibrium {
+                may_move: false,
+                ..none(Control::Auto, reason)
+            })
+        };
+        let proposal = "`method = \"auto\"` with `relaxation = true`";
+        for reason in [unmet(Iterations::Newton(200, None)), LIMIT] {
+            assert!(still(reason.clone()).starts_with(proposal));
+            assert!(!help(Control::Auto, reason).contains(proposal));
+        }
+        let free = Reason::Singular(Some((Singularity::Free, 0.7)));
+        assert!(!still(free).contains(proposal));
     }
 
     #[test]

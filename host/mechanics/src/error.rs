@@ -74,6 +74,8 @@ pub struct NoEquilibrium {
     pub of: usize,
     /// What led its steps at last.
     pub control: Control,
+    /// Where iterations stand still, the settings let relaxation or creep lead on.
+    pub may_move: bool,
     /// The last attempt: reason, both criteria with residuals, the point that failed.
     pub failure: StepFailure,
     /// The displacement that ran away, if one did.

@@ -51,6 +51,7 @@ impl Simulation {
         failure: StepFailure,
     ) -> NoEquilibrium {
         let of = self.problem.phases[phase.number].increments;
+        let settings = &self.problem.settings;
         NoEquilibrium {
             place: place.clone(),
             reached: lambda * of as f64,
@@ -58,8 +59,10 @@ impl Simulation {
             control: if phase.record.crept_from.is_some() {
                 Control::Creep
             } else {
-                self.problem.settings.control
+                settings.control
             },
+            may_move: settings.method.is_newton()
+                && (settings.relaxation || settings.control == Control::Creep),
             failure,
             runaway: None,
         }
