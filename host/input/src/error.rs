@@ -106,9 +106,12 @@ fn hint(error: &mechanics::Error) -> Option<String> {
 
 /// What may lead on where no equilibrium was found and was not tried yet, and what is written of the run.
 fn after_no_equilibrium(none: &NoEquilibrium) -> String {
-    let creep = none.control.relaxes().then_some(
-        "`control = \"creep\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on",
-    );
+    let creep = none.control.relaxes().then_some(if none.crept {
+        "`control = \"creep\"` in [solver], by whole increments, may lead on where short steps do not: what flows on its way \
+         stays, so hold the results against those of other increments"
+    } else {
+        "`control = \"creep\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on"
+    });
     let ways = match &none.failure.reason {
         reason if none.control == Control::ArcLength && may_have_another_way(reason) => vec![
             "`control = \"auto\"` in [solver], which relaxes and creeps where the load leads no further, and \
@@ -303,6 +306,7 @@ mod tests {
             reached: 2.5,
             of: 10,
             control,
+            crept: false,
             may_move: true,
             failure: reason.into(),
             runaway: None,
@@ -325,13 +329,20 @@ mod tests {
     }
 
     #[test]
-    fn auto_proposes_creep_until_creep_has_led() {
+    fn auto_proposes_creep_that_was_not_tried() {
         let in_vain = |motion| unmet(Iterations::Newton(25, Some(motion)));
         let relaxed = help(Control::Auto, in_vain(Motion::Relaxation));
         assert!(relaxed.starts_with(BY_CREEP), "{relaxed}");
         assert!(relaxed.contains("`convergence = \"force\"`"), "{relaxed}");
         assert!(help(Control::Auto, LIMIT).starts_with(BY_CREEP));
-        // An `auto` that crept hands on creep as its control.
+        // By short steps under `auto`.
+        let short = after_no_equilibrium(&NoEquilibrium {
+            crept: true,
+            ..none(Control::Auto, in_vain(Motion::Creep))
+        });
+        assert!(short.starts_with(BY_CREEP), "{short}");
+        assert!(short.contains("by whole increments"), "{short}");
+        assert!(!relaxed.contains("by whole increments"), "{relaxed}");
         let crept = help(Control::Creep, in_vain(Motion::Creep));
         assert!(!crept.contains(BY_CREEP), "{crept}");
         assert!(crept.starts_with("other increments"), "{crept}");

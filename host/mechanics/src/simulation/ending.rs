@@ -56,11 +56,8 @@ impl Simulation {
             place: place.clone(),
             reached: lambda * of as f64,
             of,
-            control: if phase.record.crept_from.is_some() {
-                Control::Creep
-            } else {
-                settings.control
-            },
+            control: settings.control,
+            crept: phase.record.crept_from.is_some(),
             may_move: settings.method.is_newton()
                 && (settings.relaxation || settings.control == Control::Creep),
             failure,
