@@ -54,10 +54,7 @@ impl Matrix {
     /// Says that the equations are about to be factorised once more, for what is asked beside the iterations.
     pub(super) fn announce_beside(&self, bytes: u64) {
         if let Some(announces) = self.announces {
-            announces(
-                bytes,
-                "factorising the equations beside those of the iterations",
-            );
+            announces(bytes, "factorising the equations once more");
         }
     }
 
