@@ -11,7 +11,7 @@
 //!             away, by every method, condensed or not
 
 use crate::footing::{self, Footing};
-use crate::setup::fail;
+use crate::setup::{Results, fail};
 use input::Kind;
 use std::f64::consts::PI;
 use tests::case::{column, run_text};
@@ -249,4 +249,79 @@ fn both_criteria_are_given_and_the_failed_one_first() {
     let residual = at("residual");
     assert!(residual < at("last correction"), "{message}");
     assert!(message.contains("tolerance 1.0e-9") && message.contains("tolerance 1.0e-7"));
+}
+
+/// A pile in an elastic ground whose layer slides; with the matrix of a step's start corrections grow tenfold.
+const GROWS: &str = r#"
+analysis = "axisymmetric"
+[mesh]
+origin = [0.0, -6.0]
+columns = [{ n = 1, to = 0.5 }, { n = 1, to = 0.52 }, { n = 5, to = 5.0, ratio = 1.3 }]
+rows = [{ n = 2, to = -2.0 }, { n = 4, to = 0.0 }]
+[[mesh.region]]
+group = "ground"
+[[mesh.region]]
+group = "pile"
+x = [0.0, 0.5]
+[[mesh.region]]
+group = "shaft"
+x = [0.5, 0.52]
+[mesh.lines]
+axis = { x = 0.0 }
+far = { x = 5.0 }
+bottom = { y = -6.0 }
+head = { x = [0.0, 0.5], y = 0.0 }
+[laws]
+ground = { law = "elastic", parameters = { young_modulus = 20e3, poisson_ratio = 0.3 } }
+concrete = { law = "elastic", parameters = { young_modulus = 30e6, poisson_ratio = 0.2 } }
+[laws.shaft]
+law = "cyclic_joint"
+parameters = { normal_stiffness = 1e6, shear_stiffness = 3e5, peak_friction_angle = 30.0, residual_friction_angle = 22.0, friction_slip = 0.01, contraction_angle = 3.0, contraction_slip = 0.01 }
+[groups]
+ground = { formulation = "solid", law = "ground", integration = "reduced", unit_weight = 18.0, initial_stress = { k_0 = 0.6 } }
+pile = { formulation = "solid", law = "concrete", unit_weight = 18.0, initial_stress = { k_0 = 0.6 } }
+[groups.shaft]
+formulation = "thin_layer"
+law = "ground"
+normal = "x"
+integration = "reduced"
+unit_weight = 18.0
+initial_stress = { stress_11 = [[-6.0, -64.8], [0.0, 0.0]], stress_22 = [[-6.0, -108.0], [0.0, 0.0]], stress_33 = [[-6.0, -64.8], [0.0, 0.0]] }
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[supports]]
+line = "far"
+fixed = ["x"]
+[[supports]]
+line = "axis"
+fixed = ["x"]
+[[phase]]
+name = "in place"
+increments = 1
+laws = { shaft = "shaft" }
+[[phase]]
+name = "push"
+increments = 1
+displacement = [{ line = "head", y = -0.01 }]
+[solver]
+method = "modified_newton"
+"#;
+
+/// Corrections that grow until their squares are no numbers end the iterations there: what is said of them is finite, and
+/// how many there were.
+#[test]
+fn iterations_that_leave_all_numbers_behind_end_there() {
+    let failed = fail(GROWS);
+    assert_eq!(failed.error.kind(), Kind::NoEquilibrium);
+    let log = std::fs::read_to_string(failed.folder().join("log.jsonl")).unwrap();
+    let said = |line: &str| line.contains("no equilibrium after");
+    let attempts: Vec<&str> = log.lines().filter(|line| said(line)).collect();
+    assert!(!log.contains("NaN"), "{log}");
+    assert!(!log.contains("last correction inf"), "{log}");
+    // 200 iterations are allowed.
+    let is_short = |line: &&&str| !line.contains("no equilibrium after 200 iterations");
+    let short: Vec<_> = attempts.iter().filter(is_short).collect();
+    assert!(!short.is_empty(), "{attempts:?}");
+    assert!(short.len() < attempts.len(), "{attempts:?}");
 }

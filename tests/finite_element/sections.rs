@@ -4,7 +4,8 @@
 //! Geometry  a column of 3 × 4 unequal quads under an end pressure, standing and lying; a round pile
 //!           in a ring of soil with an interface along its whole shaft
 //! Asserts   the force through every section is the end load; through part of one its share; the
-//!           integral of the friction is what equilibrium leaves to the shaft
+//!           integral of the friction is what equilibrium leaves to the shaft; reactions beside an
+//!           interface that is not there are those of the mesh without it
 
 use crate::setup::{Results, assert_close, run};
 use std::f64::consts::PI;
@@ -272,4 +273,81 @@ traction = { group = "joint", quantity = "traction_n", reduce = "integral" }
     // 100 kPa on half a metre.
     assert_close("force", finished.last("force"), 50.0, EXACT, 50.0);
     assert_close("traction", finished.last("traction"), -50.0, EXACT, 50.0);
+}
+
+/// Two blocks with a wall between them that is not there: what holds or pushes a line that ends at the wall is that of one
+/// block, on either side and with the blocks to the right or to the left, condensed or not.
+#[test]
+fn reactions_beside_an_interface_that_is_not_there_are_those_without_it() {
+    let case = |side: f64, wall: bool, pushed: &str, equations: &str| {
+        let x = |a: f64, b: f64| {
+            let (a, b) = (side * a, side * b);
+            format!("x = [{:?}, {:?}]", a.min(b), a.max(b))
+        };
+        let (near, far, whole) = (x(0.0, 1.0), x(1.0, 2.0), x(0.0, 2.0));
+        let first = if side > 0.0 { 0.0 } else { -2.0 };
+        let joint = if wall {
+            "wall = { formulation = \"zero_thickness\", line = \"wall\", law = \"wall\", active = false }"
+        } else {
+            ""
+        };
+        format!(
+            r#"
+analysis = "plane_strain"
+[mesh]
+origin = [{first:?}, 0.0]
+columns = [{{ n = 4, to = {:?} }}]
+rows = [{{ n = 2, to = 1.0 }}]
+lines.bottom = {{ {whole}, y = 0.0 }}
+lines.near = {{ {near}, y = 1.0 }}
+lines.far = {{ {far}, y = 1.0 }}
+lines.wall = {{ x = {side:?}, y = [0.0, 1.0] }}
+[[mesh.region]]
+group = "near"
+[[mesh.region]]
+group = "far"
+{far}
+[laws]
+soil = {{ law = "elastic", parameters = {{ young_modulus = 20e3, poisson_ratio = 0.3 }} }}
+wall = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = 1e6, shear_stiffness = 3e5, cohesion = 20.0, friction_angle = 25.0, dilatancy_angle = 1.0 }} }}
+[groups]
+near = {{ formulation = "solid", law = "soil" }}
+far = {{ formulation = "solid", law = "soil" }}
+{joint}
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "push"
+increments = 2
+displacement = [{{ line = "{pushed}", y = -0.01 }}]
+[probes]
+near = {{ line = "near", quantity = "reaction_y" }}
+far = {{ line = "far", quantity = "reaction_y" }}
+bottom = {{ line = "bottom", quantity = "reaction_y" }}
+[solver]
+equations = "{equations}"
+"#,
+            first + 2.0
+        )
+    };
+    for pushed in ["near", "far"] {
+        let of = |side, wall, equations| {
+            let finished = run(&case(side, wall, pushed, equations));
+            ["near", "far", "bottom"].map(|probe| finished.last(probe))
+        };
+        let expected = of(1.0, false, "sparse");
+        for (side, wall, equations) in [
+            (-1.0, false, "sparse"),
+            (1.0, true, "sparse"),
+            (1.0, true, "condensed"),
+            (-1.0, true, "condensed"),
+        ] {
+            let found = of(side, wall, equations);
+            for (value, expected_value) in found.into_iter().zip(expected) {
+                let what = format!("{pushed} {side} {wall} {equations}");
+                assert_close(&what, value, expected_value, 1e-9, expected[2]);
+            }
+        }
+    }
 }

@@ -106,13 +106,20 @@ fn hint(error: &mechanics::Error) -> Option<String> {
 
 /// What may lead on where no equilibrium was found and was not tried yet, and what is written of the run.
 fn after_no_equilibrium(none: &NoEquilibrium) -> String {
-    let creep = none.control.relaxes().then_some(
-        "`control = \"creep\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on",
-    );
+    let creep = none.control.relaxes().then_some(if none.crept {
+        "`control = \"creep\"` in [solver], by whole increments, may lead on where short steps do not: what flows on its way \
+         stays, so hold the results against those of other increments"
+    } else {
+        "`control = \"creep\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on"
+    });
     let ways = match &none.failure.reason {
         reason if none.control == Control::ArcLength && may_have_another_way(reason) => vec![
             "`control = \"auto\"` in [solver], which relaxes and creeps where the load leads no further, and \
              `control = \"creep\"` were not tried",
+        ],
+        reason if !none.may_move && may_have_another_way(reason) => vec![
+            "`method = \"auto\"` with `relaxation = true` in [solver], with which relaxation and creep lead on where iterations \
+             stand still, was not tried",
         ],
         Reason::Unmet(Iterations::Newton(_, Some(_)), _) => vec![
             creep.unwrap_or("other increments may lead on"),
@@ -290,8 +297,8 @@ mod tests {
     const BY_CREEP: &str = "`control = \"creep\"`";
     const LIMIT: Reason = Reason::Singular(Some((Singularity::Limit, 0.7)));
 
-    fn help(control: Control, reason: Reason) -> String {
-        after_no_equilibrium(&NoEquilibrium {
+    fn none(control: Control, reason: Reason) -> NoEquilibrium {
+        NoEquilibrium {
             place: Place {
                 phase: "push".to_owned(),
                 increment: 3,
@@ -299,9 +306,15 @@ mod tests {
             reached: 2.5,
             of: 10,
             control,
+            crept: false,
+            may_move: true,
             failure: reason.into(),
             runaway: None,
-        })
+        }
+    }
+
+    fn help(control: Control, reason: Reason) -> String {
+        after_no_equilibrium(&none(control, reason))
     }
 
     fn unmet(iterations: Iterations) -> Reason {
@@ -316,19 +329,44 @@ mod tests {
     }
 
     #[test]
-    fn auto_proposes_creep_until_creep_has_led() {
+    fn auto_proposes_creep_that_was_not_tried() {
         let in_vain = |motion| unmet(Iterations::Newton(25, Some(motion)));
         let relaxed = help(Control::Auto, in_vain(Motion::Relaxation));
         assert!(relaxed.starts_with(BY_CREEP), "{relaxed}");
         assert!(relaxed.contains("`convergence = \"force\"`"), "{relaxed}");
         assert!(help(Control::Auto, LIMIT).starts_with(BY_CREEP));
-        // An `auto` that crept hands on creep as its control.
+        // By short steps under `auto`.
+        let short = after_no_equilibrium(&NoEquilibrium {
+            crept: true,
+            ..none(Control::Auto, in_vain(Motion::Creep))
+        });
+        assert!(short.starts_with(BY_CREEP), "{short}");
+        assert!(short.contains("by whole increments"), "{short}");
+        assert!(!relaxed.contains("by whole increments"), "{relaxed}");
         let crept = help(Control::Creep, in_vain(Motion::Creep));
         assert!(!crept.contains(BY_CREEP), "{crept}");
         assert!(crept.starts_with("other increments"), "{crept}");
         let written = "results up to the last whole increment";
         assert!(help(Control::Creep, LIMIT).starts_with(written));
         assert!(help(Control::Auto, Reason::NoState).starts_with(written));
+    }
+
+    /// `modified_newton` and the like, and `relaxation = false`.
+    #[test]
+    fn settings_without_relaxation_propose_it() {
+        let still = |reason| {
+            after_no_equilibrium(&NoEquilibrium {
+                may_move: false,
+                ..none(Control::Auto, reason)
+            })
+        };
+        let proposal = "`method = \"auto\"` with `relaxation = true`";
+        for reason in [unmet(Iterations::Newton(200, None)), LIMIT] {
+            assert!(still(reason.clone()).starts_with(proposal));
+            assert!(!help(Control::Auto, reason).contains(proposal));
+        }
+        let free = Reason::Singular(Some((Singularity::Free, 0.7)));
+        assert!(!still(free).contains(proposal));
     }
 
     #[test]

@@ -72,8 +72,12 @@ pub struct NoEquilibrium {
     pub reached: f64,
     /// Increments of the phase.
     pub of: usize,
-    /// What led its steps at last.
+    /// What the settings let lead its steps.
     pub control: Control,
+    /// Under `auto` creep led, by short steps, and led no further.
+    pub crept: bool,
+    /// Where iterations stand still, the settings let relaxation or creep lead on.
+    pub may_move: bool,
     /// The last attempt: reason, both criteria with residuals, the point that failed.
     pub failure: StepFailure,
     /// The displacement that ran away, if one did.

@@ -6,6 +6,7 @@
 mod aside;
 mod carry;
 mod differences;
+mod joined;
 mod layer;
 mod look;
 mod operator;
@@ -16,6 +17,7 @@ mod varying;
 mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
+pub use joined::joined;
 pub use look::{Deviation, Notice, Went};
 pub use state::GroupState;
 pub use tangent::Fault;

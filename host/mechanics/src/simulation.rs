@@ -30,7 +30,7 @@ use crate::assembly::Tie;
 use crate::equilibrium::{Clock, Reuse};
 use crate::error::{Error, Place};
 use crate::ground::{Acting, Loading};
-use crate::group::Group;
+use crate::group::{Group, joined};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::problem::{Material, Problem};
@@ -254,7 +254,7 @@ impl Simulation {
     /// Sum of the reactions at the nodes of a line, x and y: kN of the whole turn, or kN/m. `None`
     /// if there is no such line.
     pub fn reaction_of(&self, line: &str) -> Option<[f64; 2]> {
-        let nodes = &self.problem.mesh.lines.get(line)?.nodes;
+        let nodes = joined(&self.groups, &self.problem.mesh.lines.get(line)?.nodes);
         Some([0, 1].map(|c| nodes.iter().map(|node| self.reaction[2 * node + c]).sum()))
     }
 

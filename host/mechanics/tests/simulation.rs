@@ -216,6 +216,53 @@ fn a_state_is_gone_on_from_twice() {
     assert!(matches!(finer.go_to(state), Err(Error::OtherState(_))));
 }
 
+/// What was in play in earlier phases is part of a state: where nothing is left of it, what remains is round-off, in
+/// phases long after a stop too.
+#[test]
+fn the_largest_forces_of_earlier_phases_are_gone_on_with() {
+    let mut problem = sliding(|mesh| mesh, 30.0);
+    let pressed = |name: &str, value: f64| {
+        let mut phase = Phase::new(name, 2);
+        phase.pressure = vec![Pressure {
+            line: "top".to_owned(),
+            value: value.into(),
+        }];
+        phase
+    };
+    let rest = ["rest", "rest on", "rest still"].map(|name| Phase::new(name, 2));
+    problem.phases = vec![pressed("press", 1e3), pressed("release", 0.0)];
+    problem.phases.extend(rest);
+    let kept = |simulation: &mut Simulation| {
+        let state = serde_json::to_value(simulation.state().unwrap()).unwrap();
+        let loads = &state["course"]["loads"];
+        (state["largest_forces"].clone(), loads["largest"].clone())
+    };
+    let steps = |simulation: &mut Simulation, n: usize| {
+        for _ in 0..n {
+            simulation.step().unwrap();
+        }
+    };
+    let mut whole = Simulation::new(problem.clone()).unwrap();
+    steps(&mut whole, 9);
+    let expected = kept(&mut whole);
+    assert!(
+        expected
+            .0
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|force| force.as_f64().unwrap() > 10.0)
+    );
+    for increments in 1..9 {
+        let mut first = Simulation::new(problem.clone()).unwrap();
+        steps(&mut first, increments);
+        let mut second = Simulation::new(problem.clone()).unwrap();
+        second.go_to(first.state().unwrap()).unwrap();
+        steps(&mut second, 9 - increments);
+        assert_eq!(kept(&mut second), expected, "{increments}");
+    }
+}
+
 /// A thin layer keeps the elastic stiffnesses of the stress that its law started from, and so does a state of it:
 /// those of the stress where it was left would be others.
 #[test]

@@ -6,7 +6,7 @@ mod size;
 use crate::pressures::Pressure;
 use crate::wanted::Reduce;
 use mechanics::assembly::fold;
-use mechanics::group::Group;
+use mechanics::group::{Group, joined};
 use mechanics::simulation::{Part, Snapshot};
 pub use section::{Section, section};
 pub use size::Sizes;
@@ -121,6 +121,7 @@ impl Probes {
                 } => dofs.extend(nodes.iter().map(|n| 2 * n + component)),
                 // A reaction is that of all elements at the nodes.
                 Probe::Force { nodes, .. } => {
+                    let nodes = joined(groups, nodes);
                     for (looked, group) in looked.iter_mut().zip(groups) {
                         let kinematics = &group.kinematics;
                         let mut elements = 0..kinematics.n_elements();
@@ -190,36 +191,27 @@ impl Probe {
                 elements,
                 scale,
             } => {
-                let of_group;
-                let forces = match group {
-                    None => snapshot.reaction,
-                    Some(group) => {
-                        let n_dofs = snapshot.displacement.len();
-                        let number = *group;
-                        let group = active(snapshot, number)?;
-                        let mut forces = match elements {
-                            None => group.forces(n_dofs),
-                            Some(elements) => group.forces_of(elements, n_dofs),
-                        };
-                        // Weight and pore water act within the elements; the rest comes from others.
-                        let (acting, problem) = (snapshot.acting, snapshot.problem);
-                        let within =
-                            acting.in_bodies(problem, (number, group), elements.as_deref());
-                        for (force, within) in forces.iter_mut().zip(within) {
-                            *force -= within;
-                        }
-                        fold(snapshot.ties, &mut forces);
-                        of_group = forces;
-                        &of_group
-                    }
+                let sum = |nodes: &[usize], forces: &[f64]| -> f64 {
+                    nodes.iter().map(|&n| forces[2 * n + component]).sum()
                 };
-                Some(
-                    scale
-                        * nodes
-                            .iter()
-                            .map(|&n| forces[2 * n + component])
-                            .sum::<f64>(),
-                )
+                let Some(number) = *group else {
+                    let nodes = joined(snapshot.groups, nodes);
+                    return Some(scale * sum(&nodes, snapshot.reaction));
+                };
+                let group = active(snapshot, number)?;
+                let n_dofs = snapshot.displacement.len();
+                let mut forces = match elements {
+                    None => group.forces(n_dofs),
+                    Some(elements) => group.forces_of(elements, n_dofs),
+                };
+                // Weight and pore water act within the elements; the rest comes from others.
+                let (acting, problem) = (snapshot.acting, snapshot.problem);
+                let within = acting.in_bodies(problem, (number, group), elements.as_deref());
+                for (force, within) in forces.iter_mut().zip(within) {
+                    *force -= within;
+                }
+                fold(snapshot.ties, &mut forces);
+                Some(scale * sum(nodes, &forces))
             }
             Self::HandedOn {
                 group,

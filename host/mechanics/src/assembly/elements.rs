@@ -39,6 +39,21 @@ impl Elements {
     pub fn changed(&self) -> &[bool] {
         &self.changed
     }
+
+    /// The matrix, which is not there any longer.
+    pub fn take(&mut self) -> Vec<f64> {
+        std::mem::take(&mut self.values)
+    }
+
+    /// Bytes of what is kept.
+    pub fn bytes(&self) -> u64 {
+        let of_piece = |piece: &Piece| {
+            let tangents = piece.tangents.as_deref().unwrap_or_default();
+            size_of_val(&*piece.matrices) + size_of_val(tangents)
+        };
+        let of_pieces: usize = self.pieces.iter().flatten().map(of_piece).sum();
+        (of_pieces + size_of_val(&*self.values) + size_of_val(&*self.largest)) as u64
+    }
 }
 
 impl System {
@@ -58,9 +73,35 @@ impl System {
         }
     }
 
+    /// Whether its matrix is always the same: all groups that take part are linear.
+    pub fn is_constant(&self, groups: &[Group]) -> bool {
+        let mut included = (groups.iter().enumerate()).filter(|(number, _)| self.includes(*number));
+        included.all(|(_, group)| group.is_linear())
+    }
+
+    /// Bytes of the [`Elements`] that the system keeps from one matrix to the next, if there is a next one:
+    /// matrices, and tangents that may change.
+    pub fn bytes_of_elements(&self, groups: &[Group]) -> u64 {
+        if self.is_constant(groups) {
+            return 0;
+        }
+        let of_group = |(group, maps): (&Group, &Vec<ElementMap>)| {
+            let matrices: usize = maps.iter().map(|map| map.slots.len()).sum();
+            let times = if group.constant_tangents().is_some() {
+                maps.len().div_ceil(PIECE)
+            } else {
+                usize::from(!maps.is_empty())
+            };
+            matrices + times * group.tangents().len()
+        };
+        let of_groups: usize = groups.iter().zip(&self.elements).map(of_group).sum();
+        let numbers = of_groups + self.pattern.rows.len() + self.free.len();
+        (numbers * size_of::<f64>()) as u64
+    }
+
     /// As [`Self::assemble`], for the same bits with less work: matrices of elements whose tangents
     /// are those of the last time are still there, and so are sums of nothing else. `kept` is one of
-    /// this system alone.
+    /// this system alone. Of a matrix that never changes nothing else is kept.
     pub fn assemble_after(&self, kept: &mut Elements, groups: &[Group]) {
         let Elements {
             pieces,
@@ -68,6 +109,15 @@ impl System {
             largest,
             changed,
         } = kept;
+        if self.is_constant(groups) {
+            self.assemble(groups, values);
+            let columns = (0..self.free.len()).map(|column| self.pattern.places(column));
+            *largest = columns
+                .map(|places| algebra::largest(&values[places]))
+                .collect();
+            *changed = vec![true; self.free.len()];
+            return;
+        }
         let is_new = pieces.is_empty();
         pieces.resize_with(groups.len(), Vec::new);
         changed.clear();

@@ -136,11 +136,7 @@ impl<'a> Newton<'a> {
         settings: &'a Settings,
         costs: &'a mut Costs,
     ) -> Self {
-        let mut included = groups
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| system.includes(*i));
-        matrix.is_constant = included.all(|(_, group)| group.is_linear());
+        matrix.is_constant = system.is_constant(groups);
         Self {
             system,
             places,

@@ -51,15 +51,15 @@ impl Simulation {
         failure: StepFailure,
     ) -> NoEquilibrium {
         let of = self.problem.phases[phase.number].increments;
+        let settings = &self.problem.settings;
         NoEquilibrium {
             place: place.clone(),
             reached: lambda * of as f64,
             of,
-            control: if phase.record.crept_from.is_some() {
-                Control::Creep
-            } else {
-                self.problem.settings.control
-            },
+            control: settings.control,
+            crept: phase.record.crept_from.is_some(),
+            may_move: settings.method.is_newton()
+                && (settings.relaxation || settings.control == Control::Creep),
             failure,
             runaway: None,
         }

@@ -59,6 +59,9 @@ impl Simulation {
         let mut solver = self
             .solver(&equations.system, equations.domain.as_ref())
             .ok()?;
+        let bytes = solver.bytes() + equations.system.bytes_of_elements(&self.groups);
+        self.reuse
+            .announce(bytes, "factorising the equations once more");
         let before = self.forces(equations, Group::add_carried);
         let here = self.forces(equations, Group::add_trial_forces);
         let aside: Vec<Aside> = self.groups.iter_mut().map(Group::put_aside).collect();

@@ -279,8 +279,8 @@ impl Simulation {
             ),
         };
         let solver = self.solver(&system, domain.as_ref())?;
-        self.reuse
-            .announce(solver.bytes(), "factorising the equations");
+        let bytes = solver.bytes() + system.bytes_of_elements(groups);
+        self.reuse.announce(bytes, "factorising the equations");
         let mut unknowns = system.free().to_vec();
         unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
         unknowns.sort_unstable();
@@ -307,7 +307,8 @@ impl Simulation {
             system,
             domain,
             solver,
-            matrix: Matrix::resumed(course.map_or(0.0, |course| course.largest)),
+            matrix: Matrix::resumed(course.map_or(0.0, |course| course.largest))
+                .announcing(self.reuse.announces),
             measured: None,
             out_of_balance,
             n_unknowns: unknowns.len(),

@@ -38,10 +38,9 @@ impl Newton<'_> {
         control: &impl Control,
         state: &State,
         task: &Task,
-        correction: Option<f64>,
+        (n, correction): (usize, Option<f64>),
         in_vain: Option<Motion>,
     ) -> StepFailure {
-        let n = self.settings.max_iterations();
         let unmet = self.unmet(&state.balance, correction);
         // What ran away did so in the last iterate, not in the one that is only tried.
         let runaway = self.runaway;

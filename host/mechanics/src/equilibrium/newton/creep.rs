@@ -123,7 +123,7 @@ impl Creep {
 
     /// The last series of Newton iterations, with the state that it started from.
     pub(super) fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
-        &iterations[self.first..]
+        iterations.get(self.first..).unwrap_or_default()
     }
 
     /// Whether it may be asked for.

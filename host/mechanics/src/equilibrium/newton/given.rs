@@ -309,6 +309,7 @@ impl Newton<'_> {
             (None, None) => LinearSolver::new(pattern, false, None),
         }
         .map_err(|_| Singularity::Free)?;
+        self.matrix.announce_beside(solver.bytes());
         let mut values = solver.room();
         self.system.assemble(self.groups, &mut values);
         let outcome = solver.factorise(values);

@@ -158,12 +158,19 @@ impl Newton<'_> {
                 }
                 return Err(control.give_up(self, &state, iterations));
             }
-            state = match control.correct(self, &state, iterations) {
+            let before = iterations.len();
+            let next = match control.correct(self, &state, iterations) {
                 Err(failure) if failure.is_singular() && control.has_settled(self, &state) => {
                     return Ok(Equilibrium::at(state, 0.0));
                 }
                 corrected => corrected?,
             };
+            // Numbers have come to their end far away: nothing leads back.
+            if !next.balance.relative.is_finite() {
+                iterations.truncate(before);
+                return Err(control.give_up(self, &state, iterations));
+            }
+            state = next;
         }
     }
 

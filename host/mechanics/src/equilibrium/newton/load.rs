@@ -245,7 +245,9 @@ impl Control for LoadControl {
             let in_vain = self.relaxation.was_in_vain();
             in_vain.then_some(Motion::Relaxation)
         };
-        newton.no_equilibrium(self, state, &self.task, correction, in_vain)
+        // The state before the first correction is one of the series.
+        let n = self.series(iterations).len().saturating_sub(1);
+        newton.no_equilibrium(self, state, &self.task, (n, correction), in_vain)
     }
 }
 

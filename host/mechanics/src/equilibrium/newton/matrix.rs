@@ -45,7 +45,12 @@ pub struct Matrix {
     sum: Sum,
     /// The same equations once more, for what is asked beside the iterations.
     pub(super) beside: Option<LinearSolver>,
+    /// Who is told beforehand how many bytes these take.
+    announces: Option<Announces>,
 }
+
+/// Takes how many bytes a large piece of work needs, and what it is.
+type Announces = fn(u64, &'static str);
 
 impl Matrix {
     /// That of a run that goes on.
@@ -53,6 +58,19 @@ impl Matrix {
         Self {
             largest,
             ..Self::default()
+        }
+    }
+
+    /// Tells this function what large pieces of memory are needed later.
+    #[must_use]
+    pub fn announcing(self, announces: Option<Announces>) -> Self {
+        Self { announces, ..self }
+    }
+
+    /// Says that the equations are about to be factorised once more, for what is asked beside the iterations.
+    pub(super) fn announce_beside(&self, bytes: u64) {
+        if let Some(announces) = self.announces {
+            announces(bytes, "factorising the equations once more");
         }
     }
 
@@ -65,11 +83,6 @@ impl Matrix {
     pub(super) fn largest_of(&self, body: usize) -> f64 {
         let known = self.largest_by_body.get(body);
         known.copied().unwrap_or(self.largest)
-    }
-
-    /// The matrix from the last tangents that were added up.
-    pub(super) fn tangents(&self) -> &[f64] {
-        self.elements.values()
     }
 
     pub(super) fn hold(&mut self) {
@@ -133,8 +146,11 @@ impl Newton<'_> {
     pub(super) fn factorise_tangents(&mut self) -> Result<(), StepFailure> {
         self.stiffness();
         let start = Instant::now();
-        let elements = &self.matrix.elements;
-        let outcome = if self.matrix.sum == Sum::Next {
+        let elements = &mut self.matrix.elements;
+        let outcome = if self.matrix.is_constant {
+            // It is not added up again.
+            self.solver.factorise(elements.take())
+        } else if self.matrix.sum == Sum::Next {
             self.solver
                 .factorise_changed(elements.values(), elements.changed())
         } else {

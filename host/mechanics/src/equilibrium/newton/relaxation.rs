@@ -102,7 +102,7 @@ impl Relaxation {
     /// The last series of Newton iterations, with the state that it started from. A relaxed state
     /// is allowed as many as the first one was.
     pub(super) fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
-        &iterations[self.first..]
+        iterations.get(self.first..).unwrap_or_default()
     }
 
     /// Whether it led to the present state.
@@ -191,8 +191,8 @@ impl Newton<'_> {
     fn start_motion(&mut self, task: &Task) -> Option<Motion> {
         let still = vec![0.0; task.external.len()];
         let before = self.evaluate(&still, task, Operator::Elastic).ok()?;
-        self.factorise_tangents().ok()?;
-        let elastic = self.matrix.tangents().to_vec();
+        let elastic = self.stiffness().to_vec();
+        self.factorise(elastic.clone()).ok()?;
         Some(Motion {
             elastic,
             increment: self.answer_to(&before.residual, task).ok()?,
