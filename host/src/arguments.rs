@@ -52,7 +52,8 @@ pub(crate) enum Command {
         /// Go on from where an earlier run into the same folder was stopped, or start if none was.
         #[arg(long)]
         resume: bool,
-        /// Seconds between checkpoints, from which a run can be resumed; 0: after every increment.
+        /// Seconds between checkpoints, from which a run can be resumed, or 20 times what the last one took if that is
+        /// longer; 0: after every increment.
         #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
         checkpoint: f64,
         /// Threads; the results do not depend on it [default: all processors].
@@ -105,7 +106,8 @@ pub(crate) enum Command {
         /// Forget what was done before.
         #[arg(long)]
         anew: bool,
-        /// Seconds between checkpoints, from which a run can be resumed; 0: after every increment.
+        /// Seconds between checkpoints, from which a run can be resumed, or 20 times what the last one took if that is
+        /// longer; 0: after every increment.
         #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
         checkpoint: f64,
         /// Threads of each run; the results do not depend on it [default: 1].

@@ -12,7 +12,8 @@ pub use elements::Elements;
 
 use crate::group::Group;
 use algebra::Pattern;
-use elements::ElementMatrix;
+use elements::{ElementMatrix, PIECE};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A degree of freedom that follows others.
@@ -262,12 +263,15 @@ impl System {
         let boundary: Vec<usize> = free.iter().copied().filter(is_shared).collect();
         let of_elements = elements.iter().flatten().map(|map| map.dofs.as_slice());
         let pattern = Pattern::new(free.len(), &equation, of_elements);
-        for map in elements.iter_mut().flatten() {
+        let place = |map: &mut ElementMap| {
             map.slots = find_slots(&map.dofs, &equation, &pattern);
             let filled = map.slots.iter().filter(|&&slot| slot != u32::MAX);
             map.span = filled.fold([u32::MAX, 0], |[first, last], &slot| {
                 [first.min(slot), last.max(slot)]
             });
+        };
+        for maps in &mut elements {
+            maps.par_iter_mut().with_min_len(PIECE).for_each(place);
         }
         Self {
             equation,

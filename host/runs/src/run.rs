@@ -497,6 +497,10 @@ impl Watch for Follower<'_> {
     }
 }
 
+/// After a checkpoint a run goes on for so many times what it took, whatever it is told: a large state is not
+/// written over and over.
+const AT_LEAST: u32 = 20;
+
 /// Writes the checkpoints of a run.
 struct Keeper {
     identity: String,
@@ -505,6 +509,8 @@ struct Keeper {
     /// There is none at the end.
     ends_without: bool,
     last: Instant,
+    /// How long the last one took.
+    took: Duration,
 }
 
 impl Keeper {
@@ -516,6 +522,7 @@ impl Keeper {
             every: options.checkpoints,
             ends_without: options.ends_without,
             last: Instant::now(),
+            took: Duration::ZERO,
         }
     }
 
@@ -526,7 +533,12 @@ impl Keeper {
 
     /// Whether it is time for another checkpoint.
     fn is_due(&self) -> bool {
-        self.every.is_some_and(|every| self.last.elapsed() >= every)
+        let pause = |every: Duration| match every {
+            Duration::ZERO => every,
+            _ => every.max(AT_LEAST * self.took),
+        };
+        self.every
+            .is_some_and(|every| self.last.elapsed() >= pause(every))
     }
 
     fn keep(
@@ -536,9 +548,11 @@ impl Keeper {
         warnings: &[String],
     ) -> Result<(), text::Error> {
         if self.every.is_some() {
+            let start = Instant::now();
             let so_far = results.state()?;
             Checkpoint::new(&self.identity, so_far, warnings, Some(state)).write(&self.folder)?;
             self.last = Instant::now();
+            self.took = self.last - start;
         }
         Ok(())
     }

@@ -5,6 +5,7 @@ use super::Kind;
 use super::supernodes::Supernodes;
 use super::updates::{Run, add_runs};
 use crate::{Pattern, Singular};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// The order of elimination and the shape of everything that follows from it.
@@ -46,6 +47,9 @@ pub(super) struct Branch {
 /// Operations from which on solutions are shared among threads, and the largest share of a branch.
 const WORTH_SHARING: f64 = 2e7;
 const LARGEST_SHARE: f64 = 0.125;
+
+/// Tasks that fronts are shared among where their entries are placed.
+const TASKS: usize = 16;
 
 /// Where an entry between kept equations goes.
 #[derive(Clone, Copy, Debug)]
@@ -309,46 +313,66 @@ impl Analysis {
     fn place_entries(&mut self, pattern: &Pattern, position: &[u32]) {
         // Rows of the matrix, for entries above the diagonal: the transposed pattern is the same.
         let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
-        let mut place = vec![0_u32; position.len()];
-        let most = match self.kind {
-            Kind::Symmetric => pattern.rows.len().midpoint(pattern.n()),
-            Kind::Unsymmetric => pattern.rows.len(),
-        };
-        let (mut sources, mut targets) = (Vec::with_capacity(most), Vec::with_capacity(most));
-        let mut entries = Vec::new();
-        for front in 0..self.fronts.len() {
-            let Shape { pivots, rows, .. } = &self.fronts[front];
-            let (pivots, rows) = (pivots.clone(), rows.clone());
-            let (k, n) = (pivots.len(), pivots.len() + rows.len());
-            self.place_front(pivots.clone(), rows, &mut place);
-            let start = targets.len();
-            for (column, pivot) in pivots.clone().enumerate() {
-                let equation = self.order[pivot] as usize;
-                for at in pattern.places(equation) {
-                    let row = position[pattern.rows[at] as usize] as usize;
-                    let lower = self.kind == Kind::Unsymmetric || row >= pivot;
-                    if row >= pivots.start && lower {
-                        let target = column * n + place[row] as usize;
-                        entries.push((at as u32, target as u32));
-                    }
-                    // The entry across the diagonal, in the row of this pivot.
-                    if let Some(transposed) = &transposed
-                        && row >= pivots.end
-                    {
-                        let target = n * k + (place[row] as usize - k) * k + column;
-                        entries.push((transposed[at], target as u32));
-                    }
-                }
-            }
-            // In the order in which they stand in memory.
-            entries.sort_unstable();
-            for (source, target) in entries.drain(..) {
+        let per_task = self.fronts.len().div_ceil(TASKS).max(1);
+        let numbers: Vec<usize> = (0..self.fronts.len()).collect();
+        let tasks = numbers.par_chunks(per_task).with_max_len(1);
+        let placed: Vec<Vec<Vec<(u32, u32)>>> = tasks
+            .map(|fronts| {
+                let mut place = vec![0_u32; position.len()];
+                let entries_of = |&front: &usize| {
+                    let shape = &self.fronts[front];
+                    self.place_front(shape.pivots.clone(), shape.rows.clone(), &mut place);
+                    self.entries_of(shape, (pattern, transposed.as_deref()), position, &place)
+                };
+                fronts.iter().map(entries_of).collect()
+            })
+            .collect();
+        let of_fronts = || placed.iter().flatten();
+        let n_entries = of_fronts().map(Vec::len).sum();
+        let (mut sources, mut targets) =
+            (Vec::with_capacity(n_entries), Vec::with_capacity(n_entries));
+        for (shape, entries) in self.fronts.iter_mut().zip(of_fronts()) {
+            shape.entries = targets.len()..targets.len() + entries.len();
+            for &(source, target) in entries {
                 sources.push(source);
                 targets.push(target);
             }
-            self.fronts[front].entries = start..targets.len();
         }
         (self.sources, self.targets) = (sources, targets);
+    }
+
+    /// Entries of a front whose rows have these places in it: where they come from and where they go, in the order
+    /// in which they stand in memory.
+    fn entries_of(
+        &self,
+        shape: &Shape,
+        (pattern, transposed): (&Pattern, Option<&[u32]>),
+        position: &[u32],
+        place: &[u32],
+    ) -> Vec<(u32, u32)> {
+        let pivots = &shape.pivots;
+        let (k, n) = (pivots.len(), pivots.len() + shape.rows.len());
+        let mut entries = Vec::new();
+        for (column, pivot) in pivots.clone().enumerate() {
+            let equation = self.order[pivot] as usize;
+            for at in pattern.places(equation) {
+                let row = position[pattern.rows[at] as usize] as usize;
+                let lower = self.kind == Kind::Unsymmetric || row >= pivot;
+                if row >= pivots.start && lower {
+                    let target = column * n + place[row] as usize;
+                    entries.push((at as u32, target as u32));
+                }
+                // The entry across the diagonal, in the row of this pivot.
+                if let Some(transposed) = transposed
+                    && row >= pivots.end
+                {
+                    let target = n * k + (place[row] as usize - k) * k + column;
+                    entries.push((transposed[at], target as u32));
+                }
+            }
+        }
+        entries.sort_unstable();
+        entries
     }
 
     fn add_kept_entries(&mut self, pattern: &Pattern, position: &[u32]) {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Elements that one thread takes at a time.
-const PIECE: usize = 256;
+pub(super) const PIECE: usize = 256;
 /// Pieces that are computed before their matrices are added up.
 const ROUND: usize = 16;
 /// Parts of the columns that are added up at the same time.
