@@ -126,7 +126,7 @@ impl Simulation {
         let mut is_free = vec![false; external.len()];
         let of_domain = equations.domain.iter().filter(|_| beside.is_none());
         let of_domain = of_domain.flat_map(LinearDomain::unknowns);
-        for &dof in equations.system.free().iter().chain(of_domain) {
+        for dof in equations.system.free().iter().copied().chain(of_domain) {
             is_free[dof] = true;
         }
         let supports = || {

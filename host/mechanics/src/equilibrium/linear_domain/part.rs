@@ -72,13 +72,19 @@ impl LinearDomain {
                 mark[equation] = true;
             }
         }
+        let free = self.system.free();
         let own = |&equation: &usize| {
-            wanted[equation] && !shared[equation] && !self.on_boundary[equation]
+            let is_inside = !self.on_boundary[equation] && !self.holds(free[equation]);
+            wanted[equation] && !shared[equation] && is_inside
         };
         let inner = (0..wanted.len()).filter(own).collect();
         let known = dofs.iter().flat_map(|&dof| self.system.masters(dof));
         for equation in known.filter_map(|dof| self.system.equation(dof)) {
             wanted[equation] = true;
+        }
+        // Displacements that are prescribed are known.
+        for equation in (0..wanted.len()).filter(|&equation| self.holds(free[equation])) {
+            wanted[equation] = false;
         }
         Part {
             groups: groups.to_vec(),
@@ -111,7 +117,6 @@ impl LinearDomain {
             latest: (self.standing.part.as_ref()).map(|_| increment(latest, of_latest)),
         };
         let free = self.system.free();
-        let still = vec![0.0; self.boundary.len()];
         let mut tries = 0..REFINEMENTS;
         let mut before = f64::INFINITY;
         let (relative, internal) = loop {
@@ -148,8 +153,12 @@ impl LinearDomain {
             }
             before = relative;
             let fronts = Some(part.fronts.as_slice());
-            let (y, _) = self.factors.forward(&residual, fronts);
-            let correction = self.factors.backward(&y, &still, fronts);
+            let (y, left) = self.factors.forward(&residual, fronts);
+            let beside = match &self.aside {
+                Some(aside) => aside.corrections(&left),
+                None => vec![0.0; left.len()],
+            };
+            let correction = self.factors.backward(&y, &beside, fronts);
             for increment in since.complete.iter_mut().chain(&mut since.latest) {
                 for &equation in &part.wanted {
                     increment[free[equation]] += correction[equation];
@@ -186,7 +195,12 @@ impl LinearDomain {
         let rise = lambda - origin.lambda;
         let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
         let fronts = Some(part.fronts.as_slice());
-        let values = self.factors.backward(&y, &origin.moved, fronts);
+        let values = match &self.aside {
+            None => self.factors.backward(&y, &origin.moved, fronts),
+            Some(aside) => self
+                .factors
+                .backward(&y, &aside.moved(rise, &origin.moved), fronts),
+        };
         let moved = displacement.iter().zip(&origin.displacement);
         let mut increment: Vec<f64> = moved.map(|(u, origin)| u - origin).collect();
         for &equation in &part.wanted {
