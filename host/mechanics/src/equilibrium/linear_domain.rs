@@ -442,9 +442,8 @@ impl LinearDomain {
         tolerance: f64,
     ) -> Result<Vec<f64>, DomainFailure> {
         let goal = Goal {
-            external: &loads.external(lambda),
+            loads,
             lambda,
-            scale: loads.scale,
             tolerance,
         };
         let is_part = self.choose_part(looked_at);
@@ -455,11 +454,10 @@ impl LinearDomain {
             // Where round-off alone keeps a part from equilibrium, that shows in the whole.
             if let Ok(internal) = reached {
                 self.standing.forces = self.forces_at(lambda);
-                self.standing.latest = Origin {
-                    lambda,
-                    displacement: displacement.to_vec(),
-                    moved: vec![0.0; self.boundary.len()],
-                };
+                let latest = &mut self.standing.latest;
+                latest.lambda = lambda;
+                latest.displacement.copy_from_slice(displacement);
+                latest.moved.fill(0.0);
                 self.commit(groups, &numbers);
                 self.standing.part = Some(numbers);
                 return Ok(internal);
