@@ -10,7 +10,7 @@ use input::Case;
 use input::case::Axis;
 use law::Operator;
 use mechanics::assembly::{Places, System};
-use mechanics::equilibrium::{Clock, Costs, LinearDomain, Loads, Matrix, Newton};
+use mechanics::equilibrium::{Clock, Costs, Held, LinearDomain, Loads, Matrix, Newton};
 use mechanics::group::Group;
 use mechanics::{Mesh, Model, Place, Settings};
 use runs::run::{Observer, run};
@@ -210,7 +210,11 @@ impl Chamber {
             .map(mechanics::group::Group::is_linear)
             .collect();
         let of = (groups.as_slice(), linear.as_slice());
-        let condensed = LinearDomain::new(of, &self.prescribed, ties, &lines, true, None);
+        let held = Held {
+            now: &self.prescribed,
+            sometimes: &vec![false; self.prescribed.len()],
+        };
+        let condensed = LinearDomain::new(of, &held, ties, &lines, true, None);
         condensed.expect("supported").expect("linear groups")
     }
 }

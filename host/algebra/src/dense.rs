@@ -65,3 +65,56 @@ pub(crate) fn solve(factors: &[f64], exchanges: &Exchanges, right: &[f64]) -> Ve
     triangular::solve_upper_triangular_in_place(factors, column, Par::Seq);
     x
 }
+
+/// Pivots of [`Factors`] that are smaller than this, as a fraction of the largest entry of the matrix, are taken for what
+/// rounding leaves of nothing.
+const VANISHING: f64 = 1e-13;
+
+/// A small dense matrix, factorised.
+#[derive(Debug)]
+pub struct Factors {
+    /// L and U, column-major.
+    values: Vec<f64>,
+    exchanges: Exchanges,
+}
+
+impl Factors {
+    /// Of a square matrix with `n` rows, column-major.
+    ///
+    /// # Errors
+    /// [`Singular`], but for round-off.
+    pub fn new(mut values: Vec<f64>, n: usize) -> Result<Self, Singular> {
+        let least = VANISHING * largest(&values);
+        let mut exchanges = Exchanges::default();
+        let matrix = MatMut::from_column_major_slice_mut(&mut values, n, n);
+        factorise(matrix, &mut exchanges)?;
+        if (0..n).any(|i| values[i * n + i].abs() < least) {
+            return Err(Singular);
+        }
+        Ok(Self { values, exchanges })
+    }
+
+    /// Solves for one right-hand side.
+    pub fn solve(&self, right: &[f64]) -> Vec<f64> {
+        solve(&self.values, &self.exchanges, right)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_matrices_are_solved_with_and_refused_where_they_are_singular() {
+        // Columns (0, 2), (3, 1): rows have to be exchanged.
+        let factors = Factors::new(vec![0.0, 2.0, 3.0, 1.0], 2).unwrap();
+        let x = factors.solve(&[6.0, 4.0]);
+        assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
+        // Springs of 0.1 and 0.7 between three points that nothing holds.
+        let free = vec![0.1, -0.1, 0.0, -0.1, 0.1 + 0.7, -0.7, 0.0, -0.7, 0.7];
+        assert!(Factors::new(free.clone(), 3).is_err());
+        let mut held = free;
+        held[8] += 1e-6;
+        assert!(Factors::new(held, 3).is_ok());
+    }
+}

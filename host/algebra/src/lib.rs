@@ -16,8 +16,8 @@ mod multifrontal;
 mod order;
 mod pattern;
 
-pub use dense::largest;
-pub use linear::{Block, LinearSolver, Singular};
+pub use dense::{Factors, largest};
+pub use linear::{Block, Dense, LinearSolver, Singular};
 pub use multifrontal::{Gathered, Kind, Multifrontal};
 pub use order::mesh_lines;
 pub use pattern::Pattern;

@@ -13,36 +13,54 @@ use std::sync::Arc;
 /// Largest backward error of an accepted solution.
 const BACKWARD_ERROR: f64 = 1e-10;
 
+/// A square dense matrix, column-major, which several may hold.
+#[derive(Clone, Debug)]
+pub enum Dense {
+    /// The Schur complement of these factors.
+    SchurOf(Arc<Multifrontal>),
+    /// These values.
+    Of(Arc<Vec<f64>>),
+}
+
+impl Dense {
+    /// Its entries.
+    pub fn values(&self) -> &[f64] {
+        match self {
+            Self::SchurOf(factors) => factors.schur(),
+            Self::Of(values) => values,
+        }
+    }
+}
+
 /// A dense matrix that stands beside the sparse one: the condensed stiffness of a domain.
 #[derive(Debug)]
 pub struct Block {
     /// Its equations, ascending.
     equations: Vec<usize>,
-    /// What it is the Schur complement of.
-    factors: Arc<Multifrontal>,
+    matrix: Dense,
     /// Sums of the absolute values of its rows.
     row_sums: Vec<f64>,
 }
 
 impl Block {
-    /// The Schur complement of these factors on these equations, which are as many as it keeps.
-    pub fn new(equations: Vec<usize>, factors: &Arc<Multifrontal>) -> Self {
+    /// A matrix on these equations, which are as many as its rows.
+    pub fn new(equations: Vec<usize>, matrix: Dense) -> Self {
         let mut row_sums = vec![0.0; equations.len()];
-        for column in factors.schur().chunks_exact(equations.len().max(1)) {
+        for column in matrix.values().chunks_exact(equations.len().max(1)) {
             for (sum, value) in row_sums.iter_mut().zip(column) {
                 *sum += value.abs();
             }
         }
         Self {
             equations,
-            factors: Arc::clone(factors),
+            matrix,
             row_sums,
         }
     }
 
     /// Column-major.
     fn values(&self) -> &[f64] {
-        self.factors.schur()
+        self.matrix.values()
     }
 }
 
@@ -442,7 +460,7 @@ mod tests {
         let mut factors = Multifrontal::new(&domain, Kind::Symmetric, &kept, None).unwrap();
         let values = [4.0, 1.0, 1.0, 1.0, 3.0, 1.0, 3.0];
         factors.factorise(&values).unwrap();
-        let block = Block::new(vec![1, 2], &Arc::new(factors));
+        let block = Block::new(vec![1, 2], Dense::SchurOf(Arc::new(factors)));
         let pattern = Pattern {
             column_start: vec![0, 2, 4, 5],
             rows: vec![0, 1, 0, 1, 2],

@@ -5,7 +5,7 @@ mod diagnosis;
 mod linear_domain;
 mod newton;
 
-pub use linear_domain::{LinearDomain, LookedAt, Reuse, Standing};
+pub use linear_domain::{Held, LinearDomain, LookedAt, Reuse, Standing};
 pub use newton::{
     Clock, Costs, Criterion, Culprit, DomainFailure, Guess, Imbalance, Iteration, Iterations,
     Loads, Matrix, Measure, Motion, Newton, Open, PointPlace, Reason, Runaway, Singularity,

@@ -79,6 +79,8 @@ pub struct Simulation {
     displacement: Vec<f64>,
     /// Prescribed displacements by degree of freedom.
     prescribed: BTreeMap<usize, f64>,
+    /// Degrees of freedom that some phases prescribe and others do not.
+    sometimes_held: Vec<bool>,
     /// What acts at the start of the phase, and at its end.
     loading: [Loading; 2],
     acting: Acting,
@@ -155,6 +157,7 @@ impl Simulation {
             warnings,
             displacement: vec![0.0; n_dofs],
             prescribed: BTreeMap::new(),
+            sometimes_held: Vec::new(),
             acting: Acting::before(&problem),
             loading: [Loading::before(&problem), Loading::before(&problem)],
             released: vec![0.0; n_dofs],
@@ -184,6 +187,7 @@ impl Simulation {
                 simulation.prescribed.insert(dof, 0.0);
             }
         }
+        simulation.sometimes_held = simulation.held_in_some_phases();
         Ok(simulation)
     }
 

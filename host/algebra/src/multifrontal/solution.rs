@@ -110,8 +110,56 @@ impl Multifrontal {
     /// Values of all equations from `y` of [`Self::forward`] and those of the kept ones.
     /// Only those of some supernodes, see [`Self::fronts_of`]; the others mean nothing.
     pub fn backward(&self, y: &[f64], kept: &[f64], fronts: Option<&[bool]>) -> Vec<f64> {
-        let analysis = &self.analysis;
         let mut x = [y, kept].concat();
+        self.substitute(&mut x, fronts);
+        let mut result = vec![0.0; x.len()];
+        let all = self.analysis.order.iter().chain(&self.analysis.kept);
+        for (&equation, value) in all.zip(x) {
+            result[equation as usize] = value;
+        }
+        result
+    }
+
+    /// As [`Self::backward`] with a multiple of `y`, for some equations only: those at these
+    /// [`places`](Self::places), and in their order.
+    pub fn backward_at(
+        &self,
+        places: &[u32],
+        (share, y): (f64, &[f64]),
+        kept: &[f64],
+        fronts: &[bool],
+    ) -> Vec<f64> {
+        let mut x = vec![0.0; y.len()];
+        for (shape, _) in self
+            .analysis
+            .fronts
+            .iter()
+            .zip(fronts)
+            .filter(|(_, is)| **is)
+        {
+            let pivots = shape.pivots.clone();
+            for (x, y) in x[pivots.clone()].iter_mut().zip(&y[pivots]) {
+                *x = share * y;
+            }
+        }
+        x.extend_from_slice(kept);
+        self.substitute(&mut x, Some(fronts));
+        places.iter().map(|&place| x[place as usize]).collect()
+    }
+
+    /// Of every equation, its place in the order of elimination, or behind it among those that are kept.
+    pub fn places(&self) -> Vec<u32> {
+        let all = self.analysis.order.iter().chain(&self.analysis.kept);
+        let mut places = vec![0; self.analysis.order.len() + self.analysis.kept.len()];
+        for (place, &equation) in all.enumerate() {
+            places[equation as usize] = place as u32;
+        }
+        places
+    }
+
+    /// Values of all equations, in the order of elimination, from what [`Self::forward`] left.
+    fn substitute(&self, x: &mut [f64], fronts: Option<&[bool]>) {
+        let analysis = &self.analysis;
         let is_wanted = |number: usize| fronts.is_none_or(|fronts| fronts[number]);
         let mut below = Vec::new();
         let top = analysis.top.iter().rev();
@@ -121,21 +169,16 @@ impl Multifrontal {
             below.extend(rows.iter().map(|&row| x[row as usize]));
             self.backward_front(number, &mut x[pivots], &below);
         }
-        let solved: Vec<Vec<f64>> = analysis
-            .branches
+        let has_wanted = |branch: &&Branch| branch.fronts.iter().any(|&number| is_wanted(number));
+        let branches: Vec<&Branch> = analysis.branches.iter().filter(has_wanted).collect();
+        let solved: Vec<Vec<f64>> = branches
             .par_iter()
             .with_max_len(1)
-            .map(|branch| self.backward_branch(branch, &x, is_wanted))
+            .map(|branch| self.backward_branch(branch, x, is_wanted))
             .collect();
-        for (branch, values) in analysis.branches.iter().zip(solved) {
-            analysis.put(branch, &values, &mut x);
+        for (branch, values) in branches.into_iter().zip(solved) {
+            analysis.put(branch, &values, x);
         }
-        let mut result = vec![0.0; x.len()];
-        let all = analysis.order.iter().chain(&analysis.kept);
-        for (&equation, value) in all.zip(x) {
-            result[equation as usize] = value;
-        }
-        result
     }
 
     /// Values of the pivots of a branch from those of the rows above it.

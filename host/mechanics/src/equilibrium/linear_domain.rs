@@ -13,10 +13,13 @@
 //!
 //! which is all that the iterations see. Δu_i follows from the first of (1) when it is wanted.
 //! Everything is counted from the last state that was completed.
+//! Unknowns that some phases of the run prescribe and others do not are kept beside the boundary, for one
+//! factorisation that serves all phases: see `aside`.
 //! Where only some groups are looked at (the pile whose head force is wanted, not the sand), they
 //! alone are brought to the state in question, counted from the one before it; the others wait for
 //! the next complete one.
 
+mod aside;
 mod part;
 mod product;
 mod reuse;
@@ -26,7 +29,9 @@ pub use reuse::Reuse;
 use super::newton::{DomainFailure, Loads};
 use crate::assembly::{System, Tie};
 use crate::group::Group;
-use algebra::{Block, Kind, Multifrontal, Pattern, Singular};
+use algebra::{Block, Dense, Kind, Multifrontal, Pattern, Singular};
+use aside::Aside;
+pub use aside::Held;
 use part::{Goal, Part};
 use product::add_product;
 use reuse::{Condensed, Numbered, Setup};
@@ -79,10 +84,14 @@ pub struct LinearDomain {
     pub largest: f64,
     /// Largest entry of its matrix before it was condensed.
     pub stiffest: f64,
-    /// Degrees of freedom of the boundary, in the order of the Schur complement.
+    /// Degrees of freedom of the boundary, in the order of its stiffness.
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
     on_boundary: Vec<bool>,
+    /// What is kept beside the boundary, if anything is.
+    aside: Option<Aside>,
+    /// S.
+    stiffness: Dense,
     /// L⁻¹ r_i.
     y: Vec<f64>,
     /// r'.
@@ -94,9 +103,10 @@ pub struct LinearDomain {
     whole: Option<Part>,
 }
 
-/// Of every unknown of a system, whether the rest shares it.
-fn kept(system: &System, rest: &System) -> Vec<bool> {
-    let mut kept = vec![false; system.n_equations()];
+/// Of every unknown of a system, whether the rest shares it, or some phases prescribe it.
+fn kept(system: &System, rest: &System, sometimes: &[bool]) -> Vec<bool> {
+    let free = system.free().iter();
+    let mut kept: Vec<bool> = free.map(|&dof| sometimes[dof]).collect();
     let shared = rest.boundary().iter();
     for equation in shared.filter_map(|&dof| system.equation(dof)) {
         kept[equation] = true;
@@ -176,32 +186,35 @@ impl LinearDomain {
     /// [`Singular`] if they are not held where they are not connected to the rest.
     pub fn new(
         (groups, condensed): (&[Group], &[bool]),
-        prescribed: &[bool],
+        held: &Held<'_>,
         ties: &[Tie],
         lines: &[[u32; 2]],
         always: bool,
         mut reuse: Option<&mut Reuse>,
     ) -> Result<Option<(Self, System)>, Singular> {
-        let setup = Setup::of((groups, condensed), prescribed, ties);
+        let sometimes = held.kept((groups, condensed));
+        let lasting = held.but_for(&sometimes);
+        let setup = Setup::of((groups, condensed), &lasting, ties);
         let is_other = |number: usize, group: &Group| group.is_active && !condensed[number];
-        let rest = |system: &System| System::new(groups, is_other, prescribed, ties, Some(system));
+        let rest = |system: &System| System::new(groups, is_other, held.now, ties, Some(system));
         let same = reuse.as_ref().and_then(|reuse| reuse.same(&setup));
         if let Some(numbered) = same {
             let rest = rest(&numbered.system);
             if !always && !pays(&numbered.system, &rest) {
                 return Ok(None);
             }
-            if numbered.kept == kept(&numbered.system, &rest) {
+            if numbered.kept == kept(&numbered.system, &rest, &sometimes) {
                 if let Some(reuse) = reuse {
                     reuse.forget();
                 }
-                return Ok(Some((Self::of(numbered, false), rest)));
+                let domain = Self::of(numbered, false, held.now, &rest)?;
+                return Ok(Some((domain, rest)));
             }
         }
         let mut system = System::new(
             groups,
             |number, group| group.is_active && condensed[number],
-            prescribed,
+            &lasting,
             ties,
             None,
         );
@@ -212,7 +225,7 @@ impl LinearDomain {
         if !always && !pays(&system, &rest) {
             return Ok(None);
         }
-        let kept = kept(&system, &rest);
+        let kept = kept(&system, &rest, &sometimes);
         let symmetric = groups
             .iter()
             .zip(condensed)
@@ -242,45 +255,67 @@ impl LinearDomain {
         if let Some(reuse) = reuse {
             reuse.keep(setup, &numbered);
         }
-        Ok(Some((Self::of(numbered, factorised), rest)))
+        let domain = Self::of(numbered, factorised, held.now, &rest)?;
+        Ok(Some((domain, rest)))
     }
 
-    /// With its unknowns and its factors; whether those were made for this phase.
-    fn of(numbered: Numbered, factorised: bool) -> Self {
+    /// With its unknowns and its factors, and whether those were made for this phase, in which these degrees
+    /// of freedom are prescribed.
+    fn of(
+        numbered: Numbered,
+        factorised: bool,
+        prescribed: &[bool],
+        rest: &System,
+    ) -> Result<Self, Singular> {
         let Numbered {
             system,
-            kept,
+            mut kept,
             factors,
             stiffest,
         } = numbered;
         let free = system.free();
-        let boundary: Vec<usize> = factors.kept().iter().map(|&e| free[e as usize]).collect();
-        let largest = |largest: f64, value: &f64| largest.max(value.abs());
-        Self {
+        let of_kept = factors.kept().iter().map(|&e| free[e as usize]);
+        let of_kept: Vec<usize> = of_kept.collect();
+        let mut stiffness = Dense::SchurOf(Arc::clone(&factors));
+        let mut aside = None;
+        if of_kept.len() != rest.boundary().len() {
+            let (found, own) = Aside::new(factors.schur(), &of_kept, prescribed, rest)?;
+            for (&equation, dof) in factors.kept().iter().zip(&of_kept) {
+                kept[equation as usize] = rest.boundary().binary_search(dof).is_ok();
+            }
+            stiffness = Dense::Of(Arc::new(own));
+            aside = Some(found);
+        }
+        Ok(Self {
             stiffest,
-            largest: factors.schur().iter().fold(0.0, largest),
+            largest: algebra::largest(stiffness.values()),
             standing: Standing::default(),
             part: None,
             whole: None,
-            boundary,
+            boundary: match &aside {
+                Some(_) => rest.boundary().to_vec(),
+                None => of_kept,
+            },
             on_boundary: kept,
+            aside,
+            stiffness,
             factors,
             factorised,
             system,
             y: Vec::new(),
             condensed: Vec::new(),
-        }
+        })
     }
 
     /// The domain as a dense block in the equations of the rest.
     pub fn block(&self, rest: &System) -> Block {
         let equations = self.boundary.iter().filter_map(|&dof| rest.equation(dof));
-        Block::new(equations.collect(), &self.factors)
+        Block::new(equations.collect(), self.stiffness.clone())
     }
 
     /// Stiffness of the boundary, column-major: S of (2).
     pub fn stiffness(&self) -> &[f64] {
-        self.factors.schur()
+        self.stiffness.values()
     }
 
     /// Sets up a phase that starts from the groups' committed state and these displacements.
@@ -299,7 +334,12 @@ impl LinearDomain {
                 *right += at_end[dof] - at_start[dof];
             }
         }
-        (self.y, self.condensed) = self.factors.forward(&right, None);
+        let (y, left) = self.factors.forward(&right, None);
+        self.y = y;
+        self.condensed = match &mut self.aside {
+            Some(aside) => aside.condense(self.factors.schur(), &left, &prescribed),
+            None => left,
+        };
         let mut internal = vec![0.0; n_dofs];
         for (number, group) in groups.iter().enumerate() {
             if self.system.includes(number) {
@@ -402,9 +442,8 @@ impl LinearDomain {
         tolerance: f64,
     ) -> Result<Vec<f64>, DomainFailure> {
         let goal = Goal {
-            external: &loads.external(lambda),
+            loads,
             lambda,
-            scale: loads.scale,
             tolerance,
         };
         let is_part = self.choose_part(looked_at);
@@ -415,11 +454,10 @@ impl LinearDomain {
             // Where round-off alone keeps a part from equilibrium, that shows in the whole.
             if let Ok(internal) = reached {
                 self.standing.forces = self.forces_at(lambda);
-                self.standing.latest = Origin {
-                    lambda,
-                    displacement: displacement.to_vec(),
-                    moved: vec![0.0; self.boundary.len()],
-                };
+                let latest = &mut self.standing.latest;
+                latest.lambda = lambda;
+                latest.displacement.copy_from_slice(displacement);
+                latest.moved.fill(0.0);
                 self.commit(groups, &numbers);
                 self.standing.part = Some(numbers);
                 return Ok(internal);
@@ -446,8 +484,14 @@ impl LinearDomain {
         }
     }
 
-    /// Degrees of freedom of the domain's unknowns, boundary included.
-    pub fn unknowns(&self) -> &[usize] {
-        self.system.free()
+    /// Degrees of freedom of the domain's unknowns in this phase, boundary included.
+    pub fn unknowns(&self) -> impl Iterator<Item = usize> {
+        let free = self.system.free().iter().copied();
+        free.filter(|&dof| !self.holds(dof))
+    }
+
+    /// Whether a degree of freedom is prescribed in this phase, though not in all of them.
+    fn holds(&self, dof: usize) -> bool {
+        self.aside.as_ref().is_some_and(|aside| aside.holds(dof))
     }
 }

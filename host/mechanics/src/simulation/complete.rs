@@ -4,7 +4,7 @@
 use super::phase::PhaseEquations;
 use super::{Part, Simulation, UnderWay, statics};
 use crate::assembly::fold;
-use crate::equilibrium::{LinearDomain, Loads, LookedAt, Reason, StepSuccess, norm};
+use crate::equilibrium::{Loads, LookedAt, Reason, StepSuccess, norm};
 use std::time::Instant;
 
 impl Simulation {
@@ -119,23 +119,24 @@ impl Simulation {
         let Some((scales, tolerance)) = &equations.measured else {
             return Ok(());
         };
-        let mut external = loads.external(lambda);
-        for &(dof, force) in beside.unwrap_or_default() {
-            external[dof] -= force;
-        }
-        let mut is_free = vec![false; external.len()];
-        let of_domain = equations.domain.iter().filter(|_| beside.is_none());
-        let of_domain = of_domain.flat_map(LinearDomain::unknowns);
-        for &dof in equations.system.free().iter().chain(of_domain) {
-            is_free[dof] = true;
-        }
         let supports = || {
             let prescribed = loads.prescribed.iter();
             prescribed.map(|&(dof, ..)| (dof, internal[dof]))
         };
+        let mut unknowns = equations.system.free().to_vec();
+        if let (Some(domain), None) = (&equations.domain, beside) {
+            unknowns.extend(domain.unknowns());
+            unknowns.sort_unstable();
+            unknowns.dedup();
+        }
+        let taken = |dof: &usize| {
+            let beside = beside.unwrap_or_default();
+            let at = beside.binary_search_by_key(dof, |(dof, _)| *dof);
+            at.map_or(0.0, |at| beside[at].1)
+        };
         let unknowns = || {
-            let numbered = is_free.iter().enumerate().filter(|(_, is_free)| **is_free);
-            numbered.map(|(dof, _)| (dof, external[dof]))
+            let external = |dof: &usize| (*dof, loads.external_at(*dof, lambda) - taken(dof));
+            unknowns.iter().map(external)
         };
         // Supports may be those of several bodies: they are added up together.
         let bound = statics::Bound {

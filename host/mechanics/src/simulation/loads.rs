@@ -56,6 +56,37 @@ impl Simulation {
         Ok(prescribed)
     }
 
+    /// Before the first phase: the degrees of freedom that some phases prescribe and others do not, but for
+    /// what moves alike.
+    pub(super) fn held_in_some_phases(&self) -> Vec<bool> {
+        let n_dofs = self.displacement.len();
+        let mut held = vec![false; n_dofs];
+        for &dof in self.prescribed.keys() {
+            held[dof] = true;
+        }
+        let (mut always, mut ever) = (vec![true; n_dofs], vec![false; n_dofs]);
+        for phase in &self.problem.phases {
+            for input in &phase.free {
+                for dof in self.dofs(&input.line, &input.components) {
+                    held[dof] = false;
+                }
+            }
+            for input in &phase.displacement {
+                let axes = [(input.x, Axis::X), (input.y, Axis::Y)];
+                let given = axes.into_iter().filter(|(value, _)| value.is_some());
+                for dof in given.flat_map(|(_, axis)| self.dofs(&input.line, &[axis])) {
+                    held[dof] = true;
+                }
+            }
+            for (dof, &held) in held.iter().enumerate() {
+                always[dof] &= held;
+                ever[dof] |= held;
+            }
+        }
+        let both = ever.iter().zip(&always);
+        both.map(|(ever, always)| *ever && !always).collect()
+    }
+
     /// Loads on a leg of a phase that starts here.
     pub(super) fn loads_on(
         &self,

@@ -4,7 +4,7 @@ use super::history::History;
 use super::state::PhaseCourse;
 use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
 use crate::assembly::{Bodies, Places, System, fold};
-use crate::equilibrium::{Costs, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
+use crate::equilibrium::{Costs, Held, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
 use crate::error::Error;
 use crate::group::Group;
 use crate::problem::Axis;
@@ -354,6 +354,10 @@ impl Simulation {
         let always = wanted == Equations::Condensed;
         let lines = mesh_lines(&self.problem.mesh.nodes);
         let (groups, ties) = (&self.groups, &self.tied);
+        let held = Held {
+            now: is_prescribed,
+            sometimes: &self.sometimes_held,
+        };
         let linear: Vec<bool> = groups.iter().map(Group::is_linear).collect();
         let mut lasting = linear.clone();
         for (group, law) in self.swaps.iter().skip(number + 1).flatten() {
@@ -364,7 +368,7 @@ impl Simulation {
                 (groups.as_slice(), lasting.as_slice()),
                 Some(&mut self.reuse),
             );
-            let found = LinearDomain::new(of, is_prescribed, ties, &lines, false, reuse);
+            let found = LinearDomain::new(of, &held, ties, &lines, false, reuse);
             if let Ok(Some(found)) = found {
                 return Some(found);
             }
@@ -373,7 +377,7 @@ impl Simulation {
             (groups.as_slice(), linear.as_slice()),
             Some(&mut self.reuse),
         );
-        LinearDomain::new(of, is_prescribed, ties, &lines, always, reuse).unwrap_or(None)
+        LinearDomain::new(of, &held, ties, &lines, always, reuse).unwrap_or(None)
     }
 
     /// A solver for these equations.

@@ -2,7 +2,7 @@
 
 use super::{LinearDomain, LookedAt, Origin, Standing};
 use crate::equilibrium::newton::{
-    ACCEPTED_ROUND_OFF, DomainFailure, STILL_SMALL, last_bit_scattered, norm,
+    ACCEPTED_ROUND_OFF, DomainFailure, Loads, STILL_SMALL, last_bit_scattered, norm,
 };
 use crate::group::Group;
 use law::Operator;
@@ -17,8 +17,12 @@ const REFINED: f64 = 0.1;
 pub(super) struct Part {
     /// Of every group of the model, whether it belongs to the part.
     pub(super) groups: Vec<bool>,
+    /// Degrees of freedom of their elements, ascending.
+    dofs: Vec<usize>,
     /// Equations of their unknowns and of others that are wanted.
     wanted: Vec<usize>,
+    /// Their places in the factors.
+    places: Vec<u32>,
     /// Equations inside the domain of which no other group of the domain takes part.
     inner: Vec<usize>,
     /// Supernodes of the wanted equations, and those above them.
@@ -36,11 +40,8 @@ struct Since {
 /// A state to be reached.
 #[derive(Debug)]
 pub(super) struct Goal<'g> {
-    /// External forces, by degree of freedom.
-    pub(super) external: &'g [f64],
+    pub(super) loads: &'g Loads,
     pub(super) lambda: f64,
-    /// The residual is measured against forces no smaller than this.
-    pub(super) scale: f64,
     pub(super) tolerance: f64,
 }
 
@@ -63,28 +64,44 @@ impl LinearDomain {
     }
 
     pub(super) fn of_groups(&self, groups: &[bool], dofs: &[usize]) -> Part {
+        let mut of_elements = vec![false; self.system.n_dofs()];
         let mut wanted = vec![false; self.system.n_equations()];
         let mut shared = vec![false; self.system.n_equations()];
         for (number, in_part) in groups.iter().enumerate() {
             let mark = if *in_part { &mut wanted } else { &mut shared };
-            let dofs = self.system.dofs_of(number);
-            for equation in dofs.filter_map(|dof| self.system.equation(dof)) {
-                mark[equation] = true;
+            for dof in self.system.dofs_of(number) {
+                of_elements[dof] |= *in_part;
+                if let Some(equation) = self.system.equation(dof) {
+                    mark[equation] = true;
+                }
             }
         }
+        let free = self.system.free();
         let own = |&equation: &usize| {
-            wanted[equation] && !shared[equation] && !self.on_boundary[equation]
+            let is_inside = !self.on_boundary[equation] && !self.holds(free[equation]);
+            wanted[equation] && !shared[equation] && is_inside
         };
         let inner = (0..wanted.len()).filter(own).collect();
         let known = dofs.iter().flat_map(|&dof| self.system.masters(dof));
         for equation in known.filter_map(|dof| self.system.equation(dof)) {
             wanted[equation] = true;
         }
+        // Displacements that are prescribed are known.
+        for equation in (0..wanted.len()).filter(|&equation| self.holds(free[equation])) {
+            wanted[equation] = false;
+        }
+        let fronts = self.factors.fronts_of(&wanted);
+        let wanted: Vec<usize> = (0..wanted.len()).filter(|&e| wanted[e]).collect();
+        let places = self.factors.places();
         Part {
             groups: groups.to_vec(),
             inner,
-            fronts: self.factors.fronts_of(&wanted),
-            wanted: (0..wanted.len()).filter(|&e| wanted[e]).collect(),
+            fronts,
+            places: wanted.iter().map(|&equation| places[equation]).collect(),
+            wanted,
+            dofs: (0..of_elements.len())
+                .filter(|&dof| of_elements[dof])
+                .collect(),
         }
     }
 
@@ -111,16 +128,18 @@ impl LinearDomain {
             latest: (self.standing.part.as_ref()).map(|_| increment(latest, of_latest)),
         };
         let free = self.system.free();
-        let still = vec![0.0; self.boundary.len()];
         let mut tries = 0..REFINEMENTS;
         let mut before = f64::INFINITY;
         let (relative, internal) = loop {
             let internal = self.evaluate(groups, &since, part)?;
-            let mut residual = vec![0.0; free.len()];
-            for &equation in &part.inner {
-                residual[equation] = goal.external[free[equation]] - internal[free[equation]];
-            }
-            let scale = norm(&internal).max(goal.scale).max(f64::MIN_POSITIVE);
+            let left = |&equation: &usize| {
+                let dof = free[equation];
+                goal.loads.external_at(dof, goal.lambda) - internal[dof]
+            };
+            let residual: Vec<f64> = part.inner.iter().map(left).collect();
+            let forces: Vec<f64> = part.dofs.iter().map(|&dof| internal[dof]).collect();
+            let scale = norm(&forces).max(goal.loads.scale);
+            let scale = scale.max(f64::MIN_POSITIVE);
             let relative = norm(&residual) / scale;
             if relative <= REFINED * goal.tolerance {
                 break (0.0, internal);
@@ -148,8 +167,16 @@ impl LinearDomain {
             }
             before = relative;
             let fronts = Some(part.fronts.as_slice());
-            let (y, _) = self.factors.forward(&residual, fronts);
-            let correction = self.factors.backward(&y, &still, fronts);
+            let mut right = vec![0.0; free.len()];
+            for (&equation, residual) in part.inner.iter().zip(residual) {
+                right[equation] = residual;
+            }
+            let (y, left) = self.factors.forward(&right, fronts);
+            let beside = match &self.aside {
+                Some(aside) => aside.corrections(&left),
+                None => vec![0.0; left.len()],
+            };
+            let correction = self.factors.backward(&y, &beside, fronts);
             for increment in since.complete.iter_mut().chain(&mut since.latest) {
                 for &equation in &part.wanted {
                     increment[free[equation]] += correction[equation];
@@ -184,13 +211,19 @@ impl LinearDomain {
         displacement: &[f64],
     ) -> Vec<f64> {
         let rise = lambda - origin.lambda;
-        let y: Vec<f64> = self.y.iter().map(|y| rise * y).collect();
-        let fronts = Some(part.fronts.as_slice());
-        let values = self.factors.backward(&y, &origin.moved, fronts);
-        let moved = displacement.iter().zip(&origin.displacement);
-        let mut increment: Vec<f64> = moved.map(|(u, origin)| u - origin).collect();
-        for &equation in &part.wanted {
-            increment[self.system.free()[equation]] = values[equation];
+        let kept = match &self.aside {
+            Some(aside) => &aside.moved(rise, &origin.moved),
+            None => &origin.moved,
+        };
+        let values = self
+            .factors
+            .backward_at(&part.places, (rise, &self.y), kept, &part.fronts);
+        let mut increment = vec![0.0; displacement.len()];
+        for &dof in &part.dofs {
+            increment[dof] = displacement[dof] - origin.displacement[dof];
+        }
+        for (&equation, value) in part.wanted.iter().zip(values) {
+            increment[self.system.free()[equation]] = value;
         }
         self.system.follow(&mut increment);
         increment

@@ -64,6 +64,12 @@ impl Loads {
             .collect()
     }
 
+    /// One of them.
+    pub fn external_at(&self, dof: usize, lambda: f64) -> f64 {
+        let (start, end) = (self.force_start[dof], self.force_end[dof]);
+        start + self.share(lambda) * (end - start) + (1.0 - lambda) * self.out_of_balance[dof]
+    }
+
     /// Change of the external forces with λ, by degree of freedom.
     pub(super) fn external_rate(&self) -> Vec<f64> {
         let ends = self.force_start.iter().zip(&self.force_end);
