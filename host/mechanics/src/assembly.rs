@@ -35,6 +35,25 @@ pub fn fold(ties: &[Tie], force: &mut [f64]) {
     }
 }
 
+/// Of every degree of freedom, whether elements at these nodes use it: those that are tied use what they follow.
+pub fn used(nodes: impl Iterator<Item = usize>, ties: &[Tie], n_dofs: usize) -> Vec<bool> {
+    let mut used = vec![false; n_dofs];
+    for node in nodes {
+        used[2 * node..2 * node + 2].fill(true);
+    }
+    let followed = ties.iter().filter(|tie| used[tie.dof]);
+    let masters: Vec<usize> = followed
+        .flat_map(|tie| tie.masters.map(|(master, _)| master))
+        .collect();
+    for master in masters {
+        used[master] = true;
+    }
+    for tie in ties {
+        used[tie.dof] = false;
+    }
+    used
+}
+
 /// Gives tied degrees of freedom the values that follow from the others.
 fn follow(ties: &[Tie], displacement: &mut [f64]) {
     for tie in ties {

@@ -168,14 +168,38 @@ impl Matrix {
     }
 }
 
-/// Whether condensation pays: the linear part is the larger one, and its boundary small.
+/// Whether condensation pays: the linear part is the larger one, and its boundary small. Unknowns are counted
+/// before anything is numbered: of the linear part, those that are not `lasting`ly prescribed; of the rest, those that
+/// are not `now`.
 ///
 /// The dense equations of the boundary must not cost more than the sparse ones they replace.
-fn pays(system: &System, rest: &System) -> bool {
-    let n_boundary = rest.boundary().len();
-    let n_interior = system.n_equations() - n_boundary;
+fn pays(
+    (groups, condensed): (&[Group], &[bool]),
+    [lasting, now]: [&[bool]; 2],
+    ties: &[Tie],
+) -> bool {
+    let of = |in_domain: bool| {
+        let mut numbered = groups.iter().zip(condensed);
+        let groups = numbered.by_ref();
+        let chosen =
+            groups.filter(|(group, condensed)| group.is_active && **condensed == in_domain);
+        let kinematics: Vec<_> = chosen.map(|(group, _)| &group.kinematics).collect();
+        let nodes = kinematics
+            .iter()
+            .flat_map(|kinematics| (0..kinematics.n_elements()).flat_map(|e| kinematics.nodes(e)));
+        crate::assembly::used(nodes.copied(), ties, now.len())
+    };
+    let (own, others) = (of(true), of(false));
+    let (mut n_own, mut n_boundary, mut n_others) = (0, 0, 0);
+    for dof in 0..now.len() {
+        let (own, others) = (own[dof] && !lasting[dof], others[dof] && !now[dof]);
+        n_own += usize::from(own);
+        n_others += usize::from(others);
+        n_boundary += usize::from(own && others);
+    }
+    let n_interior = n_own - n_boundary;
     let dense = 5.0 * f64::sqrt(n_interior as f64);
-    n_interior > rest.n_equations() && n_boundary as f64 <= dense
+    n_interior > n_others && n_boundary as f64 <= dense
 }
 
 impl LinearDomain {
@@ -194,15 +218,15 @@ impl LinearDomain {
     ) -> Result<Option<(Self, System)>, Singular> {
         let sometimes = held.kept((groups, condensed));
         let lasting = held.but_for(&sometimes);
+        if !always && !pays((groups, condensed), [&lasting, held.now], ties) {
+            return Ok(None);
+        }
         let setup = Setup::of((groups, condensed), &lasting, ties);
         let is_other = |number: usize, group: &Group| group.is_active && !condensed[number];
         let rest = |system: &System| System::new(groups, is_other, held.now, ties, Some(system));
         let same = reuse.as_ref().and_then(|reuse| reuse.same(&setup));
         if let Some(numbered) = same {
             let rest = rest(&numbered.system);
-            if !always && !pays(&numbered.system, &rest) {
-                return Ok(None);
-            }
             if numbered.kept == kept(&numbered.system, &rest, &sometimes) {
                 if let Some(reuse) = reuse {
                     reuse.forget();
@@ -222,9 +246,6 @@ impl LinearDomain {
             return Ok(None);
         }
         let rest = rest(&system);
-        if !always && !pays(&system, &rest) {
-            return Ok(None);
-        }
         let kept = kept(&system, &rest, &sometimes);
         let symmetric = groups
             .iter()
