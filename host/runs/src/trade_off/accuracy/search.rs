@@ -109,7 +109,7 @@ impl Search<'_> {
     /// Doubles increments until the finest run is good enough, or the coarsest takes more seconds than the
     /// limit. What comes to no end is passed over.
     fn with(&mut self, settings: &Settings, most: f64, limit: Option<f64>) -> Result<Found, Error> {
-        let mut levels = Levels::default();
+        let mut levels = Levels::of_increments();
         let mut last_increments = Vec::new();
         let mut failure = None;
         // Factor and seconds of the last run.

@@ -27,7 +27,10 @@ pub(super) fn estimate([next, finest]: [f64; 2], order: f64) -> String {
 
 /// Why no error could be estimated.
 pub(super) fn no_estimate(runs: usize) -> String {
-    format!("none: it takes three runs of different increments, and {runs} came to the end")
+    format!(
+        "none: it takes three runs with different increments in every phase that is not linear, and {runs} came to the \
+         end"
+    )
 }
 
 /// A finer mesh was not tried: it takes so long, and so much is left.
