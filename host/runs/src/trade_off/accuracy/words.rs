@@ -103,8 +103,8 @@ fn settings(chosen: &Chosen) -> String {
         (Some(error), ..) => format!("error {error:.1e} estimated, {asked}"),
         (None, Some(error), _) => format!("{asked}; increments and tolerance have {error:.1e}"),
         (None, None, Some(difference)) => format!(
-            "{asked}; the two finest runs that came to their end differ by {difference:.1e}, and it takes a third \
-             one to tell the error"
+            "{asked}; the two finest runs that came to their end differ by {difference:.1e}, and it takes three with \
+             different increments in every phase to tell the error"
         ),
         (None, None, None) => format!("{asked}; a single run came to its end"),
     };
