@@ -308,6 +308,15 @@ pub(crate) struct Trial {
     pub(super) linear: Vec<bool>,
 }
 
+impl Trial {
+    /// Steps that were cut back.
+    pub(super) fn cut_backs(&self) -> u64 {
+        let counts = COUNTS.iter().zip(&self.counts);
+        let of_cut_backs = counts.filter(|(name, _)| **name == "cut_backs");
+        of_cut_backs.map(|(_, count)| count).sum()
+    }
+}
+
 /// A probe is zero that never exceeds this share of what its quantity has in the model: so many times the tolerance of
 /// equilibrium, within bounds.
 const TOLERATED: f64 = 10.0;

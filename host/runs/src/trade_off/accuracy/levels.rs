@@ -61,6 +61,12 @@ impl Levels {
         Some(next.rows.difference(&finest.rows, &scale))
     }
 
+    /// How many of the three finest cut steps back.
+    pub(super) fn cut_back(&self) -> usize {
+        let finest = self.runs.iter().rev().take(3);
+        finest.filter(|(_, run)| run.cut_backs() > 0).count()
+    }
+
     /// The value by which the two finest differ most.
     pub(super) fn worst(&self) -> Option<String> {
         let [.., (_, next), (_, finest)] = self.runs.as_slice() else {
@@ -285,6 +291,15 @@ mod tests {
         assert!(!of([[1, 2], [1, 4], [2, 8]], false));
         assert!(of([[1, 2], [1, 4], [2, 8]], true));
         assert!(!of([[1, 1], [2, 1], [4, 2]], false));
+    }
+
+    #[test]
+    fn runs_that_cut_steps_back_are_counted_among_those_that_tell_the_error() {
+        let mut runs = levels(1.0, &[4.0, 8.0, 16.0, 32.0]);
+        for ((_, run), cut_backs) in runs.runs.iter_mut().zip([3, 0, 2, 1]) {
+            run.counts = vec![10, 10, 10, cut_backs];
+        }
+        assert_eq!(runs.cut_back(), 2);
     }
 
     #[test]

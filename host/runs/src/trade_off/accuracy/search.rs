@@ -40,6 +40,8 @@ pub(super) struct Found {
     pub(super) worst: Option<String>,
     /// How the error was estimated.
     pub(super) estimate: String,
+    /// Of the runs that tell it, so many cut steps back.
+    pub(super) cut_back: usize,
     pub(super) trial: Trial,
     pub(super) scale: Vec<f64>,
 }
@@ -221,6 +223,7 @@ impl Search<'_> {
         let (finest_factor, finest) = levels.finest()?;
         let scale = finest.rows.largest();
         let (difference, worst) = (levels.difference(), levels.worst());
+        let cut_back = levels.cut_back();
         let of_finest = levels.error();
         let estimate = match (levels.next(), of_finest) {
             (Some((next, _)), Some(_)) => words::estimate([*next, *finest_factor], ORDERS[1]),
@@ -233,6 +236,7 @@ impl Search<'_> {
             difference,
             worst,
             estimate,
+            cut_back,
             trial,
             scale,
         })
