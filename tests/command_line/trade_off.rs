@@ -343,7 +343,8 @@ fn softening(first: &str) -> String {
         ("analysis", &format!("{first}\nanalysis")),
         (
             "increments = 2\npressure",
-            "increments = 2\ntime = 100.0\npressure",
+            // Four, so that each phase has three different ones among a quarter, half and all of them.
+            "increments = 4\ntime = 100.0\npressure",
         ),
         (
             "increments = 2\ndisplacement",

@@ -23,6 +23,8 @@ pub struct Chosen {
     pub worst: Option<String>,
     /// How the error was estimated.
     pub estimate: String,
+    /// Of the runs that tell the error of increments, so many cut steps back: their steps are shorter than their increments.
+    pub cut_back: usize,
     /// Increments by phase.
     pub increments: Vec<(String, usize)>,
     /// Tolerance of the residual.

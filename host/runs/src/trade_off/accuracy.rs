@@ -154,6 +154,7 @@ pub fn reach_until(
         worst: found.worst,
         failed: search.failed,
         estimate: found.estimate,
+        cut_back: found.cut_back,
         increments: increments.collect(),
         force_tolerance: chosen.file.solver.get_ref().force_tolerance,
         displacement_tolerance: chosen.file.solver.get_ref().displacement_tolerance,

@@ -38,6 +38,7 @@ struct Line<'a> {
     settings: Cow<'a, str>,
     cpu_seconds: Cow<'a, str>,
     counts: Cow<'a, [u64]>,
+    linear: Cow<'a, [bool]>,
     names: Cow<'a, [String]>,
     bits: Vec<Vec<Vec<u64>>>,
     zeros: Vec<u64>,
@@ -94,6 +95,7 @@ impl Kept {
             settings: settings.as_str().into(),
             cpu_seconds: trial.seconds.to_string().into(),
             counts: trial.counts.as_slice().into(),
+            linear: trial.linear.as_slice().into(),
             names: trial.rows.names.as_slice().into(),
             bits: stretches.map(|s| s.iter().map(bits).collect()).collect(),
             zeros: bits(&trial.rows.zeros),
@@ -148,6 +150,7 @@ fn read(path: &Path, identity: &str) -> Result<BTreeMap<String, Trial>, Error> {
                 },
                 seconds: line.cpu_seconds.parse().unwrap_or(f64::NAN),
                 counts: line.counts.into_owned(),
+                linear: line.linear.into_owned(),
             };
             (line.settings.into_owned(), trial)
         })
@@ -167,6 +170,7 @@ mod tests {
             },
             seconds: 0.25,
             counts: vec![3, 7],
+            linear: vec![true],
         }
     }
 
@@ -195,6 +199,7 @@ mod tests {
             (found.seconds, found.counts.as_slice()),
             (0.25, &[3, 7][..])
         );
+        assert_eq!(found.linear, [true]);
         assert_eq!((kept.len(), kept.find("fine").is_none()), (1, true));
         kept.end();
         assert!(!path.exists());

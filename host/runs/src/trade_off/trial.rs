@@ -304,6 +304,17 @@ pub(crate) struct Trial {
     pub(super) seconds: f64,
     /// Counts, in the order of [`COUNTS`].
     pub(super) counts: Vec<u64>,
+    /// Of every phase, whether no step took a second iteration: it is linear, and increments do not matter to it.
+    pub(super) linear: Vec<bool>,
+}
+
+impl Trial {
+    /// Steps that were cut back.
+    pub(super) fn cut_backs(&self) -> u64 {
+        let counts = COUNTS.iter().zip(&self.counts);
+        let of_cut_backs = counts.filter(|(name, _)| **name == "cut_backs");
+        of_cut_backs.map(|(_, count)| count).sum()
+    }
 }
 
 /// A probe is zero that never exceeds this share of what its quantity has in the model: so many times the tolerance of
@@ -417,6 +428,7 @@ pub(crate) fn measure(
         rows,
         seconds,
         counts: counts(&summary),
+        linear: linear(&summary),
     })
 }
 
@@ -487,6 +499,14 @@ fn counts(summary: &Value) -> Vec<u64> {
         calls,
         of_phases("cut_backs"),
     ]
+}
+
+/// Of every phase that ended, whether each of its increments took one iteration.
+fn linear(summary: &Value) -> Vec<bool> {
+    let phases = summary["phases"].as_array().map_or(&[][..], Vec::as_slice);
+    let count = |phase: &Value, key: &str| phase[key].as_u64().unwrap_or_default();
+    let is_linear = |phase| count(phase, "iterations") <= count(phase, "increments");
+    phases.iter().map(is_linear).collect()
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 //!
 //! With an error that falls as h^p, h = 1/n, three runs tell p and the error of the finest, whatever their n:
 //! runs in between may be missing. An error below the difference of the two finest is not claimed: over a gap it
-//! would rest on the order alone.
+//! would rest on the order alone. Of increments each phase has to differ in all three, unless it is linear: the file's
+//! two, one and again one tell as little of a phase as two runs do.
 
 use super::super::sampled::NOISE;
 use super::super::trial::Trial;
@@ -18,9 +19,19 @@ const BISECTIONS: usize = 40;
 pub(super) struct Levels {
     /// How finely each divides, and what came out.
     runs: Vec<(f64, Trial)>,
+    /// They differ in their increments.
+    by_increments: bool,
 }
 
 impl Levels {
+    /// Runs that differ in their increments.
+    pub(super) fn of_increments() -> Self {
+        Self {
+            by_increments: true,
+            ..Self::default()
+        }
+    }
+
     /// Adds a run that is finer than all others.
     pub(super) fn push(&mut self, n: f64, trial: Trial) {
         self.runs.push((n, trial));
@@ -48,6 +59,12 @@ impl Levels {
         };
         let scale = finest.rows.largest();
         Some(next.rows.difference(&finest.rows, &scale))
+    }
+
+    /// How many of the three finest cut steps back.
+    pub(super) fn cut_back(&self) -> usize {
+        let finest = self.runs.iter().rev().take(3);
+        finest.filter(|(_, run)| run.cut_backs() > 0).count()
     }
 
     /// The value by which the two finest differ most.
@@ -91,6 +108,9 @@ impl Levels {
         let [.., (a, coarse), (b, middle), (c, fine)] = self.runs.as_slice() else {
             return None;
         };
+        if self.by_increments && !are_apart([coarse, middle, fine]) {
+            return None;
+        }
         let scale = fine.rows.largest();
         let difference = |(a, b): (&Trial, &Trial)| a.rows.difference(&b.rows, &scale);
         let differences = [(coarse, middle), (middle, fine)].map(difference);
@@ -115,6 +135,19 @@ impl Levels {
         let (n, trial) = self.runs.swap_remove(chosen);
         Some((n, trial, errors[chosen]))
     }
+}
+
+/// Whether every phase that is not linear in the finest of three runs has more increments from each to the next.
+fn are_apart(runs: [&Trial; 3]) -> bool {
+    let [coarse, middle, fine] = runs.map(|run| run.rows.stretches.iter().map(Vec::len));
+    let linear = runs[2]
+        .linear
+        .iter()
+        .copied()
+        .chain(std::iter::repeat(false));
+    let mut phases = coarse.zip(middle).zip(fine).zip(linear);
+    phases
+        .all(|(((coarse, middle), fine), is_linear)| is_linear || coarse < middle && middle < fine)
 }
 
 /// The error of the finer of two runs, in parts of their difference; at least all of it.
@@ -165,6 +198,7 @@ mod tests {
                 rows,
                 seconds: 0.0,
                 counts: Vec::new(),
+                linear: Vec::new(),
             };
             levels.push(n, trial);
         }
@@ -218,6 +252,7 @@ mod tests {
                     rows,
                     seconds: 0.0,
                     counts: Vec::new(),
+                    linear: Vec::new(),
                 };
                 levels.push(n, trial);
             }
@@ -229,6 +264,42 @@ mod tests {
         assert!(of([1.0, 1.1, 1.19]).is_none());
         assert!(of([1.0, 1.0 + 1e-12, 1.0 + 3e-12]).is_none());
         assert!(levels(0.1, &[4.0, 8.0, 16.0]).growth().is_none());
+    }
+
+    /// Runs of two phases of so many increments, the first one linear or not.
+    #[test]
+    fn a_phase_has_three_increments_or_is_linear_where_an_error_is_told() {
+        let of = |increments: [[usize; 2]; 3], is_linear: bool| {
+            let mut levels = Levels::of_increments();
+            for (n, phases) in [1.0, 2.0, 4.0].into_iter().zip(increments) {
+                let rows = Sampled {
+                    names: vec!["f".to_owned()],
+                    stretches: phases.map(|n| vec![vec![1.0]; n]).to_vec(),
+                    zeros: Vec::new(),
+                };
+                let trial = Trial {
+                    rows,
+                    seconds: 0.0,
+                    counts: Vec::new(),
+                    linear: vec![is_linear, false],
+                };
+                levels.push(n, trial);
+            }
+            levels.error().is_some()
+        };
+        assert!(of([[1, 2], [2, 4], [4, 8]], false));
+        assert!(!of([[1, 2], [1, 4], [2, 8]], false));
+        assert!(of([[1, 2], [1, 4], [2, 8]], true));
+        assert!(!of([[1, 1], [2, 1], [4, 2]], false));
+    }
+
+    #[test]
+    fn runs_that_cut_steps_back_are_counted_among_those_that_tell_the_error() {
+        let mut runs = levels(1.0, &[4.0, 8.0, 16.0, 32.0]);
+        for ((_, run), cut_backs) in runs.runs.iter_mut().zip([3, 0, 2, 1]) {
+            run.counts = vec![10, 10, 10, cut_backs];
+        }
+        assert_eq!(runs.cut_back(), 2);
     }
 
     #[test]

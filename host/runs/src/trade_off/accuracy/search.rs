@@ -40,6 +40,8 @@ pub(super) struct Found {
     pub(super) worst: Option<String>,
     /// How the error was estimated.
     pub(super) estimate: String,
+    /// Of the runs that tell it, so many cut steps back.
+    pub(super) cut_back: usize,
     pub(super) trial: Trial,
     pub(super) scale: Vec<f64>,
 }
@@ -109,7 +111,7 @@ impl Search<'_> {
     /// Doubles increments until the finest run is good enough, or the coarsest takes more seconds than the
     /// limit. What comes to no end is passed over.
     fn with(&mut self, settings: &Settings, most: f64, limit: Option<f64>) -> Result<Found, Error> {
-        let mut levels = Levels::default();
+        let mut levels = Levels::of_increments();
         let mut last_increments = Vec::new();
         let mut failure = None;
         // Factor and seconds of the last run.
@@ -221,6 +223,7 @@ impl Search<'_> {
         let (finest_factor, finest) = levels.finest()?;
         let scale = finest.rows.largest();
         let (difference, worst) = (levels.difference(), levels.worst());
+        let cut_back = levels.cut_back();
         let of_finest = levels.error();
         let estimate = match (levels.next(), of_finest) {
             (Some((next, _)), Some(_)) => words::estimate([*next, *finest_factor], ORDERS[1]),
@@ -233,6 +236,7 @@ impl Search<'_> {
             difference,
             worst,
             estimate,
+            cut_back,
             trial,
             scale,
         })

@@ -27,7 +27,10 @@ pub(super) fn estimate([next, finest]: [f64; 2], order: f64) -> String {
 
 /// Why no error could be estimated.
 pub(super) fn no_estimate(runs: usize) -> String {
-    format!("none: it takes three runs of different increments, and {runs} came to the end")
+    format!(
+        "none: it takes three runs with different increments in every phase that is not linear, and {runs} came to the \
+         end"
+    )
 }
 
 /// A finer mesh was not tried: it takes so long, and so much is left.
@@ -72,6 +75,9 @@ pub(super) fn mesh_diverges(n: usize, [coarse, fine]: [f64; 2], why: Option<Stri
 pub(super) fn outcome(chosen: &Chosen) -> Result<String, String> {
     let settings = settings(chosen);
     match chosen.verdict {
+        Verdict::Reached if chosen.cut_back > 0 => Err(format!(
+            "the accuracy is reached as far as increments tell: {settings}"
+        )),
         Verdict::Reached => Ok(format!("{STUDY}: {settings}")),
         Verdict::NotReached => Err(format!("the accuracy is not reached: {settings}")),
         Verdict::NotKnown => Err(format!(
@@ -100,8 +106,8 @@ fn settings(chosen: &Chosen) -> String {
         (Some(error), ..) => format!("error {error:.1e} estimated, {asked}"),
         (None, Some(error), _) => format!("{asked}; increments and tolerance have {error:.1e}"),
         (None, None, Some(difference)) => format!(
-            "{asked}; the two finest runs that came to their end differ by {difference:.1e}, and it takes a third \
-             one to tell the error"
+            "{asked}; the two finest runs that came to their end differ by {difference:.1e}, and it takes three with \
+             different increments in every phase to tell the error"
         ),
         (None, None, None) => format!("{asked}; a single run came to its end"),
     };
@@ -142,6 +148,14 @@ fn settings(chosen: &Chosen) -> String {
     {
         let _ = write!(text, "; the runs differ most in `{probe}`");
     }
+    if chosen.cut_back > 0 && chosen.without_mesh.is_some() {
+        let _ = write!(
+            text,
+            "; of the three runs that tell the error of increments {} cut steps back: their steps differ by less than \
+             their increments, and the error may be larger",
+            chosen.cut_back
+        );
+    }
     if !chosen.zero.is_empty() {
         let _ = write!(text, "; {}", zero(&chosen.zero));
     }
@@ -151,4 +165,37 @@ fn settings(chosen: &Chosen) -> String {
         let _ = write!(text, "; failed ({STUDY}.csv has why): {failed}");
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_reached_by_runs_that_cut_steps_back_is_a_warning() {
+        let mut chosen = Chosen {
+            asked: 0.01,
+            reached: Some(0.004),
+            without_mesh: Some(0.004),
+            mesh: None,
+            is_reached: true,
+            verdict: Verdict::Reached,
+            difference: Some(0.002),
+            worst: None,
+            estimate: String::new(),
+            cut_back: 0,
+            increments: vec![("push".to_owned(), 8)],
+            force_tolerance: 1e-9,
+            displacement_tolerance: 1e-7,
+            parameters: Vec::new(),
+            zero: Vec::new(),
+            runs: 3,
+            failed: Vec::new(),
+        };
+        let plain = outcome(&chosen).unwrap();
+        assert!(!plain.contains("cut steps back"), "{plain}");
+        chosen.cut_back = 2;
+        let warned = outcome(&chosen).unwrap_err();
+        assert!(warned.contains("increments 2 cut steps back"), "{warned}");
+    }
 }
