@@ -88,6 +88,8 @@ pub struct LinearDomain {
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
     on_boundary: Vec<bool>,
+    /// Of every unknown, whether it is prescribed in this phase, though not in all of them.
+    is_held: Vec<bool>,
     /// What is kept beside the boundary, if anything is.
     aside: Option<Aside>,
     /// S.
@@ -297,12 +299,14 @@ impl LinearDomain {
         let free = system.free();
         let of_kept = factors.kept().iter().map(|&e| free[e as usize]);
         let of_kept: Vec<usize> = of_kept.collect();
+        let mut is_held = vec![false; free.len()];
         let mut stiffness = Dense::SchurOf(Arc::clone(&factors));
         let mut aside = None;
         if of_kept.len() != rest.boundary().len() {
             let (found, own) = Aside::new(factors.schur(), &of_kept, prescribed, rest)?;
             for (&equation, dof) in factors.kept().iter().zip(&of_kept) {
                 kept[equation as usize] = rest.boundary().binary_search(dof).is_ok();
+                is_held[equation as usize] = prescribed[*dof];
             }
             stiffness = Dense::Of(Arc::new(own));
             aside = Some(found);
@@ -318,6 +322,7 @@ impl LinearDomain {
                 None => of_kept,
             },
             on_boundary: kept,
+            is_held,
             aside,
             stiffness,
             factors,
@@ -507,12 +512,7 @@ impl LinearDomain {
 
     /// Degrees of freedom of the domain's unknowns in this phase, boundary included.
     pub fn unknowns(&self) -> impl Iterator<Item = usize> {
-        let free = self.system.free().iter().copied();
-        free.filter(|&dof| !self.holds(dof))
-    }
-
-    /// Whether a degree of freedom is prescribed in this phase, though not in all of them.
-    fn holds(&self, dof: usize) -> bool {
-        self.aside.as_ref().is_some_and(|aside| aside.holds(dof))
+        let free = self.system.free().iter().zip(&self.is_held);
+        free.filter(|(_, is_held)| !**is_held).map(|(dof, _)| *dof)
     }
 }

@@ -125,9 +125,7 @@ impl Simulation {
         };
         let mut unknowns = equations.system.free().to_vec();
         if let (Some(domain), None) = (&equations.domain, beside) {
-            unknowns.extend(domain.unknowns());
-            unknowns.sort_unstable();
-            unknowns.dedup();
+            unknowns = among_both(&unknowns, domain.unknowns(), internal.len());
         }
         let taken = |dof: &usize| {
             let beside = beside.unwrap_or_default();
@@ -160,4 +158,17 @@ impl Simulation {
             Some(imbalance) => Err(Reason::Unbalanced(imbalance)),
         }
     }
+}
+
+/// Degrees of freedom that are among some or others, ascending.
+pub(super) fn among_both(
+    some: &[usize],
+    others: impl Iterator<Item = usize>,
+    n_dofs: usize,
+) -> Vec<usize> {
+    let mut is_any = vec![false; n_dofs];
+    for dof in some.iter().copied().chain(others) {
+        is_any[dof] = true;
+    }
+    (0..n_dofs).filter(|&dof| is_any[dof]).collect()
 }

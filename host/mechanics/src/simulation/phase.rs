@@ -1,5 +1,6 @@
 //! A phase: its equations, its loads, and what is out of balance as it begins.
 
+use super::complete::among_both;
 use super::history::History;
 use super::state::PhaseCourse;
 use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
@@ -281,10 +282,8 @@ impl Simulation {
         let solver = self.solver(&system, domain.as_ref())?;
         let bytes = solver.bytes() + system.bytes_of_elements(groups);
         self.reuse.announce(bytes, "factorising the equations");
-        let mut unknowns = system.free().to_vec();
-        unknowns.extend(domain.iter().flat_map(LinearDomain::unknowns));
-        unknowns.sort_unstable();
-        unknowns.dedup();
+        let of_domain = domain.iter().flat_map(LinearDomain::unknowns);
+        let unknowns = among_both(system.free(), of_domain, system.n_dofs());
         let out_of_balance = match course {
             Some(course) => course.record.out_of_balance,
             None => self.out_of_balance(&unknowns, &mut loads),

@@ -149,11 +149,6 @@ impl Aside {
         Ok((aside, own))
     }
 
-    /// Whether a degree of freedom is one of those that are prescribed.
-    pub(super) fn holds(&self, dof: usize) -> bool {
-        self.held_dofs.binary_search(&dof).is_ok()
-    }
-
     /// Forces per λ on the boundary, from those on all that is kept, r', and the displacements per λ that are
     /// prescribed, by degree of freedom.
     pub(super) fn condense(

@@ -76,9 +76,8 @@ impl LinearDomain {
                 }
             }
         }
-        let free = self.system.free();
         let own = |&equation: &usize| {
-            let is_inside = !self.on_boundary[equation] && !self.holds(free[equation]);
+            let is_inside = !self.on_boundary[equation] && !self.is_held[equation];
             wanted[equation] && !shared[equation] && is_inside
         };
         let inner = (0..wanted.len()).filter(own).collect();
@@ -87,8 +86,8 @@ impl LinearDomain {
             wanted[equation] = true;
         }
         // Displacements that are prescribed are known.
-        for equation in (0..wanted.len()).filter(|&equation| self.holds(free[equation])) {
-            wanted[equation] = false;
+        for (wanted, is_held) in wanted.iter_mut().zip(&self.is_held) {
+            *wanted &= !is_held;
         }
         let fronts = self.factors.fronts_of(&wanted);
         let wanted: Vec<usize> = (0..wanted.len()).filter(|&e| wanted[e]).collect();
