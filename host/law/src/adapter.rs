@@ -11,6 +11,7 @@
 //! `ForeignInstance`.
 
 pub mod conventions;
+mod guarded;
 mod mfront;
 mod sidecar;
 mod symbols;

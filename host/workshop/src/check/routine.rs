@@ -8,26 +8,29 @@ mod first;
 mod tangent;
 mod words;
 
-use super::mathematics::{ITERATED, UPDATE, depends_on_time, flux_scale, largest};
+use super::extent::beyond_elastic;
+use super::mathematics::{ELASTIC, ITERATED, UPDATE, depends_on_time, flux_scale, largest};
 use super::random::Random;
 use super::specimen::{LONG, Specimen, first_difference, is_success};
-use super::walk::Step;
+use super::walk::{Refused, Step};
 use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
 use abi::raw;
 use abi::status::Outcome;
-use law::Site;
 use law::adapter::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointEnd, PointStart};
+use law::vetting::plausible;
+use law::{Bounds, LoadedLaw, Site};
 use std::path::Path;
 use text::{Source, suggestion};
-use words::{Words, advice, is_mfront};
+use words::{Words, advice, has_sidecar, is_mfront};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "sidecar-is-read",
         family: Family::Routine,
-        description: "UMAT: the sidecar beside the library, or that of the driver, is there and makes sense. (What is \
+        description: "UMAT: the sidecar beside the library, or that of the driver, is there and makes sense; its \
+                      parameters have a default or a usual range, or are set (warning). (What is \
                       asked of a UMAT here is asked of a UDSM and of MFront behaviours, too, along a driver.)",
         needs: &["file-is-a-library"],
         run: sidecar_is_read,
@@ -45,7 +48,8 @@ pub(super) const CHECKS: &[Check] = &[
         family: Family::Routine,
         description: "UMAT: on random paths and on those that go far, there and back, nothing is written \
                       beyond an array or over sizes, names and PROPS, and PNEWDT is sound; results are finite \
-                      on random ones; a copy that is used up is a warning.",
+                      on random ones; the process goes on: PNEWDT asks for a smaller increment, STOP and XIT end \
+                      it; a copy that is used up is a warning.",
         needs: &["routine-answers"],
         run: routine_stays_inside,
     },
@@ -121,7 +125,7 @@ pub(super) const SHARED: [&str; 3] = [
 
 /// Those that mean the same for a routine, too, whose parameters and increments are random or far away. What
 /// they fail of a law they warn of here: public routines are often imprecise, and are of use all the same.
-pub(super) const OF_RESPONSES: [&str; 8] = [
+pub(super) const OF_RESPONSES: [&str; 9] = [
     "response-is-isotropic",
     "compression-is-negative",
     "angles-are-degrees",
@@ -130,7 +134,11 @@ pub(super) const OF_RESPONSES: [&str; 8] = [
     "states-are-carried-on",
     "plastic-variables-rest",
     "units-belong-together",
+    "paths-leave-elasticity",
 ];
+
+/// A routine that ends its process far away fails this check; others warn of it.
+pub(super) const GOES_FAR: &str = "routine-stays-inside";
 
 /// Increments of the random part of a path.
 const N_INCREMENTS: usize = 36;
@@ -243,7 +251,31 @@ fn sidecar_is_read(subject: &Subject) -> Found {
             description.parameters.len()
         )
     });
-    Ok(names.collect::<Vec<_>>().join("; "))
+    let names = names.collect::<Vec<_>>().join("; ");
+    let groundless = groundless(subject, &laws);
+    if groundless.is_empty() {
+        return Ok(names);
+    }
+    Err(Verdict::Warning(format!(
+        "{names}; checked with {}, for which the sidecar has neither `default` nor `usual = [a, b]`, so that what is \
+         found may be of no use: write them there, or give values by `--set ID=VALUE` or `--driver FILE`",
+        groundless.join(", ")
+    )))
+}
+
+/// Parameters of a sidecar, with the values that they are checked with, for which nothing speaks.
+fn groundless(subject: &Subject, laws: &[LoadedLaw]) -> Vec<String> {
+    if subject.driver.is_some() || subject.at.is_some() {
+        return Vec::new();
+    }
+    let parameters = laws.iter().flat_map(|law| &law.description().parameters);
+    let is_range = |bounds: &Bounds| bounds.lower.is_finite() && bounds.upper.is_finite();
+    parameters
+        .filter(|p| p.default.is_none() && !p.optional && p.choices.is_empty())
+        .filter(|p| !is_range(&p.usual) && !is_range(&p.bounds))
+        .filter(|p| subject.settings.iter().all(|(id, _)| *id != p.id))
+        .map(|p| format!("`{}` = {}", p.id, plausible(p)))
+        .collect()
 }
 
 /// Compression of a first call, kPa.
@@ -317,10 +349,10 @@ fn routine_stays_inside(subject: &Subject) -> Found {
         };
         let near_ones = near.refusals.iter().map(|refused| (refused, true));
         let mut refused = near_ones.chain(all.refusals.iter().map(|refused| (refused, false)));
-        if let Some(((status, text), _)) =
-            refused.find(|((status, _), is_near)| is_defect(*status, *is_near))
+        if let Some((refused, _)) =
+            refused.find(|(refused, is_near)| is_defect(refused.status, *is_near))
         {
-            return Err(routine.fails(refusal(*status, Some(text))));
+            return Err(refuses(&routine, refused)?);
         }
         if near.steps.is_empty() && all.steps.is_empty() {
             let why = format!("{}: no increment succeeded: {}", routine.name(), near.why());
@@ -340,6 +372,20 @@ fn routine_stays_inside(subject: &Subject) -> Found {
         Some(note) => Err(Verdict::Warning(note)),
         None => Ok(format!("{n} increments")),
     }
+}
+
+/// The failure of an increment that a routine refuses: alone if it does so alone, too, as is repeated by its
+/// capsule.
+fn refuses(routine: &Specimen, refused: &Refused) -> Result<Verdict, Verdict> {
+    let alone = routine.call(std::slice::from_ref(&refused.start), UPDATE)?;
+    let status = alone.points[0].status;
+    let text = alone.text().filter(|_| status == refused.status);
+    let why = refusal(refused.status, Some(text.as_ref().unwrap_or(&refused.text)));
+    let why = format!("{why}, at {}", routine.at(&refused.start));
+    Ok(match text {
+        Some(_) => routine.fails_at(&refused.start, why),
+        None => routine.fails(why),
+    })
 }
 
 /// Whether it is the same law with the same parameters.
@@ -468,16 +514,20 @@ fn routine_stays_at_rest(subject: &Subject) -> Found {
                 return Err(routine.fails_at(point, format!("{strain} = 0 is refused: {why}")));
             }
             if differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step)) {
+                let hint = if let Some(hint) = unreturned(routine, step)? {
+                    hint
+                } else if has_sidecar(routine) && moves_with_time(routine, point)? {
+                    "; what the time does is declared by `time_dependent = true` in the sidecar"
+                        .to_owned()
+                } else {
+                    String::new()
+                };
                 let why = format!(
-                    "{strain} = 0 changes {stress} {:?} to {:?}{}",
-                    step.end.flux,
-                    end.flux,
-                    advice(
-                        routine,
-                        "; what the time does is declared by `time_dependent = true` in the sidecar"
-                    )
+                    "{strain} = 0 changes {stress} {:?} to {:?}{hint}",
+                    step.end.flux, end.flux
                 );
-                return Err(routine.fails_at(point, why));
+                // A replay goes on from the end of the increment, too.
+                return Err(routine.fails_at(&step.start, why));
             }
         }
         Ok(steps.len())
@@ -486,6 +536,53 @@ fn routine_stays_at_rest(subject: &Subject) -> Found {
         return Err(skipped("the routine depends on the time"));
     }
     Ok(format!("{n} increments"))
+}
+
+/// How near a component is to what elasticity alone makes of it, and how far others are.
+const PREDICTED: [f64; 2] = [1e-10, 1e-6];
+
+/// What an increment has left as it was, bit by bit, or as elasticity alone makes it, by the names that the routine
+/// has for it. A component that is zero says nothing.
+fn unreturned(routine: &Specimen, step: &Step) -> Result<Option<String>, Verdict> {
+    let words = Words::of(routine);
+    let components = routine.hypothesis.components();
+    let stress = |c: usize| format!("{}({}), {}", words.stress, c + 1, components[c]);
+    let stays = |from: f64, to: f64| from.to_bits() == to.to_bits();
+    let fluxes = step.start.flux0.iter().zip(&step.end.flux).enumerate();
+    let fluxes = fluxes.filter(|(_, (from, to))| **to != 0.0 && stays(**from, **to));
+    let variables = &routine.formulation.internal_variables;
+    let states = step.start.state0.iter().zip(&step.end.state).enumerate();
+    let states = states
+        .filter(|(_, (from, to))| stays(**from, **to))
+        .map(|(k, _)| format!("{}({}), `{}`", words.state, k + 1, variables[k].id));
+    let left: Vec<String> = fluxes.map(|(c, _)| stress(c)).chain(states).collect();
+    if !left.is_empty() {
+        return Ok(Some(format!(
+            "; the increment before that has left {}, as it was: is it returned?",
+            left.join(", and ")
+        )));
+    }
+    let start = std::slice::from_ref(&step.start);
+    let elastic = routine.call(start, ELASTIC)?.points;
+    let off = beyond_elastic(step, &elastic[0]);
+    let scale = flux_scale(step);
+    let is_predicted = |c: &usize| off[*c] <= PREDICTED[0] * scale && step.end.flux[*c] != 0.0;
+    let predicted: Vec<String> = (0..off.len()).filter(is_predicted).map(stress).collect();
+    let is_inelastic = largest(&off) > PREDICTED[1] * scale;
+    Ok((is_inelastic && !predicted.is_empty()).then(|| {
+        format!(
+            "; in the increment before that {}, is what elasticity alone gives, and others are not: is it corrected?",
+            predicted.join(", and ")
+        )
+    }))
+}
+
+/// Whether a stress at rest depends on how long the rest is.
+fn moves_with_time(routine: &Specimen, point: &PointStart) -> Result<bool, Verdict> {
+    let points = std::slice::from_ref(point);
+    let usual = routine.call(points, raw::PILUM_REQ_FLUX)?.points;
+    let longer = routine.lasting(SLOWER, points, raw::PILUM_REQ_FLUX)?;
+    Ok(usual[0].flux != longer[0].flux)
 }
 
 /// Whether components differ by more than this.
