@@ -11,8 +11,8 @@ use std::fmt::Write as _;
 pub(super) const CHECKS: &[Check] = &[Check {
     id: "paths-leave-elasticity",
     family: Family::Mathematics,
-    description: "Where a law has internal variables, some increments of the paths are not elastic, else what comes \
-                  after yielding was not looked at; no component of the flux for which the tangent has a stiffness \
+    description: "Where a law has internal variables, some increments of the paths are not elastic, or change one of \
+                  them after the first, else what comes after yielding was not looked at; no component of the flux for which the tangent has a stiffness \
                   stays what it was in all of them (warning). Internal variables that never change are told.",
     needs: NEEDS,
     run: paths_leave_elasticity,
@@ -25,9 +25,9 @@ const INELASTIC: f64 = 1e-6;
 
 fn paths_leave_elasticity(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "extent");
-    let (mut n, mut n_inelastic, mut has_variables) = (0, 0, false);
-    let mut still: Vec<String> = Vec::new();
-    let mut elastic_one = None;
+    let (mut n, mut n_inelastic) = (0, 0);
+    let mut still: Option<Vec<String>> = None;
+    let mut idle = None;
     for specimen in subject.specimens_by_default(1, &mut random)? {
         let steps = specimen.paths(N_INCREMENTS, &mut random)?.steps;
         if steps.is_empty() {
@@ -39,36 +39,46 @@ fn paths_leave_elasticity(subject: &Subject) -> Found {
             return Err(specimen.recorded(&steps[0].start, verdict));
         }
         let elastic = specimen.call(&starts, ELASTIC)?.points;
-        let own = steps.iter().zip(&elastic);
-        let own = own.filter(|(step, elastic)| is_inelastic(step, elastic));
-        let n_own = own.count();
+        let pairs = steps.iter().zip(&elastic);
+        let inelastic = pairs.filter(|(step, elastic)| is_inelastic(step, elastic));
+        let n_own = inelastic.count();
         n += steps.len();
         n_inelastic += n_own;
         let has_own = !specimen.formulation.internal_variables.is_empty();
-        has_variables |= has_own;
-        if n_own == 0 && has_own && !specimen.formulation.linear {
-            elastic_one = elastic_one.or_else(|| Some(specimen.name()));
+        let is_idle = n_own == 0 && !steps.iter().any(changes_later);
+        if is_idle && has_own && !specimen.formulation.linear {
+            idle = idle.or_else(|| Some(specimen.name()));
         }
-        for id in still_variables(&specimen, &steps) {
-            if !still.contains(&id) {
-                still.push(id);
-            }
-        }
+        // Under none of the hypotheses, and with no parameters.
+        let mut own = still_variables(&specimen, &steps);
+        own.retain(|id| still.as_ref().is_none_or(|still| still.contains(id)));
+        still = Some(own);
     }
     if n == 0 {
         return Err(skipped("no increment succeeded"));
     }
-    if let Some(name) = elastic_one {
+    if let Some(name) = idle {
         return Err(Verdict::Warning(format!(
-            "{name}: none of the increments leaves elasticity, so that no check has seen what comes after yielding; \
-             other parameters by `--set`, or a path of your own by `--driver`"
+            "{name}: none of the increments leaves elasticity, and no internal variable changes after the first: no \
+             check has seen what comes after yielding; other parameters by `--set`, or a path of your own by `--driver`"
         )));
     }
     let mut details = format!("{n} increments, {n_inelastic} of them inelastic");
-    if n_inelastic > 0 && has_variables && !still.is_empty() {
+    let still = still.unwrap_or_default();
+    if n_inelastic > 0 && !still.is_empty() {
         let _ = write!(details, ", never changed: {}", still.join(", "));
     }
     Ok(details)
+}
+
+/// Whether an increment that is not the first one of a point changes an internal variable.
+fn changes_later(step: &Step) -> bool {
+    let pairs = step.start.state0.iter().zip(&step.end.state);
+    let is_later = step.start.gradient0.iter().any(|value| *value != 0.0);
+    is_later
+        && pairs
+            .into_iter()
+            .any(|(from, to)| from.to_bits() != to.to_bits())
 }
 
 /// Whether the flux is not what the elastic operator makes of the increment.
