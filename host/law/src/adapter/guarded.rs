@@ -343,7 +343,7 @@ mod tests {
                 0,
                 41,
                 "beyond the end of A, which has 2 entries: entry 42 becomes 2.5e0 (or in front of B: \
-                 entry -214)",
+                 entry -216)",
             ),
             (
                 1,
