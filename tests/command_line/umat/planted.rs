@@ -96,6 +96,12 @@ fn each_mistake_is_called_by_its_name() {
             "failed",
             "in front of STATEV: entry 0 becomes",
         ),
+        (
+            9,
+            "routine-stays-inside",
+            "failed",
+            "the routine reads beyond the end of STATEV, which has 1 entries, or in front of DDSDDE",
+        ),
     ] {
         let (checks, outcome) = planted(&place, what, &[]);
         let [found, details] = &checks[id];
@@ -201,6 +207,34 @@ fn parameters_without_a_ground_are_named() {
     let (checks, _) = checked(&place, "planted", &all);
     let [found, details] = &checks["sidecar-is-read"];
     assert_eq!(found, "passed", "{details}");
+}
+
+/// A sidecar with too few parameters leaves a routine without the last one, which is read all the same.
+#[test]
+fn a_parameter_that_the_sidecar_lacks_is_told() {
+    let Some(place) = place("planted") else {
+        return;
+    };
+    let path = place.path("planted.law.toml");
+    std::fs::remove_file(&path).unwrap();
+    let arguments = [
+        "new-sidecar",
+        "libplanted.so",
+        "--nprops",
+        "3",
+        "--nstatv",
+        "1",
+    ];
+    let outcome = place.run(&arguments);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let all = ["prop_1=5e5", "prop_2=0.3", "prop_3=200"];
+    let all: Vec<&str> = all.iter().flat_map(|set| ["--set", set]).collect();
+    let (checks, outcome) = checked(&place, "planted", &all);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let [found, details] = &checks["routine-answers"];
+    assert_eq!(found, "failed", "{details}");
+    let said = "the routine reads beyond the end of PROPS, which has 3 entries";
+    assert!(details.contains(said), "{details}");
 }
 
 /// A replay has the numbers of the check: it makes the same calls.

@@ -61,6 +61,15 @@ pub(super) struct Block<const N: usize> {
     given: Vec<u64>,
     /// Guard words do not hold what they should.
     is_damaged: bool,
+    /// What some of them hold in place of the usual.
+    beside: Option<Beside>,
+}
+
+/// Another number in guard words: in front of that argument, after the last one if there is none, or everywhere.
+#[derive(Clone, Copy, Debug)]
+struct Beside {
+    gap: Option<usize>,
+    word: u64,
 }
 
 impl<const N: usize> Block<N> {
@@ -79,6 +88,7 @@ impl<const N: usize> Block<N> {
             arguments,
             given: Vec::new(),
             is_damaged: false,
+            beside: None,
         };
         for i in 0..N {
             let all = block.range(i);
@@ -95,14 +105,50 @@ impl<const N: usize> Block<N> {
     /// Takes the arguments of another block of the same sizes.
     pub(super) fn refresh(&mut self, template: &Self) {
         if self.is_damaged {
-            self.words.copy_from_slice(&template.words);
-            self.is_damaged = false;
-            return;
+            self.stand_guard(self.beside);
         }
         for i in 0..N {
             let all = self.range(i);
             self.words[all.clone()].copy_from_slice(&template.words[all]);
         }
+    }
+
+    /// Fills the guard words.
+    fn stand_guard(&mut self, beside: Option<Beside>) {
+        self.beside = beside;
+        self.is_damaged = false;
+        for gap in 0..=N {
+            let (all, word) = (self.gap(gap), self.guard(gap));
+            self.words[all].fill(word);
+        }
+    }
+
+    /// Guard words in front of an argument, or after the last one.
+    fn gap(&self, gap: usize) -> std::ops::Range<usize> {
+        let from = gap
+            .checked_sub(1)
+            .map_or(0, |before| self.range(before).end);
+        from..self.at.get(gap).copied().unwrap_or(self.words.len())
+    }
+
+    /// What they hold.
+    fn guard(&self, gap: usize) -> u64 {
+        let other = self
+            .beside
+            .filter(|other| other.gap.is_none_or(|own| own == gap));
+        other.map_or(GUARD, |other| other.word)
+    }
+
+    /// Where they are, in words.
+    fn place(&self, gap: usize) -> String {
+        let beyond = gap.checked_sub(1).map(|i| {
+            let (name, size) = (self.arguments[i].0, self.entries[i]);
+            format!("beyond the end of {name}, which has {size} entries")
+        });
+        let in_front = self.arguments.get(gap);
+        let in_front = in_front.map(|argument| format!("in front of {}", argument.0));
+        let both: Vec<String> = beyond.into_iter().chain(in_front).collect();
+        both.join(", or ")
     }
 
     /// Writes the first entries of an argument.
@@ -192,24 +238,21 @@ impl<const N: usize> Block<N> {
 
     /// The first guard words that do not hold what they should, in words.
     fn damage(&self) -> Option<String> {
-        let mut from = 0;
-        for after in 0..=N {
-            let to = self.at.get(after).copied().unwrap_or(self.words.len());
-            let guards = &self.words[from..to];
-            if !guards.iter().fold(0, |all, word| all | word ^ GUARD).eq(&0) {
-                return Some(self.told(guards, after));
-            }
-            if after < N {
-                from = self.range(after).end;
-            }
-        }
-        None
+        let is_damaged = |gap: &usize| {
+            let (guards, expected) = (&self.words[self.gap(*gap)], self.guard(*gap));
+            let off = guards.iter().fold(0, |all, word| all | (word ^ expected));
+            off != 0
+        };
+        (0..=N).find(is_damaged).map(|gap| self.told(gap))
     }
 
     /// What was written into the guard words in front of this argument: whose it was to be by its distance, its
     /// place, counted from 1 as in Fortran, and its value.
-    fn told(&self, guards: &[u64], after: usize) -> String {
-        let written: Vec<usize> = (0..guards.len()).filter(|&i| guards[i] != GUARD).collect();
+    fn told(&self, after: usize) -> String {
+        let (guards, expected) = (&self.words[self.gap(after)], self.guard(after));
+        let written: Vec<usize> = (0..guards.len())
+            .filter(|&i| guards[i] != expected)
+            .collect();
         let (first, last) = (written[0], written[written.len() - 1]);
         let left = guards.len() - 1 - last;
         let beyond = after.checked_sub(1).map(|i| {
@@ -258,6 +301,7 @@ impl<const N: usize> Block<N> {
 pub(super) struct Blocks<const N: usize> {
     template: Block<N>,
     unused: Mutex<Vec<Block<N>>>,
+    beside: Mutex<Option<Beside>>,
 }
 
 impl<const N: usize> Blocks<N> {
@@ -265,6 +309,7 @@ impl<const N: usize> Blocks<N> {
         Self {
             template,
             unused: Mutex::default(),
+            beside: Mutex::default(),
         }
     }
 
@@ -272,11 +317,31 @@ impl<const N: usize> Blocks<N> {
         &self.template
     }
 
+    /// Puts a number into the guard words in front of that argument, or all, of calls from now on; the usual one if
+    /// there is none. In words where that is; `None` if there is no such place.
+    pub(super) fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
+        if gap.is_some_and(|gap| gap > N) {
+            return None;
+        }
+        let word = value.map(f64::to_bits);
+        let beside = word.map(|word| Beside { gap, word });
+        *self.beside.lock().unwrap_or_else(PoisonError::into_inner) = beside;
+        let mut unused = self.unused.lock().unwrap_or_else(PoisonError::into_inner);
+        unused
+            .iter_mut()
+            .for_each(|block| block.stand_guard(beside));
+        Some(gap.map_or_else(String::new, |gap| self.template.place(gap)))
+    }
+
     /// Makes calls with a block of their own.
     pub(super) fn with<T>(&self, calls: impl FnOnce(&mut Block<N>) -> T) -> T {
         let unused = || self.unused.lock().unwrap_or_else(PoisonError::into_inner);
         let one = unused().pop();
-        let mut block = one.unwrap_or_else(|| self.template.clone());
+        let mut block = one.unwrap_or_else(|| {
+            let mut block = self.template.clone();
+            block.stand_guard(*self.beside.lock().unwrap_or_else(PoisonError::into_inner));
+            block
+        });
         let made = calls(&mut block);
         unused().push(block);
         made
@@ -369,6 +434,31 @@ mod tests {
         assert_eq!(said(3, 1), Ok(1 << 3));
         let why = said(2, 0).unwrap_err();
         assert_eq!(why, "the routine overwrites N, which is an input");
+    }
+
+    #[test]
+    fn another_number_stands_where_it_is_put_and_is_guarded() {
+        let blocks = Blocks::new(block());
+        let seen = |at: isize| {
+            blocks.with(|block| {
+                let word = block.words[block.at[1].checked_add_signed(at).unwrap()];
+                assert!(block.overwritten().is_ok());
+                word
+            })
+        };
+        assert_eq!(seen(4), GUARD);
+        let place = blocks.put_beside(Some(2), Some(1.0)).unwrap();
+        assert_eq!(
+            place,
+            "beyond the end of B, which has 4 entries, or in front of N"
+        );
+        assert_eq!(seen(4), 1.0_f64.to_bits());
+        assert_eq!(seen(-1), GUARD);
+        blocks.put_beside(None, Some(-1.0)).unwrap();
+        assert_eq!(seen(-1), (-1.0_f64).to_bits());
+        blocks.put_beside(None, None).unwrap();
+        assert_eq!(seen(-1), GUARD);
+        assert_eq!(blocks.put_beside(Some(5), None), None);
     }
 
     #[test]

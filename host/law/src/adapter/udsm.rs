@@ -438,6 +438,10 @@ impl ForeignInstance for Instance {
             .with(|block| each_point(call, |start, end| self.update(block, start, end)))
     }
 
+    fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
+        self.blocks.put_beside(gap, value)
+    }
+
     fn take_overwritten(&self) -> Vec<String> {
         let overwritten = self.overwritten.load(Ordering::Relaxed);
         let told = self.told.swap(overwritten, Ordering::Relaxed);

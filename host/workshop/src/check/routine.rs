@@ -4,6 +4,7 @@
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
 mod axes;
+mod beside;
 mod first;
 mod tangent;
 mod words;
@@ -17,6 +18,7 @@ use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
 use abi::raw;
 use abi::status::Outcome;
+use beside::reads_beside;
 use law::adapter::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointEnd, PointStart};
 use law::vetting::plausible;
@@ -46,8 +48,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "routine-stays-inside",
         family: Family::Routine,
-        description: "UMAT: on random paths and on those that go far, there and back, nothing is written \
-                      beyond an array or over sizes, names and PROPS, and PNEWDT is sound; results are finite \
+        description: "UMAT: on random paths and on those that go far, there and back, nothing is written or \
+                      read beyond an array, nor written over sizes, names and PROPS, and PNEWDT is sound; results are finite \
                       on random ones; the process goes on: PNEWDT asks for a smaller increment, STOP and XIT end \
                       it; a copy that is used up is a warning.",
         needs: &["routine-answers"],
@@ -144,6 +146,8 @@ pub(super) const GOES_FAR: &str = "routine-stays-inside";
 const N_INCREMENTS: usize = 36;
 /// What time increments differ by, to see whether they matter.
 const SLOWER: f64 = 1e3;
+/// Increments that are asked for what is read beside arguments.
+const MOST_READ: usize = 400;
 /// Another time at which an increment begins.
 const LATER: f64 = 1e5;
 
@@ -312,7 +316,9 @@ fn routine_answers(subject: &Subject) -> Found {
         let answer = routine.call(std::slice::from_ref(&start), UPDATE)?;
         if !is_success(answer.status) {
             let why = refusal(answer.status, answer.text().as_deref());
-            return Err(routine.fails_at(&start, why));
+            let read = reads_beside(&routine, std::slice::from_ref(&start))?;
+            let read = read.map_or(String::new(), |(_, read)| format!("; {read}"));
+            return Err(routine.fails_at(&start, format!("{why}{read}")));
         }
         let stiffness = largest(&answer.points[0].tangent);
         if stiffness <= 0.0 {
@@ -358,6 +364,15 @@ fn routine_stays_inside(subject: &Subject) -> Found {
             let why = format!("{}: no increment succeeded: {}", routine.name(), near.why());
             return Err(skipped(why));
         }
+        let some = near.steps.iter().chain(&all.steps);
+        let every = (near.steps.len() + all.steps.len())
+            .div_ceil(MOST_READ)
+            .max(1);
+        let some: Vec<PointStart> = some.step_by(every).map(|step| step.start.clone()).collect();
+        if let Some((start, why)) = reads_beside(&routine, &some)? {
+            let why = format!("{why}, at {}", routine.at(&start));
+            return Err(routine.fails_at(&start, why));
+        }
         n += near.steps.len() + all.steps.len();
         let names = routine.probe.take_overwritten();
         if !names.is_empty() {
@@ -381,7 +396,9 @@ fn refuses(routine: &Specimen, refused: &Refused) -> Result<Verdict, Verdict> {
     let status = alone.points[0].status;
     let text = alone.text().filter(|_| status == refused.status);
     let why = refusal(refused.status, Some(text.as_ref().unwrap_or(&refused.text)));
-    let why = format!("{why}, at {}", routine.at(&refused.start));
+    let read = reads_beside(routine, std::slice::from_ref(&refused.start))?;
+    let read = read.map_or(String::new(), |(_, read)| format!("; {read}"));
+    let why = format!("{why}{read}, at {}", routine.at(&refused.start));
     Ok(match text {
         Some(_) => routine.fails_at(&refused.start, why),
         None => routine.fails(why),
