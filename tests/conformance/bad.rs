@@ -593,6 +593,12 @@ fn a_warning_says_what_was_probably_meant() {
             "the usual range [-1000, 1000000000] kPa/m reaches outside the bounds (0, ∞)",
         ),
         (
+            fixture("radians").replace("sin(instance", "floor(instance"),
+            "rounded",
+            "parameters-matter",
+            "`angle` of `fixture` is rounded to a whole number",
+        ),
+        (
             fixture("engineering_shear"),
             "shear",
             "response-is-isotropic",

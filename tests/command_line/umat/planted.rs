@@ -102,6 +102,24 @@ fn each_mistake_is_called_by_its_name() {
             "failed",
             "the routine reads beyond the end of STATEV, which has 1 entries, or in front of DDSDDE",
         ),
+        (
+            10,
+            "time-as-declared",
+            "warning",
+            "and STRESS of the next increment changes",
+        ),
+        (
+            11,
+            "routine-is-repeatable",
+            "warning",
+            "with another NPT: STRESS [",
+        ),
+        (
+            12,
+            "paths-leave-elasticity",
+            "warning",
+            "the routine asks for a smaller increment, PNEWDT = 0.5",
+        ),
     ] {
         let (checks, outcome) = planted(&place, what, &[]);
         let [found, details] = &checks[id];

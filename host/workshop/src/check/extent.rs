@@ -29,7 +29,9 @@ fn paths_leave_elasticity(subject: &Subject) -> Found {
     let mut still: Option<Vec<String>> = None;
     let mut idle = None;
     for specimen in subject.specimens_by_default(1, &mut random)? {
-        let steps = specimen.paths(N_INCREMENTS, &mut random)?.steps;
+        let walk = specimen.paths(N_INCREMENTS, &mut random)?;
+        let (n_refused, why) = (walk.refusals.len(), walk.why());
+        let steps = walk.steps;
         if steps.is_empty() {
             continue;
         }
@@ -47,7 +49,7 @@ fn paths_leave_elasticity(subject: &Subject) -> Found {
         let has_own = !specimen.formulation.internal_variables.is_empty();
         let is_idle = n_own == 0 && !steps.iter().any(changes_later);
         if is_idle && has_own && !specimen.formulation.linear {
-            idle = idle.or_else(|| Some(specimen.name()));
+            idle = idle.or_else(|| Some((specimen.name(), n_refused, why)));
         }
         // Under none of the hypotheses, and with no parameters.
         let mut own = still_variables(&specimen, &steps);
@@ -57,10 +59,15 @@ fn paths_leave_elasticity(subject: &Subject) -> Found {
     if n == 0 {
         return Err(skipped("no increment succeeded"));
     }
-    if let Some(name) = idle {
+    if let Some((name, n_refused, why)) = idle {
+        let refused = if n_refused > 0 {
+            format!("; {n_refused} increments did not succeed, the first one by {why}")
+        } else {
+            String::new()
+        };
         return Err(Verdict::Warning(format!(
             "{name}: none of the increments leaves elasticity, and no internal variable changes after the first: no \
-             check has seen what comes after yielding; other parameters by `--set`, or a path of your own by `--driver`"
+             check has seen what comes after yielding; other parameters by `--set`, or a path of your own by `--driver`{refused}"
         )));
     }
     let mut details = format!("{n} increments, {n_inelastic} of them inelastic");

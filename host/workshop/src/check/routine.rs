@@ -10,10 +10,12 @@ mod tangent;
 mod words;
 
 use super::extent::beyond_elastic;
-use super::mathematics::{ELASTIC, ITERATED, UPDATE, depends_on_time, flux_scale, largest};
+use super::mathematics::{
+    ELASTIC, ITERATED, UPDATE, depends_on_time, flux_scale, increment, largest,
+};
 use super::random::Random;
 use super::specimen::{LONG, Specimen, first_difference, is_success};
-use super::walk::{Refused, Step};
+use super::walk::{Refused, Step, sum};
 use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
 use abi::raw;
@@ -148,6 +150,9 @@ const N_INCREMENTS: usize = 36;
 const SLOWER: f64 = 1e3;
 /// Increments that are asked for what is read beside arguments.
 const MOST_READ: usize = 400;
+/// Stress of the next increment that other internal variables make, relative to the stresses in play: substeps of
+/// another length give another one within their tolerance.
+const CARRIED: f64 = 1e-3;
 /// Another time at which an increment begins.
 const LATER: f64 = 1e5;
 
@@ -413,24 +418,15 @@ fn is_like(other: &Specimen, routine: &Specimen) -> bool {
 }
 
 /// Places that differ from the usual one in the number of the element, of its point, where it lies and how long
-/// it is.
-fn elsewhere() -> [Site; 4] {
+/// it is; which of these it is. A routine may be another law in the first element or at one of the points.
+fn elsewhere() -> Vec<(Site, usize)> {
     let here = Site::default();
-    [
-        Site {
-            element: 40,
-            ..here
-        },
-        Site { point: 4, ..here },
-        Site {
-            position: [3.0, -7.0],
-            ..here
-        },
-        Site {
-            length: 0.25,
-            ..here
-        },
-    ]
+    let elements = [1, 40].map(|element| (Site { element, ..here }, 0));
+    let points = [1, 2, 3, 4, 8].map(|point| (Site { point, ..here }, 1));
+    let position = [3.0, -7.0];
+    let length = 0.25;
+    let others = [(Site { position, ..here }, 2), (Site { length, ..here }, 3)];
+    elements.into_iter().chain(points).chain(others).collect()
 }
 
 /// What first differs between two results, in words.
@@ -484,7 +480,8 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
             );
             return Err(routine.fails_at(&points[i], why));
         }
-        for (site, name) in elsewhere().into_iter().zip(Words::of(routine).site) {
+        for (site, which) in elsewhere() {
+            let name = Words::of(routine).site[which];
             let form = Form {
                 site: Some(site),
                 ..routine.form(UPDATE)
@@ -626,21 +623,31 @@ fn time_as_declared(subject: &Subject) -> Found {
         };
         let later = routine.probe.integrate(&starts, &later)?.points;
         for (ends, what) in [(&slower, words.duration), (&later, words.time)] {
-            for (step, end) in steps.iter().zip(ends) {
+            let carried = carried_on(routine, steps, ends)?;
+            for ((step, end), carried) in steps.iter().zip(ends).zip(carried) {
                 // What begins at TIME(2) = 0 does not at another one.
                 let begins = step.start.gradient0.iter().all(|value| *value == 0.0);
+                let of_flux = differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
                 let depends = !(begins && what == words.time)
                     && is_success(end.status)
-                    && differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
+                    && (of_flux || carried);
                 seen |= depends;
                 if depends && !is_declared {
+                    let change = if of_flux {
+                        format!(
+                            "{} {:?} becomes {:?}",
+                            words.stress, step.end.flux, end.flux
+                        )
+                    } else {
+                        format!(
+                            "{} {:?} becomes {:?}, and {} of the next increment changes",
+                            words.state, step.end.state, end.state, words.stress
+                        )
+                    };
                     return Err(routine.warns_at(
                         &step.start,
                         format!(
-                            "with another {what} {} {:?} becomes {:?}, which {} does not say{}",
-                            words.stress,
-                            step.end.flux,
-                            end.flux,
+                            "with another {what} {change}, which {} does not say{}",
                             words.describer,
                             advice(
                                 routine,
@@ -660,4 +667,33 @@ fn time_as_declared(subject: &Subject) -> Found {
         return Err(Verdict::Warning(why.to_owned()));
     }
     Ok(format!("{n} increments"))
+}
+
+/// Whether other internal variables at the end of steps give another stress in a next increment like the last one:
+/// what is kept for its own sake, such as the length of substeps, does not count.
+fn carried_on(
+    routine: &Specimen,
+    steps: &[Step],
+    others: &[PointEnd],
+) -> Result<Vec<bool>, Verdict> {
+    let next = |step: &Step, state: &[f64]| PointStart {
+        gradient0: step.start.gradient1.clone(),
+        gradient1: sum(&step.start.gradient1, &increment(&step.start)),
+        flux0: step.end.flux.clone(),
+        state0: state.to_vec(),
+    };
+    let pairs = || steps.iter().zip(others);
+    let usual: Vec<PointStart> = pairs()
+        .map(|(step, _)| next(step, &step.end.state))
+        .collect();
+    let other: Vec<PointStart> = pairs().map(|(step, end)| next(step, &end.state)).collect();
+    let usual = routine.call(&usual, raw::PILUM_REQ_FLUX)?.points;
+    let other = routine.call(&other, raw::PILUM_REQ_FLUX)?.points;
+    let counts = pairs().zip(usual.iter().zip(&other));
+    let counts = counts.map(|((step, end), (usual, other))| {
+        let changed = bits(&step.end.state) != bits(&end.state);
+        let both = is_success(usual.status) && is_success(other.status);
+        changed && both && differ(&usual.flux, &other.flux, CARRIED * flux_scale(step))
+    });
+    Ok(counts.collect())
 }
