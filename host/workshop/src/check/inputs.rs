@@ -172,23 +172,32 @@ fn may_be_rounded(p: &ParameterDescription) -> bool {
         || p.default.is_some_and(|default| default.fract() != 0.0)
 }
 
-/// Whether results are the same for two values between two whole numbers, and others beyond the next one.
+/// Whole numbers that are passed: a strength that is met between two of them looks rounded there, and not at others.
+const PASSED: usize = 4;
+
+/// Whether results are the same for two values between two whole numbers, and others between the next two, at
+/// several of them.
 fn is_rounded(
     p: &ParameterDescription,
     value: f64,
     results: impl Fn(f64) -> Result<Option<Vec<PointEnd>>, Verdict>,
 ) -> Result<bool, Verdict> {
-    let among = [0.25, 0.75, 1.25].map(|part| value.floor() + part);
-    if among.iter().any(|value| !p.bounds.contain(*value)) {
-        return Ok(false);
-    }
-    let [Some(first), Some(second), Some(beyond)] =
-        [results(among[0])?, results(among[1])?, results(among[2])?]
-    else {
-        return Ok(false);
-    };
     let is_like = |a: &[PointEnd], b: &[PointEnd]| a.iter().zip(b).all(|(a, b)| is_same(a, b));
-    Ok(is_like(&first, &second) && !is_like(&second, &beyond))
+    let mut before: Option<Vec<PointEnd>> = None;
+    for k in 0..PASSED {
+        let [low, high] = [0.25, 0.75].map(|part| value.floor() + k as f64 + part);
+        if !(p.bounds.contain(low) && p.bounds.contain(high)) {
+            return Ok(false);
+        }
+        let (Some(first), Some(second)) = (results(low)?, results(high)?) else {
+            return Ok(false);
+        };
+        if !is_like(&first, &second) || before.is_some_and(|before| is_like(&before, &first)) {
+            return Ok(false);
+        }
+        before = Some(second);
+    }
+    Ok(true)
 }
 
 /// How numbers grow where the units of force, length and time become smaller.

@@ -6,16 +6,15 @@
 mod axes;
 mod beside;
 mod first;
+mod rest;
 mod tangent;
+mod time;
 mod words;
 
-use super::extent::beyond_elastic;
-use super::mathematics::{
-    ELASTIC, ITERATED, UPDATE, depends_on_time, flux_scale, increment, largest,
-};
+use super::mathematics::{UPDATE, largest};
 use super::random::Random;
 use super::specimen::{LONG, Specimen, first_difference, is_success};
-use super::walk::{Refused, Step, sum};
+use super::walk::{Refused, Step};
 use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
 use abi::raw;
@@ -27,7 +26,7 @@ use law::vetting::plausible;
 use law::{Bounds, LoadedLaw, Site};
 use std::path::Path;
 use text::{Source, suggestion};
-use words::{Words, advice, has_sidecar, is_mfront};
+use words::{Words, advice};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -82,7 +81,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: after an update, DSTRAN = 0 keeps STRESS; routines that depend on the time are \
                       passed over.",
         needs: &["routine-is-repeatable"],
-        run: routine_stays_at_rest,
+        run: rest::routine_stays_at_rest,
     },
     Check {
         id: "time-as-declared",
@@ -90,7 +89,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: DTIME or TIME changes the response where the sidecar says `time_dependent = \
                       true`, and nowhere else (warning).",
         needs: &["routine-is-repeatable"],
-        run: time_as_declared,
+        run: time::time_as_declared,
     },
     Check {
         id: "ddsdde-matches-differences",
@@ -146,16 +145,8 @@ pub(super) const GOES_FAR: &str = "routine-stays-inside";
 
 /// Increments of the random part of a path.
 const N_INCREMENTS: usize = 36;
-/// What time increments differ by, to see whether they matter.
-const SLOWER: f64 = 1e3;
 /// Increments that are asked for what is read beside arguments.
 const MOST_READ: usize = 400;
-/// Stress of the next increment that other internal variables make, relative to the stresses in play: substeps of
-/// another length give another one within their tolerance.
-const CARRIED: f64 = 1e-3;
-/// Another time at which an increment begins.
-const LATER: f64 = 1e5;
-
 /// What a library is made for, if not for the contract. Nothing of it runs.
 pub(super) fn adapter(path: &Path) -> Option<Adapter> {
     law::inspect::inspect(path).ok()?.adapter()
@@ -503,197 +494,7 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
     by_site.map_or(Ok(format!("{n} increments")), Err)
 }
 
-fn routine_stays_at_rest(subject: &Subject) -> Found {
-    let n = each(subject, "rest", |routine, steps, _| {
-        // An MFront behaviour does not say whether it depends on the time.
-        if routine.formulation.time_dependent
-            || is_mfront(routine) && depends_on_time(routine, steps)?
-        {
-            return Ok(0);
-        }
-        let Words { strain, stress, .. } = Words::of(routine);
-        let still: Vec<PointStart> = steps
-            .iter()
-            .map(|step| PointStart {
-                gradient0: step.start.gradient1.clone(),
-                gradient1: step.start.gradient1.clone(),
-                flux0: step.end.flux.clone(),
-                state0: step.end.state.clone(),
-            })
-            .collect();
-        let answer = routine.call(&still, raw::PILUM_REQ_FLUX)?;
-        for ((step, point), end) in steps.iter().zip(&still).zip(&answer.points) {
-            if !is_success(end.status) {
-                let why = refusal(end.status, answer.text().as_deref());
-                return Err(routine.fails_at(point, format!("{strain} = 0 is refused: {why}")));
-            }
-            if differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step)) {
-                let hint = if let Some(hint) = unreturned(routine, step)? {
-                    hint
-                } else if has_sidecar(routine) && moves_with_time(routine, point)? {
-                    "; what the time does is declared by `time_dependent = true` in the sidecar"
-                        .to_owned()
-                } else {
-                    String::new()
-                };
-                let why = format!(
-                    "{strain} = 0 changes {stress} {:?} to {:?}{hint}",
-                    step.end.flux, end.flux
-                );
-                // A replay goes on from the end of the increment, too.
-                return Err(routine.fails_at(&step.start, why));
-            }
-        }
-        Ok(steps.len())
-    })?;
-    if n == 0 {
-        return Err(skipped("the routine depends on the time"));
-    }
-    Ok(format!("{n} increments"))
-}
-
-/// How near a component is to what elasticity alone makes of it, and how far others are.
-const PREDICTED: [f64; 2] = [1e-10, 1e-6];
-
-/// What an increment has left as it was, bit by bit, or as elasticity alone makes it, by the names that the routine
-/// has for it. A component that is zero says nothing.
-fn unreturned(routine: &Specimen, step: &Step) -> Result<Option<String>, Verdict> {
-    let words = Words::of(routine);
-    let components = routine.hypothesis.components();
-    let stress = |c: usize| format!("{}({}), {}", words.stress, c + 1, components[c]);
-    let stays = |from: f64, to: f64| from.to_bits() == to.to_bits();
-    let fluxes = step.start.flux0.iter().zip(&step.end.flux).enumerate();
-    let fluxes = fluxes.filter(|(_, (from, to))| **to != 0.0 && stays(**from, **to));
-    let variables = &routine.formulation.internal_variables;
-    let states = step.start.state0.iter().zip(&step.end.state).enumerate();
-    let states = states
-        .filter(|(_, (from, to))| stays(**from, **to))
-        .map(|(k, _)| format!("{}({}), `{}`", words.state, k + 1, variables[k].id));
-    let left: Vec<String> = fluxes.map(|(c, _)| stress(c)).chain(states).collect();
-    if !left.is_empty() {
-        return Ok(Some(format!(
-            "; the increment before that has left {}, as it was: is it returned?",
-            left.join(", and ")
-        )));
-    }
-    let start = std::slice::from_ref(&step.start);
-    let elastic = routine.call(start, ELASTIC)?.points;
-    let off = beyond_elastic(step, &elastic[0]);
-    let scale = flux_scale(step);
-    let is_predicted = |c: &usize| off[*c] <= PREDICTED[0] * scale && step.end.flux[*c] != 0.0;
-    let predicted: Vec<String> = (0..off.len()).filter(is_predicted).map(stress).collect();
-    let is_inelastic = largest(&off) > PREDICTED[1] * scale;
-    Ok((is_inelastic && !predicted.is_empty()).then(|| {
-        format!(
-            "; in the increment before that {}, is what elasticity alone gives, and others are not: is it corrected?",
-            predicted.join(", and ")
-        )
-    }))
-}
-
-/// Whether a stress at rest depends on how long the rest is.
-fn moves_with_time(routine: &Specimen, point: &PointStart) -> Result<bool, Verdict> {
-    let points = std::slice::from_ref(point);
-    let usual = routine.call(points, raw::PILUM_REQ_FLUX)?.points;
-    let longer = routine.lasting(SLOWER, points, raw::PILUM_REQ_FLUX)?;
-    Ok(usual[0].flux != longer[0].flux)
-}
-
 /// Whether components differ by more than this.
 fn differ(a: &[f64], b: &[f64], bound: f64) -> bool {
     a.iter().zip(b).any(|(a, b)| (a - b).abs() > bound)
-}
-
-fn time_as_declared(subject: &Subject) -> Found {
-    if subject.foreign().map(|foreign| foreign.adapter) == Some(Adapter::Mfront) {
-        return Err(skipped(
-            "a behaviour of MFront does not say whether it depends on the time",
-        ));
-    }
-    let (mut declared, mut seen) = (false, false);
-    let n = each(subject, "time", |routine, steps, _| {
-        let words = Words::of(routine);
-        let is_declared = routine.formulation.time_dependent;
-        declared |= is_declared;
-        let starts = starts(steps);
-        let slower = routine.lasting(SLOWER, &starts, raw::PILUM_REQ_FLUX)?;
-        let later = Form {
-            time: LATER,
-            ..routine.form(raw::PILUM_REQ_FLUX)
-        };
-        let later = routine.probe.integrate(&starts, &later)?.points;
-        for (ends, what) in [(&slower, words.duration), (&later, words.time)] {
-            let carried = carried_on(routine, steps, ends)?;
-            for ((step, end), carried) in steps.iter().zip(ends).zip(carried) {
-                // What begins at TIME(2) = 0 does not at another one.
-                let begins = step.start.gradient0.iter().all(|value| *value == 0.0);
-                let of_flux = differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
-                let depends = !(begins && what == words.time)
-                    && is_success(end.status)
-                    && (of_flux || carried);
-                seen |= depends;
-                if depends && !is_declared {
-                    let change = if of_flux {
-                        format!(
-                            "{} {:?} becomes {:?}",
-                            words.stress, step.end.flux, end.flux
-                        )
-                    } else {
-                        format!(
-                            "{} {:?} becomes {:?}, and {} of the next increment changes",
-                            words.state, step.end.state, end.state, words.stress
-                        )
-                    };
-                    return Err(routine.warns_at(
-                        &step.start,
-                        format!(
-                            "with another {what} {change}, which {} does not say{}",
-                            words.describer,
-                            advice(
-                                routine,
-                                ": say `time_dependent = true` in the sidecar, so that phases and segments \
-                                 without a `time` are told of"
-                            )
-                        ),
-                    ));
-                }
-            }
-        }
-        Ok(steps.len())
-    })?;
-    if declared && !seen {
-        let why = "it is said to depend on the time (`time_dependent = true` in a sidecar), and neither the length of an \
-                   increment (DTIME) nor its time changes anything";
-        return Err(Verdict::Warning(why.to_owned()));
-    }
-    Ok(format!("{n} increments"))
-}
-
-/// Whether other internal variables at the end of steps give another stress in a next increment like the last one:
-/// what is kept for its own sake, such as the length of substeps, does not count.
-fn carried_on(
-    routine: &Specimen,
-    steps: &[Step],
-    others: &[PointEnd],
-) -> Result<Vec<bool>, Verdict> {
-    let next = |step: &Step, state: &[f64]| PointStart {
-        gradient0: step.start.gradient1.clone(),
-        gradient1: sum(&step.start.gradient1, &increment(&step.start)),
-        flux0: step.end.flux.clone(),
-        state0: state.to_vec(),
-    };
-    let pairs = || steps.iter().zip(others);
-    let usual: Vec<PointStart> = pairs()
-        .map(|(step, _)| next(step, &step.end.state))
-        .collect();
-    let other: Vec<PointStart> = pairs().map(|(step, end)| next(step, &end.state)).collect();
-    let usual = routine.call(&usual, raw::PILUM_REQ_FLUX)?.points;
-    let other = routine.call(&other, raw::PILUM_REQ_FLUX)?.points;
-    let counts = pairs().zip(usual.iter().zip(&other));
-    let counts = counts.map(|((step, end), (usual, other))| {
-        let changed = bits(&step.end.state) != bits(&end.state);
-        let both = is_success(usual.status) && is_success(other.status);
-        changed && both && differ(&usual.flux, &other.flux, CARRIED * flux_scale(step))
-    });
-    Ok(counts.collect())
 }
