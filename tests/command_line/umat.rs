@@ -8,6 +8,7 @@
 mod begins;
 mod incremental_driver;
 mod mohr_coulomb;
+mod planted;
 mod routines;
 mod silent;
 mod space;
@@ -473,7 +474,7 @@ fn what_is_overwritten_is_named() {
         (1, "overwrites CMNAME, which is an input"),
         (2, "overwrites PROPS, which is an input"),
         (3, "writes beyond the end of STATEV, which has 1 entries"),
-        (4, "writes between STRAN and DSTRAN"),
+        (4, "writes in front of DSTRAN: entry 0 becomes 1e0"),
         (5, "overwrites KINC, which is an input"),
         // Arithmetic on what stands there shows too, even if it changes no number.
         (6, "writes beyond the end of STATEV, which has 1 entries"),

@@ -355,8 +355,9 @@ const GALLERY: [(&str, &str, &str, Point); 82] = [
 ];
 
 /// Mistakes that may be meant: the fixture, and the one check that warns.
-const WARNED: [(&str, &str); 17] = [
+const WARNED: [(&str, &str); 18] = [
     ("bad_idle_parameter", "parameters-matter"),
+    ("bad_idle_variable", "paths-leave-elasticity"),
     ("bad_plastic_variable", "plastic-variables-rest"),
     ("bad_stiffness_left", "tangent-matches-differences"),
     ("bad_two_versions", "independent-of-request"),
@@ -590,6 +591,12 @@ fn a_warning_says_what_was_probably_meant() {
             "usual",
             "ranges-are-plausible",
             "the usual range [-1000, 1000000000] kPa/m reaches outside the bounds (0, ∞)",
+        ),
+        (
+            fixture("radians").replace("sin(instance", "floor(instance"),
+            "rounded",
+            "parameters-matter",
+            "`angle` of `fixture` is rounded to a whole number",
         ),
         (
             fixture("engineering_shear"),

@@ -202,6 +202,7 @@ fn ids_are_stable() {
             "plastic-variables-rest",
             "parameters-matter",
             "units-belong-together",
+            "paths-leave-elasticity",
             "sidecar-is-read",
             "routine-answers",
             "routine-stays-inside",

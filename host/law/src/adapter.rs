@@ -11,6 +11,7 @@
 //! `ForeignInstance`.
 
 pub mod conventions;
+mod guarded;
 mod mfront;
 mod sidecar;
 mod symbols;
@@ -180,6 +181,12 @@ pub(crate) trait ForeignInstance: Debug + Send + Sync {
     /// not told before.
     fn take_overwritten(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// Puts a number between the arguments of calls from now on, in front of that one or everywhere; the usual one if
+    /// there is none. In words where that is; `None` if there is no such place.
+    fn put_beside(&self, _gap: Option<usize>, _value: Option<f64>) -> Option<String> {
+        None
     }
 }
 

@@ -22,9 +22,11 @@ fn routines_that_begin_again_are_named() {
         assert_eq!(found, expected, "{what}: {details}");
         assert!(details.contains(said), "{what}: {details}");
         let others = checks.iter().filter(|(id, _)| *id != CHECK);
-        for (id, [found, details]) in others.filter(|(id, _)| *id != "description-is-complete") {
+        for (id, [found, details]) in others {
+            // With KSTEP = 1, as in all other checks, this one is elastic.
+            let is_elastic = what == 3 && id == "paths-leave-elasticity";
             assert!(
-                ["passed", "skipped"].contains(&found.as_str()),
+                ["passed", "skipped"].contains(&found.as_str()) || is_elastic,
                 "{what}: {id} {found}: {details}"
             );
         }

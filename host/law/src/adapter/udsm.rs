@@ -4,9 +4,10 @@
 //! functions, which run where the models do: in a worker, unless the file says otherwise. All calls
 //! have six components; plane problems leave yz and zx at zero.
 //!
-//! Arguments stand in one block of words, apart from each other by guard words. A point gets a
-//! fresh block; after the call every word that is no output must be what it was.
+//! A point gets a fresh block of [guarded](super::guarded) arguments; after the call every word that is no
+//! output must be what it was.
 
+use super::guarded::{Argument, Block as Guarded, Blocks, Kind, Role};
 use super::sidecar::is_column;
 use super::{
     Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
@@ -37,10 +38,6 @@ const PLACE: [usize; N] = [0, 1, 2, 3, 5, 4];
 /// Most models and state variables that are plausible.
 const MOST_MODELS: i32 = 200;
 const MOST_STATES: i32 = 1000;
-/// Guard words on each side of an argument.
-const N_GUARD: usize = 24;
-/// What guard words hold: a signalling NaN.
-const GUARD: u64 = 0x7ff4_dead_beef_dead;
 /// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
 const OUT_OF_PLANE: f64 = 1e-9;
 
@@ -65,36 +62,26 @@ enum A {
     IPrjLen, IAbort,
 }
 
-/// What an argument consists of.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Real,
-    Integer,
+impl From<A> for usize {
+    fn from(argument: A) -> Self {
+        argument as Self
+    }
 }
 
-/// What a routine may do with an argument: write it; read its copy, so that nobody sees what it
-/// leaves there; read it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Role {
-    Output,
-    Copy,
-    Fixed,
-}
+type Block = Guarded<N_ARGUMENTS>;
 
 use Kind::{Integer as I, Real as R};
-use Role::{Copy as C, Fixed as F, Output as O};
+use Role::{Array as W, Copy as C, Fixed as F, Output as O};
 
-/// Name, kind, entries and role. StVar0 and StVar have as many entries as the model has variables.
+/// Name, kind and role.
 #[rustfmt::skip]
-const ARGUMENTS: [(&str, Kind, usize, Role); N_ARGUMENTS] = [
-    ("IDTask", I, 1, F), ("iMod", I, 1, F), ("IsUndr", I, 1, F), ("iStep", I, 1, F),
-    ("iTer", I, 1, F), ("iEl", I, 1, F), ("Int", I, 1, F), ("X", R, 1, C), ("Y", R, 1, C),
-    ("Z", R, 1, C), ("Time0", R, 1, C), ("dTime", R, 1, C), ("Props", R, N_PROPS, F),
-    ("Sig0", R, N_SIG0, C), ("Swp0", R, 1, C), ("StVar0", R, 0, O), ("dEps", R, N_DEPS, C),
-    ("D", R, N * N, O), ("BulkW", R, 1, O), ("Sig", R, N, O), ("Swp", R, 1, O),
-    ("StVar", R, 0, O), ("ipl", I, 1, O), ("nStat", I, 1, O), ("NonSym", I, 1, O),
-    ("iStrsDep", I, 1, O), ("iTimeDep", I, 1, O), ("iTang", I, 1, O), ("iPrjDir", I, N_DIR, F),
-    ("iPrjLen", I, 1, F), ("iAbort", I, 1, O),
+static ARGUMENTS: [Argument; N_ARGUMENTS] = [
+    ("IDTask", I, F), ("iMod", I, F), ("IsUndr", I, F), ("iStep", I, F), ("iTer", I, F), ("iEl", I, F),
+    ("Int", I, F), ("X", R, C), ("Y", R, C), ("Z", R, C), ("Time0", R, C), ("dTime", R, C),
+    ("Props", R, F), ("Sig0", R, C), ("Swp0", R, C), ("StVar0", R, W), ("dEps", R, C), ("D", R, W),
+    ("BulkW", R, O), ("Sig", R, W), ("Swp", R, O), ("StVar", R, W), ("ipl", I, O), ("nStat", I, O),
+    ("NonSym", I, O), ("iStrsDep", I, O), ("iTimeDep", I, O), ("iTang", I, O), ("iPrjDir", I, F),
+    ("iPrjLen", I, F), ("iAbort", I, O),
 ];
 
 /// Asks a library for its models. Its functions run.
@@ -257,11 +244,11 @@ const ANY: Bounds = Bounds {
 
 /// The answer to a task that is not about a point.
 fn asked(routine: Routine, model: i32, task: Task) -> Result<Block, String> {
-    let mut block = Block::new(model, 0, &[]);
+    let mut block = template(model, 0, &[]);
     block.set_integers(A::IdTask, &[task as i32]);
-    let before = block.clone();
+    block.hand_over();
     routine.call(&mut block.words, &block.at);
-    block.overwritten(&before)?;
+    block.overwritten().map_err(|refusal| refusal.message)?;
     match block.integer(A::IAbort) {
         0 => Ok(block),
         abort => Err(format!("task {} ends with iAbort = {abort}", task as i32)),
@@ -366,7 +353,7 @@ impl ForeignLaw for Udsm {
         let routine = open_again(&self.library, &self.sha256, self.traps).map_err(unusable)?;
         Ok(Box::new(Instance {
             routine,
-            template: Block::new(self.model, self.n_states, parameters),
+            blocks: Blocks::new(template(self.model, self.n_states, parameters)),
             n: hypothesis.n_components(),
             order: self.order,
             time_dependent: self.time_dependent,
@@ -377,126 +364,40 @@ impl ForeignLaw for Udsm {
     }
 }
 
-/// Arguments of a call in one block of words.
-#[derive(Clone, Debug)]
-struct Block {
-    words: Vec<u64>,
-    /// First word and number of entries of every argument.
-    at: [usize; N_ARGUMENTS],
-    entries: [usize; N_ARGUMENTS],
-}
-
-impl Block {
-    /// What all calls of a material have in common.
-    fn new(model: i32, n_states: usize, parameters: &[f64]) -> Self {
-        let mut entries = ARGUMENTS.map(|(_, _, entries, _)| entries);
-        entries[A::StVar0 as usize] = n_states;
-        entries[A::StVar as usize] = n_states;
-        let mut at = [0; N_ARGUMENTS];
-        let mut end = N_GUARD;
-        for (i, (_, kind, ..)) in ARGUMENTS.iter().enumerate() {
-            at[i] = end;
-            end += n_words(*kind, entries[i]) + N_GUARD;
-        }
-        let mut block = Self {
-            words: vec![GUARD; end],
-            at,
-            entries,
-        };
-        for (i, (_, kind, ..)) in ARGUMENTS.iter().enumerate() {
-            let n = n_words(*kind, entries[i]);
-            block.words[at[i]..][..n].fill(0);
-        }
-        block.set(A::Props, parameters);
-        block.set_integers(A::IMod, &[model]);
-        block.set_integers(A::IStep, &[1]);
-        block.set_integers(A::ITer, &[1]);
-        block.set_integers(A::NStat, &[n_states as i32]);
-        let folder = std::env::current_dir().unwrap_or_default();
-        let folder = folder.to_string_lossy();
-        let characters: Vec<i32> = folder.bytes().take(N_DIR).map(i32::from).collect();
-        block.set_integers(A::IPrjDir, &characters);
-        block.set_integers(A::IPrjLen, &[characters.len() as i32]);
-        block
+/// What all calls of a material have in common.
+fn template(model: i32, n_states: usize, parameters: &[f64]) -> Block {
+    let mut entries = [1; N_ARGUMENTS];
+    for (argument, count) in [
+        (A::Props, N_PROPS),
+        (A::Sig0, N_SIG0),
+        (A::StVar0, n_states),
+        (A::DEps, N_DEPS),
+        (A::D, N * N),
+        (A::Sig, N),
+        (A::StVar, n_states),
+        (A::IPrjDir, N_DIR),
+    ] {
+        entries[argument as usize] = count;
     }
-
-    /// Writes the first entries of an argument.
-    fn set(&mut self, argument: A, values: &[f64]) {
-        let words = &mut self.words[self.at[argument as usize]..];
-        for (word, value) in words.iter_mut().zip(values) {
-            *word = value.to_bits();
-        }
-    }
-
-    fn set_integers(&mut self, argument: A, values: &[i32]) {
-        let words = &mut self.words[self.at[argument as usize]..];
-        for (word, pair) in words.iter_mut().zip(values.chunks(2)) {
-            let half = |i: usize| pair.get(i).copied().unwrap_or_default().to_ne_bytes();
-            let ([a, b, c, d], [e, f, g, h]) = (half(0), half(1));
-            *word = u64::from_ne_bytes([a, b, c, d, e, f, g, h]);
-        }
-    }
-
-    fn reals(&self, argument: A) -> impl Iterator<Item = f64> {
-        let i = argument as usize;
-        let words = &self.words[self.at[i]..][..self.entries[i]];
-        words.iter().map(|word| f64::from_bits(*word))
-    }
-
-    fn integer(&self, argument: A) -> i32 {
-        let [a, b, c, d, ..] = self.words[self.at[argument as usize]].to_ne_bytes();
-        i32::from_ne_bytes([a, b, c, d])
-    }
-
-    /// Which copies a call has written to, by bits.
-    ///
-    /// # Errors
-    /// The first argument that it has written to without right, in words.
-    fn overwritten(&self, before: &Self) -> Result<u64, String> {
-        let mut copies = 0;
-        let differs = |from: usize, to: usize| self.words[from..to] != before.words[from..to];
-        if differs(0, self.at[0]) {
-            return Err(format!("the routine writes in front of {}", ARGUMENTS[0].0));
-        }
-        for (i, (name, kind, _, role)) in ARGUMENTS.iter().enumerate() {
-            let (first, n) = (self.at[i], n_words(*kind, self.entries[i]));
-            if *role != Role::Output && differs(first, first + n) {
-                if *role == Role::Fixed {
-                    return Err(format!("the routine overwrites {name}, which is an input"));
-                }
-                copies |= 1 << i;
-            }
-            let end = first + n;
-            let next = ARGUMENTS.get(i + 1).map_or("", |(name, ..)| *name);
-            if differs(end, end + N_GUARD / 2) {
-                let size = self.entries[i];
-                return Err(format!(
-                    "the routine writes beyond the end of {name}, which has {size} entries"
-                ));
-            }
-            if differs(end + N_GUARD / 2, end + N_GUARD) {
-                return Err(format!(
-                    "the routine writes between {name} and {next}, in front of one or beyond the \
-                     end of the other"
-                ));
-            }
-        }
-        Ok(copies)
-    }
-}
-
-fn n_words(kind: Kind, entries: usize) -> usize {
-    match kind {
-        Kind::Real => entries,
-        Kind::Integer => entries.div_ceil(2),
-    }
+    let mut block = Block::new(&ARGUMENTS, entries);
+    block.set(A::Props, parameters);
+    block.set_integers(A::IMod, &[model]);
+    block.set_integers(A::IStep, &[1]);
+    block.set_integers(A::ITer, &[1]);
+    block.set_integers(A::NStat, &[n_states as i32]);
+    let folder = std::env::current_dir().unwrap_or_default();
+    let folder = folder.to_string_lossy();
+    let characters: Vec<i32> = folder.bytes().take(N_DIR).map(i32::from).collect();
+    block.set_integers(A::IPrjDir, &characters);
+    block.set_integers(A::IPrjLen, &[characters.len() as i32]);
+    block
 }
 
 /// A model with its parameters fixed.
 #[derive(Debug)]
 struct Instance {
     routine: Routine,
-    template: Block,
+    blocks: Blocks<N_ARGUMENTS>,
     /// Components of the hypothesis.
     n: usize,
     /// How D stands in memory.
@@ -512,28 +413,33 @@ struct Instance {
 impl ForeignInstance for Instance {
     fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
         let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut block = self.template.clone();
         // No gradients, no state at the start: an increment of nothing.
         let zeros = vec![0.0; call.state1.len()];
         let call = Call {
             state0: &zeros,
             ..call
         };
-        Some(each_point(call, |start, end| {
-            self.fill(&mut block, start, Task::Initialise);
-            self.call(&mut block)?;
-            finite(&block, A::StVar0, true)?;
-            for (to, value) in end.state.iter_mut().zip(block.reals(A::StVar0)) {
-                *to = value;
-            }
-            Ok(())
+        Some(self.blocks.with(|block| {
+            each_point(call, |start, end| {
+                self.fill(block, start, Task::Initialise);
+                self.call(block)?;
+                finite(block, A::StVar0, true)?;
+                for (to, value) in end.state.iter_mut().zip(block.reals(A::StVar0)) {
+                    *to = value;
+                }
+                Ok(())
+            })
         }))
     }
 
     fn integrate(&self, call: Call<'_>) -> (Status, String) {
         let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut block = self.template.clone();
-        each_point(call, |start, end| self.update(&mut block, start, end))
+        self.blocks
+            .with(|block| each_point(call, |start, end| self.update(block, start, end)))
+    }
+
+    fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
+        self.blocks.put_beside(gap, value)
     }
 
     fn take_overwritten(&self) -> Vec<String> {
@@ -593,14 +499,14 @@ impl Instance {
         self.call(block)?;
         if block.reals(A::D).all(|entry| entry == 0.0) {
             // No stiffness, or no word about it: what is not written shows.
-            block.words.clone_from(&asked.words);
+            block.refresh(&asked);
             block.set(A::D, &[f64::NAN; N * N]);
             self.call(block)?;
             if block.reals(A::D).all(f64::is_nan) {
                 let message = format!("the routine leaves D unwritten in task {}", task as i32);
                 return Err(Refusal::error(raw::PILUM_E_INTERNAL, message));
             }
-            block.words.clone_from(&asked.words);
+            block.refresh(&asked);
             self.call(block)?;
         }
         finite(block, A::D, is_at_rest)?;
@@ -619,7 +525,7 @@ impl Instance {
 
     /// Fresh arguments.
     fn fill(&self, block: &mut Block, start: &PointStart<'_>, task: Task) {
-        block.words.copy_from_slice(&self.template.words);
+        block.refresh(self.blocks.template());
         let six = |values: &[f64]| {
             let mut six = [0.0; N];
             for (value, place) in values.iter().zip(PLACE) {
@@ -659,11 +565,9 @@ impl Instance {
 
     /// One call.
     fn call(&self, block: &mut Block) -> Result<(), Refusal> {
-        let before = block.clone();
+        block.hand_over();
         self.routine.call(&mut block.words, &block.at);
-        let overwritten = block
-            .overwritten(&before)
-            .map_err(|damage| Refusal::error(raw::PILUM_E_INTERNAL, damage))?;
+        let overwritten = block.overwritten()?;
         if overwritten != 0 {
             self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
         }
@@ -672,7 +576,7 @@ impl Instance {
             return Ok(());
         }
         // A routine has no other words for an increment that it cannot follow.
-        let task = before.integer(A::IdTask);
+        let task = block.integer(A::IdTask);
         let is_update = task == Task::Stresses as i32;
         Err(Refusal {
             status: if is_update {

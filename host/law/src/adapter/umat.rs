@@ -1,8 +1,9 @@
 //! Abaqus user subroutines `UMAT` as laws.
 //!
-//! All arguments of a call stand in one block of words, apart from each other by guard words. A
-//! point gets a fresh block; after the call every word that is no output must be what it was.
+//! A point gets a fresh block of [guarded](super::guarded) arguments; after the call every word that is no
+//! output must be what it was.
 
+use super::guarded::{Argument, Block as Guarded, Blocks, Kind, Role};
 use super::sidecar::Sidecar;
 use super::{
     Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
@@ -23,24 +24,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub const SYMBOLS: [&str; 4] = ["umat_", "umat", "UMAT", "UMAT_"];
 /// Characters of CMNAME.
 const N_CMNAME: usize = 80;
-/// Guard words on each side of an argument: a DDSDDE of six components where there is room for
-/// four ends 20 words too far.
-const N_GUARD: usize = 24;
-/// What guard words hold: a signalling NaN. What is read there shows in the results, and what is
-/// computed with it and written back shows in the word, since every operation makes it a quiet one.
-const GUARD: u64 = 0x7ff4_dead_beef_dead;
 /// Words of PREDEF and DPRED: no predefined fields, but room to read.
 const N_FIELDS: usize = 8;
 /// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
 const OUT_OF_PLANE: f64 = 1e-9;
-
-/// What an argument consists of.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Real,
-    Integer,
-    Text,
-}
 
 /// The arguments in their order.
 #[rustfmt::skip]
@@ -52,24 +39,20 @@ enum A {
     Pnewdt, Celent, Dfgrd0, Dfgrd1, Noel, Npt, Layer, Kspt, Jstep, Kinc,
 }
 
-/// What a routine may do with an argument.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Role {
-    /// Write it.
-    Output,
-    /// Read it. Abaqus computes it anew for every call, as is done here, so that nobody sees what a
-    /// routine leaves there; some use it as their own.
-    Copy,
-    /// Read it: sizes, names and numbers, and the parameters, which all points share in Abaqus.
-    Fixed,
+impl From<A> for usize {
+    fn from(argument: A) -> Self {
+        argument as Self
+    }
 }
 
-use Role::{Copy as C, Fixed as F, Output as O};
+type Block = Guarded<N_ARGUMENTS>;
+
+use Role::{Array as R, Copy as C, Fixed as F, Output as O};
 
 /// Name, kind and role.
 #[rustfmt::skip]
-const ARGUMENTS: [(&str, Kind, Role); N_ARGUMENTS] = [
-    ("STRESS", Kind::Real, O), ("STATEV", Kind::Real, O), ("DDSDDE", Kind::Real, O),
+static ARGUMENTS: [Argument; N_ARGUMENTS] = [
+    ("STRESS", Kind::Real, R), ("STATEV", Kind::Real, R), ("DDSDDE", Kind::Real, R),
     ("SSE", Kind::Real, O), ("SPD", Kind::Real, O), ("SCD", Kind::Real, O),
     ("RPL", Kind::Real, O), ("DDSDDT", Kind::Real, O), ("DRPLDE", Kind::Real, O),
     ("DRPLDT", Kind::Real, O), ("STRAN", Kind::Real, C), ("DSTRAN", Kind::Real, C),
@@ -156,7 +139,7 @@ impl ForeignLaw for Umat {
         let is_recorded = AtomicBool::new(self.record.is_none());
         Ok(Box::new(Instance {
             routine,
-            template: Block::new(sizes, &self.sidecar.cmname, parameters),
+            blocks: Blocks::new(template(sizes, &self.sidecar.cmname, parameters)),
             sizes,
             order: self.sidecar.order,
             time_dependent: formulations[number].time_dependent,
@@ -183,184 +166,84 @@ struct Sizes {
     n_props: usize,
 }
 
-/// Arguments of a call in one block of words.
-#[derive(Clone, Debug)]
-struct Block {
-    words: Vec<u64>,
-    /// First word and number of entries of every argument.
-    at: [usize; N_ARGUMENTS],
-    entries: [usize; N_ARGUMENTS],
+/// What all calls of a material have in common.
+fn template(sizes: Sizes, cmname: &str, parameters: &[f64]) -> Block {
+    let n = sizes.n_tens;
+    let mut entries = [1; N_ARGUMENTS];
+    for (argument, count) in [
+        (A::Stress, n),
+        (A::Statev, sizes.n_states),
+        (A::Ddsdde, n * n),
+        (A::Ddsddt, n),
+        (A::Drplde, n),
+        (A::Stran, n),
+        (A::Dstran, n),
+        (A::Time, 2),
+        (A::Predef, N_FIELDS),
+        (A::Dpred, N_FIELDS),
+        (A::Cmname, N_CMNAME),
+        (A::Props, sizes.n_props),
+        (A::Coords, 3),
+        (A::Drot, 9),
+        (A::Dfgrd0, 9),
+        (A::Dfgrd1, 9),
+        (A::Jstep, 4),
+    ] {
+        entries[argument as usize] = count;
+    }
+    let mut block = Block::new(&ARGUMENTS, entries);
+    block.set_text(A::Cmname, &format!("{cmname:<N_CMNAME$}"));
+    let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    for matrix in [A::Drot, A::Dfgrd0, A::Dfgrd1] {
+        block.set(matrix, &identity);
+    }
+    block.set(A::Props, parameters);
+    block.set(A::Pnewdt, &[1.0]);
+    block.set_integers(A::Ndi, &[sizes.n_normal as i32]);
+    block.set_integers(A::Nshr, &[(n - sizes.n_normal) as i32]);
+    block.set_integers(A::Ntens, &[n as i32]);
+    block.set_integers(A::Nstatv, &[sizes.n_states as i32]);
+    block.set_integers(A::Nprops, &[sizes.n_props as i32]);
+    block.set_integers(A::Layer, &[1]);
+    block.set_integers(A::Kspt, &[1]);
+    block
 }
 
-impl Block {
-    /// What all calls of a material have in common.
-    fn new(sizes: Sizes, cmname: &str, parameters: &[f64]) -> Self {
-        let n = sizes.n_tens;
-        let mut entries = [1; N_ARGUMENTS];
-        for (argument, count) in [
-            (A::Stress, n),
-            (A::Statev, sizes.n_states),
-            (A::Ddsdde, n * n),
-            (A::Ddsddt, n),
-            (A::Drplde, n),
-            (A::Stran, n),
-            (A::Dstran, n),
-            (A::Time, 2),
-            (A::Predef, N_FIELDS),
-            (A::Dpred, N_FIELDS),
-            (A::Cmname, N_CMNAME),
-            (A::Props, sizes.n_props),
-            (A::Coords, 3),
-            (A::Drot, 9),
-            (A::Dfgrd0, 9),
-            (A::Dfgrd1, 9),
-            (A::Jstep, 4),
-        ] {
-            entries[argument as usize] = count;
-        }
-        let mut at = [0; N_ARGUMENTS];
-        let mut end = N_GUARD;
-        for (i, (_, kind, _)) in ARGUMENTS.iter().enumerate() {
-            at[i] = end;
-            end += n_words(*kind, entries[i]) + N_GUARD;
-        }
-        let mut block = Self {
-            words: vec![GUARD; end],
-            at,
-            entries,
+/// The first result that holds a number that is none.
+fn not_finite(block: &Block) -> Option<&'static str> {
+    let results = [A::Stress, A::Statev, A::Ddsdde];
+    let mut bad = results.into_iter();
+    bad.find(|result| block.reals(*result).any(|value| !value.is_finite()))
+        .map(|result| ARGUMENTS[result as usize].0)
+}
+
+/// All arguments as TOML.
+fn text(block: &Block, title: &str) -> String {
+    let mut text = format!("[{title}]\n");
+    for (i, (name, kind, _)) in ARGUMENTS.iter().enumerate() {
+        let (words, n) = block.entries(i);
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
+        let values: Vec<String> = match kind {
+            Kind::Real => words
+                .iter()
+                .map(|word| real(f64::from_bits(*word)))
+                .collect(),
+            Kind::Integer => {
+                let (integers, _) = bytes.as_chunks::<4>();
+                let integers = integers.iter().take(n);
+                integers
+                    .map(|i| i32::from_ne_bytes(*i).to_string())
+                    .collect()
+            }
+            Kind::Text => {
+                let characters = String::from_utf8_lossy(&bytes).into_owned();
+                let _ = writeln!(text, "{name} = {}", toml::Value::from(characters));
+                continue;
+            }
         };
-        for (i, (_, kind, _)) in ARGUMENTS.iter().enumerate() {
-            let n = n_words(*kind, entries[i]);
-            block.words[at[i]..][..n].fill(0);
-        }
-        let name = format!("{cmname:<N_CMNAME$}");
-        let (characters, _) = name.as_bytes().as_chunks::<8>();
-        for (word, eight) in block.words[at[A::Cmname as usize]..]
-            .iter_mut()
-            .zip(characters)
-        {
-            *word = u64::from_ne_bytes(*eight);
-        }
-        let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-        for matrix in [A::Drot, A::Dfgrd0, A::Dfgrd1] {
-            block.set(matrix, &identity);
-        }
-        block.set(A::Props, parameters);
-        block.set(A::Pnewdt, &[1.0]);
-        block.set_integers(A::Ndi, &[sizes.n_normal as i32]);
-        block.set_integers(A::Nshr, &[(n - sizes.n_normal) as i32]);
-        block.set_integers(A::Ntens, &[n as i32]);
-        block.set_integers(A::Nstatv, &[sizes.n_states as i32]);
-        block.set_integers(A::Nprops, &[sizes.n_props as i32]);
-        block.set_integers(A::Layer, &[1]);
-        block.set_integers(A::Kspt, &[1]);
-        block
+        let _ = writeln!(text, "{name} = [{}]", values.join(", "));
     }
-
-    /// Writes the first entries of an argument.
-    fn set(&mut self, argument: A, values: &[f64]) {
-        let words = &mut self.words[self.at[argument as usize]..];
-        for (word, value) in words.iter_mut().zip(values) {
-            *word = value.to_bits();
-        }
-    }
-
-    fn set_integers(&mut self, argument: A, values: &[i32]) {
-        let words = &mut self.words[self.at[argument as usize]..];
-        for (word, pair) in words.iter_mut().zip(values.chunks(2)) {
-            let half = |i: usize| pair.get(i).copied().unwrap_or_default().to_ne_bytes();
-            let ([a, b, c, d], [e, f, g, h]) = (half(0), half(1));
-            *word = u64::from_ne_bytes([a, b, c, d, e, f, g, h]);
-        }
-    }
-
-    fn reals(&self, argument: A) -> impl Iterator<Item = f64> {
-        let i = argument as usize;
-        let words = &self.words[self.at[i]..][..self.entries[i]];
-        words.iter().map(|word| f64::from_bits(*word))
-    }
-
-    /// The first result that holds a number that is none.
-    fn not_finite(&self) -> Option<&'static str> {
-        let results = [A::Stress, A::Statev, A::Ddsdde];
-        let mut bad = results.into_iter();
-        bad.find(|result| self.reals(*result).any(|value| !value.is_finite()))
-            .map(|result| ARGUMENTS[result as usize].0)
-    }
-
-    /// Which copies a call has written to, by bits.
-    ///
-    /// # Errors
-    /// The first argument that it has written to without right, in words.
-    fn overwritten(&self, before: &Self) -> Result<u64, String> {
-        let mut copies = 0;
-        for (i, (name, kind, role)) in ARGUMENTS.iter().enumerate() {
-            let (first, n) = (self.at[i], n_words(*kind, self.entries[i]));
-            let differs = |from: usize, to: usize| self.words[from..to] != before.words[from..to];
-            if *role != Role::Output && differs(first, first + n) {
-                if *role == Role::Fixed {
-                    return Err(format!("the routine overwrites {name}, which is an input"));
-                }
-                copies |= 1 << i;
-            }
-            let end = first + n;
-            let next = ARGUMENTS.get(i + 1).map_or("", |(name, ..)| *name);
-            if differs(end, end + N_GUARD / 2) {
-                let size = self.entries[i];
-                return Err(format!(
-                    "the routine writes beyond the end of {name}, which has {size} entries"
-                ));
-            }
-            if differs(end + N_GUARD / 2, end + N_GUARD) {
-                return Err(format!(
-                    "the routine writes between {name} and {next}, in front of one or beyond the \
-                     end of the other"
-                ));
-            }
-            if i == 0 && differs(0, first) {
-                return Err(format!("the routine writes in front of {name}"));
-            }
-        }
-        Ok(copies)
-    }
-
-    /// All arguments as TOML.
-    fn text(&self, title: &str) -> String {
-        let mut text = format!("[{title}]\n");
-        for (i, (name, kind, _)) in ARGUMENTS.iter().enumerate() {
-            let n = self.entries[i];
-            let words = &self.words[self.at[i]..][..n_words(*kind, n)];
-            let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
-            let values: Vec<String> = match kind {
-                Kind::Real => words
-                    .iter()
-                    .map(|word| real(f64::from_bits(*word)))
-                    .collect(),
-                Kind::Integer => {
-                    let (integers, _) = bytes.as_chunks::<4>();
-                    let integers = integers.iter().take(n);
-                    integers
-                        .map(|i| i32::from_ne_bytes(*i).to_string())
-                        .collect()
-                }
-                Kind::Text => {
-                    let characters = String::from_utf8_lossy(&bytes).into_owned();
-                    let _ = writeln!(text, "{name} = {}", toml::Value::from(characters));
-                    continue;
-                }
-            };
-            let _ = writeln!(text, "{name} = [{}]", values.join(", "));
-        }
-        text
-    }
-}
-
-fn n_words(kind: Kind, entries: usize) -> usize {
-    match kind {
-        Kind::Real => entries,
-        Kind::Integer => entries.div_ceil(2),
-        Kind::Text => entries.div_ceil(8),
-    }
+    text
 }
 
 /// A number that reads back to the same bits.
@@ -376,7 +259,7 @@ fn real(value: f64) -> String {
 #[derive(Debug)]
 struct Instance {
     routine: Routine,
-    template: Block,
+    blocks: Blocks<N_ARGUMENTS>,
     sizes: Sizes,
     /// How DDSDDE stands in memory.
     order: Order,
@@ -398,8 +281,12 @@ impl ForeignInstance for Instance {
             .turn
             .as_ref()
             .map(|turn| turn.lock().unwrap_or_else(PoisonError::into_inner));
-        let mut block = self.template.clone();
-        each_point(call, |start, end| self.update(&mut block, start, end))
+        self.blocks
+            .with(|block| each_point(call, |start, end| self.update(block, start, end)))
+    }
+
+    fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
+        self.blocks.put_beside(gap, value)
     }
 
     fn take_overwritten(&self) -> Vec<String> {
@@ -425,7 +312,7 @@ impl Instance {
             .collect();
         self.call(block, start, &increment)?;
         let n = self.sizes.n;
-        if let Some(name) = block.not_finite() {
+        if let Some(name) = not_finite(block) {
             // A smaller increment may mend it, unless there is none at all.
             let at_rest = increment.iter().all(|v| *v == 0.0);
             return Err(Refusal::error(
@@ -482,7 +369,7 @@ impl Instance {
         start: &PointStart<'_>,
         increment: &[f64],
     ) -> Result<(), Refusal> {
-        block.words.copy_from_slice(&self.template.words);
+        block.refresh(self.blocks.template());
         block.set(A::Stress, start.flux);
         block.set(A::Statev, start.state);
         block.set(A::Stran, start.gradient);
@@ -496,23 +383,22 @@ impl Instance {
         // A static procedure of small strains.
         block.set_integers(A::Jstep, &[start.moment.step as i32, 1, 0, 0]);
         block.set_integers(A::Kinc, &[start.moment.increment as i32]);
-        let before = block.clone();
+        block.hand_over();
         let recorded = self.record.as_ref().filter(|file| {
             increment.iter().any(|v| *v != 0.0)
                 && !self.is_recorded.swap(true, Ordering::Relaxed)
                 && !(self.records_once && file.exists())
         });
-        if let Some(path) = recorded {
+        let given = recorded.map(|_| text(block, "before"));
+        if let (Some(path), Some(given)) = (recorded, &given) {
             // What a routine is given, even if it never returns.
-            record(path, &before, None)?;
+            record(path, given, None)?;
         }
         self.routine.call(&mut block.words, &block.at, N_CMNAME);
-        if let Some(path) = recorded {
-            record(path, &before, Some(block))?;
+        if let (Some(path), Some(given)) = (recorded, &given) {
+            record(path, given, Some(block))?;
         }
-        let overwritten = block
-            .overwritten(&before)
-            .map_err(|damage| Refusal::error(raw::PILUM_E_INTERNAL, damage))?;
+        let overwritten = block.overwritten()?;
         if overwritten != 0 {
             self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
         }
@@ -538,16 +424,15 @@ impl Instance {
 }
 
 /// Writes the arguments before a call, and after it once it has returned.
-fn record(path: &Path, before: &Block, after: Option<&Block>) -> Result<(), Refusal> {
-    let text = format!(
-        "# All arguments of one call of a UMAT, in their order; matrices column by column.\n\n{}\n{}",
-        before.text("before"),
+fn record(path: &Path, before: &str, after: Option<&Block>) -> Result<(), Refusal> {
+    let all = format!(
+        "# All arguments of one call of a UMAT, in their order; matrices column by column.\n\n{before}\n{}",
         after.map_or_else(
             || "# The routine has not returned.\n".to_owned(),
-            |after| after.text("after")
+            |after| text(after, "after")
         )
     );
-    std::fs::write(path, text).map_err(|why| {
+    std::fs::write(path, all).map_err(|why| {
         let message = format!("`record`: {} cannot be written: {why}", path.display());
         Refusal::error(raw::PILUM_E_INTERNAL, message)
     })

@@ -576,6 +576,16 @@ impl Probe {
         }
     }
 
+    /// Puts a number between the arguments of a routine behind an adapter, in front of that argument or everywhere,
+    /// for calls from now on; the usual one if there is none: what is read there shows. In words where that is; `None`
+    /// if there is no such place.
+    pub fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
+        match &self.instance {
+            Held::Own(_) => None,
+            Held::Foreign(instance) => instance.put_beside(gap, value),
+        }
+    }
+
     /// Asks for the internal variables of points that carry these fluxes. `None` if the law has no
     /// `init_state`.
     ///

@@ -80,7 +80,7 @@ fn told(check: &Check, answer: &Answer, capsule: &Capsule, say: &mut dyn FnMut(&
         Outcome::Failed | Outcome::Crashed => "fails for this increment",
     };
     // Words that were told above are not told again.
-    let is_known = answer.details == capsule.outcome.message;
+    let is_known = answer.details.ends_with(&capsule.outcome.message);
     let details = match answer.outcome {
         Outcome::Passed | Outcome::Skipped => String::new(),
         _ if is_known => ", as recorded".to_owned(),

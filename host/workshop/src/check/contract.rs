@@ -2,6 +2,7 @@
 
 use super::random::Random;
 use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses};
+use super::walk::Refused;
 use super::{Check, Family, Found, Subject, Verdict, course, failed, refusal, status_name};
 use abi::raw;
 use abi::status::{Outcome, most_severe};
@@ -347,7 +348,7 @@ fn integrate_works(subject: &Subject) -> Found {
                 Verdict::Skipped(why) => Verdict::Failed(why),
                 other => other,
             })?;
-        for (status, text) in &walk.refusals {
+        for Refused { status, text, .. } in &walk.refusals {
             let expected = matches!(
                 Outcome::from_code(*status),
                 Outcome::CutStep | Outcome::Domain | Outcome::Numeric

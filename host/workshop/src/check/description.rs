@@ -17,7 +17,7 @@ pub(super) const CHECKS: &[Check] = &[
         id: "description-is-complete",
         family: Family::Description,
         description: "No text is empty, initial values are finite, and every law offers a \
-                      hypothesis (warning).",
+                      hypothesis (warning). A sidecar needs no symbols, and no text on the law.",
         needs: &["description-is-readable"],
         run: description_is_complete,
     },
@@ -68,6 +68,8 @@ fn can_be_said(subject: &Subject) -> Result<(), Verdict> {
 
 fn description_is_complete(subject: &Subject) -> Found {
     can_be_said(subject)?;
+    // A sidecar says what its numbers are: symbols and a text are for those who want them.
+    let is_sidecar = subject.foreign().is_some();
     let mut gaps = Vec::new();
     for law in subject.laws()? {
         let d = law.description();
@@ -83,16 +85,24 @@ fn description_is_complete(subject: &Subject) -> Found {
             ("doc", &d.doc),
             ("references", &d.references),
         ] {
-            gaps.extend(empty(what, value));
+            if !(is_sidecar && what == "doc") {
+                gaps.extend(empty(what, value));
+            }
         }
         for p in &d.parameters {
             for (what, value) in [("symbol", &p.symbol), ("unit", &p.unit), ("doc", &p.doc)] {
+                if is_sidecar && what == "symbol" {
+                    continue;
+                }
                 gaps.extend(empty(&format!("the {what} of parameter `{}`", p.id), value));
             }
         }
         for formulation in &d.formulations {
             for v in &formulation.internal_variables {
                 for (what, value) in [("symbol", &v.symbol), ("unit", &v.unit), ("doc", &v.doc)] {
+                    if is_sidecar && what == "symbol" {
+                        continue;
+                    }
                     gaps.extend(empty(
                         &format!("the {what} of internal variable `{}`", v.id),
                         value,

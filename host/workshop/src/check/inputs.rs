@@ -14,8 +14,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "parameters-matter",
         family: Family::Mathematics,
-        description: "Every parameter changes some result (warning, since some may count only where no \
-                      path leads).",
+        description: "Every parameter changes some result, and none with a unit, or whose default is no whole number, is \
+                      rounded to one (warning, since some may count only where no path leads).",
         needs: NEEDS,
         run: parameters_matter,
     },
@@ -130,6 +130,20 @@ fn parameters_matter(subject: &Subject) -> Found {
                         break;
                     }
                 }
+                let among = |value: f64| -> Result<Option<Vec<PointEnd>>, Verdict> {
+                    let mut values = base.clone();
+                    values[i] = value;
+                    with_values(&specimen, &values)?
+                        .as_ref()
+                        .map(results)
+                        .transpose()
+                };
+                if entry.1 && may_be_rounded(p) && is_rounded(p, base[i], among)? {
+                    return Err(Verdict::Warning(format!(
+                        "`{}` of `{}` is rounded to a whole number: values between two of them give the same bits",
+                        p.id, law.id
+                    )));
+                }
             }
         }
     }
@@ -150,6 +164,40 @@ fn parameters_matter(subject: &Subject) -> Found {
         return Err(skipped("no parameter can be changed"));
     }
     Ok(format!("{tried} parameters"))
+}
+
+/// Whether a parameter is no count, which may be a whole number.
+fn may_be_rounded(p: &ParameterDescription) -> bool {
+    !["-", "1", ""].contains(&p.unit.as_str())
+        || p.default.is_some_and(|default| default.fract() != 0.0)
+}
+
+/// Whole numbers that are passed: a strength that is met between two of them looks rounded there, and not at others.
+const PASSED: usize = 4;
+
+/// Whether results are the same for two values between two whole numbers, and others between the next two, at
+/// several of them.
+fn is_rounded(
+    p: &ParameterDescription,
+    value: f64,
+    results: impl Fn(f64) -> Result<Option<Vec<PointEnd>>, Verdict>,
+) -> Result<bool, Verdict> {
+    let is_like = |a: &[PointEnd], b: &[PointEnd]| a.iter().zip(b).all(|(a, b)| is_same(a, b));
+    let mut before: Option<Vec<PointEnd>> = None;
+    for k in 0..PASSED {
+        let [low, high] = [0.25, 0.75].map(|part| value.floor() + k as f64 + part);
+        if !(p.bounds.contain(low) && p.bounds.contain(high)) {
+            return Ok(false);
+        }
+        let (Some(first), Some(second)) = (results(low)?, results(high)?) else {
+            return Ok(false);
+        };
+        if !is_like(&first, &second) || before.is_some_and(|before| is_like(&before, &first)) {
+            return Ok(false);
+        }
+        before = Some(second);
+    }
+    Ok(true)
 }
 
 /// How numbers grow where the units of force, length and time become smaller.

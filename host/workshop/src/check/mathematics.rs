@@ -6,6 +6,7 @@ mod rest;
 mod signs;
 mod tangent;
 
+pub(super) use axes::own_random;
 pub(super) use rest::counts;
 pub(super) use tangent::{Slope, slope};
 

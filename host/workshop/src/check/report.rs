@@ -53,6 +53,12 @@ pub(super) struct Finding {
     /// How the library has ended its process, as the details say.
     #[serde(skip)]
     pub(super) ended: Option<String>,
+    /// The check took longer than it may.
+    #[serde(skip)]
+    pub(super) is_late: bool,
+    /// It fails far away alone: those that build on it go on.
+    #[serde(skip)]
+    pub(super) is_well_nearby: bool,
 }
 
 #[derive(Serialize)]
@@ -75,29 +81,34 @@ pub(super) fn finding(check: &Check, outcome: Outcome, details: String) -> Findi
         capsule: None,
         nearest: BTreeMap::new(),
         ended: None,
+        is_late: false,
+        is_well_nearby: false,
     }
 }
 
-/// Tells how a library has ended its process with the first check that it has ended so, and which others those
-/// are; these refer to it.
+/// Tells how a library has ended its process with the first check that fails of it, or else the first one that it has
+/// ended so, and which others those are; these refer to it.
 pub(super) fn tell_once(findings: &mut [Finding]) {
-    for first in 0..findings.len() {
-        let Some(ended) = findings[first].ended.clone() else {
+    for i in 0..findings.len() {
+        let Some(ended) = findings[i].ended.clone() else {
             continue;
         };
-        let id = findings[first].id;
+        let is_same = |finding: &Finding| finding.ended.as_ref() == Some(&ended);
+        let fails = |finding: &Finding| finding.outcome.is_bad() && is_same(finding);
+        let main = findings.iter().position(fails).unwrap_or(i);
+        let as_there = format!("the process ended as in `{}`", findings[main].id);
         let mut others = Vec::new();
-        for other in &mut findings[first + 1..] {
-            if other.ended.as_ref() == Some(&ended) {
-                let as_there = format!("the process ended as in `{id}`");
+        for (k, other) in findings.iter_mut().enumerate() {
+            if k != main && is_same(other) {
                 other.details = other.details.replacen(&ended, &as_there, 1);
                 other.ended = None;
                 others.push(format!("`{}`", other.id));
             }
         }
+        findings[main].ended = None;
         if !others.is_empty() {
             let with_others = format!("{ended} (so it did in {})", others.join(", "));
-            let details = &mut findings[first].details;
+            let details = &mut findings[main].details;
             *details = details.replacen(&ended, &with_others, 1);
         }
     }

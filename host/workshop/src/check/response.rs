@@ -1,6 +1,7 @@
 //! What can be said of a response without knowing its equations: where it jumps, what becomes of it in
 //! smaller increments, whether its elastic operator is one.
 
+use super::extent::beyond_elastic;
 use super::margins;
 use super::mathematics::{
     ELASTIC, ITERATED, NEEDS, ROUND_OFF, UPDATE, counts, depends_on_time, flux_scale, increment,
@@ -480,15 +481,9 @@ fn plastic_variables_rest(subject: &Subject) -> Found {
         }
         let elastic = specimen.call(&starts, ELASTIC)?.points;
         for (step, elastic) in steps.iter().zip(&elastic) {
-            let moved = increment(&step.start);
-            let size = largest(&moved);
-            let columns = moved.len();
-            let off = (0..columns).map(|row| {
-                let entries = elastic.tangent[row * columns..].iter().zip(&moved);
-                let rise: f64 = entries.map(|(k, d)| k * d).sum();
-                (step.end.flux[row] - step.start.flux0[row] - rise).abs()
-            });
-            let is_elastic = off.fold(0.0, f64::max) <= ROUND_OFF * flux_scale(step)
+            let size = largest(&increment(&step.start));
+            let off = beyond_elastic(step, elastic);
+            let is_elastic = largest(&off) <= ROUND_OFF * flux_scale(step)
                 && is_near(elastic, &step.end)
                 && size * largest(&elastic.tangent) > NEAR * flux_scale(step);
             if !is_elastic {

@@ -4,30 +4,36 @@
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
 mod axes;
+mod beside;
 mod first;
+mod rest;
 mod tangent;
+mod time;
 mod words;
 
-use super::mathematics::{ITERATED, UPDATE, depends_on_time, flux_scale, largest};
+use super::mathematics::{UPDATE, largest};
 use super::random::Random;
 use super::specimen::{LONG, Specimen, first_difference, is_success};
-use super::walk::Step;
+use super::walk::{Refused, Step};
 use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
 use crate::Error;
 use abi::raw;
 use abi::status::Outcome;
-use law::Site;
+use beside::reads_beside;
 use law::adapter::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointEnd, PointStart};
+use law::vetting::plausible;
+use law::{Bounds, LoadedLaw, Site};
 use std::path::Path;
 use text::{Source, suggestion};
-use words::{Words, advice, is_mfront};
+use words::{Words, advice};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "sidecar-is-read",
         family: Family::Routine,
-        description: "UMAT: the sidecar beside the library, or that of the driver, is there and makes sense. (What is \
+        description: "UMAT: the sidecar beside the library, or that of the driver, is there and makes sense; its \
+                      parameters have a default or a usual range, or are set (warning). (What is \
                       asked of a UMAT here is asked of a UDSM and of MFront behaviours, too, along a driver.)",
         needs: &["file-is-a-library"],
         run: sidecar_is_read,
@@ -43,9 +49,10 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "routine-stays-inside",
         family: Family::Routine,
-        description: "UMAT: on random paths and on those that go far, there and back, nothing is written \
-                      beyond an array or over sizes, names and PROPS, and PNEWDT is sound; results are finite \
-                      on random ones; a copy that is used up is a warning.",
+        description: "UMAT: on random paths and on those that go far, there and back, nothing is written or \
+                      read beyond an array, nor written over sizes, names and PROPS, and PNEWDT is sound; results are finite \
+                      on random ones; the process goes on: PNEWDT asks for a smaller increment, STOP and XIT end \
+                      it; a copy that is used up is a warning.",
         needs: &["routine-answers"],
         run: routine_stays_inside,
     },
@@ -74,7 +81,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: after an update, DSTRAN = 0 keeps STRESS; routines that depend on the time are \
                       passed over.",
         needs: &["routine-is-repeatable"],
-        run: routine_stays_at_rest,
+        run: rest::routine_stays_at_rest,
     },
     Check {
         id: "time-as-declared",
@@ -82,7 +89,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: DTIME or TIME changes the response where the sidecar says `time_dependent = \
                       true`, and nowhere else (warning).",
         needs: &["routine-is-repeatable"],
-        run: time_as_declared,
+        run: time::time_as_declared,
     },
     Check {
         id: "ddsdde-matches-differences",
@@ -121,7 +128,7 @@ pub(super) const SHARED: [&str; 3] = [
 
 /// Those that mean the same for a routine, too, whose parameters and increments are random or far away. What
 /// they fail of a law they warn of here: public routines are often imprecise, and are of use all the same.
-pub(super) const OF_RESPONSES: [&str; 8] = [
+pub(super) const OF_RESPONSES: [&str; 9] = [
     "response-is-isotropic",
     "compression-is-negative",
     "angles-are-degrees",
@@ -130,15 +137,16 @@ pub(super) const OF_RESPONSES: [&str; 8] = [
     "states-are-carried-on",
     "plastic-variables-rest",
     "units-belong-together",
+    "paths-leave-elasticity",
 ];
+
+/// A routine that ends its process far away fails this check; others warn of it.
+pub(super) const GOES_FAR: &str = "routine-stays-inside";
 
 /// Increments of the random part of a path.
 const N_INCREMENTS: usize = 36;
-/// What time increments differ by, to see whether they matter.
-const SLOWER: f64 = 1e3;
-/// Another time at which an increment begins.
-const LATER: f64 = 1e5;
-
+/// Increments that are asked for what is read beside arguments.
+const MOST_READ: usize = 400;
 /// What a library is made for, if not for the contract. Nothing of it runs.
 pub(super) fn adapter(path: &Path) -> Option<Adapter> {
     law::inspect::inspect(path).ok()?.adapter()
@@ -243,7 +251,31 @@ fn sidecar_is_read(subject: &Subject) -> Found {
             description.parameters.len()
         )
     });
-    Ok(names.collect::<Vec<_>>().join("; "))
+    let names = names.collect::<Vec<_>>().join("; ");
+    let groundless = groundless(subject, &laws);
+    if groundless.is_empty() {
+        return Ok(names);
+    }
+    Err(Verdict::Warning(format!(
+        "{names}; checked with {}, for which the sidecar has neither `default` nor `usual = [a, b]`, so that what is \
+         found may be of no use: write them there, or give values by `--set ID=VALUE` or `--driver FILE`",
+        groundless.join(", ")
+    )))
+}
+
+/// Parameters of a sidecar, with the values that they are checked with, for which nothing speaks.
+fn groundless(subject: &Subject, laws: &[LoadedLaw]) -> Vec<String> {
+    if subject.driver.is_some() || subject.at.is_some() {
+        return Vec::new();
+    }
+    let parameters = laws.iter().flat_map(|law| &law.description().parameters);
+    let is_range = |bounds: &Bounds| bounds.lower.is_finite() && bounds.upper.is_finite();
+    parameters
+        .filter(|p| p.default.is_none() && !p.optional && p.choices.is_empty())
+        .filter(|p| !is_range(&p.usual) && !is_range(&p.bounds))
+        .filter(|p| subject.settings.iter().all(|(id, _)| *id != p.id))
+        .map(|p| format!("`{}` = {}", p.id, plausible(p)))
+        .collect()
 }
 
 /// Compression of a first call, kPa.
@@ -280,7 +312,9 @@ fn routine_answers(subject: &Subject) -> Found {
         let answer = routine.call(std::slice::from_ref(&start), UPDATE)?;
         if !is_success(answer.status) {
             let why = refusal(answer.status, answer.text().as_deref());
-            return Err(routine.fails_at(&start, why));
+            let read = reads_beside(&routine, std::slice::from_ref(&start))?;
+            let read = read.map_or(String::new(), |(_, read)| format!("; {read}"));
+            return Err(routine.fails_at(&start, format!("{why}{read}")));
         }
         let stiffness = largest(&answer.points[0].tangent);
         if stiffness <= 0.0 {
@@ -317,14 +351,23 @@ fn routine_stays_inside(subject: &Subject) -> Found {
         };
         let near_ones = near.refusals.iter().map(|refused| (refused, true));
         let mut refused = near_ones.chain(all.refusals.iter().map(|refused| (refused, false)));
-        if let Some(((status, text), _)) =
-            refused.find(|((status, _), is_near)| is_defect(*status, *is_near))
+        if let Some((refused, _)) =
+            refused.find(|(refused, is_near)| is_defect(refused.status, *is_near))
         {
-            return Err(routine.fails(refusal(*status, Some(text))));
+            return Err(refuses(&routine, refused)?);
         }
         if near.steps.is_empty() && all.steps.is_empty() {
             let why = format!("{}: no increment succeeded: {}", routine.name(), near.why());
             return Err(skipped(why));
+        }
+        let some = near.steps.iter().chain(&all.steps);
+        let every = (near.steps.len() + all.steps.len())
+            .div_ceil(MOST_READ)
+            .max(1);
+        let some: Vec<PointStart> = some.step_by(every).map(|step| step.start.clone()).collect();
+        if let Some((start, why)) = reads_beside(&routine, &some)? {
+            let why = format!("{why}, at {}", routine.at(&start));
+            return Err(routine.fails_at(&start, why));
         }
         n += near.steps.len() + all.steps.len();
         let names = routine.probe.take_overwritten();
@@ -342,6 +385,22 @@ fn routine_stays_inside(subject: &Subject) -> Found {
     }
 }
 
+/// The failure of an increment that a routine refuses: alone if it does so alone, too, as is repeated by its
+/// capsule.
+fn refuses(routine: &Specimen, refused: &Refused) -> Result<Verdict, Verdict> {
+    let alone = routine.call(std::slice::from_ref(&refused.start), UPDATE)?;
+    let status = alone.points[0].status;
+    let text = alone.text().filter(|_| status == refused.status);
+    let why = refusal(refused.status, Some(text.as_ref().unwrap_or(&refused.text)));
+    let read = reads_beside(routine, std::slice::from_ref(&refused.start))?;
+    let read = read.map_or(String::new(), |(_, read)| format!("; {read}"));
+    let why = format!("{why}{read}, at {}", routine.at(&refused.start));
+    Ok(match text {
+        Some(_) => routine.fails_at(&refused.start, why),
+        None => routine.fails(why),
+    })
+}
+
 /// Whether it is the same law with the same parameters.
 fn is_like(other: &Specimen, routine: &Specimen) -> bool {
     other.hypothesis == routine.hypothesis
@@ -350,24 +409,15 @@ fn is_like(other: &Specimen, routine: &Specimen) -> bool {
 }
 
 /// Places that differ from the usual one in the number of the element, of its point, where it lies and how long
-/// it is.
-fn elsewhere() -> [Site; 4] {
+/// it is; which of these it is. A routine may be another law in the first element or at one of the points.
+fn elsewhere() -> Vec<(Site, usize)> {
     let here = Site::default();
-    [
-        Site {
-            element: 40,
-            ..here
-        },
-        Site { point: 4, ..here },
-        Site {
-            position: [3.0, -7.0],
-            ..here
-        },
-        Site {
-            length: 0.25,
-            ..here
-        },
-    ]
+    let elements = [1, 40].map(|element| (Site { element, ..here }, 0));
+    let points = [1, 2, 3, 4, 8].map(|point| (Site { point, ..here }, 1));
+    let position = [3.0, -7.0];
+    let length = 0.25;
+    let others = [(Site { position, ..here }, 2), (Site { length, ..here }, 3)];
+    elements.into_iter().chain(points).chain(others).collect()
 }
 
 /// What first differs between two results, in words.
@@ -421,7 +471,8 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
             );
             return Err(routine.fails_at(&points[i], why));
         }
-        for (site, name) in elsewhere().into_iter().zip(Words::of(routine).site) {
+        for (site, which) in elsewhere() {
+            let name = Words::of(routine).site[which];
             let form = Form {
                 site: Some(site),
                 ..routine.form(UPDATE)
@@ -443,107 +494,7 @@ fn routine_is_repeatable(subject: &Subject) -> Found {
     by_site.map_or(Ok(format!("{n} increments")), Err)
 }
 
-fn routine_stays_at_rest(subject: &Subject) -> Found {
-    let n = each(subject, "rest", |routine, steps, _| {
-        // An MFront behaviour does not say whether it depends on the time.
-        if routine.formulation.time_dependent
-            || is_mfront(routine) && depends_on_time(routine, steps)?
-        {
-            return Ok(0);
-        }
-        let Words { strain, stress, .. } = Words::of(routine);
-        let still: Vec<PointStart> = steps
-            .iter()
-            .map(|step| PointStart {
-                gradient0: step.start.gradient1.clone(),
-                gradient1: step.start.gradient1.clone(),
-                flux0: step.end.flux.clone(),
-                state0: step.end.state.clone(),
-            })
-            .collect();
-        let answer = routine.call(&still, raw::PILUM_REQ_FLUX)?;
-        for ((step, point), end) in steps.iter().zip(&still).zip(&answer.points) {
-            if !is_success(end.status) {
-                let why = refusal(end.status, answer.text().as_deref());
-                return Err(routine.fails_at(point, format!("{strain} = 0 is refused: {why}")));
-            }
-            if differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step)) {
-                let why = format!(
-                    "{strain} = 0 changes {stress} {:?} to {:?}{}",
-                    step.end.flux,
-                    end.flux,
-                    advice(
-                        routine,
-                        "; what the time does is declared by `time_dependent = true` in the sidecar"
-                    )
-                );
-                return Err(routine.fails_at(point, why));
-            }
-        }
-        Ok(steps.len())
-    })?;
-    if n == 0 {
-        return Err(skipped("the routine depends on the time"));
-    }
-    Ok(format!("{n} increments"))
-}
-
 /// Whether components differ by more than this.
 fn differ(a: &[f64], b: &[f64], bound: f64) -> bool {
     a.iter().zip(b).any(|(a, b)| (a - b).abs() > bound)
-}
-
-fn time_as_declared(subject: &Subject) -> Found {
-    if subject.foreign().map(|foreign| foreign.adapter) == Some(Adapter::Mfront) {
-        return Err(skipped(
-            "a behaviour of MFront does not say whether it depends on the time",
-        ));
-    }
-    let (mut declared, mut seen) = (false, false);
-    let n = each(subject, "time", |routine, steps, _| {
-        let words = Words::of(routine);
-        let is_declared = routine.formulation.time_dependent;
-        declared |= is_declared;
-        let starts = starts(steps);
-        let slower = routine.lasting(SLOWER, &starts, raw::PILUM_REQ_FLUX)?;
-        let later = Form {
-            time: LATER,
-            ..routine.form(raw::PILUM_REQ_FLUX)
-        };
-        let later = routine.probe.integrate(&starts, &later)?.points;
-        for (ends, what) in [(&slower, words.duration), (&later, words.time)] {
-            for (step, end) in steps.iter().zip(ends) {
-                // What begins at TIME(2) = 0 does not at another one.
-                let begins = step.start.gradient0.iter().all(|value| *value == 0.0);
-                let depends = !(begins && what == words.time)
-                    && is_success(end.status)
-                    && differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
-                seen |= depends;
-                if depends && !is_declared {
-                    return Err(routine.warns_at(
-                        &step.start,
-                        format!(
-                            "with another {what} {} {:?} becomes {:?}, which {} does not say{}",
-                            words.stress,
-                            step.end.flux,
-                            end.flux,
-                            words.describer,
-                            advice(
-                                routine,
-                                ": say `time_dependent = true` in the sidecar, so that phases and segments \
-                                 without a `time` are told of"
-                            )
-                        ),
-                    ));
-                }
-            }
-        }
-        Ok(steps.len())
-    })?;
-    if declared && !seen {
-        let why = "it is said to depend on the time (`time_dependent = true` in a sidecar), and neither the length of an \
-                   increment (DTIME) nor its time changes anything";
-        return Err(Verdict::Warning(why.to_owned()));
-    }
-    Ok(format!("{n} increments"))
 }

@@ -36,11 +36,19 @@ pub(super) struct Step {
     pub(super) stiffness: f64,
 }
 
+/// An increment of a point that did not end well, and what was said of it or of another one beside it.
+#[derive(Clone, Debug)]
+pub(super) struct Refused {
+    pub(super) status: raw::Status,
+    pub(super) text: String,
+    pub(super) start: PointStart,
+}
+
 /// Steps of a path, and the outcomes that ended parts of it.
 #[derive(Debug, Default)]
 pub(super) struct Walk {
     pub(super) steps: Vec<Step>,
-    pub(super) refusals: Vec<(raw::Status, String)>,
+    pub(super) refusals: Vec<Refused>,
     /// Starts of the points that are said to have succeeded, finite or not.
     pub(super) successes: Vec<PointStart>,
 }
@@ -49,7 +57,9 @@ impl Walk {
     /// Why a part of the path ended first; empty if none did.
     pub(super) fn why(&self) -> String {
         let first = self.refusals.first();
-        first.map_or(String::new(), |(status, text)| refusal(*status, Some(text)))
+        first.map_or(String::new(), |first| {
+            refusal(first.status, Some(&first.text))
+        })
     }
 }
 
@@ -474,7 +484,11 @@ impl Walk {
         if success {
             self.successes.push(point.clone());
         } else {
-            self.refusals.push((end.status, text.to_owned()));
+            self.refusals.push(Refused {
+                status: end.status,
+                text: text.to_owned(),
+                start: point.clone(),
+            });
         }
         let goes_on = success && is_finite(&end);
         if goes_on {

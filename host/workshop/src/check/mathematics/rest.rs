@@ -36,6 +36,7 @@ pub(super) fn zero_increment_changes_nothing(subject: &Subject) -> Found {
             })
             .collect();
         let ended = steps.iter().map(|step| Rest {
+            told: step.start.clone(),
             point: at_rest(&step.start.gradient1, &step.end.flux, &step.end.state),
             flux: ITERATED * flux_scale(step),
             size: largest(&increment(&step.start)),
@@ -47,7 +48,7 @@ pub(super) fn zero_increment_changes_nothing(subject: &Subject) -> Found {
         let ends = specimen.call(&points, UPDATE)?.points;
         for (rest, end) in rests.iter().zip(ends) {
             if rest.moves(&end) {
-                let Rest { point, .. } = rest;
+                let Rest { point, told, .. } = rest;
                 let what = if is_success(end.status) {
                     format!(
                         "to {:?}, internal variables {:?} to {:?}",
@@ -57,7 +58,7 @@ pub(super) fn zero_increment_changes_nothing(subject: &Subject) -> Found {
                     format!("to a failure, {}", status_name(end.status))
                 };
                 let why = format!("an increment of zero changes flux {:?} {what}", point.flux0);
-                return Err(specimen.fails_at(point, why));
+                return Err(specimen.fails_at(told, why));
             }
             n += 1;
         }
@@ -87,7 +88,7 @@ fn drifts(specimen: &Specimen, rests: &[Rest]) -> Result<(), Verdict> {
                      variables {:?} to {:?}",
                     rest.point.flux0, end.flux, rest.point.state0, end.state
                 );
-                return Err(specimen.fails_at(&rest.point, why));
+                return Err(specimen.fails_at(&rest.told, why));
             }
             point.flux0 = end.flux;
             point.state0 = end.state;
@@ -99,6 +100,8 @@ fn drifts(specimen: &Specimen, rests: &[Rest]) -> Result<(), Verdict> {
 /// A point that is to stay where it is.
 struct Rest {
     point: PointStart,
+    /// The call that a capsule has: the increment that has led there, so that a replay leads there too.
+    told: PointStart,
     /// How little flux is none.
     flux: f64,
     /// Of the increment before, and internal variables before it.
@@ -176,6 +179,7 @@ pub(super) fn initial_states_fit(subject: &Subject) -> Found {
                     size,
                     before: start.state0.clone(),
                     may_change: vec![false; start.state0.len()],
+                    told: start.clone(),
                     point: start,
                 });
             }

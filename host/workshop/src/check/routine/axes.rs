@@ -2,7 +2,8 @@
 
 use super::words::Words;
 use super::{differ, each};
-use crate::check::mathematics::{ITERATED, flux_scale, largest};
+use crate::check::mathematics::{ITERATED, flux_scale, largest, own_random};
+use crate::check::random::Random;
 use crate::check::specimen::{Specimen, create_form, enlarged, hypotheses, is_success, longer};
 use crate::check::{Found, Subject, Verdict, refusal, skipped};
 use abi::Hypothesis;
@@ -77,57 +78,67 @@ pub(super) fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
 }
 
 pub(super) fn tangential_directions_are_alike(subject: &Subject) -> Found {
-    let n = each(subject, "turned", |routine, steps, random| {
+    let (mut n, mut random) = (0, Random::new(subject.seed, "turned"));
+    for mut routine in subject.specimens_by_default(1, &mut random)? {
         if !routine.hypothesis.is_interface() {
-            return Ok(0);
+            continue;
         }
-        let mut compared = 0;
-        for _ in steps.iter().take(200) {
-            // Internal variables with a direction would have to turn as well, so every path starts fresh.
-            let origin = routine.origin(random)?;
-            let size = origin.size * random.logarithmic(0.03, 30.0);
-            let mut point = origin.start;
-            point.gradient1 = routine.direction(size, random);
-            let angle = random.between(0.5, 2.5);
-            let turn = |values: &[f64]| match *values {
-                [n, t, s] => {
-                    let (sin, cos) = f64::sin_cos(angle);
-                    vec![n, cos * t - sin * s, sin * t + cos * s]
-                }
-                _ => vec![values[0], -values[1]],
-            };
-            let turned = PointStart {
-                gradient0: turn(&point.gradient0),
-                gradient1: turn(&point.gradient1),
-                flux0: turn(&point.flux0),
-                state0: point.state0.clone(),
-            };
-            let ends = routine.call(&[point.clone(), turned], raw::PILUM_REQ_FLUX)?;
-            let [first, second] = ends.points.as_slice() else {
-                continue;
-            };
-            if !(is_success(first.status) && is_success(second.status)) {
-                continue;
-            }
-            let scale = largest(&point.flux0)
-                .max(largest(&first.flux))
-                .max(origin.stiffness * size);
-            let expected = turn(&first.flux);
-            if differ(&second.flux, &expected, ITERATED * scale) {
-                let why = format!(
-                    "the traction {:?} becomes {:?} where it should be {expected:?}, at {}",
-                    first.flux,
-                    second.flux,
-                    routine.at(&point)
-                );
-                return Err(routine.warns_at(&point, why));
-            }
-            compared += 1;
-        }
-        Ok(compared)
-    })?;
+        let mut random = own_random(subject, "turned", &mut routine);
+        n += turned_alike(&routine, &mut random)?;
+    }
     if n == 0 {
         return Err(skipped("it is no routine of interfaces"));
     }
     Ok(format!("{n} increments"))
+}
+
+/// Increments that are turned.
+const TURNED: usize = 200;
+
+/// Increments at which a traction was compared with that of the turned one.
+fn turned_alike(routine: &Specimen, random: &mut Random) -> Result<usize, Verdict> {
+    let mut compared = 0;
+    for _ in 0..TURNED {
+        // Internal variables with a direction would have to turn as well, so every path starts fresh.
+        let origin = routine.origin(random)?;
+        let size = origin.size * random.logarithmic(0.03, 30.0);
+        let mut point = origin.start;
+        point.gradient1 = routine.direction(size, random);
+        let angle = random.between(0.5, 2.5);
+        let turn = |values: &[f64]| match *values {
+            [n, t, s] => {
+                let (sin, cos) = f64::sin_cos(angle);
+                vec![n, cos * t - sin * s, sin * t + cos * s]
+            }
+            _ => vec![values[0], -values[1]],
+        };
+        let turned = PointStart {
+            gradient0: turn(&point.gradient0),
+            gradient1: turn(&point.gradient1),
+            flux0: turn(&point.flux0),
+            state0: point.state0.clone(),
+        };
+        let ends = routine.call(&[point.clone(), turned], raw::PILUM_REQ_FLUX)?;
+        let [first, second] = ends.points.as_slice() else {
+            continue;
+        };
+        if !(is_success(first.status) && is_success(second.status)) {
+            continue;
+        }
+        let scale = largest(&point.flux0)
+            .max(largest(&first.flux))
+            .max(origin.stiffness * size);
+        let expected = turn(&first.flux);
+        if differ(&second.flux, &expected, ITERATED * scale) {
+            let why = format!(
+                "the traction {:?} becomes {:?} where it should be {expected:?}, at {}",
+                first.flux,
+                second.flux,
+                routine.at(&point)
+            );
+            return Err(routine.warns_at(&point, why));
+        }
+        compared += 1;
+    }
+    Ok(compared)
 }

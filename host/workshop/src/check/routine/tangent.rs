@@ -11,6 +11,9 @@ use law::Tangent;
 /// Steps whose tangents are compared with differences, one in so many.
 const COMPARED: usize = 3;
 
+/// How near a ratio is to 2 or 1/2 where shear strains are confused.
+const FACTOR: f64 = 1e-3;
+
 /// What is found of the stiffness of many steps.
 #[derive(Default)]
 struct Tally {
@@ -153,19 +156,53 @@ fn of_entry(
     off: f64,
 ) -> String {
     let names = routine.hypothesis.components();
+    let words = Words::of(routine);
     format!(
         "{}({}, {}), {} by {}, is {by_law:.6e}, differences give {by_differences:.6e}: wrong by {off:.1e} of \
-         the stiffness, the most of all, which a run pays for with iterations. {}At {}",
-        Words::of(routine).stiffness,
+         the stiffness, the most of all, which a run pays for with iterations. {}{}At {}",
+        words.stiffness,
         row + 1,
         column + 1,
         names[row],
         names[column],
+        cause(routine, step, (row, column), by_differences / by_law),
         advice(
             routine,
             "An elastic or otherwise approximate one is declared by `tangent = \"approximate\"` in the \
              sidecar. "
         ),
         routine.at(&step.start)
+    )
+}
+
+/// What a wrong entry looks like, where it looks like something.
+fn cause(routine: &Specimen, step: &Step, (row, column): (usize, usize), ratio: f64) -> String {
+    let Words {
+        stress,
+        strain,
+        stiffness,
+        ..
+    } = Words::of(routine);
+    let (from, to) = (step.start.flux0[row], step.end.flux[row]);
+    if ratio == 0.0 && from.to_bits() == to.to_bits() {
+        return format!(
+            "{stress}({}) stays {to:e} in this increment: is it returned? ",
+            row + 1
+        );
+    }
+    let is_shear = |c: usize| !routine.hypothesis.is_interface() && c >= routine.n_normal();
+    if !(is_shear(row) && is_shear(column)) {
+        return String::new();
+    }
+    let times = if (ratio - 2.0).abs() < FACTOR {
+        "twice"
+    } else if (ratio - 0.5).abs() < FACTOR {
+        "half of"
+    } else {
+        return String::new();
+    };
+    format!(
+        "{stress} changes by {times} what {stiffness} says: shear components of {strain} are γ = 2ε, with G in \
+         {stiffness} and {stress} += G γ. "
     )
 }

@@ -1,0 +1,113 @@
+//! Does the time matter to a routine where that is said, and nowhere else?
+
+use super::words::{Words, advice};
+use super::{bits, differ, each, starts};
+use crate::check::mathematics::{ITERATED, flux_scale, increment};
+use crate::check::specimen::{Specimen, is_success};
+use crate::check::walk::{Step, sum};
+use crate::check::{Found, Subject, Verdict, skipped};
+use abi::raw;
+use law::adapter::Adapter;
+use law::probe::{Form, PointEnd, PointStart};
+
+/// What time increments differ by, to see whether they matter.
+const SLOWER: f64 = 1e3;
+/// Stress of the next increment that other internal variables make, relative to the stresses in play: substeps of
+/// another length give another one within their tolerance.
+const CARRIED: f64 = 1e-3;
+/// Another time at which an increment begins.
+const LATER: f64 = 1e5;
+
+pub(super) fn time_as_declared(subject: &Subject) -> Found {
+    if subject.foreign().map(|foreign| foreign.adapter) == Some(Adapter::Mfront) {
+        return Err(skipped(
+            "a behaviour of MFront does not say whether it depends on the time",
+        ));
+    }
+    let (mut declared, mut seen) = (false, false);
+    let n = each(subject, "time", |routine, steps, _| {
+        let words = Words::of(routine);
+        let is_declared = routine.formulation.time_dependent;
+        declared |= is_declared;
+        let starts = starts(steps);
+        let slower = routine.lasting(SLOWER, &starts, raw::PILUM_REQ_FLUX)?;
+        let later = Form {
+            time: LATER,
+            ..routine.form(raw::PILUM_REQ_FLUX)
+        };
+        let later = routine.probe.integrate(&starts, &later)?.points;
+        for (ends, what) in [(&slower, words.duration), (&later, words.time)] {
+            let carried = carried_on(routine, steps, ends)?;
+            for ((step, end), carried) in steps.iter().zip(ends).zip(carried) {
+                // What begins at TIME(2) = 0 does not at another one.
+                let begins = step.start.gradient0.iter().all(|value| *value == 0.0);
+                let of_flux = differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
+                let depends = !(begins && what == words.time)
+                    && is_success(end.status)
+                    && (of_flux || carried);
+                seen |= depends;
+                if depends && !is_declared {
+                    let change = if of_flux {
+                        format!(
+                            "{} {:?} becomes {:?}",
+                            words.stress, step.end.flux, end.flux
+                        )
+                    } else {
+                        format!(
+                            "{} {:?} becomes {:?}, and {} of the next increment changes",
+                            words.state, step.end.state, end.state, words.stress
+                        )
+                    };
+                    return Err(routine.warns_at(
+                        &step.start,
+                        format!(
+                            "with another {what} {change}, which {} does not say{}",
+                            words.describer,
+                            advice(
+                                routine,
+                                ": say `time_dependent = true` in the sidecar, so that phases and segments \
+                                 without a `time` are told of"
+                            )
+                        ),
+                    ));
+                }
+            }
+        }
+        Ok(steps.len())
+    })?;
+    if declared && !seen {
+        let why = "it is said to depend on the time (`time_dependent = true` in a sidecar), and neither the length of an \
+                   increment (DTIME) nor its time changes anything";
+        return Err(Verdict::Warning(why.to_owned()));
+    }
+    Ok(format!("{n} increments"))
+}
+
+/// Whether other internal variables at the end of steps give another stress in a next increment like the last one:
+/// what is kept for its own sake, such as the length of substeps, does not count.
+fn carried_on(
+    routine: &Specimen,
+    steps: &[Step],
+    others: &[PointEnd],
+) -> Result<Vec<bool>, Verdict> {
+    let next = |step: &Step, state: &[f64]| PointStart {
+        gradient0: step.start.gradient1.clone(),
+        gradient1: sum(&step.start.gradient1, &increment(&step.start)),
+        flux0: step.end.flux.clone(),
+        state0: state.to_vec(),
+    };
+    let pairs = || steps.iter().zip(others);
+    let usual: Vec<PointStart> = pairs()
+        .map(|(step, _)| next(step, &step.end.state))
+        .collect();
+    let other: Vec<PointStart> = pairs().map(|(step, end)| next(step, &end.state)).collect();
+    let usual = routine.call(&usual, raw::PILUM_REQ_FLUX)?.points;
+    let other = routine.call(&other, raw::PILUM_REQ_FLUX)?.points;
+    let counts = pairs().zip(usual.iter().zip(&other));
+    let counts = counts.map(|((step, end), (usual, other))| {
+        let changed = bits(&step.end.state) != bits(&end.state);
+        let both = is_success(usual.status) && is_success(other.status);
+        changed && both && differ(&usual.flux, &other.flux, CARRIED * flux_scale(step))
+    });
+    Ok(counts.collect())
+}
