@@ -12,7 +12,9 @@ use std::time::Instant;
 /// Entries that one thread looks at, at a time.
 pub(super) const PER_TASK: usize = 1 << 16;
 
-/// Share of what is tolerated out of balance that corrections may leave.
+/// Residual that corrections may leave, relative to the forces in play: rounding leaves as much. Also a share of what
+/// is tolerated.
+const NOISE: f64 = 1e-12;
 const LEFT: f64 = 1e-3;
 
 /// What the sum of the groups' tangents is to the solver.
@@ -199,14 +201,15 @@ impl Newton<'_> {
 
     /// The correction that takes away what is out of balance, with the matrix there is, by place.
     ///
-    /// Entries of the residual that all together are far below what is tolerated are left: where ground
-    /// stays elastic the first corrections leave no others, and the solver has less to eliminate.
+    /// Entries of the residual that all together are noise are left: where ground stays elastic the first
+    /// corrections leave no others, and the solver has less to eliminate.
     ///
     /// # Errors
     /// The matrix is singular.
     pub(super) fn correction_of(&mut self, balance: &Balance) -> Result<Vec<f64>, StepFailure> {
         let of_equation = &self.places.bodies.of_equation;
-        let share = LEFT * self.settings.force_tolerance / (balance.residual.len() as f64).sqrt();
+        let all = NOISE.min(LEFT * self.settings.force_tolerance);
+        let share = all / (balance.residual.len() as f64).sqrt();
         let left: Vec<f64> = balance.scales.iter().map(|scale| share * scale).collect();
         let entries = balance.residual.iter().enumerate();
         let residual: Vec<f64> = entries
