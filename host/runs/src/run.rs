@@ -497,8 +497,8 @@ impl Watch for Follower<'_> {
     }
 }
 
-/// After a checkpoint a run goes on for so many times what it took, whatever it is told: a large state is not
-/// written over and over.
+/// After a checkpoint a run goes on for so many times what it took: a large state is not written over and over.
+/// Not where one is wanted after every increment.
 const AT_LEAST: u32 = 20;
 
 /// Writes the checkpoints of a run.

@@ -395,10 +395,12 @@ impl Instance {
             record(path, given, None)?;
         }
         self.routine.call(&mut block.words, &block.at, N_CMNAME);
+        // Known before anything else fails: a damaged block is not used again.
+        let overwritten = block.overwritten();
         if let (Some(path), Some(given)) = (recorded, &given) {
             record(path, given, Some(block))?;
         }
-        let overwritten = block.overwritten()?;
+        let overwritten = overwritten?;
         if overwritten != 0 {
             self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
         }

@@ -128,7 +128,10 @@ impl Aside {
         let mut follows = Vec::new();
         if !free.is_empty() {
             let towards_free = part(&boundary, &free);
-            for (column, own) in boundary.iter().zip(own.chunks_exact_mut(boundary.len())) {
+            for (column, own) in boundary
+                .iter()
+                .zip(own.chunks_exact_mut(boundary.len().max(1)))
+            {
                 let column = &stiffness[column * n..][..n];
                 let right: Vec<f64> = free.iter().map(|&row| -column[row]).collect();
                 let follow = factors.solve(&right);

@@ -63,7 +63,7 @@ impl Setup {
 #[derive(Clone, Debug)]
 pub(super) struct Numbered {
     pub(super) system: Arc<System>,
-    /// Of every unknown, whether it is on the boundary.
+    /// Of every unknown, whether it is not eliminated: on the boundary, or kept beside it.
     pub(super) kept: Vec<bool>,
     pub(super) factors: Arc<Multifrontal>,
     /// Largest entry of the matrix.

@@ -301,15 +301,17 @@ impl Newton<'_> {
         outcome.map_err(|_| Singularity::Unknown)?;
         self.places.fold(&mut internal);
         let pattern = &self.system.pattern;
-        let mut solver = match (self.matrix.beside.take(), self.domain) {
-            (Some(solver), _) => Ok(solver),
-            (None, Some(domain)) => {
-                LinearSolver::with_block(pattern, None, domain.block(self.system))
-            }
-            (None, None) => LinearSolver::new(pattern, false, None),
-        }
-        .map_err(|_| Singularity::Free)?;
-        self.matrix.announce_beside(solver.bytes());
+        let mut solver = if let Some(solver) = self.matrix.beside.take() {
+            solver
+        } else {
+            let solver = match self.domain {
+                Some(domain) => LinearSolver::with_block(pattern, None, domain.block(self.system)),
+                None => LinearSolver::new(pattern, false, None),
+            };
+            let solver = solver.map_err(|_| Singularity::Free)?;
+            self.matrix.announce_beside(solver.bytes());
+            solver
+        };
         let mut values = solver.room();
         self.system.assemble(self.groups, &mut values);
         let outcome = solver.factorise(values);

@@ -149,14 +149,7 @@ impl Newton<'_> {
             }
             control.note(&state);
             if self.is_over(control.series(iterations)) {
-                if let Some(state) = control.tolerate(self, iterations)? {
-                    let tolerated = state.balance.relative;
-                    return Ok(Equilibrium {
-                        tolerated,
-                        ..Equilibrium::at(state, 0.0)
-                    });
-                }
-                return Err(control.give_up(self, &state, iterations));
+                return self.end_of(control, &state, iterations);
             }
             let before = iterations.len();
             let next = match control.correct(self, &state, iterations) {
@@ -168,10 +161,27 @@ impl Newton<'_> {
             // Numbers have come to their end far away: nothing leads back.
             if !next.balance.relative.is_finite() {
                 iterations.truncate(before);
-                return Err(control.give_up(self, &state, iterations));
+                return self.end_of(control, &state, iterations);
             }
             state = next;
         }
+    }
+
+    /// What iterations that have come to their end at this state lead to: a state that is tolerated, or none.
+    fn end_of(
+        &mut self,
+        control: &mut impl Control,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> Result<Equilibrium, StepFailure> {
+        if let Some(state) = control.tolerate(self, iterations)? {
+            let tolerated = state.balance.relative;
+            return Ok(Equilibrium {
+                tolerated,
+                ..Equilibrium::at(state, 0.0)
+            });
+        }
+        Err(control.give_up(self, state, iterations))
     }
 
     /// Whether no more iterations are allowed. The state before the first correction is one of the

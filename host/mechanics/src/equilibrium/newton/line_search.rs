@@ -58,8 +58,17 @@ impl LineSearch {
                     return outcome.map(taken);
                 }
                 Ok(state) => {
-                    let least = best.as_ref().map(|best| best.state.balance.relative);
-                    if least.is_none_or(|least| state.balance.relative < least) {
+                    // What is no number is no answer while another one is.
+                    let size = |state: &State| {
+                        let relative = state.balance.relative;
+                        if relative.is_nan() {
+                            f64::INFINITY
+                        } else {
+                            relative
+                        }
+                    };
+                    let least = best.as_ref().map(|best| size(&best.state));
+                    if least.is_none_or(|least| size(&state) < least) {
                         best = Some(Found {
                             is_held: false,
                             ..taken(state)
@@ -164,6 +173,12 @@ mod tests {
             among(Otherwise::Shortest, residuals),
             (3, Some((0.25, true)))
         );
+    }
+
+    #[test]
+    fn a_residual_that_is_no_number_is_not_the_best() {
+        let residuals = [Some(f64::NAN), Some(4.0), Some(3.0)];
+        assert_eq!(among(Otherwise::Best, residuals), (3, Some((0.25, false))));
     }
 
     #[test]

@@ -23,8 +23,8 @@ const STILL_MOVES: f64 = 0.1;
 const FAR: f64 = 5.0;
 /// From the state of the least residual so far a correction is taken as a whole where it leaves no more than so many
 /// times that: ground that has just yielded somewhere else makes the residual grow for one iteration. Found by trial
-/// on the bonded pile; more is no better. Not beside a condensed domain, where an interface is all that yields: in
-/// chambers iterations went round in circles.
+/// on the bonded pile; more is no better. Not where an interface is all that yields: in chambers iterations went
+/// round in circles.
 const GROWTH: f64 = 2.0;
 /// Lengths of a correction that the line search tries.
 const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
@@ -173,9 +173,10 @@ impl Control for LoadControl {
     fn line_search(&self, newton: &Newton<'_>, from: &State) -> LineSearch {
         let residual = from.balance.relative;
         let is_least = (self.least.as_ref()).is_some_and(|(_, least)| residual <= *least);
-        let growth = match newton.domain {
-            None if is_least => GROWTH,
-            _ => 1.0,
+        let growth = if is_least && newton.ground_yields() {
+            GROWTH
+        } else {
+            1.0
         };
         LineSearch {
             lengths: &STEP_LENGTHS,
@@ -324,6 +325,14 @@ impl LoadControl {
 }
 
 impl Newton<'_> {
+    /// Whether the law of a solid is not linear.
+    fn ground_yields(&self) -> bool {
+        let mut numbered = self.groups.iter().enumerate();
+        numbered.any(|(number, group)| {
+            self.system.includes(number) && group.is_solid() && !group.is_linear()
+        })
+    }
+
     /// Displacement increments that the tangent at the start predicts.
     fn predict(&mut self, task: &Task) -> Result<Vec<f64>, StepFailure> {
         let still = vec![0.0; task.external.len()];
