@@ -669,11 +669,6 @@ impl Group {
         &self.tangent[first * n * n..(first + points.len()) * n * n]
     }
 
-    /// Whether its elements are solids: no layer, no interface without thickness.
-    pub fn is_solid(&self) -> bool {
-        self.layer.is_none() && self.kinematics.n_components() == 4
-    }
-
     /// The tangents of every element's points, if they are the same at all of them.
     pub fn constant_tangents(&self) -> Option<&[f64]> {
         self.tangents_are_constant.then_some(&self.tangent)

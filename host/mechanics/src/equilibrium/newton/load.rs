@@ -21,11 +21,6 @@ const LAST: usize = 5;
 const STILL_MOVES: f64 = 0.1;
 /// Nor is one whose displacement increments are so many times those that the iterations started from.
 const FAR: f64 = 5.0;
-/// From the state of the least residual so far a correction is taken as a whole where it leaves no more than so many
-/// times that: ground that has just yielded somewhere else makes the residual grow for one iteration. Found by trial
-/// on the bonded pile; more is no better. Not where an interface is all that yields: in chambers iterations went
-/// round in circles.
-const GROWTH: f64 = 2.0;
 /// Lengths of a correction that the line search tries.
 const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 
@@ -171,17 +166,10 @@ impl Control for LoadControl {
     }
 
     fn line_search(&self, newton: &Newton<'_>, from: &State) -> LineSearch {
-        let residual = from.balance.relative;
-        let is_least = (self.least.as_ref()).is_some_and(|(_, least)| residual <= *least);
-        let growth = if is_least && newton.ground_yields() {
-            GROWTH
-        } else {
-            1.0
-        };
         LineSearch {
             lengths: &STEP_LENGTHS,
             // Below the tolerance the residual may grow: there it is round-off.
-            enough: (growth * residual).max(newton.settings.force_tolerance),
+            enough: from.balance.relative.max(newton.settings.force_tolerance),
             otherwise: Otherwise::Best,
         }
     }
@@ -325,14 +313,6 @@ impl LoadControl {
 }
 
 impl Newton<'_> {
-    /// Whether the law of a solid is not linear.
-    fn ground_yields(&self) -> bool {
-        let mut numbered = self.groups.iter().enumerate();
-        numbered.any(|(number, group)| {
-            self.system.includes(number) && group.is_solid() && !group.is_linear()
-        })
-    }
-
     /// Displacement increments that the tangent at the start predicts.
     fn predict(&mut self, task: &Task) -> Result<Vec<f64>, StepFailure> {
         let still = vec![0.0; task.external.len()];
