@@ -36,7 +36,7 @@ pub fn fold(ties: &[Tie], force: &mut [f64]) {
 }
 
 /// Of every degree of freedom, whether elements at these nodes use it: those that are tied use what they follow.
-pub fn used(nodes: impl Iterator<Item = usize>, ties: &[Tie], n_dofs: usize) -> Vec<bool> {
+pub(crate) fn used(nodes: impl Iterator<Item = usize>, ties: &[Tie], n_dofs: usize) -> Vec<bool> {
     let mut used = vec![false; n_dofs];
     for node in nodes {
         used[2 * node..2 * node + 2].fill(true);
@@ -264,16 +264,14 @@ impl System {
                     .collect()
             })
             .collect();
-        let mut used = vec![false; n_dofs];
-        for map in elements.iter().flatten() {
-            for &dof in &map.dofs {
-                used[dof] = true;
-            }
-        }
+        let numbered = groups.iter().enumerate();
+        let taking_part = numbered.filter(|(number, group)| takes_part(*number, group));
+        let nodes = taking_part.flat_map(|(_, group)| group.nodes());
+        let used = used(nodes, ties, n_dofs);
         let mut equation = vec![None; n_dofs];
         let mut free = Vec::new();
         for dof in 0..n_dofs {
-            if used[dof] && !prescribed[dof] && tie_of[dof].is_none() {
+            if used[dof] && !prescribed[dof] {
                 equation[dof] = Some(free.len());
                 free.push(dof);
             }

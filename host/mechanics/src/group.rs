@@ -669,6 +669,12 @@ impl Group {
         &self.tangent[first * n * n..(first + points.len()) * n * n]
     }
 
+    /// Nodes of its elements; most of them several times.
+    pub fn nodes(&self) -> impl Iterator<Item = usize> {
+        let elements = 0..self.kinematics.n_elements();
+        elements.flat_map(|element| self.kinematics.nodes(element).iter().copied())
+    }
+
     /// The tangents of every element's points, if they are the same at all of them.
     pub fn constant_tangents(&self) -> Option<&[f64]> {
         self.tangents_are_constant.then_some(&self.tangent)

@@ -27,7 +27,7 @@ mod reuse;
 pub use reuse::Reuse;
 
 use super::newton::{DomainFailure, Loads};
-use crate::assembly::{System, Tie};
+use crate::assembly::{System, Tie, used};
 use crate::group::Group;
 use algebra::{Block, Dense, Kind, Multifrontal, Pattern, Singular};
 use aside::Aside;
@@ -181,15 +181,11 @@ fn pays(
     ties: &[Tie],
 ) -> bool {
     let of = |in_domain: bool| {
-        let mut numbered = groups.iter().zip(condensed);
-        let groups = numbered.by_ref();
+        let numbered = groups.iter().zip(condensed);
         let chosen =
-            groups.filter(|(group, condensed)| group.is_active && **condensed == in_domain);
-        let kinematics: Vec<_> = chosen.map(|(group, _)| &group.kinematics).collect();
-        let nodes = kinematics
-            .iter()
-            .flat_map(|kinematics| (0..kinematics.n_elements()).flat_map(|e| kinematics.nodes(e)));
-        crate::assembly::used(nodes.copied(), ties, now.len())
+            numbered.filter(|(group, condensed)| group.is_active && **condensed == in_domain);
+        let nodes = chosen.flat_map(|(group, _)| group.nodes());
+        used(nodes, ties, now.len())
     };
     let (own, others) = (of(true), of(false));
     let (mut n_own, mut n_boundary, mut n_others) = (0, 0, 0);

@@ -38,14 +38,10 @@ impl Held<'_> {
             vec![false; self.now.len() / 2],
             vec![false; self.now.len() / 2],
         ];
-        for (group, &condensed) in groups.iter().zip(condensed) {
-            let n = if group.is_active {
-                group.kinematics.n_elements()
-            } else {
-                0
-            };
-            for node in (0..n).flat_map(|element| group.kinematics.nodes(element)) {
-                nodes[usize::from(condensed)][*node] = true;
+        let numbered = groups.iter().zip(condensed);
+        for (group, &condensed) in numbered.filter(|(group, _)| group.is_active) {
+            for node in group.nodes() {
+                nodes[usize::from(condensed)][node] = true;
             }
         }
         let [others, own] = nodes;

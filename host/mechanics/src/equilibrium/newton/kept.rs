@@ -142,7 +142,7 @@ impl Newton<'_> {
         };
         let operator = self.operator();
         let moved = control.evaluate(self, state.moved_by(1.0, &correction), operator);
-        let enough = (state.balance.relative).max(self.settings.force_tolerance);
+        let enough = control.line_search(self, state).enough;
         if let Ok(next) = moved
             && next.balance.relative <= enough
         {

@@ -9,9 +9,6 @@ use algebra::{LinearSolver, Singular, largest};
 use law::Operator;
 use std::time::Instant;
 
-/// Entries that one thread looks at, at a time.
-pub(super) const PER_TASK: usize = 1 << 16;
-
 /// Residual that corrections may leave, relative to the forces in play: rounding leaves as much. Also a share of what
 /// is tolerated.
 const NOISE: f64 = 1e-12;

@@ -20,7 +20,6 @@
 
 use super::Newton;
 use super::failure::{Iterations, Reason, StepFailure};
-use super::matrix::PER_TASK;
 use super::outcome::Iteration;
 use super::residual::{Balance, Task};
 use crate::settings::Settings;
@@ -41,6 +40,8 @@ const FALL: f64 = 0.1;
 const MAX_STEPS: usize = 40;
 /// Newton iterations without a new least residual that count as a standstill.
 const STANDSTILL: usize = 6;
+/// Entries of a matrix that one thread takes at a time.
+const PER_TASK: usize = 1 << 16;
 /// Iterations before a standstill is looked for.
 const FIRST: usize = 10;
 /// What a new least residual must be below, relative to the old one.
