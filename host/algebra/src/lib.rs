@@ -15,6 +15,7 @@ mod linear;
 mod multifrontal;
 mod order;
 mod pattern;
+pub mod threads;
 
 pub use dense::{Factors, largest};
 pub use linear::{Block, Dense, LinearSolver, Singular};

@@ -1,6 +1,6 @@
 //! Which entries of a sparse matrix are not zero.
 
-use rayon::prelude::*;
+use crate::threads;
 use std::ops::Range;
 
 /// Entries from which on products with a vector are shared among threads, and the parts in which they
@@ -112,7 +112,7 @@ impl Pattern {
             return of_columns(0..n);
         }
         let part = |part: usize| of_columns(part * n / PARTS..(part + 1) * n / PARTS);
-        let parts: Vec<_> = (0..PARTS).into_par_iter().map(part).collect();
+        let parts = threads::map(0..PARTS, part);
         let mut sums = [(); N].map(|()| vec![0.0; n]);
         for of_part in parts {
             for (sum, of_part) in sums.iter_mut().zip(of_part) {

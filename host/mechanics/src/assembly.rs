@@ -11,9 +11,8 @@ pub use bodies::{Bodies, SHARED, norms};
 pub use elements::Elements;
 
 use crate::group::Group;
-use algebra::Pattern;
+use algebra::{Pattern, threads};
 use elements::{ElementMatrix, PIECE};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A degree of freedom that follows others.
@@ -288,7 +287,9 @@ impl System {
             });
         };
         for maps in &mut elements {
-            maps.par_iter_mut().with_min_len(PIECE).for_each(place);
+            threads::each(maps.chunks_mut(PIECE), |maps| {
+                maps.iter_mut().for_each(place);
+            });
         }
         Self {
             equation,

@@ -4,8 +4,7 @@
 use super::Kind;
 use super::supernodes::Supernodes;
 use super::updates::{Run, add_runs};
-use crate::{Pattern, Singular};
-use rayon::prelude::*;
+use crate::{Pattern, Singular, threads};
 use std::ops::Range;
 
 /// The order of elimination and the shape of everything that follows from it.
@@ -315,18 +314,16 @@ impl Analysis {
         let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
         let per_task = self.fronts.len().div_ceil(TASKS).max(1);
         let numbers: Vec<usize> = (0..self.fronts.len()).collect();
-        let tasks = numbers.par_chunks(per_task).with_max_len(1);
-        let placed: Vec<Vec<Vec<(u32, u32)>>> = tasks
-            .map(|fronts| {
-                let mut place = vec![0_u32; position.len()];
-                let entries_of = |&front: &usize| {
-                    let shape = &self.fronts[front];
-                    self.place_front(shape.pivots.clone(), shape.rows.clone(), &mut place);
-                    self.entries_of(shape, (pattern, transposed.as_deref()), position, &place)
-                };
-                fronts.iter().map(entries_of).collect()
-            })
-            .collect();
+        let placed = threads::map(numbers.chunks(per_task), |fronts| {
+            let mut place = vec![0_u32; position.len()];
+            let entries_of = |&front: &usize| {
+                let shape = &self.fronts[front];
+                self.place_front(shape.pivots.clone(), shape.rows.clone(), &mut place);
+                self.entries_of(shape, (pattern, transposed.as_deref()), position, &place)
+            };
+            let entries: Vec<Vec<(u32, u32)>> = fronts.iter().map(entries_of).collect();
+            entries
+        });
         let of_fronts = || placed.iter().flatten();
         let n_entries = of_fronts().map(Vec::len).sum();
         let (mut sources, mut targets) =

@@ -6,6 +6,7 @@ use super::updates::{OnPivots, OnRest, Pile, Update};
 use super::{Before, Front, Gathered, Kind, Multifrontal};
 use crate::Singular;
 use crate::dense::Exchanges;
+use crate::threads;
 use pulp::Arch;
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -120,11 +121,10 @@ impl Multifrontal {
             Before::Values(before) if before.len() == values.len() => {
                 let is_same =
                     |&at: &u32| before[at as usize].to_bits() == values[at as usize].to_bits();
-                let stays = shapes
-                    .par_iter()
-                    .with_min_len(PER_TASK)
-                    .map(|shape| sources[shape.entries.clone()].iter().all(is_same));
-                stays.collect()
+                let stays = |shape: &Shape| sources[shape.entries.clone()].iter().all(is_same);
+                let of_task =
+                    |shapes: &[Shape]| -> Vec<bool> { shapes.iter().map(stays).collect() };
+                threads::map(shapes.chunks(PER_TASK), of_task).concat()
             }
             Before::Values(_) => vec![false; shapes.len()],
             // An entry of a front has a pivot for its row or its column.
@@ -187,6 +187,7 @@ impl Multifrontal {
         let n = self.analysis.kept.len();
         let mut schur = std::mem::take(&mut self.schur);
         let analysis = &self.analysis;
+        threads::stay_awake();
         let results: Vec<_> = analysis
             .roots
             .par_iter()

@@ -3,8 +3,8 @@
 use super::analysis::{Analysis, Branch};
 use super::substitution::{Down, Up};
 use super::{Kind, Multifrontal};
+use crate::threads;
 use pulp::Arch;
-use rayon::prelude::*;
 use std::ops::Range;
 
 impl Multifrontal {
@@ -32,12 +32,9 @@ impl Multifrontal {
         let all = analysis.order.iter().chain(&analysis.kept);
         let mut y: Vec<f64> = all.map(|&equation| right[equation as usize]).collect();
         let is_wanted = |number: usize| fronts.is_none_or(|fronts| fronts[number]);
-        let solved: Vec<(Vec<f64>, Vec<f64>)> = analysis
-            .branches
-            .par_iter()
-            .with_max_len(1)
-            .map(|branch| self.forward_branch(branch, &y, is_wanted))
-            .collect();
+        let solved = threads::map(&analysis.branches, |branch| {
+            self.forward_branch(branch, &y, is_wanted)
+        });
         // In one order, whoever computed them.
         for (branch, (values, left)) in analysis.branches.iter().zip(solved) {
             analysis.put(branch, &values, &mut y);
@@ -171,11 +168,9 @@ impl Multifrontal {
         }
         let has_wanted = |branch: &&Branch| branch.fronts.iter().any(|&number| is_wanted(number));
         let branches: Vec<&Branch> = analysis.branches.iter().filter(has_wanted).collect();
-        let solved: Vec<Vec<f64>> = branches
-            .par_iter()
-            .with_max_len(1)
-            .map(|branch| self.backward_branch(branch, x, is_wanted))
-            .collect();
+        let solved = threads::map(&branches, |branch| {
+            self.backward_branch(branch, x, is_wanted)
+        });
         for (branch, values) in branches.into_iter().zip(solved) {
             analysis.put(branch, &values, x);
         }

@@ -2,8 +2,7 @@
 
 use super::{ElementMap, System};
 use crate::group::Group;
-use algebra::largest;
-use rayon::prelude::*;
+use algebra::{largest, threads};
 use std::ops::Range;
 
 /// Elements that one thread takes at a time.
@@ -169,7 +168,7 @@ impl System {
 /// Does something with every part, on several threads if that is worth it.
 fn each(parts: Vec<Part<'_>>, is_shared: bool, act: impl Fn(Part<'_>) + Send + Sync) {
     if is_shared {
-        parts.into_par_iter().with_max_len(1).for_each(act);
+        threads::each(parts, act);
     } else {
         parts.into_iter().for_each(act);
     }
@@ -177,12 +176,11 @@ fn each(parts: Vec<Part<'_>>, is_shared: bool, act: impl Fn(Part<'_>) + Send + S
 
 /// Computes the matrices of the elements of a group from the `first` on that are not there yet.
 fn renew(group: &Group, first: usize, maps: &[ElementMap], pieces: &mut [Piece]) {
-    let is_shared = maps.len() > PIECE;
-    let each = pieces.par_iter_mut().zip(maps.par_chunks(PIECE));
     // What is not worth sharing is one piece, which no other thread is woken for.
-    each.with_min_len(if is_shared { 1 } else { usize::MAX })
-        .enumerate()
-        .for_each(|(piece, (kept, maps))| kept.renew(group, first + PIECE * piece, maps));
+    let each = pieces.iter_mut().zip(maps.chunks(PIECE)).enumerate();
+    threads::each(each, |(piece, (kept, maps))| {
+        kept.renew(group, first + PIECE * piece, maps);
+    });
 }
 
 /// Part of a matrix: some columns.

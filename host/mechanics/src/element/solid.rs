@@ -7,8 +7,8 @@
 use super::shape::{Functions, Reference, RulePoint};
 use super::{Axes, Kinematics, depth, projection};
 use crate::problem::Analysis;
+use algebra::threads;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Elements that one thread takes at a time.
@@ -268,8 +268,7 @@ impl<const N: usize> Kinematics for Solid<N> {
             });
         };
         if self.nodes.len() > PIECE {
-            let pieces = out.par_chunks_mut(PIECE * per_element).enumerate();
-            pieces.for_each(piece);
+            threads::each(out.chunks_mut(PIECE * per_element).enumerate(), piece);
         } else {
             piece((0, out));
         }
@@ -296,9 +295,8 @@ impl<const N: usize> Kinematics for Solid<N> {
             }
         };
         if self.nodes.len() > PIECE {
-            let pieces = flux.par_chunks(PIECE * per_element).enumerate();
-            let forces: Vec<_> = pieces.map(forces_of).collect();
-            forces
+            let pieces = flux.chunks(PIECE * per_element).enumerate();
+            threads::map(pieces, forces_of)
                 .into_iter()
                 .enumerate()
                 .for_each(|(number, of_piece)| add(number, of_piece));

@@ -1,8 +1,8 @@
 //! Carrying points through the law of a group, batch by batch.
 
 use super::Group;
+use algebra::threads;
 use law::{BatchFailure, BatchSuccess, End, Law, Operator, Start, Strided, calls};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points that one thread takes at a time.
@@ -108,7 +108,7 @@ impl Group {
         let outcomes: Vec<_> = if self.kinematics.n_points() <= BATCH {
             work.into_iter().map(batch).collect()
         } else {
-            work.into_par_iter().map(batch).collect()
+            threads::map(work, batch)
         };
         together(outcomes)
     }

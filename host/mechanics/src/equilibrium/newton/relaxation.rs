@@ -23,8 +23,8 @@ use super::failure::{Iterations, Reason, StepFailure};
 use super::outcome::Iteration;
 use super::residual::{Balance, Task};
 use crate::settings::Settings;
+use algebra::threads;
 use law::Operator;
-use rayon::prelude::*;
 
 /// α at first. With flow along m and yield along n, enclosing an angle θ (in energy), the symmetric part
 /// of D + α D_e is positive definite for α above (1/cos θ − 1)/2. This value was found by trial:
@@ -250,18 +250,21 @@ impl Newton<'_> {
     ) -> Result<Vec<f64>, StepFailure> {
         let share = 1.0 / (1.0 + viscosity);
         let mut values = self.solver.room();
-        values.clear();
-        values.extend_from_slice(self.stiffness());
-        let parts = values.par_chunks_mut(PER_TASK);
-        parts
-            .zip(elastic.par_chunks(PER_TASK))
-            .for_each(|(values, elastic)| {
-                for (value, elastic) in values.iter_mut().zip(elastic) {
-                    if value.to_bits() != elastic.to_bits() {
-                        *value = share * (*value + viscosity * elastic);
-                    }
+        let stiffness = self.stiffness();
+        values.resize(stiffness.len(), 0.0);
+        let parts = values.chunks_mut(PER_TASK).zip(stiffness.chunks(PER_TASK));
+        threads::each(
+            parts.zip(elastic.chunks(PER_TASK)),
+            |((values, stiffness), elastic)| {
+                for ((value, &now), elastic) in values.iter_mut().zip(stiffness).zip(elastic) {
+                    *value = if now.to_bits() == elastic.to_bits() {
+                        now
+                    } else {
+                        share * (now + viscosity * elastic)
+                    };
                 }
-            });
+            },
+        );
         self.factorise(values)?;
         let residual: Vec<f64> = residual.iter().map(|r| share * r).collect();
         self.solve(&residual, None)
