@@ -25,6 +25,7 @@ pub use tangent::Fault;
 use crate::element::Kinematics;
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
+use algebra::threads;
 pub use aside::Aside;
 use law::Law;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
@@ -39,6 +40,18 @@ use water::Pores;
 /// its tangent's, relative to the largest of both.
 const PROBE: [f64; 4] = [1e-4, -5e-5, 2.5e-5, 7.5e-5];
 const LINEAR: f64 = 1e-8;
+
+/// Points that one thread takes at a time where little is done with each.
+const PER_TASK: usize = 4096;
+
+/// Stresses, and strains, of some points, each with those at the start.
+type Both<'v> = ((&'v mut [f64], &'v [f64]), (&'v [f64], &'v [f64]));
+
+/// Copies values of points.
+fn copy(from: &[f64], to: &mut [f64]) {
+    let pieces = to.chunks_mut(4 * PER_TASK).zip(from.chunks(4 * PER_TASK));
+    threads::each(pieces, |(to, from)| to.copy_from_slice(from));
+}
 
 /// Values of all points, before and during an increment.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -511,7 +524,8 @@ impl Group {
         time: f64,
         time_increment: f64,
     ) -> Result<BatchSuccess, PointFailure> {
-        self.strain.trial.clone_from(&self.strain.committed);
+        self.strain.begin();
+        copy(&self.strain.committed, &mut self.strain.trial);
         self.kinematics
             .add_gradients(increment, &mut self.strain.trial);
         self.follow_pores(time, time_increment);
@@ -552,24 +566,25 @@ impl Group {
     fn evaluate_linear(&mut self) {
         self.stress.begin();
         let n = self.kinematics.n_components();
-        let points = self
-            .stress
-            .trial
-            .chunks_exact_mut(n)
-            .zip(self.stress.committed.chunks_exact(n))
-            .zip(
-                self.strain
-                    .trial
-                    .chunks_exact(n)
-                    .zip(self.strain.committed.chunks_exact(n)),
-            );
-        for ((stress, stress_0), (strain, strain_0)) in points {
-            for i in 0..n {
-                let row = &self.tangent[i * n..][..n];
-                let change: f64 = (0..n).map(|j| row[j] * (strain[j] - strain_0[j])).sum();
-                stress[i] = stress_0[i] + change;
+        let tangent = &self.tangent;
+        let per_task = n * PER_TASK;
+        let stresses = self.stress.trial.chunks_mut(per_task);
+        let stresses = stresses.zip(self.stress.committed.chunks(per_task));
+        let strains = self.strain.trial.chunks(per_task);
+        let strains = strains.zip(self.strain.committed.chunks(per_task));
+        let of_points = |((stresses, stresses_0), (strains, strains_0)): Both<'_>| {
+            let stresses = stresses.chunks_exact_mut(n);
+            let stresses = stresses.zip(stresses_0.chunks_exact(n));
+            let strains = strains.chunks_exact(n).zip(strains_0.chunks_exact(n));
+            for ((stress, stress_0), (strain, strain_0)) in stresses.zip(strains) {
+                for i in 0..n {
+                    let row = &tangent[i * n..][..n];
+                    let change: f64 = (0..n).map(|j| row[j] * (strain[j] - strain_0[j])).sum();
+                    stress[i] = stress_0[i] + change;
+                }
             }
-        }
+        };
+        threads::each(stresses.zip(strains), of_points);
     }
 
     /// The constant tangent of a linear law, held against what the law makes of a small strain.

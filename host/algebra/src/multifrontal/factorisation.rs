@@ -1,18 +1,24 @@
 //! The numerical factorisation: front after front, branches of the tree in parallel.
 
 use super::analysis::{Analysis, Shape};
-use super::kernels::{WORTHWHILE, factorise_symmetric, factorise_unsymmetric, pack};
+use super::kernels::{
+    WORTHWHILE, factorise_symmetric, factorise_unsymmetric, half, leave_product, leave_square, pack,
+};
 use super::updates::{OnPivots, OnRest, Pile, Update};
 use super::{Before, Front, Gathered, Kind, Multifrontal};
 use crate::Singular;
 use crate::dense::Exchanges;
 use crate::threads;
+use faer::MatRef;
 use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Fronts whose entries one thread compares at a time.
 const PER_TASK: usize = 64;
+/// Entries that children leave to their parent from which on they are added on several threads.
+const ADDED: usize = 1 << 16;
 
 /// Values of a matrix.
 #[derive(Clone, Copy)]
@@ -199,6 +205,7 @@ impl Multifrontal {
             let mut front = self.front(root);
             Arch::new().dispatch(OnRest {
                 updates: &[self.update_of(root, &front.update)],
+                columns: 0..n,
                 target: &mut schur,
                 m: n,
                 k: 0,
@@ -357,18 +364,54 @@ fn eliminate_pivots(
 ) -> Result<(), Singular> {
     let n = k + m;
     let (l, u) = values.split_at_mut(n * k);
-    Arch::new().dispatch(OnPivots { updates, l, u, k });
-    match kind {
-        Kind::Symmetric => factorise_symmetric(l, n, k, update)?,
-        Kind::Unsymmetric => factorise_unsymmetric(l, u, n, k, update, exchanges)?,
-    }
-    Arch::new().dispatch(OnRest {
+    let columns = 0..n;
+    add_to_pivots(OnPivots {
         updates,
-        target: update,
-        m,
+        columns,
+        l,
+        u,
+        n,
         k,
     });
+    let add = |columns: Range<usize>, target: &mut [f64]| {
+        Arch::new().dispatch(OnRest {
+            updates,
+            columns,
+            target,
+            m,
+            k,
+        });
+    };
+    match kind {
+        Kind::Symmetric => {
+            factorise_symmetric(l, n, k)?;
+            leave_square(update, below(l, n, k), add);
+        }
+        Kind::Unsymmetric => {
+            factorise_unsymmetric(l, u, n, k, exchanges)?;
+            let u = MatRef::from_column_major_slice(u, k, m);
+            leave_product(update, below(l, n, k), u, add);
+        }
+    }
     Ok(())
+}
+
+/// What stands below the pivots.
+fn below(l: &[f64], n: usize, k: usize) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(l, n, k).split_at_row(k).1
+}
+
+/// Adds what the children leave, in parallel where it pays.
+fn add_to_pivots(all: OnPivots<'_>) {
+    let sizes = all.updates.iter().map(|update| update.size.pow(2));
+    if sizes.sum::<usize>() < ADDED {
+        return Arch::new().dispatch(all);
+    }
+    let (n, k) = (all.n, all.k);
+    let [pivots, others] = all.split(k);
+    let [a, b] = pivots.split(half(k));
+    let [c, d] = others.split(k + half(n - k));
+    threads::each([a, b, c, d], |part| Arch::new().dispatch(part));
 }
 
 impl Front {

@@ -22,6 +22,16 @@ impl Run {
         self.row as usize..(self.row + self.len) as usize
     }
 
+    /// Those of its columns that are among these of the parent: where they stand below the pivots of the front,
+    /// and in the parent.
+    #[inline(always)]
+    fn columns(&self, of_parent: &Range<usize>) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (row, at) = (self.row as usize, self.at as usize);
+        let first = of_parent.start.max(at);
+        let last = of_parent.end.min(at + self.len as usize);
+        (first..last).map(move |column| (column - at + row, column))
+    }
+
     /// The part from a row on; empty at the end of the run if there is none.
     fn from(&self, row: usize) -> Self {
         let skipped = (row as u32).saturating_sub(self.row).min(self.len);
@@ -55,12 +65,48 @@ pub(super) struct Update<'u> {
 }
 
 /// Adds the updates of the children to the columns of the pivots of their parent (n × k), and to
-/// their rows (k × m).
+/// their rows (k × m); to some of the columns, that is.
 pub(super) struct OnPivots<'f> {
     pub(super) updates: &'f [Update<'f>],
+    /// Which columns of the parent.
+    pub(super) columns: Range<usize>,
+    /// Values of those that are pivots.
     pub(super) l: &'f mut [f64],
+    /// Values of the others, in the rows of the pivots.
     pub(super) u: &'f mut [f64],
+    pub(super) n: usize,
     pub(super) k: usize,
+}
+
+impl<'f> OnPivots<'f> {
+    /// The columns before this one, and the others.
+    pub(super) fn split(self, column: usize) -> [Self; 2] {
+        let Self {
+            updates,
+            columns,
+            l,
+            u,
+            n,
+            k,
+        } = self;
+        let pivots = |columns: Range<usize>| columns.end.min(k).saturating_sub(columns.start);
+        let before = columns.start..column;
+        let of_l = pivots(before.clone());
+        let (l_before, l) = l.split_at_mut(of_l * n);
+        let (u_before, u) = u.split_at_mut(u.len().min((before.len() - of_l) * k));
+        let part = |columns, l, u| Self {
+            updates,
+            columns,
+            l,
+            u,
+            n,
+            k,
+        };
+        [
+            part(before, l_before, u_before),
+            part(column..columns.end, l, u),
+        ]
+    }
 }
 
 impl WithSimd for OnPivots<'_> {
@@ -69,14 +115,16 @@ impl WithSimd for OnPivots<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for update in self.updates {
-            update.extend_pivots(self.l, self.u, self.l.len() / self.k, self.k);
+            update.extend_pivots(&self.columns, (self.l, self.u), (self.n, self.k));
         }
     }
 }
 
-/// Adds them to what their parent leaves (m × m).
+/// Adds them to what their parent leaves (m × m); to some of its columns, that is.
 pub(super) struct OnRest<'f> {
     pub(super) updates: &'f [Update<'f>],
+    pub(super) columns: Range<usize>,
+    /// Values of these columns.
     pub(super) target: &'f mut [f64],
     pub(super) m: usize,
     /// Pivots of the parent.
@@ -89,7 +137,7 @@ impl WithSimd for OnRest<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for update in self.updates {
-            update.extend_rest(self.target, self.m, self.k);
+            update.extend_rest(&self.columns, self.target, (self.m, self.k));
         }
     }
 }
@@ -97,15 +145,21 @@ impl WithSimd for OnRest<'_> {
 impl Update<'_> {
     /// Adds to the columns (n rows) and rows of the pivots of the parent.
     #[inline(always)]
-    fn extend_pivots(&self, l: &mut [f64], u: &mut [f64], n: usize, k: usize) {
+    fn extend_pivots(
+        &self,
+        columns: &Range<usize>,
+        (l, u): (&mut [f64], &mut [f64]),
+        (n, k): (usize, usize),
+    ) {
         let inside = self.inside(k);
+        let first = columns.start;
         for run in self.runs {
-            for (j, column) in run.rows().zip(run.at as usize..) {
+            for (j, column) in run.columns(columns) {
                 let source = &self.values[j * self.size..][..self.size];
                 if column < k {
-                    self.add(self.runs, j, source, &mut l[column * n..][..n], 0);
+                    self.add(self.runs, j, source, &mut l[(column - first) * n..][..n], 0);
                 } else if !self.is_symmetric {
-                    let target = &mut u[(column - k) * k..][..k];
+                    let target = &mut u[(column - first.max(k)) * k..][..k];
                     self.add(&self.runs[..inside], j, source, target, 0);
                 }
             }
@@ -114,12 +168,14 @@ impl Update<'_> {
 
     /// Adds to what the parent leaves (m × m), which has `k` pivots.
     #[inline(always)]
-    fn extend_rest(&self, target: &mut [f64], m: usize, k: usize) {
+    fn extend_rest(&self, columns: &Range<usize>, target: &mut [f64], (m, k): (usize, usize)) {
         let rest = &self.runs[self.inside(k)..];
+        let of_parent = columns.start + k..columns.end + k;
         for run in rest {
-            for (j, column) in run.rows().zip(run.at as usize - k..) {
+            for (j, column) in run.columns(&of_parent) {
                 let source = &self.values[j * self.size..][..self.size];
-                self.add(rest, j, source, &mut target[column * m..][..m], k);
+                let target = &mut target[(column - of_parent.start) * m..][..m];
+                self.add(rest, j, source, target, k);
             }
         }
     }

@@ -5,8 +5,9 @@
 //! the path that it is on, however its update is integrated. Where nothing moves the law's own tangent
 //! stands.
 
-use super::{Field, Group};
+use super::{Field, Group, PER_TASK};
 use crate::settings::Tangents;
+use algebra::threads;
 use law::{BatchFailure, BatchSuccess, End, Operator, Strided, Tangent};
 use serde::{Deserialize, Serialize};
 
@@ -107,7 +108,8 @@ impl Group {
             }
             self.fluxes_at(&moved, &all, period)
         });
-        let is_wrong = |point: usize| {
+        let is_wrong = |point: &usize| {
+            let point = *point;
             let matrix = &tangents[point * n * n..][..n * n];
             let largest = matrix.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let off = |i: usize| {
@@ -119,7 +121,9 @@ impl Group {
             // Nor is it right where the law fails nearby.
             !(0..n).all(|i| off(i) <= RIGHT * largest)
         };
-        (0..sizes.len()).map(is_wrong).collect()
+        let points: Vec<usize> = (0..sizes.len()).collect();
+        let of_some = |points: &[usize]| -> Vec<bool> { points.iter().map(is_wrong).collect() };
+        threads::map(points.chunks(PER_TASK), of_some).concat()
     }
 
     /// Size of the differences at every point; `None` where nothing moves.
