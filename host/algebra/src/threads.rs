@@ -13,7 +13,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// How long a thread that has nothing to do waits awake.
-const PATIENCE: Duration = Duration::from_micros(200);
+const PATIENCE: Duration = Duration::from_micros(100);
 
 /// A thread is awake, or about to be woken, for whatever comes.
 static IS_AWAKE: AtomicBool = AtomicBool::new(false);

@@ -81,6 +81,7 @@ pub mod ground;
 pub mod group;
 pub mod mesh;
 pub mod model;
+mod numbers;
 pub mod problem;
 pub mod recovery;
 pub mod settings;

@@ -138,9 +138,13 @@ pub fn norms(bodies: &[u32], n: usize, v: &[f64]) -> Vec<f64> {
         return vec![v.iter().map(|x| x * x).sum::<f64>().sqrt()];
     }
     let mut sums = vec![0.0; n];
-    for (&body, x) in bodies.iter().zip(v) {
-        if let Some(sum) = sums.get_mut(body as usize) {
-            *sum += x * x;
+    let mut rest = v;
+    // Neighbours are mostly of one body: their sum need not go through memory.
+    for run in bodies.chunk_by(|a, b| a == b) {
+        let own;
+        (own, rest) = rest.split_at(run.len().min(rest.len()));
+        if let Some(sum) = sums.get_mut(run[0] as usize) {
+            *sum = own.iter().fold(*sum, |sum, x| sum + x * x);
         }
     }
     sums.iter().map(|sum: &f64| sum.sqrt()).collect()

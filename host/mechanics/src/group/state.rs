@@ -11,8 +11,11 @@ use std::borrow::Cow;
 pub struct GroupState<'g> {
     /// Name of the law in the case file.
     law: Cow<'g, str>,
+    #[serde(with = "crate::numbers")]
     strain: Cow<'g, [f64]>,
+    #[serde(with = "crate::numbers")]
     stress: Cow<'g, [f64]>,
+    #[serde(with = "crate::numbers")]
     internal: Cow<'g, [f64]>,
     jump: Cow<'g, [f64]>,
     /// Elastic stiffnesses of a thin layer, of the stresses that its law started from.

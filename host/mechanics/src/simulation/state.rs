@@ -17,14 +17,18 @@ pub struct State<'s> {
     /// Number of the phase, from 0.
     pub phase: usize,
     groups: Vec<GroupState<'s>>,
+    #[serde(with = "crate::numbers")]
     displacement: Cow<'s, [f64]>,
     prescribed: Cow<'s, BTreeMap<usize, f64>>,
     loading: Cow<'s, [Loading; 2]>,
+    #[serde(with = "crate::numbers")]
     force: Cow<'s, [f64]>,
+    #[serde(with = "crate::numbers")]
     reaction: Cow<'s, [f64]>,
     /// Time at the start of the phase.
     time: f64,
     largest_force: f64,
+    #[serde(with = "crate::numbers")]
     largest_forces: Cow<'s, [f64]>,
     course: Cow<'s, PhaseCourse>,
 }

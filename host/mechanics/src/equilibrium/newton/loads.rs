@@ -11,17 +11,21 @@ pub struct Loads {
     /// Times at which the leg starts and ends.
     pub leg: [f64; 2],
     /// External forces at the leg's start, by degree of freedom.
+    #[serde(with = "crate::numbers")]
     pub force_start: Vec<f64>,
     /// External forces at its end.
+    #[serde(with = "crate::numbers")]
     pub force_end: Vec<f64>,
     /// Prescribed displacements: degree of freedom, value at the leg's start, value at its end.
     pub prescribed: Vec<(usize, f64, f64)>,
     /// Forces out of balance at the start of the phase, carried to equilibrium in proportion to λ.
+    #[serde(with = "crate::numbers")]
     pub out_of_balance: Vec<f64>,
     /// Largest of the forces (2-norms) at the start of the phase, and what rounding leaves of those of
     /// earlier phases: where all forces vanish, the residual is still measured against something.
     pub scale: f64,
     /// The same at every degree of freedom.
+    #[serde(with = "crate::numbers")]
     pub largest: Vec<f64>,
 }
 
