@@ -3,6 +3,7 @@
 use crate::Pattern;
 use crate::dense::{self, Exchanges, largest};
 use crate::multifrontal::{Before, Kind, Multifrontal};
+use crate::threads;
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -12,6 +13,8 @@ use std::sync::Arc;
 
 /// Largest backward error of an accepted solution.
 const BACKWARD_ERROR: f64 = 1e-10;
+/// Columns of a matrix that one thread copies at a time.
+const PER_TASK: usize = 4096;
 
 /// A square dense matrix, column-major, which several may hold.
 #[derive(Clone, Debug)]
@@ -191,10 +194,22 @@ impl LinearSolver {
     /// # Errors
     /// [`Singular`].
     pub fn factorise_changed(&mut self, values: &[f64], changed: &[bool]) -> Result<(), Singular> {
-        for (column, _) in changed.iter().enumerate().filter(|(_, changed)| **changed) {
-            let places = self.pattern.places(column);
-            self.values[places.clone()].copy_from_slice(&values[places]);
-        }
+        let mut rest = self.values.as_mut_slice();
+        let columns: Vec<usize> = (0..changed.len()).collect();
+        let parts = columns.chunks(PER_TASK).map(|columns| {
+            let (first, last) = (columns[0], columns[columns.len() - 1]);
+            let places = self.pattern.places(first).start..self.pattern.places(last).end;
+            let own;
+            (own, rest) = std::mem::take(&mut rest).split_at_mut(places.len());
+            (columns, places.start, own)
+        });
+        threads::each(parts, |(columns, start, own)| {
+            for &column in columns.iter().filter(|&&column| changed[column]) {
+                let places = self.pattern.places(column);
+                let to = &mut own[places.start - start..places.end - start];
+                to.copy_from_slice(&values[places]);
+            }
+        });
         self.factorise_after(&Before::But(changed))
     }
 

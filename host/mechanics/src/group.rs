@@ -80,7 +80,7 @@ impl Field {
 
     fn commit(&mut self) {
         if !self.trial.is_empty() {
-            self.committed.copy_from_slice(&self.trial);
+            copy(&self.trial, &mut self.committed);
         }
     }
 

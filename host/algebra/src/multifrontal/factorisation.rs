@@ -19,6 +19,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 const PER_TASK: usize = 64;
 /// Entries that children leave to their parent from which on they are added on several threads.
 const ADDED: usize = 1 << 16;
+/// Numbers of a front that one thread sets to zero at a time.
+const LARGE: usize = 1 << 16;
 
 /// Values of a matrix.
 #[derive(Clone, Copy)]
@@ -422,8 +424,12 @@ impl Front {
             Kind::Symmetric => (k + m) * k,
             Kind::Unsymmetric => (k + 2 * m) * k,
         };
-        self.values.clear();
-        self.values.resize(len, 0.0);
+        if self.values.len() == len && len >= 2 * LARGE {
+            threads::each(self.values.chunks_mut(LARGE), |part| part.fill(0.0));
+        } else {
+            self.values.clear();
+            self.values.resize(len, 0.0);
+        }
         let targets = &analysis.targets[shape.entries.clone()];
         match values {
             Values::OfPattern(values) => {

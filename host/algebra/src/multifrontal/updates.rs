@@ -78,7 +78,7 @@ pub(super) struct OnPivots<'f> {
     pub(super) k: usize,
 }
 
-impl<'f> OnPivots<'f> {
+impl OnPivots<'_> {
     /// The columns before this one, and the others.
     pub(super) fn split(self, column: usize) -> [Self; 2] {
         let Self {
