@@ -1,5 +1,5 @@
-//! Short work on several threads: a correction is a hundred pieces of work of a millisecond or less, with some
-//! lines between them that one thread does alone.
+//! Short work on several threads: a correction is made of many pieces of work of a millisecond or less, with lines
+//! between them that one thread does alone.
 //!
 //! The threads of `rayon` sleep as soon as there is nothing to do, and it takes 50 to 100 µs until one that
 //! sleeps is at work. Here one of them stays awake for a while after such work ([`stay_awake`]), and who is done
