@@ -94,12 +94,9 @@ pub fn cannot_start(what: &str, why: &impl std::fmt::Display) -> String {
 
 /// Bytes of address space in use.
 fn in_use() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let size = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmSize:"))?;
-    let kilobytes: u64 = size.split_ascii_whitespace().next()?.parse().ok()?;
-    Some(kilobytes << 10)
+    let sizes = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: u64 = sizes.split_ascii_whitespace().next()?.parse().ok()?;
+    Some(pages * rustix::param::page_size() as u64)
 }
 
 /// How much is needed: what was expected, or at least what is in use and what could not be had.
