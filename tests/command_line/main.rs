@@ -36,3 +36,4 @@ mod troubled;
 mod trust;
 mod udsm;
 mod umat;
+mod watched;

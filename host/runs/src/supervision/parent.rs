@@ -127,9 +127,7 @@ impl Watch {
     /// This process is the copy that carries the program out; an outcome only if it cannot.
     fn become_child(self) -> Option<Result<u8, Error>> {
         let begun = child::begin(self.page, self.process);
-        let why = begun
-            .and_then(|()| self.signals.leave_to_watcher())
-            .err()?;
+        let why = begun.and_then(|()| self.signals.leave_to_watcher()).err()?;
         let message = format!("the program cannot be watched: {why}");
         Some(Err(Error::internal(message)))
     }
