@@ -4,6 +4,7 @@ mod arguments;
 mod commands;
 mod progress;
 mod say;
+mod threads;
 
 use arguments::Arguments;
 use clap::Parser;
