@@ -31,6 +31,7 @@ mod study;
 mod study_cases;
 mod swapped;
 mod syntax;
+mod threads;
 mod trade_off;
 mod troubled;
 mod trust;
