@@ -1,6 +1,5 @@
 //! How many threads a run has, and from when on.
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, Place};
 use crate::troubled;

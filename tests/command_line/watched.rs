@@ -1,6 +1,5 @@
 //! The program watches a copy of itself, whoever has started it and with whatever.
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{CASE, DONE, PLUGIN_TROUBLE, Place};
 use crate::troubled;
