@@ -1,10 +1,14 @@
 //! The kept matrix: as long as corrections with it take nearly all of the residual away, the matrix of
 //! an earlier iteration, or of the step before, is not replaced.
 //!
+//! Where factorising is dear, corrections with the matrix of the step before may also be slow: they are
+//! [accelerated](super::acceleration), and it is replaced where even so they stall.
+//!
 //! Whether another one is wanted is known before a state is evaluated; only then are laws asked for
 //! tangents.
 
 use super::Newton;
+use super::acceleration::Acceleration;
 use super::failure::StepFailure;
 use super::iterate::{Control, Correction, State};
 use super::outcome::Iteration;
@@ -16,6 +20,14 @@ use law::Operator;
 /// of equations beside a condensed domain, and of all others. Found by trial: a few iterations more
 /// are cheap where the laws of an interface are all there is to evaluate.
 const FAST: [f64; 2] = [0.03, 0.01];
+
+/// Factorising is dear beside the unknowns of a condensed domain whose number, to the third power, is more than so
+/// many times that of the points that laws are called for: then it takes as long as five iterations or more. Found
+/// by trial: beside 324 unknowns and 360 points slow iterations cost as much as the matrices they save, beside 644
+/// and 720 a third less.
+const DEAR: f64 = 2e5;
+/// Corrections with the matrix of an earlier step where factorising is dear, at most.
+const MOST: usize = 12;
 
 /// What decides in a step whether the matrix is kept.
 #[derive(Debug)]
@@ -61,11 +73,38 @@ impl Newton<'_> {
         self.settings.method == Method::Auto && !self.matrix.is_constant && !self.kept.renewed
     }
 
+    /// Whether slow corrections with the matrix of an earlier step are cheaper than another matrix.
+    pub(super) fn is_slow(&self) -> bool {
+        self.matrix.held && self.is_stale() && self.factorises_dearly()
+    }
+
+    fn factorises_dearly(&self) -> bool {
+        let groups = self.groups.iter().enumerate();
+        let called = groups.filter(|(number, _)| self.system.includes(*number));
+        let n_points = || {
+            called
+                .map(|(_, group)| group.kinematics.n_points())
+                .sum::<usize>()
+        };
+        self.domain.is_some()
+            && (self.places.boundary.len() as f64).powi(3) > DEAR * n_points() as f64
+    }
+
+    /// Whether slow corrections have been given their chance.
+    pub(super) fn has_been_slow(
+        &self,
+        iterations: &[Iteration],
+        acceleration: &Acceleration,
+    ) -> bool {
+        acceleration.stalls(iterations) || self.is_slow() && iterations.len() > MOST
+    }
+
     /// Whether the next correction needs another matrix.
     fn renews(&self) -> bool {
         !self.matrix.held
             || !self.matrix.is_constant
                 && match self.settings.method {
+                    Method::Auto if self.is_slow() => self.kept.stalls,
                     Method::Auto => {
                         self.kept.contraction > FAST[usize::from(self.domain.is_none())]
                     }
@@ -133,7 +172,7 @@ impl Newton<'_> {
         state: &State,
         task: &Task,
     ) -> Result<Option<(Iteration, State)>, StepFailure> {
-        if !self.is_stale() {
+        if !self.is_stale() || self.is_slow() {
             return Ok(None);
         }
         let correction = Correction {
