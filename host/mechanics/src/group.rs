@@ -6,6 +6,7 @@
 mod aside;
 mod carry;
 mod differences;
+mod excerpt;
 mod joined;
 mod layer;
 mod look;
@@ -17,6 +18,7 @@ mod varying;
 mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
+pub use excerpt::Excerpted;
 pub use joined::joined;
 pub use look::{Deviation, Notice, Went};
 pub use state::GroupState;

@@ -327,7 +327,7 @@ impl Recorder {
             .transpose()?;
         let from = at.and_then(|state| state.points);
         let points = Points::begin(folder, settings.points, simulation, from)?;
-        let mut looked_at = wanted.probes.looks_at(simulation.groups());
+        let mut looked_at = wanted.probes.looks_at(simulation);
         if let Some(pile) = &wanted.pile {
             pile.looks_at(&mut looked_at, simulation);
         }
