@@ -104,6 +104,22 @@ impl Probes {
         self.probes.iter().map(|(name, _)| name.as_str())
     }
 
+    /// Narrows forces of groups at nodes to the elements that may have a part in them.
+    pub fn narrow(&mut self, simulation: &Simulation) {
+        for (_, probe) in &mut self.probes {
+            if let Probe::Force {
+                nodes,
+                group: Some(group),
+                elements: elements @ None,
+                ..
+            } = probe
+            {
+                let at = simulation.gathering(nodes);
+                *elements = Some(simulation.groups()[*group].elements_at(&at).collect());
+            }
+        }
+    }
+
     /// What the probes look at: groups, the elements at which they sum forces, and the degrees of freedom of
     /// nodes whose displacements they give.
     pub fn looks_at(&self, simulation: &Simulation) -> Part {

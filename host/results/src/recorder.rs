@@ -295,12 +295,13 @@ impl Recorder {
 
     fn begin(
         folder: &Path,
-        wanted: Wanted,
+        mut wanted: Wanted,
         about: &About,
         simulation: &Simulation,
         log: LogFile,
         state: Option<ResultsState>,
     ) -> Result<Self, Error> {
+        wanted.probes.narrow(simulation);
         let settings = wanted.output;
         let columns = ["phase", "increment", "time"]
             .into_iter()
