@@ -75,6 +75,8 @@ pub struct Standing {
     part: Option<Vec<bool>>,
     /// Elements of other groups that are in the latest state, and theirs in the complete one.
     excerpt: Option<Ahead>,
+    /// Their groups follow as a whole from now on, since rounding would show.
+    as_groups: bool,
     /// Largest relative residual that had to be taken for round-off, above the tolerance; else 0.
     pub round_off: f64,
 }
@@ -410,6 +412,7 @@ impl LinearDomain {
             forces: self.boundary.iter().map(|&dof| internal[dof]).collect(),
             part: None,
             excerpt: None,
+            as_groups: self.standing.as_groups,
             round_off: self.standing.round_off,
         };
     }
@@ -475,6 +478,7 @@ impl LinearDomain {
             lambda,
             tolerance,
         };
+        let looked_at = looked_at.filter(|_| self.may_go_ahead(&goal));
         let is_part = self.choose_part(looked_at, groups);
         if is_part && let Some(part) = self.part.take() {
             let mut reached = self.settle(&part, groups, &goal, displacement);

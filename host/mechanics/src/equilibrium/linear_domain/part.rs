@@ -89,6 +89,7 @@ impl LinearDomain {
             let is_other = !groups[number] && !elements.is_empty() && self.system.includes(number);
             if is_other {
                 let excerpt = Excerpt::new(number, &of_model[number], elements);
+                let excerpt = excerpt.filter(|_| !self.standing.as_groups);
                 groups[number] = excerpt.is_none();
                 excerpts.extend(excerpt);
             }
