@@ -8,7 +8,6 @@
 //! tangents.
 
 use super::Newton;
-use super::acceleration::Acceleration;
 use super::failure::StepFailure;
 use super::iterate::{Control, Correction, State};
 use super::outcome::Iteration;
@@ -26,8 +25,10 @@ const FAST: [f64; 2] = [0.03, 0.01];
 /// by trial: beside 324 unknowns and 360 points slow iterations cost as much as the matrices they save, beside 644
 /// and 720 a third less.
 const DEAR: f64 = 2e5;
-/// Corrections with the matrix of an earlier step where factorising is dear, at most.
-const MOST: usize = 12;
+/// There another matrix costs as much as so many corrections.
+const AS_MANY: f64 = 11.0;
+/// So many last corrections say how many more it takes.
+const LAST: usize = 3;
 
 /// What decides in a step whether the matrix is kept.
 #[derive(Debug)]
@@ -90,13 +91,16 @@ impl Newton<'_> {
             && (self.places.boundary.len() as f64).powi(3) > DEAR * n_points() as f64
     }
 
-    /// Whether slow corrections have been given their chance.
-    pub(super) fn has_been_slow(
-        &self,
-        iterations: &[Iteration],
-        acceleration: &Acceleration,
-    ) -> bool {
-        acceleration.stalls(iterations) || self.is_slow() && iterations.len() > MOST
+    /// Whether slow corrections have had their chance: by the progress of the last ones it takes more than another
+    /// matrix is worth, or they are half of all iterations that a step may take.
+    pub(super) fn is_too_slow(&self, iterations: &[Iteration]) -> bool {
+        let is_half = 2 * iterations.len() > self.settings.max_iterations();
+        let Some([before, .., last]) = iterations.last_chunk::<{ LAST + 1 }>() else {
+            return is_half;
+        };
+        let progress = (before.residual / last.residual).ln() / LAST as f64;
+        let left = (last.residual / self.settings.force_tolerance).ln();
+        is_half || progress.is_nan() || left > AS_MANY * progress
     }
 
     /// Whether the next correction needs another matrix.

@@ -289,7 +289,11 @@ impl LoadControl {
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
         if let Some(acceleration) = &self.acceleration {
-            newton.kept.stalls = newton.has_been_slow(iterations, acceleration);
+            newton.kept.stalls = if newton.is_slow() {
+                newton.is_too_slow(iterations)
+            } else {
+                acceleration.stalls(iterations)
+            };
         }
         if newton.renew(self.series(iterations), &state.increment, &self.task)?
             && self.acceleration.is_some()
