@@ -131,8 +131,8 @@ fn where_factorising_is_dear_a_matrix_serves_several_increments() {
     };
     let ((slow, few), (newton, many)) = (run("auto"), run("newton"));
     agree("fine", &slow, &newton, 16);
-    // The chamber itself takes more than half.
-    assert!(2 * few[2] < many[2], "{few:?} {many:?}");
+    // Where it is not dear, three of four.
+    assert!(3 * few[2] < 2 * many[2], "{few:?} {many:?}");
 }
 
 /// A head that is pushed, let go of with a force on it, held across as well, led up and down, and let go of

@@ -8,6 +8,7 @@
 //! tangents.
 
 use super::Newton;
+use super::acceptance::STALE;
 use super::failure::StepFailure;
 use super::iterate::{Control, Correction, State};
 use super::outcome::Iteration;
@@ -35,6 +36,8 @@ const LAST: usize = 3;
 pub(super) struct Kept {
     /// The matrix has been renewed in this step.
     renewed: bool,
+    /// As long as it has not, corrections may be slow.
+    may_be_slow: bool,
     /// It makes too little progress.
     pub(super) stalls: bool,
     /// Fraction of the residual that the next correction will probably leave.
@@ -46,6 +49,7 @@ impl Default for Kept {
     fn default() -> Self {
         Self {
             renewed: false,
+            may_be_slow: false,
             stalls: false,
             contraction: f64::INFINITY,
         }
@@ -56,6 +60,7 @@ impl Newton<'_> {
     /// Begins a step: with the matrix of the last one only if an interrupted run would have it, too.
     pub(super) fn begin(&mut self) {
         self.kept.renewed = false;
+        self.kept.may_be_slow = false;
         self.matrix.held &= self.matrix.has_tangents;
         self.solver.check_next();
     }
@@ -74,21 +79,19 @@ impl Newton<'_> {
         self.settings.method == Method::Auto && !self.matrix.is_constant && !self.kept.renewed
     }
 
-    /// Whether slow corrections with the matrix of an earlier step are cheaper than another matrix.
-    pub(super) fn is_slow(&self) -> bool {
-        self.matrix.held && self.is_stale() && self.factorises_dearly()
-    }
-
-    fn factorises_dearly(&self) -> bool {
+    /// Begins the step with slow corrections where they are cheaper than another matrix.
+    pub(super) fn begin_slowly(&mut self) {
         let groups = self.groups.iter().enumerate();
         let called = groups.filter(|(number, _)| self.system.includes(*number));
-        let n_points = || {
-            called
-                .map(|(_, group)| group.kinematics.n_points())
-                .sum::<usize>()
-        };
-        self.domain.is_some()
-            && (self.places.boundary.len() as f64).powi(3) > DEAR * n_points() as f64
+        let n_points: usize = called.map(|(_, group)| group.kinematics.n_points()).sum();
+        let n = self.places.boundary.len() as f64;
+        let is_dear = self.domain.is_some() && n * n * n > DEAR * n_points as f64;
+        self.kept.may_be_slow = is_dear && self.matrix.held;
+    }
+
+    /// Whether corrections with the matrix of an earlier step may be slow.
+    pub(super) fn is_slow(&self) -> bool {
+        self.kept.may_be_slow && self.is_stale()
     }
 
     /// Whether slow corrections have had their chance: by the progress of the last ones it takes more than another
@@ -99,7 +102,7 @@ impl Newton<'_> {
             return is_half;
         };
         let progress = (before.residual / last.residual).ln() / LAST as f64;
-        let left = (last.residual / self.settings.force_tolerance).ln();
+        let left = (last.residual / (STALE * self.settings.force_tolerance)).ln();
         is_half || progress.is_nan() || left > AS_MANY * progress
     }
 

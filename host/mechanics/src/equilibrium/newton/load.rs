@@ -48,11 +48,12 @@ pub(super) struct LoadControl {
 impl LoadControl {
     /// A step to this end.
     pub(super) fn new(
-        newton: &Newton<'_>,
+        newton: &mut Newton<'_>,
         task: Task,
         guess: Option<Vec<f64>>,
         is_expected: bool,
     ) -> Self {
+        newton.begin_slowly();
         let is_quasi = newton.settings.method == Method::QuasiNewton;
         let is_slow = is_quasi || newton.is_slow();
         Self {
