@@ -27,7 +27,7 @@ mod reuse;
 
 pub use reuse::Reuse;
 
-use super::newton::{DomainFailure, Loads};
+use super::newton::{DomainFailure, Loads, norm};
 use crate::assembly::{System, Tie, used};
 use crate::group::Group;
 use algebra::{Block, Dense, Kind, Multifrontal, Pattern, Singular};
@@ -92,6 +92,8 @@ pub struct LinearDomain {
     pub largest: f64,
     /// Largest entry of its matrix before it was condensed.
     pub stiffest: f64,
+    /// 2-norm of that one's diagonal.
+    diagonal: f64,
     /// Degrees of freedom of the boundary, in the order of its stiffness.
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
@@ -266,6 +268,7 @@ impl LinearDomain {
         system.assemble(groups, &mut values);
         let stiffest = algebra::largest(&values);
         let pattern = system.forget_matrix();
+        let diagonal = norm(&pattern.diagonal(&values));
         let lines = system.lines(lines);
         let matrix = Matrix {
             kind,
@@ -278,6 +281,7 @@ impl LinearDomain {
             kept,
             factors,
             stiffest,
+            diagonal,
         };
         if let Some(reuse) = reuse {
             reuse.keep(setup, &numbered);
@@ -299,6 +303,7 @@ impl LinearDomain {
             mut kept,
             factors,
             stiffest,
+            diagonal,
         } = numbered;
         let free = system.free();
         let of_kept = factors.kept().iter().map(|&e| free[e as usize]);
@@ -317,6 +322,7 @@ impl LinearDomain {
         }
         Ok(Self {
             stiffest,
+            diagonal,
             largest: algebra::largest(stiffness.values()),
             standing: Standing::default(),
             part: None,

@@ -11,6 +11,9 @@ use crate::equilibrium::newton::norm;
 use crate::group::{Excerpted, Group};
 use serde::{Deserialize, Serialize};
 
+/// Completing the state takes as long as bringing up their groups in so many increments.
+const FEW: usize = 10;
+
 /// Some elements of one group.
 #[derive(Debug)]
 pub(super) struct Excerpt {
@@ -22,6 +25,8 @@ pub(super) struct Excerpt {
 /// Elements that are in the latest state.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Ahead {
+    /// So many increments since the complete state.
+    increments: usize,
     /// Numbers of their groups, and theirs there.
     elements: Vec<(usize, Vec<usize>)>,
     /// What they had in the complete state.
@@ -62,20 +67,17 @@ impl Part {
 }
 
 impl LinearDomain {
-    /// Whether excerpts may go further ahead. Rounding leaves ε K u of the motion u since the complete state, in which
-    /// the rest of their groups waits, with the largest stiffness K: if that is more than the tolerance (of which the
-    /// 2-norm then has about two fifths, in three meshes), the state has to be completed, and their groups follow as
-    /// a whole from then on.
+    /// Whether excerpts may go further ahead: as long as rounding of the motion since the complete state, in which the
+    /// rest of their groups waits, stays below the tolerance. Otherwise the state has to be completed; and where that
+    /// would be so again soon, their groups follow as a whole from then on.
     pub(super) fn may_go_ahead(&mut self, goal: &Goal<'_>) -> bool {
-        if self.standing.excerpt.is_none() {
-            return true;
-        }
-        let moved = algebra::largest(&self.standing.complete.moved);
         let scale = norm(&self.standing.forces).max(goal.loads.scale);
-        let rounded = f64::EPSILON * self.stiffest * moved;
-        let may = rounded <= goal.tolerance * scale;
-        self.standing.as_groups |= !may;
-        may
+        let rounded = self.rounded() > goal.tolerance * scale;
+        let Some(ahead) = &self.standing.excerpt else {
+            return true;
+        };
+        self.standing.as_groups |= rounded && ahead.increments < FEW;
+        !rounded
     }
 
     /// Brings a part's excerpts to these displacements, by degree of freedom, from those of the latest state; their
@@ -90,10 +92,13 @@ impl LinearDomain {
         if part.excerpts.is_empty() {
             return;
         }
-        if self.standing.excerpt.is_none() {
+        if let Some(ahead) = &mut self.standing.excerpt {
+            ahead.increments += 1;
+        } else {
             let elements = part.excerpts.iter();
             let complete = part.excerpts.iter();
             self.standing.excerpt = Some(Ahead {
+                increments: 1,
                 elements: elements.map(|e| (e.group, e.elements.clone())).collect(),
                 complete: complete
                     .map(|excerpt| groups[excerpt.group].excerpted(&excerpt.elements))
