@@ -56,7 +56,8 @@ pub(crate) enum Command {
         /// longer; 0: after every increment.
         #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
         checkpoint: f64,
-        /// Threads; the results do not depend on it [default: all processors].
+        /// Threads; the results do not depend on it [default: all processors, on a grid of 256 elements or less
+        /// only after 0.1 s].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,
         /// Write all arguments of one call of the case's UMAT to this file, before and after it.

@@ -5,6 +5,7 @@ mod studies;
 
 use crate::arguments::{Arguments, Command, File};
 use crate::say::{print, printing, say};
+use crate::threads;
 use cases::{dry_run_cases, run_cases, write_report};
 use clap::CommandFactory;
 use input::schema::{self, FileKind};
@@ -31,10 +32,13 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             dry_run,
             resume,
             checkpoint,
-            threads,
+            threads: n_threads,
             record,
         } => {
-            start_threads(threads)?;
+            threads::gather(n_threads)?;
+            if n_threads.is_some() || dry_run {
+                threads::begin()?;
+            }
             let options = Options {
                 resume,
                 checkpoints: Some(Duration::from_secs_f64(checkpoint)),
@@ -80,9 +84,10 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             retry,
             anew,
             checkpoint,
-            threads,
+            threads: n_threads,
         } => {
-            start_threads(Some(threads.unwrap_or(1)))?;
+            threads::gather(Some(n_threads.unwrap_or(1)))?;
+            threads::begin()?;
             let what = match run {
                 _ if plan => What::Plan,
                 Some(index) => What::One(index),
@@ -91,7 +96,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             let how = How {
                 anew,
                 checkpoint,
-                threads,
+                threads: n_threads,
             };
             let stop = stop_on_signals()?;
             studies::study(&opener, (&file, out.as_deref()), &what, &how, stop)
@@ -144,9 +149,10 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             set,
             out,
             anew,
-            threads,
+            threads: n_threads,
         } => {
-            start_threads(threads)?;
+            threads::gather(n_threads)?;
+            threads::begin()?;
             let options = calibration::Options {
                 variant,
                 settings: set,
@@ -284,17 +290,6 @@ fn stop_on_signals() -> Result<Stop, Error> {
         error => Error::internal(error.to_string()),
     })?;
     Ok(stop)
-}
-
-/// Starts the threads that a run works with; as many as there are processors, if it is not said. The calling
-/// thread is one of them, so no other may ask them for anything: with one thread nobody would answer.
-fn start_threads(n: Option<u16>) -> Result<(), Error> {
-    let threads = rayon::ThreadPoolBuilder::new()
-        .use_current_thread()
-        .num_threads(n.map_or(0, usize::from));
-    threads
-        .build_global()
-        .map_err(|why| cannot_start("the threads of the run", &why))
 }
 
 /// What starting a thread takes is memory, above all.

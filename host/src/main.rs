@@ -4,6 +4,7 @@ mod arguments;
 mod commands;
 mod progress;
 mod say;
+mod threads;
 
 use arguments::Arguments;
 use clap::Parser;
@@ -41,13 +42,8 @@ fn main() -> ExitCode {
             return ended(Output { failure }.end(Ok(())));
         }
     };
-    let outcome = match arguments.command.calls_laws().map(watched) {
-        Some(Watched::By(code)) => return code,
-        Some(Watched::Not(failure)) => failure.map_or(Ok(()), Err),
-        None => Ok(()),
-    };
-    if outcome.is_err() {
-        return ended(outcome);
+    if let Some(code) = arguments.command.calls_laws().and_then(watched) {
+        return code;
     }
     let apart = arguments
         .isolate
@@ -80,26 +76,10 @@ fn main() -> ExitCode {
 /// Seconds that a call may take where the user has set no limit to it.
 const AS_LONG_AS_IT_TAKES: f64 = 1e6;
 
-/// Who carries out a command that calls laws.
-enum Watched {
-    /// A child did, with this outcome.
-    By(ExitCode),
-    /// This process has to, unless something is wrong.
-    Not(Option<Error>),
-}
-
-/// Has a child carry the command out and watches it, unless this process is the child.
-fn watched(again: bool) -> Watched {
+/// Has a child carry the command out and watches it; the child's exit code. `None`: this process has to carry it out.
+fn watched(again: bool) -> Option<ExitCode> {
     if std::env::var_os(supervision::ALONE).is_some() {
-        return Watched::Not(None);
-    }
-    match supervision::enter() {
-        Ok(true) => return Watched::Not(None),
-        Ok(false) => {}
-        Err(why) => {
-            let message = format!("the program cannot be watched: {why}");
-            return Watched::Not(Some(Error::internal(message)));
-        }
+        return None;
     }
     // What the child could not write any more.
     let mend = |folder: &Path, error: &Error| {
@@ -119,11 +99,10 @@ fn watched(again: bool) -> Watched {
             say::error(&why.into());
         }
     };
-    match supervision::supervise(again, &mend) {
-        None => Watched::Not(None),
-        Some(Ok(code)) => Watched::By(ExitCode::from(code)),
-        Some(Err(error)) => Watched::By(ended(Err(error))),
-    }
+    Some(match supervision::supervise(again, &mend)? {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => ended(Err(error)),
+    })
 }
 
 /// The exit code, after the message. What a command came to matters more than that not all could be

@@ -194,7 +194,7 @@ fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
 
 #[test]
 fn the_table_of_a_pile_goes_on_to_the_same_bits() {
-    let text = crate::pile::PILE.replace("increments = 12", "increments = 150");
+    let text = crate::pile::PILE.replace("increments = 12", "increments = 600");
     let undisturbed = Place::new();
     undisturbed.write("block.toml", &text);
     let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);

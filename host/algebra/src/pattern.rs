@@ -18,6 +18,17 @@ pub struct Pattern {
 }
 
 impl Pattern {
+    /// Entries on the diagonal of a matrix of these values; zero where there is none.
+    pub fn diagonal(&self, values: &[f64]) -> Vec<f64> {
+        let columns = self.column_start.windows(2).enumerate();
+        let of_column = |(column, own): (usize, &[u32])| {
+            let mut own = own[0] as usize..own[1] as usize;
+            let place = own.find(|&place| self.rows[place] as usize == column);
+            place.map_or(0.0, |place| values[place])
+        };
+        columns.map(of_column).collect()
+    }
+
     /// Pattern of `n` equations whose elements couple all of their own: of every element its degrees of
     /// freedom, and the `equation` of a degree of freedom, if it has one.
     pub fn new<'a>(

@@ -112,6 +112,16 @@ impl Case {
         )
     }
 
+    /// Elements of its grid; `None` where the mesh is in a file.
+    pub fn n_elements(&self) -> Option<usize> {
+        let mesh = &self.file.mesh;
+        let [columns, rows] = [mesh.columns.as_ref()?, mesh.rows.as_ref()?].map(|parts| {
+            let numbers = parts.get_ref().iter().map(|part| part.get_ref().n);
+            numbers.fold(0, usize::saturating_add)
+        });
+        Some(columns.saturating_mul(rows))
+    }
+
     /// Folders with law libraries, relative to the file that names them.
     ///
     /// # Errors

@@ -28,7 +28,7 @@ const COUNT: usize = COPY + WORDS;
 // copy of the process (fork) is told from it by one word.
 
 /// The memory, and where in it the places begin.
-static SHARED: OnceLock<(SharedMemory, usize)> = OnceLock::new();
+static SHARED: OnceLock<(&'static SharedMemory, usize)> = OnceLock::new();
 /// A word that is 1 in this process and 0 in a copy of it.
 static ORIGINAL: OnceLock<Option<SharedMemory>> = OnceLock::new();
 /// Names so far.
@@ -62,7 +62,7 @@ pub enum Doing {
 }
 
 /// Keeps the places in this memory from now on.
-pub fn keep_in(memory: SharedMemory, at: usize) {
+pub fn keep_in(memory: &'static SharedMemory, at: usize) {
     let _ = SHARED.set((memory, at));
 }
 

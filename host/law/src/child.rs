@@ -1,6 +1,12 @@
 //! Work that may crash, hang or eat all memory runs in a child process: this program again, with a
 //! hidden command, or the program that stands for it. The child's death is an outcome like any other.
 
+#[cfg(target_os = "linux")]
+mod copy;
+
+#[cfg(target_os = "linux")]
+pub use copy::{can_be_copied, copy};
+
 use std::ffi::OsString;
 use std::io::{self, Read};
 use std::path::PathBuf;
@@ -277,12 +283,16 @@ pub fn enter() -> io::Result<()> {
 /// The system's.
 #[cfg(unix)]
 pub fn block_requests() -> io::Result<()> {
-    use nix::sys::signal::{SigSet, Signal};
-    let mut signals = SigSet::empty();
-    for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {
-        signals.add(signal);
-    }
-    signals.thread_block().map_err(io::Error::from)
+    requests().thread_block().map_err(io::Error::from)
+}
+
+/// The signals that ask a program to stop.
+#[cfg(unix)]
+pub fn requests() -> nix::sys::signal::SigSet {
+    use nix::sys::signal::Signal;
+    [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]
+        .into_iter()
+        .collect()
 }
 
 /// Has a file that may not grow any more (a limit of the user's) be a full disk, not a signal that

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use text::file;
 
 /// Bytes that are read, hashed and copied at a time: they stay in the processor's cache.
-const PIECE: usize = 1 << 17;
+const PIECE: usize = 1 << 15;
 
 /// A library's bytes.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! Opening libraries: the hand shake. This file with its modules is one of the two places of the
+//! Opening libraries: the hand shake. This file with its modules is one of the places of the
 //! project that hold `unsafe` code; each block names the clause of the contract (`abi/README.md`) it
 //! relies on.
 //!

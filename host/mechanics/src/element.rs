@@ -148,6 +148,10 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn add_gradients(&self, displacement: &[f64], out: &mut [f64]);
     /// Adds the nodal forces that balance the stresses (tractions) of all points to `force`.
     fn add_forces(&self, flux: &[f64], force: &mut [f64]);
+    /// Some of the elements alone, if that can be had.
+    fn only(&self, _elements: &[usize]) -> Option<Box<dyn Kinematics>> {
+        None
+    }
     /// Stiffness of an element from the tangents of its points (row-major), row-major, two
     /// degrees of freedom per node, in global axes. Overwrites `out`.
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]);

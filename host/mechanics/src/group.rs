@@ -6,6 +6,7 @@
 mod aside;
 mod carry;
 mod differences;
+mod excerpt;
 mod joined;
 mod layer;
 mod look;
@@ -17,6 +18,7 @@ mod varying;
 mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
+pub use excerpt::Excerpted;
 pub use joined::joined;
 pub use look::{Deviation, Notice, Went};
 pub use state::GroupState;
@@ -856,13 +858,19 @@ impl Group {
     pub fn forces_of(&self, elements: &[usize], n_dofs: usize) -> Vec<f64> {
         let n = self.kinematics.n_components();
         let carried = self.carried();
+        let mut force = vec![0.0; n_dofs];
+        if let Some(few) = self.kinematics.only(elements) {
+            let points = elements.iter().map(|&e| self.kinematics.points_of(e));
+            let stress = points.flat_map(|points| &carried[points.start * n..points.end * n]);
+            few.add_forces(&stress.copied().collect::<Vec<f64>>(), &mut force);
+            return force;
+        }
         let mut stress = vec![0.0; carried.len()];
         for &element in elements {
             let points = self.kinematics.points_of(element);
             let own = points.start * n..points.end * n;
             stress[own.clone()].copy_from_slice(&carried[own]);
         }
-        let mut force = vec![0.0; n_dofs];
         self.kinematics.add_forces(&stress, &mut force);
         force
     }

@@ -7,7 +7,7 @@ use crate::pressures::Pressure;
 use crate::wanted::Reduce;
 use mechanics::assembly::fold;
 use mechanics::group::{Group, joined};
-use mechanics::simulation::{Part, Snapshot};
+use mechanics::simulation::{Part, Simulation, Snapshot};
 pub use section::{Section, section};
 pub use size::Sizes;
 
@@ -104,38 +104,56 @@ impl Probes {
         self.probes.iter().map(|(name, _)| name.as_str())
     }
 
-    /// What the probes look at: of every group whether they do, and the degrees of freedom of
+    /// Narrows forces of groups at nodes to the elements that may have a part in them.
+    pub fn narrow(&mut self, simulation: &Simulation) {
+        for (_, probe) in &mut self.probes {
+            if let Probe::Force {
+                nodes,
+                group: Some(group),
+                elements: elements @ None,
+                ..
+            } = probe
+            {
+                let at = simulation.gathering(nodes);
+                *elements = Some(simulation.groups()[*group].elements_at(&at).collect());
+            }
+        }
+    }
+
+    /// What the probes look at: groups, the elements at which they sum forces, and the degrees of freedom of
     /// nodes whose displacements they give.
-    pub fn looks_at(&self, groups: &[Group]) -> Part {
-        let mut looked = vec![false; groups.len()];
-        let mut dofs = Vec::new();
+    pub fn looks_at(&self, simulation: &Simulation) -> Part {
+        let groups = simulation.groups();
+        let mut part = Part {
+            groups: vec![false; groups.len()],
+            elements: vec![Vec::new(); groups.len()],
+            dofs: Vec::new(),
+        };
         for (_, probe) in &self.probes {
             match probe {
-                Probe::Points { group, .. }
-                | Probe::HandedOn { group, .. }
-                | Probe::Force {
-                    group: Some(group), ..
-                } => looked[*group] = true,
+                Probe::Points { group, .. } | Probe::HandedOn { group, .. } => {
+                    part.groups[*group] = true;
+                }
                 Probe::Displacement {
                     nodes, component, ..
-                } => dofs.extend(nodes.iter().map(|n| 2 * n + component)),
+                } => part.dofs.extend(nodes.iter().map(|n| 2 * n + component)),
                 // A reaction is that of all elements at the nodes.
-                Probe::Force { nodes, .. } => {
-                    let nodes = joined(groups, nodes);
-                    for (looked, group) in looked.iter_mut().zip(groups) {
-                        let kinematics = &group.kinematics;
-                        let mut elements = 0..kinematics.n_elements();
-                        *looked |=
-                            elements.any(|e| kinematics.nodes(e).iter().any(|n| nodes.contains(n)));
+                Probe::Force { nodes, group, .. } => {
+                    let at = simulation.gathering(nodes);
+                    for (number, own) in groups.iter().enumerate() {
+                        if group.is_none_or(|group| group == number) {
+                            part.elements[number].extend(own.elements_at(&at));
+                        }
                     }
                 }
                 Probe::Combination(_) => {}
             }
         }
-        Part {
-            groups: looked,
-            dofs,
+        for elements in &mut part.elements {
+            elements.sort_unstable();
+            elements.dedup();
         }
+        part
     }
 
     /// The first probe whose value is too large for a number.

@@ -295,12 +295,13 @@ impl Recorder {
 
     fn begin(
         folder: &Path,
-        wanted: Wanted,
+        mut wanted: Wanted,
         about: &About,
         simulation: &Simulation,
         log: LogFile,
         state: Option<ResultsState>,
     ) -> Result<Self, Error> {
+        wanted.probes.narrow(simulation);
         let settings = wanted.output;
         let columns = ["phase", "increment", "time"]
             .into_iter()
@@ -327,7 +328,7 @@ impl Recorder {
             .transpose()?;
         let from = at.and_then(|state| state.points);
         let points = Points::begin(folder, settings.points, simulation, from)?;
-        let mut looked_at = wanted.probes.looks_at(simulation.groups());
+        let mut looked_at = wanted.probes.looks_at(simulation);
         if let Some(pile) = &wanted.pile {
             pile.looks_at(&mut looked_at, simulation);
         }

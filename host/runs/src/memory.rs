@@ -8,6 +8,8 @@
 use crate::Error;
 use rustix::io::Errno;
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -94,8 +96,13 @@ pub fn cannot_start(what: &str, why: &impl std::fmt::Display) -> String {
 
 /// Bytes of address space in use.
 fn in_use() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let size = status
+    // At once: read bit by bit, as what has no length, it would take the system some times as long.
+    let mut status = [0; 4096];
+    let n = File::open("/proc/self/status")
+        .and_then(|mut file| file.read(&mut status))
+        .ok()?;
+    let size = str::from_utf8(&status[..n])
+        .ok()?
         .lines()
         .find_map(|line| line.strip_prefix("VmSize:"))?;
     let kilobytes: u64 = size.split_ascii_whitespace().next()?.parse().ok()?;

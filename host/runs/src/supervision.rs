@@ -1,8 +1,8 @@
 //! A law may end the process that calls it, in many ways: `exit`, a crash, a copy by `fork`. So the
-//! program lets itself be carried out by a child, and watches. What the child calls, what it has
-//! handed out and how it means to end stands in memory that both share; a child that is gone
-//! without having said how it ends was ended by a law. Then the same is done once more with laws in
-//! processes of their own ([`law::isolate`]), which names the point.
+//! program is carried out by a child, a copy of itself made before it has any thread, and watches. What
+//! the child calls, what it has handed out and how it means to end stands in memory that both share; a
+//! child that is gone without having said how it ends was ended by a law. Then the same is done once
+//! more with laws in processes of their own ([`law::isolate`]), which names the point.
 //!
 //! The watcher takes the signals; the child and its children are not reached by those of the
 //! terminal, and see a request to stop in the memory. One that does not answer is ended.
@@ -20,10 +20,12 @@ mod child;
 mod child;
 #[cfg(target_os = "linux")]
 mod parent;
+#[cfg(target_os = "linux")]
+mod signals;
 
 #[cfg(not(target_os = "linux"))]
 pub use child::supervise;
-pub use child::{begin_run, case_begun, end, end_run, enter, is_again, stdout, stop, was_begun};
+pub use child::{begin_run, case_begun, end, end_run, is_again, stdout, stop, was_begun};
 #[cfg(target_os = "linux")]
 pub use parent::supervise;
 
@@ -34,9 +36,6 @@ use law::{SharedMemory, calls};
 pub const ALONE: &str = "PILUM_UNSUPERVISED";
 /// What is said to whoever asks the program to stop.
 pub const STOPPING: &str = "stopping after this increment; once more to stop at once";
-#[cfg(target_os = "linux")]
-/// Tells a child its watcher, and that one's descriptor of the memory.
-const WATCHER: &str = "PILUM_WATCHER";
 
 #[cfg(target_os = "linux")]
 /// Single words.

@@ -3,6 +3,7 @@
 use super::check_recording;
 use crate::progress::Progress;
 use crate::say::{self, say};
+use crate::threads;
 use input::{Case, Error};
 use law::{Opener, Stop};
 use mechanics::equilibrium::Reuse;
@@ -26,6 +27,7 @@ pub(super) fn run_cases(
     let cases = Case::load_with(path, settings)?.into_iter();
     let mut cases: Vec<Case> = cases.map(|case| case.opened_by(opener)).collect();
     variants::keep(&mut cases, variant, |case| case.variant.clone())?;
+    let stop = &threads::begin_for(&cases, stop)?;
     if opener.record().is_some() {
         check_recording(&cases)?;
     }

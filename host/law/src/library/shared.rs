@@ -41,14 +41,6 @@ impl SharedMemory {
         Ok(Self { file: None, map })
     }
 
-    /// The file that both processes map.
-    ///
-    /// # Errors
-    /// There is none.
-    pub fn descriptor(&self) -> io::Result<std::os::fd::BorrowedFd<'_>> {
-        Ok(std::os::fd::AsFd::as_fd(self.file()?))
-    }
-
     fn file(&self) -> io::Result<&File> {
         let file = self.file.as_ref();
         file.ok_or_else(|| io::Error::other("nobody shares this memory"))

@@ -305,6 +305,19 @@ impl<const N: usize> Kinematics for Solid<N> {
         }
     }
 
+    fn only(&self, elements: &[usize]) -> Option<Box<dyn Kinematics>> {
+        let points = elements.iter().flat_map(|&element| self.own(element));
+        Some(Box::new(Self {
+            nodes: elements.iter().map(|&e| self.nodes[e]).collect(),
+            axes: elements.iter().map(|&e| self.axes[e]).collect(),
+            lengths: elements.iter().map(|&e| self.lengths[e]).collect(),
+            volumes: elements.iter().map(|&e| self.volumes[e]).collect(),
+            has_linear_volume: self.has_linear_volume,
+            points_per_element: self.points_per_element,
+            points: points.cloned().collect(),
+        }))
+    }
+
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
         if self.has_linear_volume {
             let (points, axes) = (self.own(element), &self.axes[element]);

@@ -15,23 +15,25 @@
 //! Everything is counted from the last state that was completed.
 //! Unknowns that some phases of the run prescribe and others do not are kept beside the boundary, for one
 //! factorisation that serves all phases: see `aside`.
-//! Where only some groups are looked at (the pile whose head force is wanted, not the sand), they
-//! alone are brought to the state in question, counted from the one before it; the others wait for
-//! the next complete one.
+//! Where only some groups are looked at (the pile whose forces are wanted, not the sand), or some elements
+//! (those at its head), they alone are brought to the state in question, counted from the one before it; the
+//! others wait for the next complete one.
 
 mod aside;
+mod excerpt;
 mod part;
 mod product;
 mod reuse;
 
 pub use reuse::Reuse;
 
-use super::newton::{DomainFailure, Loads};
+use super::newton::{DomainFailure, Loads, norm};
 use crate::assembly::{System, Tie, used};
 use crate::group::Group;
 use algebra::{Block, Dense, Kind, Multifrontal, Pattern, Singular};
 use aside::Aside;
 pub use aside::Held;
+use excerpt::Ahead;
 use part::{Goal, Part};
 use product::add_product;
 use reuse::{Condensed, Numbered, Setup};
@@ -43,6 +45,8 @@ use std::sync::Arc;
 pub struct LookedAt<'l> {
     /// Of every group of the model, whether they do.
     pub groups: &'l [bool],
+    /// Elements of every group that they look at where they do not at all of it, ascending.
+    pub elements: &'l [Vec<usize>],
     /// Degrees of freedom whose displacements they give.
     pub dofs: &'l [usize],
 }
@@ -69,6 +73,10 @@ pub struct Standing {
     /// Of every group of the model, whether it belongs to that part; `None` if the latest state is
     /// the complete one.
     part: Option<Vec<bool>>,
+    /// Elements of other groups that are in the latest state, and theirs in the complete one.
+    excerpt: Option<Ahead>,
+    /// Their groups follow as a whole from now on, since rounding would show.
+    as_groups: bool,
     /// Largest relative residual that had to be taken for round-off, above the tolerance; else 0.
     pub round_off: f64,
 }
@@ -84,6 +92,8 @@ pub struct LinearDomain {
     pub largest: f64,
     /// Largest entry of its matrix before it was condensed.
     pub stiffest: f64,
+    /// 2-norm of that one's diagonal.
+    diagonal: f64,
     /// Degrees of freedom of the boundary, in the order of its stiffness.
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
@@ -258,6 +268,7 @@ impl LinearDomain {
         system.assemble(groups, &mut values);
         let stiffest = algebra::largest(&values);
         let pattern = system.forget_matrix();
+        let diagonal = norm(&pattern.diagonal(&values));
         let lines = system.lines(lines);
         let matrix = Matrix {
             kind,
@@ -270,6 +281,7 @@ impl LinearDomain {
             kept,
             factors,
             stiffest,
+            diagonal,
         };
         if let Some(reuse) = reuse {
             reuse.keep(setup, &numbered);
@@ -291,6 +303,7 @@ impl LinearDomain {
             mut kept,
             factors,
             stiffest,
+            diagonal,
         } = numbered;
         let free = system.free();
         let of_kept = factors.kept().iter().map(|&e| free[e as usize]);
@@ -309,6 +322,7 @@ impl LinearDomain {
         }
         Ok(Self {
             stiffest,
+            diagonal,
             largest: algebra::largest(stiffness.values()),
             standing: Standing::default(),
             part: None,
@@ -403,6 +417,8 @@ impl LinearDomain {
             complete,
             forces: self.boundary.iter().map(|&dof| internal[dof]).collect(),
             part: None,
+            excerpt: None,
+            as_groups: self.standing.as_groups,
             round_off: self.standing.round_off,
         };
     }
@@ -468,10 +484,14 @@ impl LinearDomain {
             lambda,
             tolerance,
         };
-        let is_part = self.choose_part(looked_at);
+        let looked_at = looked_at.filter(|_| self.may_go_ahead(&goal));
+        let is_part = self.choose_part(looked_at, groups);
         if is_part && let Some(part) = self.part.take() {
-            let reached = self.settle(&part, groups, &goal, displacement);
+            let mut reached = self.settle(&part, groups, &goal, displacement);
             let numbers = part.groups.clone();
+            if let Ok(internal) = &mut reached {
+                self.go_ahead(&part, groups, displacement, internal);
+            }
             self.part = Some(part);
             // Where round-off alone keeps a part from equilibrium, that shows in the whole.
             if let Ok(internal) = reached {
@@ -485,10 +505,11 @@ impl LinearDomain {
                 return Ok(internal);
             }
         }
+        self.go_back(groups);
         let all = vec![true; groups.len()];
         let whole = match self.whole.take() {
             Some(whole) => whole,
-            None => self.of_groups(&all, &[]),
+            None => self.of_groups(&all, Vec::new(), &[]),
         };
         let reached = self.settle(&whole, groups, &goal, displacement);
         self.whole = Some(whole);

@@ -230,6 +230,7 @@ impl<'a> Newton<'a> {
                 let was_motion = creep.lets_expect_another();
                 let open = self.open(&equilibrium.state.balance, &iterations);
                 Ok(StepSuccess {
+                    was_kept: self.is_stale(),
                     was_motion,
                     open,
                     ..equilibrium.reached(iterations, relaxed)
@@ -288,6 +289,7 @@ impl Equilibrium {
             iterations,
             unreliable: balance.unreliable,
             relaxed,
+            was_kept: false,
             was_motion: false,
             round_off: self.round_off,
             tolerated: self.tolerated,

@@ -37,3 +37,11 @@ pub fn joined(groups: &[Group], nodes: &[usize]) -> Vec<usize> {
     more.sort_unstable();
     nodes.iter().copied().chain(more).collect()
 }
+
+impl Group {
+    /// Elements with one of these nodes, ascending.
+    pub fn elements_at(&self, nodes: &HashSet<usize>) -> impl Iterator<Item = usize> {
+        let elements = 0..self.kinematics.n_elements();
+        elements.filter(|&e| self.kinematics.nodes(e).iter().any(|n| nodes.contains(n)))
+    }
+}

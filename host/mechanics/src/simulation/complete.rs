@@ -69,6 +69,7 @@ impl Simulation {
             let tolerance = self.problem.settings.force_tolerance;
             let looked_at = looked_at.map(|part| LookedAt {
                 groups: &part.groups,
+                elements: &part.elements,
                 dofs: &part.dofs,
             });
             let (groups, displacement) = (&mut self.groups, &mut self.displacement);

@@ -120,6 +120,7 @@ mod tests {
                 iterations: Vec::new(),
                 unreliable: None,
                 relaxed: false,
+                was_kept: false,
                 was_motion: false,
                 tolerated: 0.0,
                 round_off: 0.0,

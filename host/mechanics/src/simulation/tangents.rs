@@ -37,6 +37,8 @@ impl Simulation {
             // What was committed on the way is not where the step began.
             _ if success.was_motion => return,
             _ if success.tolerated > 0.0 || success.relaxed => Went::Badly,
+            // Nor do tangents have to answer for corrections without them.
+            _ if success.was_kept => return,
             n if n > TOO_MANY => Went::Badly,
             n if n > MANY => Went::Slowly,
             _ => return,

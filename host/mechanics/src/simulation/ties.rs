@@ -5,7 +5,7 @@ use super::loads::Prescribed;
 use crate::assembly::Tie;
 use crate::error::Error;
 use crate::problem::{Analysis, Cause, Item, Refusal};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// A node is on the axis of symmetry within this fraction of the mesh's longer side.
 const ON_AXIS: f64 = 1e-9;
@@ -20,6 +20,40 @@ pub(super) struct Tied {
 }
 
 impl Simulation {
+    /// Nodes whose forces may be counted at some of these in one phase or another: these, those that follow them, the
+    /// other faces of interfaces, the rest of rigid lines.
+    pub fn gathering(&self, nodes: &[usize]) -> HashSet<usize> {
+        let mesh = &self.problem.mesh;
+        let faces = mesh.joints.iter().flat_map(|joint| {
+            let pairs = joint.minus.iter().zip(&joint.plus);
+            pairs.map(|(&minus, &plus)| vec![minus, plus])
+        });
+        let phases = self.problem.phases.iter();
+        let rigid = phases.flat_map(|phase| &phase.rigid);
+        let rigid = rigid.filter_map(|line| Some(mesh.lines.get(line)?.nodes.clone()));
+        let mut alike: Vec<Vec<usize>> = faces.chain(rigid).collect();
+        let mut found: HashSet<usize> = nodes.iter().copied().collect();
+        loop {
+            let before = found.len();
+            for tie in &self.ties {
+                let masters = tie.masters.iter();
+                if masters.map(|(dof, _)| dof / 2).any(|n| found.contains(&n)) {
+                    found.insert(tie.dof / 2);
+                }
+            }
+            alike.retain(|nodes| {
+                let is_met = nodes.iter().any(|node| found.contains(node));
+                if is_met {
+                    found.extend(nodes);
+                }
+                !is_met
+            });
+            if found.len() == before {
+                return found;
+            }
+        }
+    }
+
     /// Ties of a phase whose own prescribed displacements these are. Where one of some displacements that
     /// move alike is prescribed, all are.
     ///

@@ -42,6 +42,8 @@ pub enum When<'w> {
 pub struct Part {
     /// Of every group, whether its stresses and strains are.
     pub groups: Vec<bool>,
+    /// Of every group, the elements whose stresses and strains are beside, ascending.
+    pub elements: Vec<Vec<usize>>,
     /// Degrees of freedom whose displacements are.
     pub dofs: Vec<usize>,
 }

@@ -1,10 +1,9 @@
 //! The child's side: it says where it is and how it ends, and looks whether it is to stop.
 
-use super::{CALLS, FOLDER, FOLDER_WORDS, Page, WATCHER, word};
+use super::{CALLS, FOLDER, FOLDER_WORDS, Page, word};
 use law::Stop;
-use law::{SharedMemory, calls};
-use rustix::process::{Signal, getppid, set_parent_process_death_signal};
-use std::fs::File;
+use law::calls;
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -15,44 +14,20 @@ static PAGE: OnceLock<Page> = OnceLock::new();
 /// Bytes of the standard output that were handed out the first time.
 static SKIP: AtomicU64 = AtomicU64::new(0);
 
-/// Whether this process is a watcher's child. It then dies with the watcher.
+/// This process is the child of the watcher with this number, shares this memory with it, and dies with it.
 ///
 /// # Errors
-/// The watcher's memory cannot be had.
-pub fn enter() -> io::Result<bool> {
-    let Some((watcher, descriptor)) = watcher() else {
-        return Ok(false);
-    };
-    // Whatever a law starts inherits the variable, but is nobody's child of the watcher.
-    let is_mine = || getppid().is_some_and(|parent| parent.as_raw_nonzero().get() == watcher);
-    if !is_mine() {
-        return Ok(false);
-    }
+/// The system's; the watcher is gone.
+pub(super) fn begin(page: Page, watcher: Pid) -> io::Result<()> {
     set_parent_process_death_signal(Some(Signal::KILL))?;
-    let open = || {
-        let path = format!("/proc/{watcher}/fd/{descriptor}");
-        File::options().read(true).write(true).open(path)
-    };
-    let file = open()?;
-    let [page, places] = [
-        SharedMemory::new(file.try_clone()?)?,
-        SharedMemory::new(file)?,
-    ];
-    let page = Page(page);
-    if !is_mine() {
+    if getppid() != Some(watcher) {
         return Err(io::Error::other("the watching process is gone"));
     }
-    calls::keep_in(places, CALLS);
+    let page = PAGE.get_or_init(|| page);
+    calls::keep_in(&page.0, CALLS);
     calls::remember_process();
     SKIP.store(page.get(word::SKIP), Ordering::Relaxed);
-    let _ = PAGE.set(page);
-    Ok(true)
-}
-
-fn watcher() -> Option<(i32, i32)> {
-    let text = std::env::var(WATCHER).ok()?;
-    let (watcher, descriptor) = text.split_once(':')?;
-    Some((watcher.parse().ok()?, descriptor.parse().ok()?))
+    Ok(())
 }
 
 /// Says how the process ends: the last thing it does.

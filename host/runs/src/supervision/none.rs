@@ -5,14 +5,6 @@ use law::Stop;
 use std::io;
 use std::path::Path;
 
-/// No watcher.
-///
-/// # Errors
-/// None.
-pub fn enter() -> io::Result<bool> {
-    Ok(false)
-}
-
 /// No child can be had.
 ///
 /// # Errors

@@ -1,21 +1,19 @@
 //! The watcher's side: it starts the child, passes requests to stop on, and makes of the child's end
 //! what it is.
 
-use super::{Page, SIZE, STOPPING, WATCHER, word};
+use super::signals::Signals;
+use super::{Page, SIZE, STOPPING, child, word};
 use crate::Error;
 use law::calls::Seen;
-use law::child::{self, Ending};
+use law::child::{Ending, can_be_copied, copy, ending};
 use law::{SharedMemory, isolate};
 use rustix::process::{
-    Pid, Signal, WaitId, WaitIdOptions, WaitOptions, kill_process, set_child_subreaper, wait,
-    waitid,
+    Pid, Signal, WaitOptions, getpid, kill_process, set_child_subreaper, wait, waitpid,
 };
-use std::ffi::OsString;
 use std::io::{self, Write};
-use std::os::fd::AsRawFd;
+use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::Command;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
 /// How long a child may take to answer a request to stop while a law is being called, or before
@@ -25,144 +23,116 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const PAUSE: Duration = Duration::from_millis(20);
 /// How long what a law has left behind may take to end by itself.
 const LEFTOVERS: Duration = Duration::from_secs(2);
+/// What is said where nothing is watched.
+const UNWATCHED: &str = "the program has threads already, as by a library that was preloaded, so a law that ends the \
+     process ends the program, too, and is not named";
 
 /// What the watcher knows.
 struct Watch {
+    /// The watcher's own number.
+    process: Pid,
     page: Page,
-    /// The child, as long as it is not waited for.
-    child: Mutex<Option<Pid>>,
-    /// The request was made a second time, or the child did not answer.
-    is_killed: Mutex<bool>,
+    signals: Signals,
 }
 
-/// Carries the program out in a child, and says how it ended. `again`: laws may be called once more
-/// in processes of their own where one has ended the child; else the outcome stands. `None`: no
-/// child can be had here, and the program is to do it all by itself.
-///
-/// # Errors
-/// What the child could not say itself.
+/// What a child's end comes to.
+enum Verdict {
+    Stands(Result<u8, Error>),
+    /// A law has ended it, which is worth a second look.
+    Again(Trouble),
+}
+
+/// How the first child ended.
+struct Trouble {
+    what: String,
+    /// With the place.
+    text: String,
+    calls: Vec<Seen>,
+    folder: String,
+}
+
+/// Has a child carry the program out, and says how it ended. `again`: laws may be called once more in
+/// processes of their own where one has ended the child; else the outcome stands. `None`: this process is
+/// to carry it out, as the child, or because none can be had here.
 pub fn supervise(again: bool, mend: &dyn Fn(&Path, &Error)) -> Option<Result<u8, Error>> {
-    let watch = Arc::new(Watch::new().ok()?);
-    watch.take_signals().ok()?;
-    let ending = match watch.carry_out() {
-        Ok(ending) => ending,
+    if !can_be_copied() {
+        let _ = writeln!(io::stderr(), "warning: {UNWATCHED}");
+        return None;
+    }
+    let watch = Watch::new().ok()?;
+    let first = match watch.carry_out() {
+        Ok(Some(ending)) => ending,
+        Ok(None) => return watch.become_child(),
         Err(why) => {
             let message = format!("the program cannot start itself: {why}");
             return Some(Err(Error::internal(message)));
         }
     };
-    Some(watch.conclude(ending, again, mend))
+    let trouble = match watch.judge(first, again, mend) {
+        Verdict::Stands(outcome) => return Some(outcome),
+        Verdict::Again(trouble) => trouble,
+    };
+    watch.prepare_again(&trouble.calls);
+    let second = match watch.carry_out() {
+        Ok(None) => return watch.become_child(),
+        Ok(Some(ending)) => format!("the second attempt ended, too: {ending}"),
+        Err(why) => format!("there was no second attempt: {why}"),
+    };
+    Some(watch.judge_again(&trouble, &second, mend))
 }
 
 impl Watch {
     fn new() -> io::Result<Self> {
         let file = isolate::memory_file()?;
         file.set_len((SIZE * size_of::<u64>()) as u64)?;
-        set_child_subreaper(Some(rustix::process::getpid()))?;
+        let process = getpid();
+        set_child_subreaper(Some(process))?;
         Ok(Self {
+            process,
             page: Page(SharedMemory::new(file)?),
-            child: Mutex::default(),
-            is_killed: Mutex::default(),
+            // Last: who cannot watch leaves them as they are.
+            signals: Signals::keep()?,
         })
     }
 
-    /// Takes the signals that ask the program to stop. Children started from now on are not reached
-    /// by them.
-    fn take_signals(self: &Arc<Self>) -> io::Result<()> {
-        let watch = Arc::clone(self);
-        ctrlc::set_handler(move || watch.asked()).map_err(io::Error::other)?;
-        // The thread that waits for them was started before.
-        child::block_requests()
-    }
-
-    /// A request to stop.
-    fn asked(self: &Arc<Self>) {
-        let stops = self.page.get(word::STOPS) + 1;
-        self.page.set(word::STOPS, stops);
-        if stops > 1 {
-            self.kill();
-            return;
-        }
-        let _ = writeln!(io::stderr(), "{STOPPING}");
-        let watch = Arc::clone(self);
-        std::thread::spawn(move || watch.wait_for_answer());
-    }
-
-    /// Ends the child where it does not answer.
-    fn wait_for_answer(&self) {
-        let asked = Instant::now();
-        let mut still = (Vec::new(), Instant::now());
-        while self.has_child() {
-            std::thread::sleep(PAUSE);
-            let calls = self.page.calls().calls();
-            if calls.is_empty() || calls != still.0 {
-                still = (calls, Instant::now());
+    /// Has a copy of this process carry the program out, and waits for its end. `None`: this is the copy.
+    fn carry_out(&self) -> io::Result<Option<Ending>> {
+        let Some(child) = copy()? else {
+            return Ok(None);
+        };
+        let mut request: Option<Request> = None;
+        loop {
+            let stops = self.page.get(word::STOPS);
+            if stops > 0 {
+                let request = request.get_or_insert_with(Request::new);
+                if stops > 1 || request.is_unanswered(&self.page) {
+                    // Not waited for yet: its number is nobody else's.
+                    let _ = kill_process(child, Signal::KILL);
+                }
             }
-            let is_over = self.page.get(word::ENDED) != 0;
-            let has_begun = self.page.get(word::RUNNING) != 0 || self.page.get(word::LONGEST) != 0;
-            let longest = Duration::from_micros(self.page.get(word::LONGEST));
-            let is_stuck = still.1.elapsed() >= PATIENCE.max(2 * longest);
-            // Equations take the time they take; a law, or what comes before the first step, not.
-            let is_calling = !still.0.is_empty();
-            let may_be_ended = is_over || if is_calling { is_stuck } else { !has_begun };
-            if asked.elapsed() >= PATIENCE && may_be_ended {
-                self.kill();
-                return;
+            let pause = request.is_some().then_some(PAUSE);
+            if self.signals.next_is_request(pause)? {
+                self.page.set(word::STOPS, stops + 1);
+                if stops == 0 {
+                    let _ = writeln!(io::stderr(), "{STOPPING}");
+                }
+            }
+            if let Some((_, status)) = waitpid(Some(child), WaitOptions::NOHANG)? {
+                end_leftovers();
+                return Ok(Some(ending(ExitStatus::from_raw(status.as_raw()))));
             }
         }
     }
 
-    fn has_child(&self) -> bool {
-        let child = self.child.lock().unwrap_or_else(PoisonError::into_inner);
-        child.is_some()
+    /// This process is the copy that carries the program out; an outcome only if it cannot.
+    fn become_child(self) -> Option<Result<u8, Error>> {
+        let begun = child::begin(self.page, self.process);
+        let why = begun.and_then(|()| self.signals.leave_to_watcher()).err()?;
+        let message = format!("the program cannot be watched: {why}");
+        Some(Err(Error::internal(message)))
     }
 
-    fn kill(&self) {
-        let child = self.child.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(child) = *child {
-            *self
-                .is_killed
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner) = true;
-            let _ = kill_process(child, Signal::KILL);
-        }
-    }
-
-    /// Starts the child and waits for its end.
-    fn carry_out(&self) -> io::Result<Ending> {
-        let program = std::env::current_exe().ok().filter(|path| path.is_file());
-        let program = program.unwrap_or_else(|| "/proc/self/exe".into());
-        let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
-        let descriptor = self.page.0.descriptor()?.as_raw_fd();
-        let mut child = Command::new(program)
-            .args(arguments)
-            .env(WATCHER, format!("{}:{descriptor}", std::process::id()))
-            .spawn()?;
-        let pid = Pid::from_child(&child);
-        let lock = || self.child.lock().unwrap_or_else(PoisonError::into_inner);
-        *lock() = Some(pid);
-        if self.page.get(word::STOPS) > 1 {
-            self.kill();
-        }
-        // Not reaped yet: its number is nobody else's while it may be killed.
-        while waitid(
-            WaitId::Pid(pid),
-            WaitIdOptions::EXITED | WaitIdOptions::NOWAIT,
-        )
-        .is_err_and(|why| why == rustix::io::Errno::INTR)
-        {}
-        *lock() = None;
-        let status = child.wait()?;
-        end_leftovers();
-        Ok(child::ending(status))
-    }
-
-    fn conclude(
-        &self,
-        ending: Ending,
-        again: bool,
-        mend: &dyn Fn(&Path, &Error),
-    ) -> Result<u8, Error> {
+    fn judge(&self, ending: Ending, again: bool, mend: &dyn Fn(&Path, &Error)) -> Verdict {
         if let Some(copied) = self.page.calls().copy() {
             let error = law::Error::Library {
                 message: format!(
@@ -171,28 +141,27 @@ impl Watch {
                 ),
                 hint: Some("what stands in the files was written by one process alone".to_owned()),
             };
-            return Err(self.mended(mend, error.into()));
+            return self.stands(mend, error.into());
         }
         if let Some(code) = self.ended() {
-            return Ok(code);
+            return Verdict::Stands(Ok(code));
         }
         let calls = self.page.calls().calls();
         if self.page.get(word::STOPS) > 0 {
-            return Err(self.mended(mend, stopped(&calls)));
+            return self.stands(mend, stopped(&calls));
         }
         let what = match ending {
             Ending::Signal(_) => format!("crashed: {ending}"),
             _ => format!("ended itself: {ending}"),
         };
-        let place = places(&calls);
         let is_apart = self.page.get(word::APART) != 0;
         if is_apart && ending != Ending::Signal(9) {
             let message = format!("the program {what}, and no law was in its process");
-            return Err(self.mended(mend, Error::internal(message)));
+            return self.stands(mend, Error::internal(message));
         }
-        let trouble = format!("{place}: the process {what}");
+        let trouble = format!("{}: the process {what}", places(&calls));
         if ending == Ending::Signal(9) {
-            return Err(self.mended(mend, Error::Killed { trouble }));
+            return self.stands(mend, Error::Killed { trouble });
         }
         if !again {
             let hint = "with `--isolate` the law is called in a process of its own, and its point is named";
@@ -200,15 +169,26 @@ impl Watch {
                 message: trouble,
                 hint: Some(hint.to_owned()),
             };
-            return Err(self.mended(mend, error.into()));
+            return self.stands(mend, error.into());
         }
         let _ = writeln!(
             io::stderr(),
             "{trouble}; once more with laws in processes of their own, to name the point"
         );
-        let folder = self.page.folder();
-        self.prepare_again(&calls);
-        let ending = self.carry_out();
+        Verdict::Again(Trouble {
+            what,
+            text: trouble,
+            calls,
+            folder: self.page.folder(),
+        })
+    }
+
+    fn judge_again(
+        &self,
+        first: &Trouble,
+        second: &str,
+        mend: &dyn Fn(&Path, &Error),
+    ) -> Result<u8, Error> {
         let code = self.ended();
         if code == Some(3) {
             return Ok(3);
@@ -219,17 +199,17 @@ impl Watch {
                 None => Err(self.mended(mend, stopped(&self.page.calls().calls()))),
             };
         }
-        if code.is_none() && calls.is_empty() {
+        if code.is_none() && first.calls.is_empty() {
+            let what = &first.what;
             let message = format!("the program {what}, twice, and no law was being called");
             return Err(self.mended(mend, Error::internal(message)));
         }
-        let since = match (code, ending) {
-            (Some(_), _) => "it did not do so in a process of its own".to_owned(),
-            (None, Ok(ending)) => format!("the second attempt ended, too: {ending}"),
-            (None, Err(why)) => format!("there was no second attempt: {why}"),
+        let since = match code {
+            Some(_) => "it did not do so in a process of its own",
+            None => second,
         };
         let error = Error::from(law::Error::Library {
-            message: format!("{trouble}\n  {since}"),
+            message: format!("{}\n  {since}", first.text),
             hint: Some(
                 "all rows in equilibrium are written; `--isolate`, with `--resume` for a run, goes \
                  on with laws in processes of their own"
@@ -237,10 +217,14 @@ impl Watch {
             ),
         });
         // The run that it happened in, not one that came after it.
-        if !folder.is_empty() {
-            mend(Path::new(&folder), &error);
+        if !first.folder.is_empty() {
+            mend(Path::new(&first.folder), &error);
         }
         Err(error)
+    }
+
+    fn stands(&self, mend: &dyn Fn(&Path, &Error), error: Error) -> Verdict {
+        Verdict::Stands(Err(self.mended(mend, error)))
     }
 
     /// The exit code, if the child has said it.
@@ -270,6 +254,38 @@ impl Watch {
         }
         page.calls().clear();
         page.set(word::AGAIN, 1);
+    }
+}
+
+/// A request to stop that the child has not answered yet.
+struct Request {
+    since: Instant,
+    /// The calls under way, and since when they are the same.
+    still: (Vec<Seen>, Instant),
+}
+
+impl Request {
+    fn new() -> Self {
+        Self {
+            since: Instant::now(),
+            still: (Vec::new(), Instant::now()),
+        }
+    }
+
+    /// Whether the child has had its time.
+    fn is_unanswered(&mut self, page: &Page) -> bool {
+        let calls = page.calls().calls();
+        let is_calling = !calls.is_empty();
+        if !is_calling || calls != self.still.0 {
+            self.still = (calls, Instant::now());
+        }
+        let is_over = page.get(word::ENDED) != 0;
+        let has_begun = page.get(word::RUNNING) != 0 || page.get(word::LONGEST) != 0;
+        let longest = Duration::from_micros(page.get(word::LONGEST));
+        let is_stuck = self.still.1.elapsed() >= PATIENCE.max(2 * longest);
+        // Equations take the time they take; a law, or what comes before the first step, not.
+        let may_be_ended = is_over || if is_calling { is_stuck } else { !has_begun };
+        self.since.elapsed() >= PATIENCE && may_be_ended
     }
 }
 

@@ -68,6 +68,8 @@ pub(super) struct Numbered {
     pub(super) factors: Arc<Multifrontal>,
     /// Largest entry of the matrix.
     pub(super) stiffest: f64,
+    /// 2-norm of its diagonal.
+    pub(super) diagonal: f64,
 }
 
 /// A matrix and what became of it.

@@ -126,6 +126,11 @@ impl Creep {
         iterations.get(self.first..).unwrap_or_default()
     }
 
+    /// Newton iterations start from this one: those before it had another matrix.
+    pub(super) fn starts_at(&mut self, iteration: usize) {
+        self.first = iteration;
+    }
+
     /// Whether it may be asked for.
     pub(super) fn is_wanted(&self) -> bool {
         self.course != Course::Off

@@ -1,10 +1,14 @@
 //! The kept matrix: as long as corrections with it take nearly all of the residual away, the matrix of
 //! an earlier iteration, or of the step before, is not replaced.
 //!
+//! Where factorising is dear, corrections with the matrix of the step before may also be slow: they are
+//! [accelerated](super::acceleration), and it is replaced where even so they stall.
+//!
 //! Whether another one is wanted is known before a state is evaluated; only then are laws asked for
 //! tangents.
 
 use super::Newton;
+use super::acceptance::STALE;
 use super::failure::StepFailure;
 use super::iterate::{Control, Correction, State};
 use super::outcome::Iteration;
@@ -17,11 +21,23 @@ use law::Operator;
 /// are cheap where the laws of an interface are all there is to evaluate.
 const FAST: [f64; 2] = [0.03, 0.01];
 
+/// Factorising is dear beside the unknowns of a condensed domain whose number, to the third power, is more than so
+/// many times that of the points that laws are called for: then it takes as long as five iterations or more. Found
+/// by trial: beside 324 unknowns and 360 points slow iterations cost as much as the matrices they save, beside 644
+/// and 720 a third less.
+const DEAR: f64 = 2e5;
+/// There another matrix costs as much as so many corrections.
+const AS_MANY: f64 = 11.0;
+/// So many last corrections say how many more it takes.
+const LAST: usize = 3;
+
 /// What decides in a step whether the matrix is kept.
 #[derive(Debug)]
 pub(super) struct Kept {
     /// The matrix has been renewed in this step.
     renewed: bool,
+    /// As long as it has not, corrections may be slow.
+    may_be_slow: bool,
     /// It makes too little progress.
     pub(super) stalls: bool,
     /// Fraction of the residual that the next correction will probably leave.
@@ -33,6 +49,7 @@ impl Default for Kept {
     fn default() -> Self {
         Self {
             renewed: false,
+            may_be_slow: false,
             stalls: false,
             contraction: f64::INFINITY,
         }
@@ -43,6 +60,7 @@ impl Newton<'_> {
     /// Begins a step: with the matrix of the last one only if an interrupted run would have it, too.
     pub(super) fn begin(&mut self) {
         self.kept.renewed = false;
+        self.kept.may_be_slow = false;
         self.matrix.held &= self.matrix.has_tangents;
         self.solver.check_next();
     }
@@ -61,11 +79,39 @@ impl Newton<'_> {
         self.settings.method == Method::Auto && !self.matrix.is_constant && !self.kept.renewed
     }
 
+    /// Begins the step with slow corrections where they are cheaper than another matrix.
+    pub(super) fn begin_slowly(&mut self) {
+        let groups = self.groups.iter().enumerate();
+        let called = groups.filter(|(number, _)| self.system.includes(*number));
+        let n_points: usize = called.map(|(_, group)| group.kinematics.n_points()).sum();
+        let n = self.places.boundary.len() as f64;
+        let is_dear = self.domain.is_some() && n * n * n > DEAR * n_points as f64;
+        self.kept.may_be_slow = is_dear && self.matrix.held;
+    }
+
+    /// Whether corrections with the matrix of an earlier step may be slow.
+    pub(super) fn is_slow(&self) -> bool {
+        self.kept.may_be_slow && self.is_stale()
+    }
+
+    /// Whether slow corrections have had their chance: by the progress of the last ones it takes more than another
+    /// matrix is worth, or they are half of all iterations that a step may take.
+    pub(super) fn is_too_slow(&self, iterations: &[Iteration]) -> bool {
+        let is_half = 2 * iterations.len() > self.settings.max_iterations();
+        let Some([before, .., last]) = iterations.last_chunk::<{ LAST + 1 }>() else {
+            return is_half;
+        };
+        let progress = (before.residual / last.residual).ln() / LAST as f64;
+        let left = (last.residual / (STALE * self.settings.force_tolerance)).ln();
+        is_half || progress.is_nan() || left > AS_MANY * progress
+    }
+
     /// Whether the next correction needs another matrix.
     fn renews(&self) -> bool {
         !self.matrix.held
             || !self.matrix.is_constant
                 && match self.settings.method {
+                    Method::Auto if self.is_slow() => self.kept.stalls,
                     Method::Auto => {
                         self.kept.contraction > FAST[usize::from(self.domain.is_none())]
                     }
@@ -133,7 +179,7 @@ impl Newton<'_> {
         state: &State,
         task: &Task,
     ) -> Result<Option<(Iteration, State)>, StepFailure> {
-        if !self.is_stale() {
+        if !self.is_stale() || self.is_slow() {
             return Ok(None);
         }
         let correction = Correction {

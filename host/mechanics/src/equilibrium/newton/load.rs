@@ -31,7 +31,7 @@ pub(super) struct LoadControl {
     /// Displacement increments to start from; the tangent at the start predicts them if there are
     /// none.
     guess: Option<Vec<f64>>,
-    /// With a quasi-Newton matrix only.
+    /// With a quasi-Newton matrix, and with that of an earlier step as long as slow corrections do.
     acceleration: Option<Acceleration>,
     pub(super) relaxation: Relaxation,
     pub(super) creep: Creep,
@@ -48,16 +48,18 @@ pub(super) struct LoadControl {
 impl LoadControl {
     /// A step to this end.
     pub(super) fn new(
-        newton: &Newton<'_>,
+        newton: &mut Newton<'_>,
         task: Task,
         guess: Option<Vec<f64>>,
         is_expected: bool,
     ) -> Self {
+        newton.begin_slowly();
         let is_quasi = newton.settings.method == Method::QuasiNewton;
+        let is_slow = is_quasi || newton.is_slow();
         Self {
             task,
             guess,
-            acceleration: is_quasi.then(Acceleration::default),
+            acceleration: is_slow.then(Acceleration::default),
             relaxation: Relaxation::new(newton.settings),
             creep: Creep::new(newton.settings, is_expected),
             least: None,
@@ -288,13 +290,23 @@ impl LoadControl {
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
         if let Some(acceleration) = &self.acceleration {
-            newton.kept.stalls = acceleration.stalls(iterations);
+            newton.kept.stalls = if newton.is_slow() {
+                newton.is_too_slow(iterations)
+            } else {
+                acceleration.stalls(iterations)
+            };
         }
         if newton.renew(self.series(iterations), &state.increment, &self.task)?
-            && let Some(acceleration) = &mut self.acceleration
+            && self.acceleration.is_some()
         {
             // What moves with another matrix achieved says nothing of this one.
-            *acceleration = Acceleration::since(iterations.len() - 1);
+            let here = iterations.len() - 1;
+            let is_quasi = newton.settings.method == Method::QuasiNewton;
+            self.acceleration = is_quasi.then(|| Acceleration::since(here));
+            if !is_quasi {
+                self.relaxation.starts_at(here);
+                self.creep.starts_at(here);
+            }
         }
         if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {
             iterations.push(taken);

@@ -62,6 +62,8 @@ pub struct StepSuccess {
     pub unreliable: Option<String>,
     /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
     pub relaxed: bool,
+    /// Corrections with the matrix of an earlier step led to it.
+    pub was_kept: bool,
     /// It took many viscous steps.
     pub was_motion: bool,
     /// Relative residual that had to be taken for round-off, above the tolerance; else 0.

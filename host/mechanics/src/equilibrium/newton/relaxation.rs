@@ -106,6 +106,11 @@ impl Relaxation {
         iterations.get(self.first..).unwrap_or_default()
     }
 
+    /// Newton iterations start from this one: those before it had another matrix.
+    pub(super) fn starts_at(&mut self, iteration: usize) {
+        self.first = iteration;
+    }
+
     /// Whether it led to the present state.
     pub(super) fn is_under_way(&self) -> bool {
         matches!(self.course, Course::UnderWay(_))

@@ -1,0 +1,49 @@
+//! The program watches a copy of itself, whoever has started it and with whatever.
+#![cfg(target_os = "linux")]
+
+use crate::program::{CASE, DONE, PLUGIN_TROUBLE, Place};
+use crate::troubled;
+use std::process::Command;
+
+/// A program that does not care for its children passes that on to them.
+#[test]
+fn ends_of_children_are_told_whoever_started_the_program() {
+    let Some(place) = troubled::place("") else {
+        return;
+    };
+    let careless = "exec env --ignore-signal=CHLD \"$0\" \"$@\"";
+    for (how, code) in [("locale", DONE), ("segfault", PLUGIN_TROUBLE)] {
+        place.write("case.toml", troubled::case(how));
+        let outcome = place.run_limited(careless, &["run", "case.toml", "--out", how]);
+        assert_eq!(outcome.code, Some(code), "{how}: {}", outcome.stderr);
+    }
+}
+
+/// A copy of a process has one thread, so one with several carries out all itself, and says so.
+#[test]
+fn a_program_that_has_threads_already_is_not_watched() {
+    const THREAD: &str = "#include <pthread.h>\n#include <unistd.h>\n\
+        static void *wait_long(void *x) { pause(); return x; }\n\
+        __attribute__((constructor)) static void begin(void) {\n\
+        pthread_t thread;\n\
+        pthread_create(&thread, 0, wait_long, 0);\n}\n";
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    place.write("thread.c", THREAD);
+    let [source, library] = ["thread.c", "thread.so"].map(|name| place.path(name));
+    let mut compiler = Command::new("cc");
+    compiler.args(["-shared", "-fPIC", "-pthread", "-o"]);
+    let Some(output) = tests::needs::output(compiler.arg(&library).arg(&source)) else {
+        return;
+    };
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let run = ["run", "case.toml", "--out", "out"];
+    let warning = "the program has threads already";
+    let preloaded = [("LD_PRELOAD", library.to_str().unwrap())];
+    for (variables, is_warned) in [(&[][..], false), (&preloaded[..], true)] {
+        let outcome = place.run_with(&run, variables);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        assert_eq!(outcome.says(warning), is_warned, "{}", outcome.stderr);
+    }
+}
