@@ -484,17 +484,18 @@ impl LinearDomain {
             lambda,
             tolerance,
         };
-        let looked_at = looked_at.filter(|_| self.may_go_ahead(&goal));
+        let looked_at = looked_at.filter(|looked_at| self.may_go_ahead(looked_at, &goal));
         let is_part = self.choose_part(looked_at, groups);
         if is_part && let Some(part) = self.part.take() {
             let mut reached = self.settle(&part, groups, &goal, displacement);
             let numbers = part.groups.clone();
-            if let Ok(internal) = &mut reached {
-                self.go_ahead(&part, groups, displacement, internal);
+            // A part that is not in the latest state yet starts where that one is the complete one.
+            if let Ok((internal, increment)) = &mut reached {
+                self.go_ahead(&part, groups, increment, internal);
             }
             self.part = Some(part);
             // Where round-off alone keeps a part from equilibrium, that shows in the whole.
-            if let Ok(internal) = reached {
+            if let Ok((internal, _)) = reached {
                 self.standing.forces = self.forces_at(lambda);
                 let latest = &mut self.standing.latest;
                 latest.lambda = lambda;
@@ -513,7 +514,7 @@ impl LinearDomain {
         };
         let reached = self.settle(&whole, groups, &goal, displacement);
         self.whole = Some(whole);
-        let internal = reached?;
+        let (internal, _) = reached?;
         self.commit(groups, &all);
         self.is_complete(lambda, displacement, &internal);
         Ok(internal)

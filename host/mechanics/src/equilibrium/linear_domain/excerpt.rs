@@ -5,7 +5,7 @@
 //! follows from the boundary alone.
 
 use super::part::{Goal, Part};
-use super::{LinearDomain, Standing};
+use super::{LinearDomain, LookedAt, Standing};
 use crate::element::Kinematics;
 use crate::equilibrium::newton::norm;
 use crate::group::{Excerpted, Group};
@@ -70,23 +70,25 @@ impl LinearDomain {
     /// Whether excerpts may go further ahead: as long as rounding of the motion since the complete state, in which the
     /// rest of their groups waits, stays below the tolerance. Otherwise the state has to be completed; and where that
     /// would be so again soon, their groups follow as a whole from then on.
-    pub(super) fn may_go_ahead(&mut self, goal: &Goal<'_>) -> bool {
+    pub(super) fn may_go_ahead(&mut self, looked_at: &LookedAt<'_>, goal: &Goal<'_>) -> bool {
+        if self.standing.as_groups || looked_at.elements.iter().all(Vec::is_empty) {
+            return true;
+        }
         let scale = norm(&self.standing.forces).max(goal.loads.scale);
         let rounded = self.rounded() > goal.tolerance * scale;
-        let Some(ahead) = &self.standing.excerpt else {
-            return true;
-        };
-        self.standing.as_groups |= rounded && ahead.increments < FEW;
+        let ahead = self.standing.excerpt.as_ref();
+        let increments = ahead.map_or(0, |ahead| ahead.increments);
+        self.standing.as_groups |= rounded && increments < FEW;
         !rounded
     }
 
-    /// Brings a part's excerpts to these displacements, by degree of freedom, from those of the latest state; their
+    /// Moves a part's excerpts on by displacement increments since the latest state, by degree of freedom; their
     /// forces are added to the `internal` ones.
     pub(super) fn go_ahead(
         &mut self,
         part: &Part,
         groups: &mut [Group],
-        displacement: &[f64],
+        increment: &[f64],
         internal: &mut [f64],
     ) {
         if part.excerpts.is_empty() {
@@ -105,15 +107,11 @@ impl LinearDomain {
                     .collect(),
             });
         }
-        let before = &self.standing.latest.displacement;
-        let moved = displacement.iter().zip(before);
-        let mut increment: Vec<f64> = moved.map(|(now, before)| now - before).collect();
-        self.system.follow(&mut increment);
         let mut forces = vec![0.0; internal.len()];
         for excerpt in &part.excerpts {
             let group = &mut groups[excerpt.group];
             let kinematics = excerpt.kinematics.as_ref();
-            group.move_excerpt((&excerpt.elements, kinematics), &increment, &mut forces);
+            group.move_excerpt((&excerpt.elements, kinematics), increment, &mut forces);
         }
         self.system.fold(&mut forces);
         for (internal, force) in internal.iter_mut().zip(forces) {

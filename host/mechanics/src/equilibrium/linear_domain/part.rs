@@ -136,6 +136,9 @@ impl LinearDomain {
             wanted[equation] && !shared[equation] && is_inside
         };
         let inner = (0..wanted.len()).filter(own).collect();
+        for dof in excerpts.iter().flat_map(Excerpt::dofs) {
+            of_elements[dof] = true;
+        }
         let of_excerpts = excerpts.iter().flat_map(Excerpt::dofs);
         let known = dofs.iter().copied().chain(of_excerpts);
         let known = known.flat_map(|dof| self.system.masters(dof));
@@ -163,15 +166,16 @@ impl LinearDomain {
         }
     }
 
-    /// Trial state of a part in equilibrium with its goal and where the boundary is; its internal
-    /// forces. Displacements are filled in.
+    /// Trial state of a part in equilibrium with its goal and where the boundary is: its internal
+    /// forces, and the displacement increments since the latest state if the part is in that one, else since
+    /// the complete one. Displacements are filled in.
     pub(super) fn settle(
         &mut self,
         part: &Part,
         groups: &mut [Group],
         goal: &Goal<'_>,
         displacement: &mut [f64],
-    ) -> Result<Vec<f64>, DomainFailure> {
+    ) -> Result<(Vec<f64>, Vec<f64>), DomainFailure> {
         let increment =
             |origin: &Origin, part: &Part| self.increment(origin, part, goal.lambda, displacement);
         let Standing {
@@ -244,16 +248,16 @@ impl LinearDomain {
                 self.system.follow(increment);
             }
         };
-        let (origin, increment) = match (&since.complete, &since.latest) {
+        let (origin, increment) = match (since.complete, since.latest) {
             (None, Some(increment)) => (latest, increment),
-            (increment, _) => (complete, increment.as_ref().ok_or(DomainFailure::NoState)?),
+            (increment, _) => (complete, increment.ok_or(DomainFailure::NoState)?),
         };
         for &equation in &part.wanted {
             let dof = free[equation];
             displacement[dof] = origin.displacement[dof] + increment[dof];
         }
         self.standing.round_off = self.standing.round_off.max(relative);
-        Ok(internal)
+        Ok((internal, increment))
     }
 
     /// Whether a part is the one that the latest state is of.
