@@ -88,7 +88,8 @@ impl LinearDomain {
         let known = self
             .part
             .as_ref()
-            .filter(|part| part.is_asked_for(looked, elements));
+            .filter(|part| part.is_asked_for(looked, elements))
+            .filter(|part| part.excerpts.is_empty() || !self.standing.as_groups);
         if known.is_some_and(|part| of_latest(part, &self.standing)) {
             return true;
         }
