@@ -177,18 +177,20 @@ fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
 
 #[test]
 fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
-    // The sand waits: probes look at the pile and the interface only.
+    // The sand waits, and the pile but for its head and toe: probes look at these and the interface only. Where
+    // rounding of the way since the complete state counts, the pile follows as a whole after some increments.
     let chamber = include_str!("../../cases/chamber_mesh1/case.toml");
     let text = chamber.replace("increments = 50", "increments = 150");
-    for control in ["load", "arc_length"] {
-        let text = format!("{text}\n[solver]\ncontrol = \"{control}\"\n");
+    for (control, tolerance) in [("load", 1e-9), ("arc_length", 1e-9), ("load", 3e-12)] {
+        let solver = format!("control = \"{control}\"\nforce_tolerance = {tolerance:e}");
+        let text = format!("{text}\n[solver]\n{solver}\n");
         let undisturbed = Place::new();
         undisturbed.write("block.toml", &text);
         let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
         assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
         let expected = results(&undisturbed.path("out"));
         assert_eq!(expected.contains_key("path.csv"), control == "arc_length");
-        stopped_and_resumed(&text, &expected, control);
+        stopped_and_resumed(&text, &expected, &solver);
     }
 }
 
