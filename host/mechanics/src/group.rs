@@ -856,19 +856,15 @@ impl Group {
 
     /// Nodal forces of some of this group's elements (committed), by degree of freedom.
     pub fn forces_of(&self, elements: &[usize], n_dofs: usize) -> Vec<f64> {
-        let n = self.kinematics.n_components();
         let carried = self.carried();
         let mut force = vec![0.0; n_dofs];
         if let Some(few) = self.kinematics.only(elements) {
-            let points = elements.iter().map(|&e| self.kinematics.points_of(e));
-            let stress = points.flat_map(|points| &carried[points.start * n..points.end * n]);
-            few.add_forces(&stress.copied().collect::<Vec<f64>>(), &mut force);
+            let own = self.places(elements).flat_map(|own| &carried[own]);
+            few.add_forces(&own.copied().collect::<Vec<f64>>(), &mut force);
             return force;
         }
         let mut stress = vec![0.0; carried.len()];
-        for &element in elements {
-            let points = self.kinematics.points_of(element);
-            let own = points.start * n..points.end * n;
+        for own in self.places(elements) {
             stress[own.clone()].copy_from_slice(&carried[own]);
         }
         self.kinematics.add_forces(&stress, &mut force);

@@ -16,13 +16,16 @@ impl Group {
     /// Some elements alone; `None` if they cannot be had: the law is not linear with one tangent for all, or there
     /// is more to them than strains and stresses.
     pub fn excerpt(&self, elements: &[usize]) -> Option<Box<dyn Kinematics>> {
-        let is_plain = self.tangents_are_constant && self.layer.is_none() && self.pores.is_none();
-        let excerpt = is_plain.then(|| self.kinematics.only(elements))?;
-        excerpt.filter(|_| self.internal.committed.is_empty())
+        let has_more =
+            self.layer.is_some() || self.pores.is_some() || !self.internal.committed.is_empty();
+        if !self.tangents_are_constant || has_more {
+            return None;
+        }
+        self.kinematics.only(elements)
     }
 
     /// Places of elements in the fields of strains and stresses.
-    fn places(&self, elements: &[usize]) -> impl Iterator<Item = Range<usize>> {
+    pub(super) fn places(&self, elements: &[usize]) -> impl Iterator<Item = Range<usize>> {
         let n = self.kinematics.n_components();
         let points = elements.iter().map(|&e| self.kinematics.points_of(e));
         points.map(move |points| points.start * n..points.end * n)

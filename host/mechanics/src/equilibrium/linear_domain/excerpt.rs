@@ -97,14 +97,15 @@ impl LinearDomain {
         if let Some(ahead) = &mut self.standing.excerpt {
             ahead.increments += 1;
         } else {
-            let elements = part.excerpts.iter();
-            let complete = part.excerpts.iter();
+            let of_excerpt = |excerpt: &Excerpt| {
+                let complete = groups[excerpt.group].excerpted(&excerpt.elements);
+                ((excerpt.group, excerpt.elements.clone()), complete)
+            };
+            let (elements, complete) = part.excerpts.iter().map(of_excerpt).unzip();
             self.standing.excerpt = Some(Ahead {
                 increments: 1,
-                elements: elements.map(|e| (e.group, e.elements.clone())).collect(),
-                complete: complete
-                    .map(|excerpt| groups[excerpt.group].excerpted(&excerpt.elements))
-                    .collect(),
+                elements,
+                complete,
             });
         }
         let mut forces = vec![0.0; internal.len()];
