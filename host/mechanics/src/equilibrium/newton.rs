@@ -230,7 +230,7 @@ impl<'a> Newton<'a> {
                 let was_motion = creep.lets_expect_another();
                 let open = self.open(&equilibrium.state.balance, &iterations);
                 Ok(StepSuccess {
-                    was_kept: self.is_stale(),
+                    was_kept: self.keeps(),
                     was_motion,
                     open,
                     ..equilibrium.reached(iterations, relaxed)

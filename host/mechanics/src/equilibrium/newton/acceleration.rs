@@ -42,6 +42,11 @@ impl Acceleration {
         }
     }
 
+    /// Where the iterations with the present matrix start.
+    pub(super) fn begins(&self) -> usize {
+        self.since
+    }
+
     /// Whether the iterations with the present matrix make too little progress.
     pub(super) fn stalls(&self, iterations: &[Iteration]) -> bool {
         let Some([before, .., last]) = iterations[self.since..].last_chunk::<PATIENCE>() else {

@@ -20,8 +20,8 @@ use super::round_off::ROUND_OFF;
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 pub(super) const EXACT: f64 = 1e-3;
-/// Share of the tolerances that a correction with the matrix of an earlier step, and the residual
-/// it leaves, must not exceed; none is waived then.
+/// Share of the tolerances that a correction with a matrix that is kept, and the residual it leaves, must not exceed;
+/// none is waived then.
 pub(super) const STALE: f64 = 0.1;
 /// The residual is measured against at most this multiple of the forces that are given.
 pub(super) const FORCES: f64 = 10.0;
@@ -87,8 +87,8 @@ impl Change {
 pub(super) struct Criteria {
     pub(super) force: f64,
     pub(super) displacement: f64,
-    /// To the matrix of an earlier step a part that has yielded since still looks stiff: its
-    /// corrections are smaller than what is left.
+    /// To a matrix that is kept a part that has yielded since still looks stiff: its corrections are smaller than what
+    /// is left.
     pub(super) is_stale: bool,
 }
 

@@ -1,8 +1,8 @@
 //! The kept matrix: as long as corrections with it take nearly all of the residual away, the matrix of
 //! an earlier iteration, or of the step before, is not replaced.
 //!
-//! Where factorising is dear, corrections with the matrix of the step before may also be slow: they are
-//! [accelerated](super::acceleration), and it is replaced where even so they stall.
+//! Where factorising is dear, corrections with the matrix of the step before, and with the first one that replaces it,
+//! may also be slow: they are [accelerated](super::acceleration), and it is replaced where even so they stall.
 //!
 //! Whether another one is wanted is known before a state is evaluated; only then are laws asked for
 //! tangents.
@@ -33,9 +33,9 @@ const LAST: usize = 3;
 /// What decides in a step whether the matrix is kept.
 #[derive(Debug)]
 pub(super) struct Kept {
-    /// The matrix has been renewed in this step.
-    renewed: bool,
-    /// As long as it has not, corrections may be slow.
+    /// How often the matrix has been renewed in this step.
+    renewed: usize,
+    /// Corrections may be slow until it is renewed for the second time.
     may_be_slow: bool,
     /// It makes too little progress.
     pub(super) stalls: bool,
@@ -47,7 +47,7 @@ impl Default for Kept {
     /// Nothing is known: no matrix is trusted.
     fn default() -> Self {
         Self {
-            renewed: false,
+            renewed: 0,
             may_be_slow: false,
             stalls: false,
             contraction: f64::INFINITY,
@@ -58,7 +58,7 @@ impl Default for Kept {
 impl Newton<'_> {
     /// Begins a step: with the matrix of the last one only if an interrupted run would have it, too.
     pub(super) fn begin(&mut self) {
-        self.kept.renewed = false;
+        self.kept.renewed = 0;
         self.kept.may_be_slow = false;
         self.matrix.held &= self.matrix.has_tangents;
         self.solver.check_next();
@@ -75,7 +75,7 @@ impl Newton<'_> {
 
     /// Whether the matrix is that of an earlier step, though another could be had.
     pub(super) fn is_stale(&self) -> bool {
-        self.settings.method == Method::Auto && !self.matrix.is_constant && !self.kept.renewed
+        self.settings.method == Method::Auto && !self.matrix.is_constant && self.kept.renewed == 0
     }
 
     /// Begins the step with slow corrections where they are cheaper than another matrix.
@@ -85,19 +85,25 @@ impl Newton<'_> {
         let n_points: usize = called.map(|(_, group)| group.kinematics.n_points()).sum();
         let n = self.places.boundary.len() as f64;
         let is_dear = self.domain.is_some() && n * n * n > DEAR * n_points as f64;
-        self.kept.may_be_slow = is_dear && self.matrix.held;
+        let is_auto = self.settings.method == Method::Auto;
+        self.kept.may_be_slow = is_dear && is_auto && !self.matrix.is_constant;
     }
 
-    /// Whether corrections with the matrix of an earlier step may be slow.
+    /// Whether corrections with the present matrix may be slow.
     pub(super) fn is_slow(&self) -> bool {
-        self.kept.may_be_slow && self.is_stale()
+        self.kept.may_be_slow && self.kept.renewed <= 1
     }
 
-    /// Whether slow corrections have had their chance: by the progress of the last ones it takes more than another
-    /// matrix is worth, or they are half of all iterations that a step may take.
-    pub(super) fn is_too_slow(&self, iterations: &[Iteration]) -> bool {
+    /// Whether corrections come from a matrix that is kept though another could be had.
+    pub(super) fn keeps(&self) -> bool {
+        self.is_stale() || self.is_slow()
+    }
+
+    /// Whether slow corrections have had their chance: by the progress of the last ones `since` the present matrix is
+    /// there it takes more than another one is worth, or they are half of all iterations that a step may take.
+    pub(super) fn is_too_slow(&self, iterations: &[Iteration], since: usize) -> bool {
         let is_half = 2 * iterations.len() > self.settings.max_iterations();
-        let Some([before, .., last]) = iterations.last_chunk::<{ LAST + 1 }>() else {
+        let Some([before, .., last]) = iterations[since..].last_chunk::<{ LAST + 1 }>() else {
             return is_half;
         };
         let progress = (before.residual / last.residual).ln() / LAST as f64;
@@ -115,7 +121,7 @@ impl Newton<'_> {
                         self.kept.contraction > FAST[usize::from(self.domain.is_none())]
                     }
                     Method::Newton => true,
-                    Method::ModifiedNewton => !self.kept.renewed,
+                    Method::ModifiedNewton => self.kept.renewed == 0,
                     Method::InitialStress => false,
                     Method::QuasiNewton => self.kept.stalls,
                 }
@@ -147,7 +153,7 @@ impl Newton<'_> {
         }
         self.factorise_tangents()?;
         self.matrix.hold();
-        self.kept.renewed = true;
+        self.kept.renewed += 1;
         self.kept.stalls = false;
         Ok(true)
     }

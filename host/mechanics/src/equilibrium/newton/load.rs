@@ -31,7 +31,7 @@ pub(super) struct LoadControl {
     /// Displacement increments to start from; the tangent at the start predicts them if there are
     /// none.
     guess: Option<Vec<f64>>,
-    /// With a quasi-Newton matrix, and with that of an earlier step as long as slow corrections do.
+    /// With a quasi-Newton matrix, and with others as long as slow corrections do.
     acceleration: Option<Acceleration>,
     pub(super) relaxation: Relaxation,
     pub(super) creep: Creep,
@@ -291,7 +291,7 @@ impl LoadControl {
     ) -> Result<State, StepFailure> {
         if let Some(acceleration) = &self.acceleration {
             newton.kept.stalls = if newton.is_slow() {
-                newton.is_too_slow(iterations)
+                newton.is_too_slow(iterations, acceleration.begins())
             } else {
                 acceleration.stalls(iterations)
             };
@@ -302,8 +302,9 @@ impl LoadControl {
             // What moves with another matrix achieved says nothing of this one.
             let here = iterations.len() - 1;
             let is_quasi = newton.settings.method == Method::QuasiNewton;
-            self.acceleration = is_quasi.then(|| Acceleration::since(here));
-            if !is_quasi {
+            let goes_on = is_quasi || newton.is_slow();
+            self.acceleration = goes_on.then(|| Acceleration::since(here));
+            if !goes_on {
                 self.relaxation.starts_at(here);
                 self.creep.starts_at(here);
             }

@@ -72,7 +72,7 @@ impl Newton<'_> {
 
     /// Which bodies are in equilibrium after an iteration.
     pub(super) fn in_equilibrium(&self, balance: &Balance, last: &Iteration) -> Vec<bool> {
-        let criteria = self.criteria(last.correction.is_some() && self.is_stale());
+        let criteria = self.criteria(last.correction.is_some() && self.keeps());
         let is_whole =
             last.correction.is_some() && last.step_length >= 1.0 && last.viscosity <= 0.0;
         let bodies = self.measures(balance, is_whole).into_iter();
