@@ -7,7 +7,7 @@
 )]
 
 use super::Kind;
-use super::kernels::{dot, packed};
+use super::kernels::{dot, dots, packed};
 use pulp::{Simd, WithSimd};
 
 /// Columns that are taken at a time.
@@ -84,11 +84,25 @@ impl WithSimd for Up<'_> {
         let n = k + self.below.len();
         match self.kind {
             Kind::Symmetric => {
-                for j in (0..k).rev() {
-                    let column = &self.values[packed(n, j)..packed(n, j + 1)];
-                    let from_below = dot(&column[k - j..], self.below);
-                    let from_own = dot(&column[1..k - j], &self.own[j + 1..]);
-                    self.own[j] = (self.own[j] - from_below - from_own) / column[0];
+                let mut end = k;
+                while end > 0 {
+                    let start = end - WIDTH.min(end);
+                    let column = |j: usize| &self.values[packed(n, j)..packed(n, j + 1)];
+                    let below = |j: usize| &column(j)[k - j..];
+                    let mut from_below = [0.0; WIDTH];
+                    if end - start == WIDTH {
+                        from_below = dots([0, 1, 2, 3].map(|c| below(start + c)), self.below);
+                    } else {
+                        for (from_below, j) in from_below.iter_mut().zip(start..end) {
+                            *from_below = dot(below(j), self.below);
+                        }
+                    }
+                    for j in (start..end).rev() {
+                        let from_own = dot(&column(j)[1..k - j], &self.own[j + 1..]);
+                        let left = self.own[j] - from_below[j - start] - from_own;
+                        self.own[j] = left / column(j)[0];
+                    }
+                    end = start;
                 }
             }
             Kind::Unsymmetric => {

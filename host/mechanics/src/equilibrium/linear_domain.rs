@@ -370,7 +370,10 @@ impl LinearDomain {
                 *right += at_end[dof] - at_start[dof];
             }
         }
-        let (y, left) = self.factors.forward(&right, None);
+        // Loads that stay as they are, or act in few places, leave most of it nothing to eliminate.
+        let loaded: Vec<bool> = right.iter().map(|value| value.abs() > 0.0).collect();
+        let fronts = self.factors.fronts_of(&loaded);
+        let (y, left) = self.factors.forward(&right, Some(&fronts));
         self.y = y;
         self.condensed = match &mut self.aside {
             Some(aside) => aside.condense(self.factors.schur(), &left, &prescribed),
