@@ -46,6 +46,16 @@ struct Since {
     latest: Option<Vec<f64>>,
 }
 
+impl Since {
+    /// The largest of them.
+    fn largest(&self) -> f64 {
+        let each = self.complete.iter().chain(&self.latest);
+        each.fold(0.0, |most: f64, increment| {
+            most.max(algebra::largest(increment))
+        })
+    }
+}
+
 /// A state to be reached.
 #[derive(Debug)]
 pub(super) struct Goal<'g> {
@@ -208,9 +218,9 @@ impl LinearDomain {
             if relative <= REFINED * goal.tolerance {
                 break (0.0, internal);
             }
-            // What rounding leaves no correction takes away.
-            let is_rounding = relative * scale <= self.rounded();
-            if relative <= goal.tolerance && (before.is_finite() || is_rounding) {
+            // Substitution leaves as much of the best of factors; more than that is corrected, within the tolerance or not.
+            let is_solved = relative * scale <= f64::EPSILON * self.diagonal * since.largest();
+            if relative <= goal.tolerance && (before.is_finite() || is_solved) {
                 break (0.0, internal);
             }
             // A residual that no longer falls has come down to round-off.
