@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Elements that one thread takes at a time.
 pub(super) const PIECE: usize = 256;
 /// Pieces that are computed before their matrices are added up.
-const ROUND: usize = 16;
+const ROUND: usize = 4;
 /// Parts of the columns that are added up at the same time.
 const PARTS: usize = 4;
 
@@ -60,9 +60,10 @@ impl System {
     pub fn assemble(&self, groups: &[Group], values: &mut Vec<f64>) {
         values.clear();
         values.resize(self.pattern.rows.len(), 0.0);
+        let mut pieces: Vec<Piece> = (0..ROUND).map(|_| Piece::default()).collect();
         for (group, maps) in groups.iter().zip(&self.elements) {
             for (round, maps) in maps.chunks(ROUND * PIECE).enumerate() {
-                let mut pieces: Vec<Piece> = maps.chunks(PIECE).map(|_| Piece::default()).collect();
+                pieces.iter_mut().for_each(|piece| piece.matrices.clear());
                 renew(group, ROUND * PIECE * round, maps, &mut pieces);
                 let parts = self.parts(values, &mut []);
                 each(parts, maps.len() > PIECE, |mut part| {
