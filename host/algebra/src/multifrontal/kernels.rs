@@ -35,28 +35,6 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// Products of four vectors with another one, each the same to the bit as [`dot`].
-#[inline]
-pub(super) fn dots(of: [&[f64]; 4], b: &[f64]) -> [f64; 4] {
-    let (eights, rest) = b.as_chunks::<8>();
-    let of = of.map(|a| a[..b.len()].as_chunks::<8>());
-    let [p, q, r, s] = of.map(|(a, _)| &a[..eights.len()]);
-    let mut sums = [[0.0; 8]; 4];
-    for (at, b) in eights.iter().enumerate() {
-        for (sums, a) in sums.iter_mut().zip([&p[at], &q[at], &r[at], &s[at]]) {
-            for i in 0..8 {
-                sums[i] += a[i] * b[i];
-            }
-        }
-    }
-    let mut next = of.iter();
-    sums.map(|sums| {
-        let of_rest = next.next().map_or(&[][..], |(_, rest)| *rest);
-        let of_rest: f64 = of_rest.iter().zip(rest).map(|(a, b)| a * b).sum();
-        sums.iter().sum::<f64>() + of_rest
-    })
-}
-
 /// Where column j of a packed L of n rows starts.
 pub(super) fn packed(n: usize, j: usize) -> usize {
     j * (2 * n + 1 - j) / 2

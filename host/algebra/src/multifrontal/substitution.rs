@@ -7,7 +7,7 @@
 )]
 
 use super::Kind;
-use super::kernels::{dot, dots, packed};
+use super::kernels::{dot, packed};
 use pulp::{Simd, WithSimd};
 
 /// Columns that are taken at a time.
@@ -112,6 +112,28 @@ impl WithSimd for Up<'_> {
             }
         }
     }
+}
+
+/// Products of four vectors with another one, each the same to the bit as [`dot`].
+#[inline(always)]
+fn dots(of: [&[f64]; WIDTH], b: &[f64]) -> [f64; WIDTH] {
+    let (eights, rest) = b.as_chunks::<8>();
+    let of = of.map(|a| a[..b.len()].as_chunks::<8>());
+    let [p, q, r, s] = of.map(|(a, _)| &a[..eights.len()]);
+    let mut sums = [[0.0; 8]; WIDTH];
+    for (at, b) in eights.iter().enumerate() {
+        for (sums, a) in sums.iter_mut().zip([&p[at], &q[at], &r[at], &s[at]]) {
+            for i in 0..8 {
+                sums[i] += a[i] * b[i];
+            }
+        }
+    }
+    let mut next = of.iter();
+    sums.map(|sums| {
+        let of_rest = next.next().map_or(&[][..], |(_, rest)| *rest);
+        let of_rest: f64 = of_rest.iter().zip(rest).map(|(a, b)| a * b).sum();
+        sums.iter().sum::<f64>() + of_rest
+    })
 }
 
 /// own -= U below, U by columns.
