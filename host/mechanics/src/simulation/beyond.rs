@@ -68,20 +68,29 @@ impl Beyond {
     fn strains(&mut self, analysis: Analysis, groups: &[Group]) {
         let (mut area, mut strained) = (0.0, 0.0);
         let mut largest = (0.0, "", [0.0; 2]);
-        for group in groups
+        // The largest principal strain, whatever the axes.
+        let principal = |e: &[f64]| {
+            let (mean, radius) = (
+                f64::midpoint(e[0], e[1]),
+                f64::hypot((e[0] - e[1]) / 2.0, e[3] / 2.0),
+            );
+            (mean.abs() + radius).max(e[2].abs())
+        };
+        let solids = groups
             .iter()
-            .filter(|g| g.formulation == Formulation::Solid)
-        {
-            let strains = group.strain.committed.chunks_exact(4);
-            for (point, e) in strains.enumerate() {
+            .filter(|g| g.formulation == Formulation::Solid);
+        let of_group = |group: &Group| {
+            let mut strains = group.strain.committed.chunks_exact(4);
+            strains.any(|e| principal(e) > LARGE)
+        };
+        if !solids.clone().any(of_group) {
+            return;
+        }
+        for group in solids {
+            for (point, e) in group.strain.committed.chunks_exact(4).enumerate() {
                 let position = group.kinematics.position(point);
                 let own = group.kinematics.weight(point) / depth(analysis, position[0]);
-                // The largest principal strain, whatever the axes.
-                let (mean, radius) = (
-                    f64::midpoint(e[0], e[1]),
-                    f64::hypot((e[0] - e[1]) / 2.0, e[3] / 2.0),
-                );
-                let strain = (mean.abs() + radius).max(e[2].abs());
+                let strain = principal(e);
                 area += own;
                 if strain > LARGE {
                     strained += own;

@@ -5,6 +5,7 @@ use super::history::History;
 use super::state::PhaseCourse;
 use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
 use crate::assembly::{Bodies, Places, System, fold};
+use crate::element::Kinematics;
 use crate::equilibrium::{Costs, Held, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
 use crate::error::Error;
 use crate::group::Group;
@@ -443,8 +444,18 @@ impl Simulation {
     }
 }
 
+/// Elements that mostly show what is true of all.
+const FEW: usize = 16;
+
 /// Whether a rotation of all nodes about one of them is no strain in a group's elements.
 pub(super) fn turns_freely(group: &Group, nodes: &[[f64; 2]]) -> bool {
+    let first: Vec<usize> = (0..group.kinematics.n_elements().min(FEW)).collect();
+    let first = group.kinematics.only(&first);
+    first.is_none_or(|first| turn_freely(first.as_ref(), nodes))
+        && turn_freely(group.kinematics.as_ref(), nodes)
+}
+
+fn turn_freely(elements: &dyn Kinematics, nodes: &[[f64; 2]]) -> bool {
     let Some(&[x, y]) = nodes.first() else {
         return true;
     };
@@ -454,8 +465,8 @@ pub(super) fn turns_freely(group: &Group, nodes: &[[f64; 2]]) -> bool {
             [turn[0] * x + turn[1] * y, turn[2] * x + turn[3] * y]
         };
         let displacement: Vec<f64> = nodes.iter().flat_map(moved).collect();
-        let mut strains = vec![0.0; group.strain.committed.len()];
-        group.kinematics.add_gradients(&displacement, &mut strains);
+        let mut strains = vec![0.0; elements.n_components() * elements.n_points()];
+        elements.add_gradients(&displacement, &mut strains);
         strains
             .iter()
             .fold(0.0, |largest: f64, e| largest.max(e.abs()))

@@ -4,6 +4,7 @@
 use super::{PointQuantity, Probe, Probes};
 use crate::wanted::Reduce;
 use mechanics::group::Group;
+use mechanics::problem::Formulation;
 use mechanics::simulation::Snapshot;
 
 /// Strains, and displacements as shares of the mesh's extent, below this are held against it: where nothing moves, all that
@@ -50,6 +51,12 @@ impl Sizes {
         for group in snapshot.groups.iter().filter(|group| group.is_active) {
             let force: f64 = group.forces(n_dofs).iter().map(|force| force.abs()).sum();
             sizes.force = sizes.force.max(force);
+            if group.formulation == Formulation::Solid {
+                // Solids have no axes of their own.
+                raise(&mut sizes.stress, &group.stress.committed);
+                raise(&mut sizes.strain, &group.strain.committed);
+                continue;
+            }
             for point in 0..group.kinematics.n_points() {
                 if let Some(stress) = group.global_stress(point) {
                     raise(&mut sizes.stress, &stress);
