@@ -15,6 +15,7 @@ mod linear;
 mod multifrontal;
 mod order;
 mod pattern;
+mod product;
 pub mod threads;
 
 pub use dense::{Factors, largest};
@@ -22,3 +23,4 @@ pub use linear::{Block, Dense, LinearSolver, Singular};
 pub use multifrontal::{Gathered, Kind, Multifrontal};
 pub use order::mesh_lines;
 pub use pattern::Pattern;
+pub use product::add_product;

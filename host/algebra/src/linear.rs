@@ -3,6 +3,7 @@
 use crate::Pattern;
 use crate::dense::{self, Exchanges, largest};
 use crate::multifrontal::{Before, Kind, Multifrontal};
+use crate::product::{add_product, add_symmetric_product};
 use crate::threads;
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
@@ -23,6 +24,8 @@ pub enum Dense {
     SchurOf(Arc<Multifrontal>),
     /// These values.
     Of(Arc<Vec<f64>>),
+    /// These values of a symmetric matrix.
+    Symmetric(Arc<Vec<f64>>),
 }
 
 impl Dense {
@@ -30,7 +33,21 @@ impl Dense {
     pub fn values(&self) -> &[f64] {
         match self {
             Self::SchurOf(factors) => factors.schur(),
-            Self::Of(values) => values,
+            Self::Of(values) | Self::Symmetric(values) => values,
+        }
+    }
+
+    /// to += K u.
+    pub fn add_product(&self, u: &[f64], to: &mut [f64]) {
+        let is_symmetric = match self {
+            Self::SchurOf(factors) => factors.is_symmetric(),
+            Self::Of(_) => false,
+            Self::Symmetric(_) => true,
+        };
+        if is_symmetric {
+            add_symmetric_product(self.values(), u, to);
+        } else {
+            add_product(self.values().chunks_exact(u.len().max(1)), u, to);
         }
     }
 }
@@ -373,13 +390,9 @@ impl LinearSolver {
         let mut residual: Vec<f64> = both.map(|(right, product)| right - product).collect();
         if let Some(block) = &self.block {
             let at = block.equations.iter();
-            let n = block.equations.len().max(1);
-            let mut product = vec![0.0; n];
-            for (&column, values) in at.clone().zip(block.values().chunks_exact(n)) {
-                for (sum, value) in product.iter_mut().zip(values) {
-                    *sum += value * x[column];
-                }
-            }
+            let own: Vec<f64> = at.clone().map(|&column| x[column]).collect();
+            let mut product = vec![0.0; own.len()];
+            block.matrix.add_product(&own, &mut product);
             for (&row, product) in at.zip(product) {
                 residual[row] -= product;
             }

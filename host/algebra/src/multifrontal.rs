@@ -122,6 +122,11 @@ impl Multifrontal {
         self.computed as f64 / self.fronts.len().max(1) as f64
     }
 
+    /// Whether the matrix is symmetric, and so its Schur complement.
+    pub fn is_symmetric(&self) -> bool {
+        self.analysis.kind == Kind::Symmetric
+    }
+
     /// Kept equations, in the order of the Schur complement.
     pub fn kept(&self) -> &[u32] {
         &self.analysis.kept

@@ -22,7 +22,6 @@
 mod aside;
 mod excerpt;
 mod part;
-mod product;
 mod reuse;
 
 pub use reuse::Reuse;
@@ -35,7 +34,6 @@ use aside::Aside;
 pub use aside::Held;
 use excerpt::Ahead;
 use part::{Goal, Part};
-use product::add_product;
 use reuse::{Condensed, Numbered, Setup};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -210,6 +208,15 @@ fn pays(
     n_interior > n_others && n_boundary as f64 <= dense
 }
 
+/// Puts what stands below the diagonal of n columns above it, too.
+fn mirror(matrix: &mut [f64], n: usize) {
+    for column in 1..n {
+        for row in 0..column {
+            matrix[column * n + row] = matrix[row * n + column];
+        }
+    }
+}
+
 impl LinearDomain {
     /// Condenses those of the groups that are to be `condensed`, all of them linear, of a mesh whose nodes lie
     /// on these lines. `None` if there are none, or if it does not pay and is not wanted `always`.
@@ -312,12 +319,17 @@ impl LinearDomain {
         let mut stiffness = Dense::SchurOf(Arc::clone(&factors));
         let mut aside = None;
         if of_kept.len() != rest.boundary().len() {
-            let (found, own) = Aside::new(factors.schur(), &of_kept, prescribed, rest)?;
+            let (found, mut own) = Aside::new(factors.schur(), &of_kept, prescribed, rest)?;
             for (&equation, dof) in factors.kept().iter().zip(&of_kept) {
                 kept[equation as usize] = rest.boundary().binary_search(dof).is_ok();
                 is_held[equation as usize] = prescribed[*dof];
             }
-            stiffness = Dense::Of(Arc::new(own));
+            stiffness = if factors.is_symmetric() {
+                mirror(&mut own, rest.boundary().len());
+                Dense::Symmetric(Arc::new(own))
+            } else {
+                Dense::Of(Arc::new(own))
+            };
             aside = Some(found);
         }
         Ok(Self {
@@ -451,8 +463,7 @@ impl LinearDomain {
 
     /// forces += S u.
     pub fn add_product(&self, displacement: &[f64], forces: &mut [f64]) {
-        let columns = self.stiffness().chunks_exact(self.boundary.len().max(1));
-        add_product(columns, displacement, forces);
+        self.stiffness.add_product(displacement, forces);
     }
 
     /// The boundary has moved by these increments, in the order of the system's boundary.

@@ -13,9 +13,9 @@
 //!
 //! and Δu_f = Δλ t_f + T Δu_b.
 
-use super::product::add_product;
 use crate::assembly::System;
 use crate::group::Group;
+use algebra::add_product;
 use algebra::{Factors, Singular};
 
 /// They are kept if they are at most this fraction of the unknowns where condensed groups and others meet: all
