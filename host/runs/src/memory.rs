@@ -17,6 +17,8 @@ use std::time::Duration;
 
 /// The last words take less than this.
 const RESERVE: usize = 4 << 20;
+/// Bytes of the largest piece that is kept once it is given back: what glibc keeps at most, with its own.
+const LARGEST_KEPT: usize = (32 << 20) - (1 << 16);
 /// Exit code: the limit is the user's to raise.
 const CODE: u8 = 1;
 
@@ -67,10 +69,28 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Sets aside what the last words are said in.
+/// Sets aside what the last words are said in, and lets freed memory be used again.
 pub fn reserve() {
+    keep_freed();
     if let Ok(mut held) = HELD.lock() {
         *held = Vec::with_capacity(RESERVE);
+    }
+}
+
+/// Lets the system's allocator keep large pieces that are given back, for the next ones: memory that is new is
+/// given by the kernel page by page. glibc does so for pieces that are no larger than the largest one that was
+/// ever given back, up to 32 MB (`mallopt(3)`, `M_MMAP_THRESHOLD`); other allocators are not bothered by it.
+fn keep_freed() {
+    let Ok(layout) = Layout::array::<u8>(LARGEST_KEPT) else {
+        return;
+    };
+    // SAFETY: the layout is not empty. What is given back is what was given, with the same layout; nobody else
+    // has seen it, and nothing was written to it.
+    unsafe {
+        let piece = std::hint::black_box(System.alloc(layout));
+        if !piece.is_null() {
+            System.dealloc(piece, layout);
+        }
     }
 }
 

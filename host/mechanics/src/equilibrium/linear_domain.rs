@@ -366,9 +366,30 @@ impl LinearDomain {
         self.stiffness.values()
     }
 
-    /// Sets up a phase that starts from the groups' committed state and these displacements.
-    pub fn start(&mut self, groups: &[Group], loads: &Loads, displacement: &[f64]) {
-        let n_dofs = self.system.n_dofs();
+    /// Nodal forces of its groups in their committed state, by degree of freedom: those of ties where they arise.
+    pub fn internal_forces(&self, groups: &[Group]) -> Vec<f64> {
+        let mut internal = vec![0.0; self.system.n_dofs()];
+        let numbered = groups.iter().enumerate();
+        for (_, group) in numbered.filter(|(number, _)| self.includes(*number)) {
+            group.kinematics.add_forces(&group.carried(), &mut internal);
+        }
+        internal
+    }
+
+    /// Whether a group is one of its own.
+    pub fn includes(&self, group: usize) -> bool {
+        self.system.includes(group)
+    }
+
+    /// Sets up a phase that starts from the groups' committed state, with these
+    /// [internal forces](Self::internal_forces), and these displacements.
+    pub fn start(
+        &mut self,
+        groups: &[Group],
+        mut internal: Vec<f64>,
+        loads: &Loads,
+        displacement: &[f64],
+    ) {
         let prescribed = loads.prescribed_rate();
         let mut right = vec![0.0; self.system.n_equations()];
         self.system
@@ -391,19 +412,14 @@ impl LinearDomain {
             Some(aside) => aside.condense(self.factors.schur(), &left, &prescribed),
             None => left,
         };
-        let mut internal = vec![0.0; n_dofs];
-        for (number, group) in groups.iter().enumerate() {
-            if self.system.includes(number) {
-                group.kinematics.add_forces(&group.carried(), &mut internal);
-            }
-        }
         self.system.fold(&mut internal);
         self.is_complete(loads.leg[0], displacement, &internal);
     }
 
     /// As [`Self::start`], within a phase.
     pub fn restart(&mut self, groups: &[Group], loads: &Loads, standing: &Standing) {
-        self.start(groups, loads, &standing.complete.displacement);
+        let internal = self.internal_forces(groups);
+        self.start(groups, internal, loads, &standing.complete.displacement);
         self.standing = standing.clone();
     }
 

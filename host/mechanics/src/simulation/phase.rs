@@ -285,15 +285,21 @@ impl Simulation {
         self.reuse.announce(bytes, "factorising the equations");
         let of_domain = domain.iter().flat_map(LinearDomain::unknowns);
         let unknowns = among_both(system.free(), of_domain, system.n_dofs());
+        let standing = course.and_then(|course| course.domain.as_ref());
+        let begins = domain.as_ref().filter(|_| standing.is_none());
+        let internal = begins.map(|domain| domain.internal_forces(&self.groups));
         let out_of_balance = match course {
             Some(course) => course.record.out_of_balance,
-            None => self.out_of_balance(&unknowns, &mut loads),
+            None => {
+                let beside = domain.as_ref().zip(internal.as_deref());
+                self.out_of_balance(&unknowns, beside, &mut loads)
+            }
         };
-        let standing = course.and_then(|course| course.domain.as_ref());
         if let Some(domain) = &mut domain {
-            match standing {
-                Some(standing) => domain.restart(&self.groups, &loads, standing),
-                None => domain.start(&self.groups, &loads, &self.displacement),
+            if let Some(standing) = standing {
+                domain.restart(&self.groups, &loads, standing);
+            } else if let Some(internal) = internal {
+                domain.start(&self.groups, internal, &loads, &self.displacement);
             }
         }
         let bodies = Bodies::new(
@@ -399,11 +405,23 @@ impl Simulation {
     /// Internal less external forces at the start of a phase where nothing holds them (after a
     /// swap of laws, a support given up, an initial stress, ground removed). Returns the size, relative to
     /// the forces in play, of those that nobody asked for: without what ground that is removed carried.
-    fn out_of_balance(&mut self, unknowns: &[usize], loads: &mut Loads) -> f64 {
+    /// Internal forces of a domain `beside` the equations are known.
+    fn out_of_balance(
+        &mut self,
+        unknowns: &[usize],
+        beside: Option<(&LinearDomain, &[f64])>,
+        loads: &mut Loads,
+    ) -> f64 {
         let n_dofs = self.displacement.len();
-        let mut internal = vec![0.0; n_dofs];
-        for group in self.groups.iter().filter(|group| group.is_active) {
-            group.kinematics.add_forces(&group.carried(), &mut internal);
+        let mut internal = match beside {
+            Some((_, of_domain)) => of_domain.to_vec(),
+            None => vec![0.0; n_dofs],
+        };
+        for (number, group) in self.groups.iter().enumerate() {
+            let is_known = beside.is_some_and(|(domain, _)| domain.includes(number));
+            if group.is_active && !is_known {
+                group.kinematics.add_forces(&group.carried(), &mut internal);
+            }
         }
         fold(&self.tied, &mut internal);
         let mut released = self.released.clone();

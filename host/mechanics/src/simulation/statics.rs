@@ -107,8 +107,19 @@ pub(super) fn complaint(
     bound: Bound,
 ) -> Option<Imbalance> {
     let mut balance = Balance::default();
+    let components: &[usize] = match (model.analysis, model.turns_freely) {
+        // Radial forces balance those around the circumference.
+        (Analysis::Axisymmetric, _) => &[1],
+        (_, true) => &[0, 1, 2],
+        (_, false) => &[0, 1],
+    };
     let n = model.nodes.len().max(1) as f64;
-    let middle = [0, 1].map(|c| model.nodes.iter().map(|node| node[c]).sum::<f64>() / n);
+    // Moments are counted about it.
+    let middle = if components.contains(&2) {
+        [0, 1].map(|c| model.nodes.iter().map(|node| node[c]).sum::<f64>() / n)
+    } else {
+        [0.0; 2]
+    };
     let mut add = |(dof, force): (usize, f64), is_prescribed| {
         let node = model.nodes[dof / 2];
         let at = [node[0] - middle[0], node[1] - middle[1]];
@@ -116,12 +127,6 @@ pub(super) fn complaint(
     };
     supports.for_each(|support| add(support, true));
     unknowns.for_each(|unknown| add(unknown, false));
-    let components: &[usize] = match (model.analysis, model.turns_freely) {
-        // Radial forces balance those around the circumference.
-        (Analysis::Axisymmetric, _) => &[1],
-        (_, true) => &[0, 1, 2],
-        (_, false) => &[0, 1],
-    };
     balance.complaint(components, bound)
 }
 

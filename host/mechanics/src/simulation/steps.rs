@@ -194,7 +194,9 @@ impl Simulation {
         if self.next_leg(phase.number, &mut phase.course)
             && let Some(domain) = &mut phase.equations.domain
         {
-            domain.start(&self.groups, &phase.course.loads, &self.displacement);
+            let internal = domain.internal_forces(&self.groups);
+            let loads = &phase.course.loads;
+            domain.start(&self.groups, internal, loads, &self.displacement);
         }
         Ok(())
     }
