@@ -225,7 +225,7 @@ impl Probe {
                 // Weight and pore water act within the elements; the rest comes from others.
                 let (acting, problem) = (snapshot.acting, snapshot.problem);
                 let within = acting.in_bodies(problem, (number, group), elements.as_deref());
-                for (force, within) in forces.iter_mut().zip(within) {
+                for (force, within) in forces.iter_mut().zip(within.unwrap_or_default()) {
                     *force -= within;
                 }
                 fold(snapshot.ties, &mut forces);

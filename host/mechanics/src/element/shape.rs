@@ -43,7 +43,7 @@ impl<const N: usize> Reference<N> {
 const STRAIGHT: f64 = 1e-12;
 
 /// An integration point of the reference element.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RulePoint {
     pub(super) at: [f64; 2],
     /// Its weight is the product.

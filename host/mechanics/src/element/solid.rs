@@ -89,6 +89,7 @@ impl<const N: usize> Solid<N> {
         let mut lengths = Vec::with_capacity(nodes.len());
         let mut volumes = Vec::with_capacity(nodes.len());
         let mut has_linear_volume = false;
+        let n_elements = nodes.len();
         for (element, nodes) in nodes.iter().enumerate() {
             let places = nodes.map(|n| coordinates[n]);
             let bad = BadShape { element };
@@ -114,7 +115,11 @@ impl<const N: usize> Solid<N> {
                 (reference.exact)()
             };
             let fine = at(&exact).ok_or(bad)?;
-            let mut own = at(&rule).ok_or(bad)?;
+            let mut own = if rule == exact {
+                fine.clone()
+            } else {
+                at(&rule).ok_or(bad)?
+            };
             match strains {
                 Strains::AtPoints => {}
                 Strains::LinearVolume => has_linear_volume = true,
@@ -146,6 +151,9 @@ impl<const N: usize> Solid<N> {
             };
             volumes.push(std::array::from_fn(volume));
             points_per_element = own.len();
+            if element == 0 {
+                points.reserve_exact(n_elements * own.len());
+            }
             points.extend(own);
             lengths.push((reference.area)(&places).sqrt());
         }

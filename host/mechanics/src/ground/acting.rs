@@ -68,16 +68,19 @@ impl Acting {
     }
 
     /// Nodal forces of weight and pore water in group `number`, or in some of its elements, by degree of
-    /// freedom. What its stresses leave beside them comes from others.
+    /// freedom; `None` if there is neither. What its stresses leave beside them comes from others.
     pub fn in_bodies(
         &self,
         problem: &Problem,
         (number, group): (usize, &Group),
         elements: Option<&[usize]>,
-    ) -> Vec<f64> {
-        self.forces(problem, |loading, force| {
+    ) -> Option<Vec<f64>> {
+        let loadings = self.parts().into_iter().map(|(loading, _)| loading);
+        let mut acting = loadings.filter(|loading| loading.acts_in(number, problem));
+        acting.next()?;
+        Some(self.forces(problem, |loading, force| {
             loading.add_bodies(problem, (number, group), elements, force);
-        })
+        }))
     }
 
     /// Nodal forces of what acts on lines and, as water, on the outline, by degree of freedom, kN.

@@ -219,6 +219,12 @@ impl Loading {
         }
     }
 
+    /// Whether there may be weight or pore water in a group.
+    pub(super) fn acts_in(&self, number: usize, problem: &Problem) -> bool {
+        let weighs = self.unit_weight[number].iter().any(|weight| *weight != 0.0);
+        weighs || (problem.groups[number].pore_water && self.water(problem).is_some())
+    }
+
     /// Adds the nodal forces of weight and pore water in a group, or in some of its elements.
     pub(super) fn add_bodies(
         &self,
