@@ -20,13 +20,12 @@ pub struct Pattern {
 impl Pattern {
     /// Entries on the diagonal of a matrix of these values; zero where there is none.
     pub fn diagonal(&self, values: &[f64]) -> Vec<f64> {
-        let columns = self.column_start.windows(2).enumerate();
-        let of_column = |(column, own): (usize, &[u32])| {
-            let mut own = own[0] as usize..own[1] as usize;
-            let place = own.find(|&place| self.rows[place] as usize == column);
-            place.map_or(0.0, |place| values[place])
+        let of_column = |column: usize| {
+            let own = self.places(column);
+            let place = self.rows[own.clone()].binary_search(&(column as u32));
+            place.map_or(0.0, |place| values[own.start + place])
         };
-        columns.map(of_column).collect()
+        (0..self.n()).map(of_column).collect()
     }
 
     /// Pattern of `n` equations whose elements couple all of their own: of every element its degrees of
