@@ -63,7 +63,9 @@ impl System {
         let mut pieces: Vec<Piece> = (0..ROUND).map(|_| Piece::default()).collect();
         for (group, maps) in groups.iter().zip(&self.elements) {
             for (round, maps) in maps.chunks(ROUND * PIECE).enumerate() {
-                pieces.iter_mut().for_each(|piece| piece.matrices.clear());
+                for piece in &mut pieces {
+                    piece.matrices.clear();
+                }
                 renew(group, ROUND * PIECE * round, maps, &mut pieces);
                 let parts = self.parts(values, &mut []);
                 each(parts, maps.len() > PIECE, |mut part| {

@@ -288,12 +288,11 @@ impl Simulation {
         let standing = course.and_then(|course| course.domain.as_ref());
         let begins = domain.as_ref().filter(|_| standing.is_none());
         let internal = begins.map(|domain| domain.internal_forces(&self.groups));
-        let out_of_balance = match course {
-            Some(course) => course.record.out_of_balance,
-            None => {
-                let beside = domain.as_ref().zip(internal.as_deref());
-                self.out_of_balance(&unknowns, beside, &mut loads)
-            }
+        let out_of_balance = if let Some(course) = course {
+            course.record.out_of_balance
+        } else {
+            let beside = domain.as_ref().zip(internal.as_deref());
+            self.out_of_balance(&unknowns, beside, &mut loads)
         };
         if let Some(domain) = &mut domain {
             if let Some(standing) = standing {
