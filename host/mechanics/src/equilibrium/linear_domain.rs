@@ -90,8 +90,9 @@ pub struct LinearDomain {
     pub largest: f64,
     /// Largest entry of its matrix before it was condensed.
     pub stiffest: f64,
-    /// 2-norm of that one's diagonal.
+    /// 2-norm of that one's diagonal, and of what stands there for unknowns that are kept.
     diagonal: f64,
+    diagonal_kept: f64,
     /// Degrees of freedom of the boundary, in the order of its stiffness.
     boundary: Vec<usize>,
     /// Of every unknown, whether it is one of them.
@@ -275,7 +276,12 @@ impl LinearDomain {
         system.assemble(groups, &mut values);
         let stiffest = algebra::largest(&values);
         let pattern = system.forget_matrix();
-        let diagonal = norm(&pattern.diagonal(&values));
+        let mut diagonal = pattern.diagonal(&values);
+        let of_all = norm(&diagonal);
+        for (value, _) in diagonal.iter_mut().zip(&kept).filter(|(_, kept)| !**kept) {
+            *value = 0.0;
+        }
+        let diagonal = [of_all, norm(&diagonal)];
         let lines = system.lines(lines);
         let matrix = Matrix {
             kind,
@@ -310,7 +316,7 @@ impl LinearDomain {
             mut kept,
             factors,
             stiffest,
-            diagonal,
+            diagonal: [diagonal, diagonal_kept],
         } = numbered;
         let free = system.free();
         let of_kept = factors.kept().iter().map(|&e| free[e as usize]);
@@ -335,6 +341,7 @@ impl LinearDomain {
         Ok(Self {
             stiffest,
             diagonal,
+            diagonal_kept,
             largest: algebra::largest(stiffness.values()),
             standing: Standing::default(),
             part: None,
@@ -545,9 +552,23 @@ impl LinearDomain {
         let reached = self.settle(&whole, groups, &goal, displacement);
         self.whole = Some(whole);
         let (internal, _) = reached?;
+        let off = self.off_boundary(&internal, &goal);
+        if off > tolerance {
+            self.standing.round_off = self.standing.round_off.max(off);
+        }
         self.commit(groups, &all);
         self.is_complete(lambda, displacement, &internal);
         Ok(internal)
+    }
+
+    /// How far the forces of a complete state on the boundary are from those that the iterations saw, (2), relative to
+    /// the forces in play: what rounding of both leaves.
+    fn off_boundary(&self, internal: &[f64], goal: &Goal<'_>) -> f64 {
+        let of_groups = self.boundary.iter().map(|&dof| internal[dof]);
+        let seen = self.forces_at(goal.lambda);
+        let off: Vec<f64> = of_groups.zip(seen).map(|(a, b)| a - b).collect();
+        let scale = norm(internal).max(goal.loads.scale);
+        norm(&off) / scale.max(f64::MIN_POSITIVE)
     }
 
     fn commit(&self, groups: &mut [Group], which: &[bool]) {

@@ -5,17 +5,13 @@ use super::{LinearDomain, LookedAt, Origin, Standing};
 use crate::equilibrium::newton::{
     ACCEPTED_ROUND_OFF, DomainFailure, Loads, STILL_SMALL, last_bit_scattered, norm,
 };
-use crate::group::Group;
+use crate::group::{Committed, Group};
 use law::Operator;
 
 /// Corrections of a complete state, at most.
 const REFINEMENTS: usize = 3;
 /// A complete state whose residual is within this of the tolerance is not corrected at all.
 const REFINED: f64 = 0.1;
-
-/// Share of ε ‖diag K‖ u that a motion u leaves out of balance: 0.12 to 0.2 in six chambers; in one with a toe of
-/// tiny elements 0.4 before a correction, 0.1 after it.
-const ROUNDED: f64 = 0.2;
 
 /// Some groups of a domain, with what gives their displacements.
 #[derive(Debug)]
@@ -47,6 +43,14 @@ struct Since {
 }
 
 impl Since {
+    /// The same increments since both of them, as far as there are any.
+    fn with(&self, increment: Vec<f64>) -> Self {
+        Self {
+            complete: self.complete.is_some().then(|| increment.clone()),
+            latest: self.latest.is_some().then_some(increment),
+        }
+    }
+
     /// The largest of them.
     fn largest(&self) -> f64 {
         let each = self.complete.iter().chain(&self.latest);
@@ -70,11 +74,15 @@ impl Part {
     }
 }
 
+/// Share of ε ‖diag K_bb‖ u that rounding of a motion u of the boundary leaves of forces there: 0.35 to 0.5 in six chambers,
+/// up to 1.1 in those with a toe of tiny elements.
+const ROUNDED: f64 = 0.5;
+
 impl LinearDomain {
-    /// What rounding of the motion since the complete state leaves out of balance (2-norm), about.
+    /// What rounding of the motion since the complete state leaves of forces on the boundary (2-norm), about.
     pub(super) fn rounded(&self) -> f64 {
         let moved = algebra::largest(&self.standing.complete.moved);
-        ROUNDED * f64::EPSILON * self.diagonal * moved
+        ROUNDED * f64::EPSILON * self.diagonal_kept * moved
     }
 
     /// Whether a part is looked at, which is there from then on: not if it is all of the domain, or another
@@ -201,11 +209,45 @@ impl LinearDomain {
             complete: (!is_looked_at).then(|| increment(complete, part)),
             latest: (self.standing.part.as_ref()).map(|_| increment(latest, of_latest)),
         };
+        let mut committed = None;
+        let reached = self.balance(part, groups, goal, &mut since, &mut committed);
+        if reached.is_err() {
+            for (number, committed) in committed.into_iter().flatten() {
+                groups[number].restore_committed(committed);
+            }
+        }
+        let (relative, internal) = reached?;
+        let (origin, increment) = match (since.complete, since.latest) {
+            (None, Some(increment)) => (latest, increment),
+            (increment, _) => (complete, increment.ok_or(DomainFailure::NoState)?),
+        };
+        for &equation in &part.wanted {
+            let dof = self.system.free()[equation];
+            displacement[dof] = origin.displacement[dof] + increment[dof];
+        }
+        self.standing.round_off = self.standing.round_off.max(relative);
+        Ok((internal, increment))
+    }
+
+    /// Trial state of a part's groups in equilibrium with its goal, from a motion that corrections are added to: what is
+    /// left out of balance and had to be taken for round-off, relative, and internal forces. A correction counts from
+    /// the state that it corrects, since beside the whole motion it would be lost in rounding: then the state that was
+    /// `committed` before is handed out.
+    fn balance(
+        &self,
+        part: &Part,
+        groups: &mut [Group],
+        goal: &Goal<'_>,
+        total: &mut Since,
+        committed: &mut Option<Vec<(usize, Committed)>>,
+    ) -> Result<(f64, Vec<f64>), DomainFailure> {
         let free = self.system.free();
         let mut tries = 0..REFINEMENTS;
         let mut before = f64::INFINITY;
-        let (relative, internal) = loop {
-            let internal = self.evaluate(groups, &since, part)?;
+        let mut own: Option<Since> = None;
+        loop {
+            let since = own.as_ref().unwrap_or(total);
+            let internal = self.evaluate(groups, since, part)?;
             let left = |&equation: &usize| {
                 let dof = free[equation];
                 goal.loads.external_at(dof, goal.lambda) - internal[dof]
@@ -216,24 +258,24 @@ impl LinearDomain {
             let scale = scale.max(f64::MIN_POSITIVE);
             let relative = norm(&residual) / scale;
             if relative <= REFINED * goal.tolerance {
-                break (0.0, internal);
+                return Ok((0.0, internal));
             }
-            // Substitution leaves as much of the best of factors; more than that is corrected, within the tolerance or not.
+            // Substitution with the best of factors leaves as much; more is corrected, within the tolerance or not.
             let is_solved = relative * scale <= f64::EPSILON * self.diagonal * since.largest();
             if relative <= goal.tolerance && (before.is_finite() || is_solved) {
-                break (0.0, internal);
+                return Ok((0.0, internal));
             }
             // A residual that no longer falls has come down to round-off.
             if relative > 0.5 * before || tries.next().is_none() {
-                let last_bit = self.last_bit(part, groups, &since, &internal)? / scale;
+                let last_bit = self.last_bit(part, groups, (since, total), &internal)? / scale;
                 let is_round_off = relative <= ACCEPTED_ROUND_OFF * last_bit;
                 if is_round_off && relative <= STILL_SMALL {
-                    break (relative, internal);
+                    return Ok((relative, internal));
                 }
                 // All forces there are, are what rounding leaves of none: a body that was moved as
                 // a whole.
                 if is_round_off && ACCEPTED_ROUND_OFF * last_bit >= 1.0 {
-                    break (0.0, internal);
+                    return Ok((0.0, internal));
                 }
                 return Err(DomainFailure::Residual {
                     left: relative,
@@ -253,23 +295,25 @@ impl LinearDomain {
                 None => vec![0.0; left.len()],
             };
             let correction = self.factors.backward(&y, &beside, fronts);
-            for increment in since.complete.iter_mut().chain(&mut since.latest) {
-                for &equation in &part.wanted {
-                    increment[free[equation]] += correction[equation];
-                }
-                self.system.follow(increment);
+            let mut by_dof = vec![0.0; self.system.n_dofs()];
+            for &equation in &part.wanted {
+                by_dof[free[equation]] = correction[equation];
             }
-        };
-        let (origin, increment) = match (since.complete, since.latest) {
-            (None, Some(increment)) => (latest, increment),
-            (increment, _) => (complete, increment.ok_or(DomainFailure::NoState)?),
-        };
-        for &equation in &part.wanted {
-            let dof = free[equation];
-            displacement[dof] = origin.displacement[dof] + increment[dof];
+            self.system.follow(&mut by_dof);
+            for increment in total.complete.iter_mut().chain(&mut total.latest) {
+                for (increment, correction) in increment.iter_mut().zip(&by_dof) {
+                    *increment += correction;
+                }
+            }
+            own = Some(total.with(by_dof));
+            if committed.is_none() {
+                let in_part = |&number: &usize| part.groups[number] && self.system.includes(number);
+                let in_part = (0..groups.len()).filter(in_part);
+                let of_group = |number: usize| (number, groups[number].committed());
+                *committed = Some(in_part.map(of_group).collect());
+            }
+            self.commit(groups, &part.groups);
         }
-        self.standing.round_off = self.standing.round_off.max(relative);
-        Ok((internal, increment))
     }
 
     /// Whether a part is the one that the latest state is of.
@@ -336,23 +380,28 @@ impl LinearDomain {
         Ok(internal)
     }
 
-    /// Change of the internal forces (2-norm) if every displacement increment is larger or smaller
-    /// by its last bit, as the sum over many elements scatters them. The trial state stays.
+    /// Change of the internal forces (2-norm) if every displacement increment of the whole motion is larger or
+    /// smaller by its last bit, as the sum over many elements scatters them. The trial state, of the increments
+    /// `since` the committed one, stays.
     fn last_bit(
         &self,
         part: &Part,
         groups: &mut [Group],
-        since: &Since,
+        (since, total): (&Since, &Since),
         internal: &[f64],
     ) -> Result<f64, DomainFailure> {
-        let scattered = |increment: &Vec<f64>| {
-            let mut scattered = last_bit_scattered(increment);
+        let scattered = |(since, total): (&Vec<f64>, &Vec<f64>)| {
+            let mut scattered = last_bit_scattered(total);
             self.system.follow(&mut scattered);
+            for (scattered, (since, total)) in scattered.iter_mut().zip(since.iter().zip(total)) {
+                *scattered = since + (*scattered - total);
+            }
             scattered
         };
+        let both = |of: fn(&Since) -> Option<&Vec<f64>>| of(since).zip(of(total)).map(scattered);
         let scattered = Since {
-            complete: since.complete.as_ref().map(scattered),
-            latest: since.latest.as_ref().map(scattered),
+            complete: both(|since| since.complete.as_ref()),
+            latest: both(|since| since.latest.as_ref()),
         };
         let moved = self.evaluate(groups, &scattered, part)?;
         self.evaluate(groups, since, part)?;

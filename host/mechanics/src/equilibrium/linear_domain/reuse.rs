@@ -68,8 +68,8 @@ pub(super) struct Numbered {
     pub(super) factors: Arc<Multifrontal>,
     /// Largest entry of the matrix.
     pub(super) stiffest: f64,
-    /// 2-norm of its diagonal.
-    pub(super) diagonal: f64,
+    /// 2-norm of its diagonal, and of what stands there for unknowns that are kept.
+    pub(super) diagonal: [f64; 2],
 }
 
 /// A matrix and what became of it.
