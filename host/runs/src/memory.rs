@@ -84,13 +84,11 @@ fn keep_freed() {
     let Ok(layout) = Layout::array::<u8>(LARGEST_KEPT) else {
         return;
     };
-    // SAFETY: the layout is not empty. What is given back is what was given, with the same layout; nobody else
-    // has seen it, and nothing was written to it.
-    unsafe {
-        let piece = std::hint::black_box(System.alloc(layout));
-        if !piece.is_null() {
-            System.dealloc(piece, layout);
-        }
+    // SAFETY: the layout is not empty.
+    let piece = std::hint::black_box(unsafe { System.alloc(layout) });
+    if !piece.is_null() {
+        // SAFETY: what is given back is what was given, with the same layout; nobody else has seen it.
+        unsafe { System.dealloc(piece, layout) };
     }
 }
 

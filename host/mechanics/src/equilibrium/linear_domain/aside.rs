@@ -15,8 +15,7 @@
 
 use crate::assembly::System;
 use crate::group::Group;
-use algebra::add_product;
-use algebra::{Factors, Singular};
+use algebra::{Factors, Singular, add_product};
 
 /// They are kept if they are at most this fraction of the unknowns where condensed groups and others meet: all
 /// dense work grows with them.
