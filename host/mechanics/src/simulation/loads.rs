@@ -96,20 +96,13 @@ impl Simulation {
     ) -> Loads {
         let phase = &self.problem.phases[number];
         let [[t_0, _], [t_1, factor]] = leg(phase, course).unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
-        let end_of = |start: f64, end: f64| {
-            if factor.to_bits() == 1.0_f64.to_bits() {
-                end
-            } else {
-                start + factor * (end - start)
-            }
-        };
         let force_end = self.loading_at(factor).forces(&self.problem, &self.groups);
         let prescribed = prescribed.iter();
         let mut loads = Loads {
             force_start: self.force.clone(),
             force_end,
             prescribed: prescribed
-                .map(|&(dof, start, end)| (dof, self.displacement[dof], end_of(start, end)))
+                .map(|&(dof, start, end)| (dof, self.displacement[dof], part(factor, start, end)))
                 .collect(),
             leg: [t_0, t_1],
             ..Loads::default()
@@ -171,9 +164,19 @@ impl Simulation {
         };
         for &(dof, start, end) in prescribed {
             if let Some(value) = self.prescribed.get_mut(&dof) {
-                *value = start + factor * (end - start);
+                *value = part(factor, start, end);
             }
         }
         self.loading[1] = self.loading_at(factor);
+    }
+}
+
+/// Where a displacement is that has gone this part of its way: at the end to the last bit, whatever rounding makes of
+/// the difference, so that what was led to one place moves alike from there.
+fn part(factor: f64, start: f64, end: f64) -> f64 {
+    if factor.to_bits() == 1.0_f64.to_bits() {
+        end
+    } else {
+        start + factor * (end - start)
     }
 }

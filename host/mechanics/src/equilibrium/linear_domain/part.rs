@@ -301,9 +301,10 @@ impl LinearDomain {
             }
             self.system.follow(&mut by_dof);
             for increment in total.complete.iter_mut().chain(&mut total.latest) {
-                for (increment, correction) in increment.iter_mut().zip(&by_dof) {
-                    *increment += correction;
+                for &equation in &part.wanted {
+                    increment[free[equation]] += correction[equation];
                 }
+                self.system.follow(increment);
             }
             own = Some(total.with(by_dof));
             if committed.is_none() {
