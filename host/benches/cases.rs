@@ -232,7 +232,9 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
     let mut chamber = Chamber::new();
     let (mut domain, system) = chamber.condense();
     let still = vec![0.0; chamber.prescribed.len()];
-    domain.start(&chamber.model.groups, &chamber.loads, &still);
+    let groups = &chamber.model.groups;
+    let internal = domain.internal_forces(groups);
+    domain.start(groups, internal, &chamber.loads, &still);
     let block = domain.block(&system);
     let solver = LinearSolver::with_block(&system.pattern, None, block);
     let mut solver = solver.expect("a sound pattern");
