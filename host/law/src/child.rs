@@ -126,7 +126,7 @@ pub(crate) fn to_start() -> io::Result<PathBuf> {
 /// processes of its group when this function returns.
 ///
 /// # Errors
-/// The child cannot be started or waited for.
+/// The child cannot be started or waited for; [`io::ErrorKind::OutOfMemory`] if memory is what it lacks.
 pub fn run(work: &Work) -> io::Result<Outcome> {
     let mut command = Command::new(to_start()?);
     command
@@ -144,8 +144,12 @@ pub fn run(work: &Work) -> io::Result<Outcome> {
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let mut child = command.spawn()?;
-    let stdout = collect(child.stdout.take());
-    let stderr = collect(child.stderr.take());
+    let outputs = (collect(child.stdout.take()), collect(child.stderr.take()));
+    let (Ok(stdout), Ok(stderr)) = outputs else {
+        kill_group(&mut child);
+        child.wait()?;
+        return Err(io::ErrorKind::OutOfMemory.into());
+    };
     let status = wait(&mut child, work.time);
     // Whatever the child has started would keep its outputs open.
     kill_group(&mut child);
@@ -192,10 +196,11 @@ fn kill_group(child: &mut Child) {
     let _ = child.kill();
 }
 
-/// Reads to the end in a thread of its own, since a full pipe would stop the child.
-fn collect(source: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
+/// Reads to the end in a thread of its own, since a full pipe would stop the child. What a thread that cannot be
+/// had lacks is memory, above all.
+fn collect(source: Option<impl Read + Send + 'static>) -> io::Result<Receiver<Vec<u8>>> {
     let (sender, receiver) = channel();
-    std::thread::spawn(move || {
+    std::thread::Builder::new().spawn(move || {
         let Some(mut source) = source else { return };
         let mut left = MOST_OUTPUT;
         let mut chunk = [0; 4096];
@@ -206,8 +211,8 @@ fn collect(source: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
                 return;
             }
         }
-    });
-    receiver
+    })?;
+    Ok(receiver)
 }
 
 /// All that was read.
@@ -255,7 +260,7 @@ pub fn enter() -> io::Result<()> {
     IS_CHILD.store(true, Ordering::Relaxed);
     #[cfg(unix)]
     {
-        use rustix::process::{Resource, Rlimit, setrlimit};
+        use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
         let limit = |bytes| Rlimit {
             current: Some(bytes),
             maximum: Some(bytes),
@@ -265,7 +270,11 @@ pub fn enter() -> io::Result<()> {
             .ok()
             .and_then(|text| text.parse().ok());
         if let Some(bytes) = memory {
-            setrlimit(Resource::As, limit(bytes))?;
+            // A limit of the user's (`ulimit -v`, a batch system) may be lower, and may not be raised.
+            let least = getrlimit(Resource::As)
+                .maximum
+                .map_or(bytes, |most: u64| most.min(bytes));
+            setrlimit(Resource::As, limit(least))?;
         }
     }
     // Those of the terminal are the parent's, who ends its children himself.

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::child::{self, Ending, Work};
 use abi::Hypothesis;
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -32,7 +32,7 @@ const N_POINTS: usize = 3;
 /// left to this process: it finds the same, in its own words.
 ///
 /// # Errors
-/// [`Error::Library`]: what the library did in the child.
+/// [`Error::Library`]: what the library did in the child. [`text::Error::Usage`]: there is not the memory for one.
 pub(crate) fn vet(path: &Path, sha256: &str) -> Result<(), Error> {
     let verdict = verdict_path(sha256);
     if verdict.as_ref().is_some_and(|file| file.is_file()) {
@@ -49,9 +49,13 @@ pub(crate) fn vet(path: &Path, sha256: &str) -> Result<(), Error> {
         memory: Some(MEMORY),
     };
     let outcome = child::run(&work).map_err(|why| {
+        let library = path.display();
+        if why.kind() == ErrorKind::OutOfMemory {
+            let message = format!("not enough memory to try library {library} in a child process");
+            return text::Error::Usage(message).into();
+        }
         Error::library(format!(
-            "library {} cannot be tried in a child process: {why}",
-            path.display()
+            "library {library} cannot be tried in a child process: {why}"
         ))
     })?;
     let output = String::from_utf8_lossy(&outcome.stdout);

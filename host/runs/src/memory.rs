@@ -8,22 +8,24 @@
 use crate::Error;
 use rustix::io::Errno;
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Duration;
 
-/// The last words take less than this.
-const RESERVE: usize = 4 << 20;
+/// Pieces that are set aside for the last words, and the bytes of each: more than what the system's allocator asks the
+/// kernel for at least (`malloc(3)`: 1 MB).
+const N_PIECES: usize = 3;
+const PIECE: usize = 5 << 18;
 /// Bytes of the largest piece that is kept once it is given back: what glibc keeps at most, with its own.
 const LARGEST_KEPT: usize = (32 << 20) - (1 << 16);
 /// Exit code: the limit is the user's to raise.
 const CODE: u8 = 1;
 
 /// What the last words are said in.
-static HELD: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+static HELD: Mutex<[Vec<u8>; N_PIECES]> = Mutex::new([const { Vec::new() }; N_PIECES]);
 /// Bytes that what goes on was expected to take in all.
 static EXPECTED: AtomicU64 = AtomicU64::new(0);
 /// What was announced with it.
@@ -33,14 +35,27 @@ static RESULTS: Mutex<Option<PathBuf>> = Mutex::new(None);
 /// A thread is saying the last words.
 static ENDS: AtomicBool = AtomicBool::new(false);
 
+thread_local! {
+    /// This one is.
+    static IS_LAST: Cell<bool> = const { Cell::new(false) };
+}
+
 /// The program's allocator: the system's, with an end that is said.
 #[derive(Debug)]
 pub struct Allocator;
 
-/// Ends the process if there is no memory.
-fn checked(found: *mut u8, size: usize) -> *mut u8 {
-    if found.is_null() {
-        end(size);
+/// Ends the process if there is no memory. Who does so already is given what was set aside, piece by piece: other
+/// threads go on until they need memory, and may be quicker.
+fn checked(size: usize, find: impl Fn() -> *mut u8) -> *mut u8 {
+    let mut found = find();
+    while found.is_null() {
+        if !IS_LAST.get() {
+            end(size);
+        }
+        if !give_back() {
+            exit();
+        }
+        found = find();
     }
     found
 }
@@ -50,7 +65,7 @@ fn checked(found: *mut u8, size: usize) -> *mut u8 {
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as the caller promises.
-        checked(unsafe { System.alloc(layout) }, layout.size())
+        checked(layout.size(), || unsafe { System.alloc(layout) })
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
@@ -60,21 +75,22 @@ unsafe impl GlobalAlloc for Allocator {
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as the caller promises.
-        checked(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        checked(layout.size(), || unsafe { System.alloc_zeroed(layout) })
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // SAFETY: as the caller promises.
-        checked(unsafe { System.realloc(pointer, layout, size) }, size)
+        // SAFETY: as the caller promises; what could not be had has left the piece as it was.
+        checked(size, || unsafe { System.realloc(pointer, layout, size) })
     }
 }
 
 /// Sets aside what the last words are said in, and lets freed memory be used again.
 pub fn reserve() {
-    keep_freed();
+    // Before freed memory is kept, so that giving it back gives it to whichever thread needs it.
     if let Ok(mut held) = HELD.lock() {
-        *held = Vec::with_capacity(RESERVE);
+        held.fill_with(|| Vec::with_capacity(PIECE));
     }
+    keep_freed();
 }
 
 /// Lets the system's allocator keep large pieces that are given back, for the next ones: memory that is new is
@@ -146,17 +162,27 @@ fn shortage(size: u64) -> String {
     format!("not enough memory: {needed}{last}")
 }
 
+/// Gives back a piece of what was set aside. Whether there was one.
+fn give_back() -> bool {
+    // It is being set aside.
+    let Ok(mut held) = HELD.try_lock() else {
+        return false;
+    };
+    let piece = held.iter_mut().find(|piece| piece.capacity() > 0);
+    piece.map(std::mem::take).is_some()
+}
+
 /// The last words of the process.
 #[cold]
 fn end(size: usize) {
     if ENDS.swap(true, Ordering::SeqCst) {
-        // Another thread ends the process; this one, if it is it, has lost even its reserve.
-        std::thread::sleep(Duration::from_secs(10));
-        std::process::abort();
+        // Another thread ends the process.
+        loop {
+            std::thread::park();
+        }
     }
-    if let Ok(mut held) = HELD.try_lock() {
-        drop(std::mem::take(&mut *held));
-    }
+    IS_LAST.set(true);
+    give_back();
     let message = shortage(size as u64);
     let text = format!(
         "error: {message}\n  |\n  = help: raise the limit of memory, or take a coarser mesh; rows that were written are whole\n"
@@ -175,7 +201,11 @@ fn end(size: usize) {
     {
         let _ = results::end_summary(folder, &crate::ending(Some(&Error::usage(message))));
     }
-    // Who watches this process knows that no law has ended it.
+    exit();
+}
+
+/// Ends the process; who watches it knows that no law has.
+fn exit() -> ! {
     crate::supervision::end(CODE);
     std::process::exit(CODE.into());
 }
