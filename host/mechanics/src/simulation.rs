@@ -1,6 +1,7 @@
 //! Leading a problem through its phases: increments, cut-back and regrowth, from equilibrium to
 //! equilibrium.
 
+mod appearing;
 mod beyond;
 mod complete;
 mod creeping;

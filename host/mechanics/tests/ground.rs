@@ -875,3 +875,67 @@ fn a_force_follows_its_course() {
         "held against what is left: {reaction}"
     );
 }
+
+/// A pile in ground that a load on half of its surface bends. When its interfaces appear, whatever their points,
+/// nothing moves: their tractions are what the faces passed on to each other.
+#[test]
+fn an_interface_appears_in_loaded_ground() {
+    let points = [Integration::Nodes, Integration::Full];
+    for (analysis, integration) in [Analysis::Axisymmetric, Analysis::PlaneStrain]
+        .into_iter()
+        .flat_map(|analysis| points.map(|points| (analysis, points)))
+    {
+        let x = [0.0, 0.5, 1.0, 2.0, 4.0];
+        let mut mesh = grid(&x, &[0.0, 1.0, 2.0, 3.0], |_, _| 0, Shape::Cut);
+        mesh.name_line("shaft", |e| {
+            e.iter()
+                .all(|n| (n[0] - 0.5).abs() < 1e-9 && n[1] >= 1.0 - 1e-9)
+        });
+        mesh.name_line("base", |e| {
+            e.iter()
+                .all(|n| (n[1] - 1.0).abs() < 1e-9 && n[0] <= 0.5 + 1e-9)
+        });
+        mesh.name_line("cap", |e| {
+            e.iter()
+                .all(|n| (n[1] - 3.0).abs() < 1e-9 && n[0] <= 1.0 + 1e-9)
+        });
+        let along = |line: &str, group| Along {
+            line: line.to_owned(),
+            group,
+            opens_ends: true,
+        };
+        mesh.insert_joints(&[along("shaft", 1), along("base", 2)])
+            .unwrap();
+        let mut problem = Problem::new(analysis, mesh);
+        problem.groups = vec![solid("ground", elastic(analysis, E, NU))];
+        let bond = [
+            ("normal_stiffness", 1e4),
+            ("shear_stiffness", 1e4),
+            ("cohesion", 1e6),
+            ("friction_angle", 30.0),
+            ("dilatancy_angle", 0.0),
+            ("tensile_strength", 1e5),
+        ];
+        for name in ["shaft", "base"] {
+            let law = material("coulomb_joint", Hypothesis::Interface2d, &bond);
+            let mut group = ElementGroup::new(name, Formulation::ZeroThickness, law);
+            group.integration = Some(integration);
+            group.is_active = false;
+            problem.groups.push(group);
+        }
+        problem.supports = roller_box();
+        let mut load = Phase::new("load", 1);
+        load.pressure = vec![Pressure {
+            line: "cap".to_owned(),
+            value: 100.0.into(),
+        }];
+        let mut appear = Phase::new("appear", 2);
+        appear.activate = vec![1, 2];
+        appear.reset_displacements = true;
+        problem.phases = vec![load, appear];
+        let simulation = run(problem);
+        // 100 kPa on 3 m of ground would settle by 11 mm.
+        let moved = largest(simulation.snapshot().displacement);
+        assert!(moved < 1e-12, "{analysis:?}, {integration:?}: {moved}");
+    }
+}

@@ -8,7 +8,7 @@ use crate::error::{Error, Place};
 use crate::ground::beside_joints;
 use crate::group::Group;
 use crate::model::Model;
-use crate::problem::{Cause, InitialStress, Item, Key, Refusal};
+use crate::problem::{Cause, Formulation, InitialStress, Item, Key, Refusal};
 use abi::status::Outcome;
 use law::Moment;
 
@@ -65,6 +65,26 @@ impl Simulation {
             starts[group] = true;
             self.groups[group].moment = moment;
             self.groups[group].appear(stress).map_err(cannot_start)?;
+        }
+        let of_interfaces =
+            |&group: &usize| self.groups[group].formulation == Formulation::ZeroThickness;
+        let appeared: Vec<usize> = phase
+            .activate
+            .iter()
+            .copied()
+            .filter(of_interfaces)
+            .collect();
+        if number > 0 && !appeared.is_empty() {
+            let lacking = self.lacking(number, &appeared)?;
+            for (&group, lacking) in appeared.iter().zip(lacking) {
+                let beside = self.groups[group].stress.committed.clone();
+                let both = beside.iter().zip(lacking);
+                let stress = both.map(|(beside, lacking)| beside + lacking).collect();
+                // Some laws start from compression only: then the means are nearer to what they can carry.
+                if self.groups[group].appear(stress).is_err() {
+                    self.groups[group].appear(beside).map_err(cannot_start)?;
+                }
+            }
         }
         Model::check_layers(&self.groups)?;
         for group in (0..self.groups.len()).filter(|&group| starts[group]) {
