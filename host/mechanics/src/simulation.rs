@@ -188,6 +188,7 @@ impl Simulation {
                 simulation.prescribed.insert(dof, 0.0);
             }
         }
+        simulation.check_alike()?;
         simulation.sometimes_held = simulation.held_in_some_phases();
         Ok(simulation)
     }

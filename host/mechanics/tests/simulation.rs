@@ -346,6 +346,37 @@ fn a_tilted_line_that_became_rigid_is_pushed_from_where_it_stands() {
     push(true).unwrap();
 }
 
+/// A line that becomes rigid in the second phase cannot be pushed at one end and held at the other in the third: that
+/// is known before the first.
+#[test]
+fn a_rigid_line_that_is_pulled_apart_later_is_refused_at_once() {
+    let with = |resets: bool, back: f64| {
+        let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |_, _| 0);
+        name_sides(&mut mesh, [1.0, 1.0]);
+        let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
+        problem.groups = vec![ElementGroup::new(
+            "block",
+            Formulation::Solid,
+            elastic(Hypothesis::PlaneStrain),
+        )];
+        problem.supports = vec![held("left", &[Axis::X, Axis::Y])];
+        let mut push = Phase::new("push", 1);
+        push.displacement = vec![moved("right", None, Some(-0.01))];
+        let mut rest = Phase::new("rest", 1);
+        rest.rigid = vec!["top".to_owned()];
+        let mut back_again = Phase::new("back", 1);
+        back_again.reset_displacements = resets;
+        back_again.displacement = vec![moved("right", None, Some(back))];
+        problem.phases = vec![push, rest, back_again];
+        Simulation::new(problem)
+    };
+    let refused = with(false, -0.02).unwrap_err().to_string();
+    assert!(refused.contains("by 0 and -0.01 m"), "{refused}");
+    assert!(with(true, -0.01).is_err());
+    with(false, -0.01).unwrap().run(&mut ()).unwrap();
+    with(true, 0.0).unwrap().run(&mut ()).unwrap();
+}
+
 /// Simulations in threads of one process give what each gives alone.
 #[test]
 fn simulations_do_not_see_each_other() {

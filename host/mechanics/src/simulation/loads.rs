@@ -29,6 +29,17 @@ impl Simulation {
     /// # Errors
     /// Lines that move alike are prescribed to move differently.
     pub(super) fn take_loads(&mut self, number: usize) -> Result<Vec<Prescribed>, Error> {
+        self.prescribe(number);
+        let own = self.prescribed.iter();
+        let own = own.map(|(&dof, &end)| (dof, self.displacement[dof], end));
+        let own: Vec<Prescribed> = own.collect();
+        let Tied { ties, prescribed } = self.tied_in(number, own)?;
+        self.tied = ties;
+        Ok(prescribed)
+    }
+
+    /// Takes over what a phase changes of prescribed displacements.
+    pub(super) fn prescribe(&mut self, number: usize) {
         let phase = self.problem.phases[number].clone();
         if phase.reset_displacements {
             self.displacement.fill(0.0);
@@ -48,12 +59,6 @@ impl Simulation {
                 }
             }
         }
-        let own = self.prescribed.iter();
-        let own = own.map(|(&dof, &end)| (dof, self.displacement[dof], end));
-        let own: Vec<Prescribed> = own.collect();
-        let Tied { ties, prescribed } = self.tied_in(number, own)?;
-        self.tied = ties;
-        Ok(prescribed)
     }
 
     /// Before the first phase: the degrees of freedom that some phases prescribe and others do not, but for
@@ -173,7 +178,7 @@ impl Simulation {
 
 /// Where a displacement is that has gone this part of its way: at the end to the last bit, whatever rounding makes of
 /// the difference, so that what was led to one place moves alike from there.
-fn part(factor: f64, start: f64, end: f64) -> f64 {
+pub(super) fn part(factor: f64, start: f64, end: f64) -> f64 {
     if factor.to_bits() == 1.0_f64.to_bits() {
         end
     } else {

@@ -1,7 +1,7 @@
 //! Displacements that are one in a phase: faces of interfaces that are not there, lines that are rigid.
 
 use super::Simulation;
-use super::loads::Prescribed;
+use super::loads::{Prescribed, part};
 use crate::assembly::Tie;
 use crate::error::Error;
 use crate::problem::{Analysis, Cause, Item, Refusal};
@@ -148,6 +148,60 @@ impl Simulation {
         }
         prescribed.sort_unstable_by_key(|(dof, ..)| *dof);
         Ok(Tied { ties, prescribed })
+    }
+
+    /// Before the first phase: follows the phases as far as it is known beforehand where displacements stand, which
+    /// is where something prescribes them.
+    ///
+    /// # Errors
+    /// What moves alike is prescribed to move differently.
+    pub(super) fn check_alike(&mut self) -> Result<(), Error> {
+        let before = self.prescribed.clone();
+        let outcome = self.follow_alike();
+        self.prescribed = before;
+        self.displacement.fill(0.0);
+        for (group, input) in self.groups.iter_mut().zip(&self.problem.groups) {
+            group.is_active = input.is_active;
+        }
+        outcome
+    }
+
+    fn follow_alike(&mut self) -> Result<(), Error> {
+        let mut is_known = vec![true; self.displacement.len()];
+        for number in 0..self.problem.phases.len() {
+            let phase = &self.problem.phases[number];
+            let factor = phase.course.last().map_or(1.0, |&[_, factor]| factor);
+            for (groups, is_active) in [(&phase.activate, true), (&phase.deactivate, false)] {
+                for &group in groups {
+                    self.groups[group].is_active = is_active;
+                }
+            }
+            if phase.reset_displacements {
+                is_known.fill(true);
+            }
+            self.prescribe(number);
+            let known = self.prescribed.iter().filter(|(dof, _)| is_known[**dof]);
+            let known = known.map(|(&dof, &end)| (dof, self.displacement[dof], end));
+            let tied = self.tied_in(number, known.collect())?;
+            let mut ends: Vec<(usize, f64)> = tied
+                .prescribed
+                .iter()
+                .filter(|(dof, ..)| is_known[*dof])
+                .map(|&(dof, start, end)| (dof, part(factor, start, end)))
+                .collect();
+            if factor.to_bits() == 1.0_f64.to_bits() {
+                ends.extend(self.prescribed.iter().map(|(&dof, &end)| (dof, end)));
+            }
+            is_known.fill(false);
+            for (dof, end) in ends {
+                is_known[dof] = true;
+                self.displacement[dof] = end;
+                if let Some(value) = self.prescribed.get_mut(&dof) {
+                    *value = end;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Lines that are rigid in a phase: those that it or an earlier one names.
