@@ -339,7 +339,13 @@ fn a_tilted_line_that_became_rigid_is_pushed_from_where_it_stands() {
         push.reset_displacements = resets;
         push.displacement = vec![moved("top", None, Some(-0.05))];
         problem.phases = vec![press, rest, push];
-        Simulation::new(problem).unwrap().run(&mut ())
+        let mut simulation = Simulation::new(problem).unwrap();
+        let warned = simulation
+            .warnings()
+            .join("\n")
+            .contains("may have moved apart");
+        assert_eq!(warned, !resets);
+        simulation.run(&mut ())
     };
     let refused = push(false).unwrap_err().to_string();
     assert!(refused.contains("`reset_displacements`"), "{refused}");

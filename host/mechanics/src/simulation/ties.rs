@@ -5,7 +5,7 @@ use super::loads::{Prescribed, part};
 use crate::assembly::Tie;
 use crate::error::Error;
 use crate::problem::{Analysis, Cause, Item, Refusal};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// A node is on the axis of symmetry within this fraction of the mesh's longer side.
 const ON_AXIS: f64 = 1e-9;
@@ -168,6 +168,8 @@ impl Simulation {
 
     fn follow_alike(&mut self) -> Result<(), Error> {
         let mut is_known = vec![true; self.displacement.len()];
+        // Directions of rigid lines whose nodes may stand apart.
+        let mut apart: BTreeSet<(String, usize)> = BTreeSet::new();
         for number in 0..self.problem.phases.len() {
             let phase = &self.problem.phases[number];
             let factor = phase.course.last().map_or(1.0, |&[_, factor]| factor);
@@ -178,6 +180,34 @@ impl Simulation {
             }
             if phase.reset_displacements {
                 is_known.fill(true);
+                apart.clear();
+            }
+            let standing: Vec<_> = self.displacement.iter().zip(&is_known).collect();
+            for (line, c) in phase.rigid.iter().flat_map(|line| [(line, 0), (line, 1)]) {
+                let nodes = &self.problem.mesh.lines[line].nodes;
+                let mut standing = nodes.iter().map(|node| standing[2 * node + c]);
+                let first = standing.next();
+                let is_level = |is: (&f64, &bool)| *is.1 && Some(is) == first;
+                if !phase.reset_displacements && !standing.all(is_level) {
+                    apart.insert((line.clone(), c));
+                }
+            }
+            for (line, c) in &apart {
+                let nodes = &self.problem.mesh.lines[line].nodes;
+                let given = phase
+                    .displacement
+                    .iter()
+                    .filter(|given| [given.x, given.y][*c].is_some());
+                let lines = given.map(|given| &self.problem.mesh.lines[&given.line].nodes);
+                let moved: HashSet<&usize> = lines.flatten().collect();
+                if nodes.iter().filter(|node| moved.contains(node)).count() > 1 {
+                    self.warnings.push(format!(
+                        "phase `{}` leads line `{line}` to one displacement, and before that line became rigid its \
+                         nodes may have moved apart: the run ends there if they have. `reset_displacements` in this \
+                         phase counts from where they stand",
+                        phase.name
+                    ));
+                }
             }
             self.prescribe(number);
             let known = self.prescribed.iter().filter(|(dof, _)| is_known[**dof]);
