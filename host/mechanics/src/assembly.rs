@@ -24,6 +24,14 @@ pub struct Tie {
     pub masters: [(usize, f64); 2],
 }
 
+impl Tie {
+    /// One that moves as another one does.
+    pub(crate) fn alike(dof: usize, master: usize) -> Self {
+        let masters = [(master, 1.0), (master, 0.0)];
+        Self { dof, masters }
+    }
+}
+
 /// Moves forces at tied degrees of freedom to those they follow.
 pub fn fold(ties: &[Tie], force: &mut [f64]) {
     for tie in ties {

@@ -73,6 +73,8 @@ pub struct Simulation {
     ties: Vec<Tie>,
     /// All that follows others in the present phase.
     tied: Vec<Tie>,
+    /// Prescribed displacements of the present phase that follow others, whose reactions are those of the others.
+    led: Vec<Tie>,
     swaps: Vec<Vec<(usize, Material)>>,
     first_materials: Vec<Material>,
     warnings: Vec<String>,
@@ -152,6 +154,7 @@ impl Simulation {
         let mut simulation = Self {
             first_materials: groups.iter().map(|group| group.law.clone()).collect(),
             tied: ties.clone(),
+            led: Vec::new(),
             groups,
             ties,
             swaps,

@@ -383,6 +383,40 @@ fn a_rigid_line_that_is_pulled_apart_later_is_refused_at_once() {
     with(true, 0.0).unwrap().run(&mut ()).unwrap();
 }
 
+/// What holds one node of a rigid line holds the line: its reaction is the whole, and all reactions are in balance.
+#[test]
+fn a_node_that_leads_a_rigid_line_has_its_reaction() {
+    let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |_, _| 0);
+    name_sides(&mut mesh, [1.0, 1.0]);
+    let corner = mesh.nodes.iter().position(|at| *at == [1.0, 1.0]).unwrap();
+    let point = mechanics::mesh::Line {
+        nodes: vec![corner],
+        edges: Vec::new(),
+    };
+    mesh.lines.insert("corner".to_owned(), point);
+    let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
+    problem.groups = vec![ElementGroup::new(
+        "block",
+        Formulation::Solid,
+        elastic(Hypothesis::PlaneStrain),
+    )];
+    problem.supports = vec![held("bottom", &[Axis::Y]), held("left", &[Axis::X])];
+    let mut push = Phase::new("push", 1);
+    push.rigid = vec!["top".to_owned()];
+    push.displacement = vec![moved("corner", None, Some(-0.01))];
+    problem.phases = vec![push];
+    let mut simulation = Simulation::new(problem).unwrap();
+    simulation.run(&mut ()).unwrap();
+    let [of_left, of_bottom, of_top, of_corner] =
+        ["left", "bottom", "top", "corner"].map(|line| simulation.reaction_of(line).unwrap());
+    let load = of_bottom[1];
+    assert!(load > 1.0);
+    assert!((of_corner[1] + load).abs() < 1e-9 * load, "{of_corner:?}");
+    assert!((of_top[1] + load).abs() < 1e-9 * load, "{of_top:?}");
+    // The top is held in x where it meets the left side.
+    assert!(of_left[0].abs() < 1e-9 * load, "{of_left:?}");
+}
+
 /// Simulations in threads of one process give what each gives alone.
 #[test]
 fn simulations_do_not_see_each_other() {

@@ -98,6 +98,7 @@ impl Simulation {
         for (force, external) in reaction.iter_mut().zip(&self.force) {
             *force -= external;
         }
+        fold(&self.led, &mut reaction);
         record.costs.laws += started.elapsed();
         self.reaction = reaction;
         self.note_bodies(phase.number, &phase.course);

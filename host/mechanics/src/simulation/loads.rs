@@ -33,8 +33,12 @@ impl Simulation {
         let own = self.prescribed.iter();
         let own = own.map(|(&dof, &end)| (dof, self.displacement[dof], end));
         let own: Vec<Prescribed> = own.collect();
-        let Tied { ties, prescribed } = self.tied_in(number, own)?;
-        self.tied = ties;
+        let Tied {
+            ties,
+            prescribed,
+            led,
+        } = self.tied_in(number, own)?;
+        (self.tied, self.led) = (ties, led);
         Ok(prescribed)
     }
 

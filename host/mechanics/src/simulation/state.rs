@@ -193,7 +193,8 @@ impl Simulation {
             group.is_active = is_active;
         }
         let own = state.course.prescribed.clone();
-        self.tied = self.tied_in(state.phase, own)?.ties;
+        let tied = self.tied_in(state.phase, own)?;
+        (self.tied, self.led) = (tied.ties, tied.led);
         self.force = state.force.into_owned();
         self.reaction = state.reaction.into_owned();
         self.has_failed = false;

@@ -17,6 +17,8 @@ pub(super) struct Tied {
     pub(super) ties: Vec<Tie>,
     /// Prescribed displacements, with those that follow from them.
     pub(super) prescribed: Vec<Prescribed>,
+    /// Those that follow from them, and from which: what holds one of them holds it for all.
+    pub(super) led: Vec<Tie>,
 }
 
 impl Simulation {
@@ -101,7 +103,7 @@ impl Simulation {
             .collect();
         let layers: HashMap<usize, [(usize, f64); 2]> =
             self.ties.iter().map(|tie| (tie.dof, tie.masters)).collect();
-        let mut ties = Vec::new();
+        let (mut ties, mut led) = (Vec::new(), Vec::new());
         let mut follows: HashMap<usize, usize> = HashMap::new();
         for members in alike.classes() {
             let moves = |dof: &usize| {
@@ -118,9 +120,11 @@ impl Simulation {
                     let cause = Cause::MovesAlike(at, [increment, other]);
                     return Err(Refusal::new(Item::Phase(number), cause).into());
                 }
+                let leader = members.iter().copied().find(|dof| own.contains_key(dof));
                 for &dof in members.iter().filter(|dof| !own.contains_key(dof)) {
                     let start = self.displacement[dof];
                     prescribed.push((dof, start, start + increment));
+                    led.extend(leader.map(|leader| Tie::alike(dof, leader)));
                 }
                 continue;
             }
@@ -130,8 +134,10 @@ impl Simulation {
             for &dof in members.iter().filter(|&&dof| dof != root) {
                 follows.insert(dof, root);
                 let masters = layers.get(&root).copied();
-                let masters = masters.unwrap_or([(root, 1.0), (root, 0.0)]);
-                ties.push(Tie { dof, masters });
+                ties.push(match masters {
+                    Some(masters) => Tie { dof, masters },
+                    None => Tie::alike(dof, root),
+                });
             }
         }
         // Faces of layers that follow others themselves.
@@ -147,7 +153,11 @@ impl Simulation {
             }
         }
         prescribed.sort_unstable_by_key(|(dof, ..)| *dof);
-        Ok(Tied { ties, prescribed })
+        Ok(Tied {
+            ties,
+            prescribed,
+            led,
+        })
     }
 
     /// Before the first phase: follows the phases as far as it is known beforehand where displacements stand, which
