@@ -128,6 +128,15 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// A place moved towards the middle of a solid, by this part of the way.
+    pub(crate) fn towards_middle(&self, solid: &Solid, at: [f64; 2], part: f64) -> [f64; 2] {
+        let n = solid.n_corners() as f64;
+        [0, 1].map(|c| {
+            let corners = solid.corners().iter().map(|&node| self.nodes[node][c]);
+            at[c] + part * (corners.sum::<f64>() / n - at[c])
+        })
+    }
+
     /// Quads between the lines of a grid, row by row from the smallest coordinates. `group` gives the
     /// group of each by its column and row. Both lists rise, m; of a list with less than two there is no
     /// element between them, and no node.

@@ -819,6 +819,8 @@ fn an_interface_appears_with_the_stress_beside_it() {
                     (normal + k * effective).abs() < 1e-9,
                     "{normal} {effective}"
                 );
+                // At the surface, too: some laws start from compression only.
+                assert!(normal < 0.0, "{shape:?}: {normal} at {y}");
                 assert!(shear.abs() < 1e-9);
             }
         }

@@ -76,16 +76,7 @@ impl<'p> InitialStresses<'p> {
         let pressure = water.map_or(0.0, |water| water.pressure(at));
         let of_side = |face: &usize| {
             let solid = &mesh.solids[*self.beside.get(face)?];
-            let n = solid.n_corners() as f64;
-            let middle = |c: usize| {
-                solid
-                    .corners()
-                    .iter()
-                    .map(|&i| mesh.nodes[i][c])
-                    .sum::<f64>()
-                    / n
-            };
-            let inside = [0, 1].map(|c| at[c] + INSIDE * (middle(c) - at[c]));
+            let inside = mesh.towards_middle(solid, at, INSIDE);
             let mut stress = self.at(solid.group, inside)?;
             let excess = match (has_water(solid.group), has_water(number)) {
                 (true, false) => -pressure,

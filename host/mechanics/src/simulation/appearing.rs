@@ -77,7 +77,9 @@ impl<'a> Faces<'a> {
             }
         }
         fold(ties, &mut area);
-        held.iter().for_each(|&dof| area[dof] = 0.0);
+        for &dof in held {
+            area[dof] = 0.0;
+        }
         let scale = area.into_iter();
         let scale = scale.map(|area| if area > 0.0 { 1.0 / area.sqrt() } else { 0.0 });
         let roots = groups.iter().map(|group| {
@@ -106,7 +108,9 @@ impl<'a> Faces<'a> {
         for (tractions, roots) in tractions.iter_mut().zip(&self.roots) {
             for (traction, &root) in tractions.chunks_exact_mut(2).zip(roots) {
                 let factor = by(root);
-                traction.iter_mut().for_each(|t| *t *= factor);
+                for t in traction {
+                    *t *= factor;
+                }
             }
         }
     }

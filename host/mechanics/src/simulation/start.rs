@@ -12,6 +12,9 @@ use crate::problem::{Cause, Formulation, InitialStress, Item, Key, Refusal};
 use abi::status::Outcome;
 use law::Moment;
 
+/// A point of an interface is taken this far towards the middle of the element beside it, as a fraction of the way:
+/// where it reaches the surface of the ground, rounding does not decide whether it is compressed.
+const INSIDE: f64 = 1e-11;
 /// Change of stress, relative to the largest of its group and of all groups, that is worth a word.
 const WORTH_A_WORD: f64 = 1e-6;
 /// The same, of earth pressure at rest, from which the law's strength is what is meant and not its own
@@ -152,7 +155,8 @@ impl Simulation {
                 if !self.groups[group].is_active {
                     return None;
                 }
-                let mut total = self.groups[group].carried_at(within[solid], at);
+                let inside = self.problem.mesh.towards_middle(&solids[solid], at, INSIDE);
+                let mut total = self.groups[group].carried_at(within[solid], inside);
                 if self.problem.groups[group].pore_water {
                     total[..3]
                         .iter_mut()
