@@ -271,13 +271,7 @@ impl Summary {
                     "increments": p.increments,
                     "iterations": p.iterations,
                     "cut_backs": p.cut_backs,
-                    "cut_back_in_halves": match p.in_halves {
-                        Some(Neighbour::Apart { displacements, forces }) => {
-                            json!({ "displacements": displacements, "forces": forces })
-                        }
-                        Some(Neighbour::None) => json!("no equilibrium"),
-                        None => json!(null),
-                    },
+                    "cut_back_in_halves": in_halves(p.in_halves),
                     "unreliable_steps": p.unreliable,
                     "relaxed_steps": p.relaxed,
                     "crept_steps": p.crept,
@@ -526,6 +520,18 @@ fn law(built: &BuiltLaw) -> Value {
         entry["shear_zone"] = json!({ "thickness": thickness, "lateral_ratio": ratio });
     }
     entry
+}
+
+/// Where two halves of a step after a cut-back lead.
+fn in_halves(neighbour: Option<Neighbour>) -> Value {
+    match neighbour {
+        Some(Neighbour::Apart {
+            displacements,
+            forces,
+        }) => json!({ "displacements": displacements, "forces": forces }),
+        Some(Neighbour::None) => json!("no equilibrium"),
+        None => Value::Null,
+    }
 }
 
 #[cfg(test)]
