@@ -5,13 +5,17 @@
 //! Geometry    the strip footing; the thick cylinder
 //! Boundary    as there; the cylinder under pressure from inside
 //! Law         mohr_coulomb
-//! Asserts     equal limits with and without cut-backs; error, exit code, history, summary
+//! Asserts     equal limits with and without cut-backs; what is said of the steps, by runs with other steps; error,
+//!             exit code, history, summary
 
 use crate::footing::{FRICTION, Footing, push, text};
 use crate::setup::{Results, assert_close, fail, run};
 use crate::thick_cylinder;
-use input::Kind;
+use input::case::CaseFile;
+use input::{Case, Kind};
+use mechanics::Simulation;
 use tests::case::table;
+use text::{Source, parse};
 
 #[test]
 fn cut_backs_end_where_small_increments_end() {
@@ -48,6 +52,70 @@ fn cut_backs_end_where_small_increments_end() {
     let recorded = summary["phases"][0]["cut_backs"].as_u64().unwrap();
     assert_eq!(recorded as usize, cut.observer.cut_backs);
     assert_eq!(cut.events("cut_back").len(), cut.observer.cut_backs);
+}
+
+/// Displacements and nodal forces at the end of a case that starts from nothing.
+fn end_of(text: &str) -> [Vec<f64>; 2] {
+    let source = Source::new("case.toml", text.to_owned());
+    let file: CaseFile = parse(&source).unwrap();
+    let case = Case {
+        source,
+        file,
+        variant: None,
+        opener: law::Opener::default(),
+    };
+    let mut simulation = Simulation::new(case.pose().unwrap().problem).unwrap();
+    while simulation.step().unwrap().is_some() {}
+    let state = simulation.snapshot();
+    [state.displacement.to_vec(), state.reaction.to_vec()]
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+    squares.sum::<f64>().sqrt()
+}
+
+/// Where iterations choose the steps, the run says how much results depend on them: of the first step after a
+/// cut-back in which something flows what whole and half increments of that length make.
+#[test]
+fn what_is_said_of_a_step_after_a_cut_back_is_what_half_increments_make() {
+    let footing = Footing {
+        n: 4,
+        increments: 3,
+        ..FRICTION
+    };
+    let cut = run(&(text(footing) + "[solver]\nmax_iterations = 6\n"));
+    let said = cut.observer.warnings.iter();
+    let said = said.filter(|warning| warning.contains("was cut back; which steps"));
+    assert_eq!(said.count(), 1, "{:?}", cut.observer.warnings);
+    // In the first step that is left nothing flows; the second one is spoken of.
+    let iterations = cut.events("iteration");
+    let ends = iterations.iter().map(|event| event["load_factor"].as_f64());
+    let mut ends: Vec<f64> = ends.map(Option::unwrap).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+    let at = |load_factor: f64| load_factor * footing.settlement;
+    let first = text(Footing {
+        increments: 1,
+        settlement: at(ends[0]),
+        ..footing
+    });
+    let before = end_of(&first);
+    let [whole, halves] = [1, 2].map(|increments| {
+        let y = -at(ends[1]);
+        let next = format!(
+            "[[phase]]\nname = \"next\"\nincrements = {increments}\n\
+             displacement = [{{ line = \"strip\", y = {y:?} }}]\n"
+        );
+        end_of(&(first.clone() + &next))
+    });
+    let recorded = &cut.summary()["phases"][0]["cut_back_in_halves"];
+    for (number, of) in ["displacements", "forces"].into_iter().enumerate() {
+        let from_whole = |other: &[Vec<f64>; 2]| distance(&other[number], &whole[number]);
+        let apart = from_whole(&halves) / from_whole(&before);
+        assert!(apart > 1e-4, "{of}: {apart}");
+        assert_close(of, recorded[of].as_f64().unwrap(), apart, 1e-4, apart);
+    }
 }
 
 #[test]

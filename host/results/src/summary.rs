@@ -5,7 +5,7 @@ use crate::wanted::{Figure, Measured, Wanted};
 use indexmap::IndexMap;
 use law::BuiltLaw;
 use mechanics::group::Group;
-use mechanics::simulation::{Increment, PhaseRecord};
+use mechanics::simulation::{Increment, Neighbour, PhaseRecord};
 use mechanics::{Place, Settings, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -271,6 +271,7 @@ impl Summary {
                     "increments": p.increments,
                     "iterations": p.iterations,
                     "cut_backs": p.cut_backs,
+                    "cut_back_in_halves": in_halves(p.in_halves),
                     "unreliable_steps": p.unreliable,
                     "relaxed_steps": p.relaxed,
                     "crept_steps": p.crept,
@@ -519,6 +520,18 @@ fn law(built: &BuiltLaw) -> Value {
         entry["shear_zone"] = json!({ "thickness": thickness, "lateral_ratio": ratio });
     }
     entry
+}
+
+/// Where two halves of a step after a cut-back lead.
+fn in_halves(neighbour: Option<Neighbour>) -> Value {
+    match neighbour {
+        Some(Neighbour::Apart {
+            displacements,
+            forces,
+        }) => json!({ "displacements": displacements, "forces": forces }),
+        Some(Neighbour::None) => json!("no equilibrium"),
+        None => Value::Null,
+    }
 }
 
 #[cfg(test)]

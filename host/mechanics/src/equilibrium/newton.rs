@@ -115,8 +115,9 @@ pub struct Newton<'a> {
     kept: Kept,
     /// Forces of the domain at the end of the step if its boundary stays where it is.
     domain_forces: Vec<f64>,
-    /// Displacement increments of the step that are committed already, by place.
-    base: Option<Vec<f64>>,
+    /// Displacement increments of the step that are committed already, by place; when what is left of it starts, and
+    /// how long that takes.
+    base: Option<(Vec<f64>, (f64, f64))>,
     /// Room for displacements and forces by degree of freedom; the forces are zero between
     /// evaluations.
     displacement: Vec<f64>,
@@ -202,6 +203,42 @@ impl<'a> Newton<'a> {
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
         self.set_out(loads);
+        self.go_on(loads, [lambda_start, lambda_end], clock, guess)
+    }
+
+    /// The same in two halves, the first of which starts from a guess and is
+    /// committed. What it returns is of the whole step, the iterations are those of the second half.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_in_halves(
+        &mut self,
+        loads: &Loads,
+        [lambda_start, lambda_end]: [f64; 2],
+        clock: Clock,
+        guess: Option<Guess>,
+    ) -> Result<StepSuccess, StepFailure> {
+        let middle = f64::midpoint(lambda_start, lambda_end);
+        let half = self.step(loads, [lambda_start, middle], clock, guess)?;
+        self.commit(&half.increment, clock.period(middle, lambda_end - middle));
+        let base = self.base.take();
+        self.set_out(loads);
+        self.base = base;
+        let guess = Guess {
+            increment: half.increment.iter().map(|u| 2.0 * u).collect(),
+            contraction: None,
+            was_motion: false,
+        };
+        self.go_on(loads, [lambda_start, lambda_end], clock, Some(guess))
+    }
+
+    fn go_on(
+        &mut self,
+        loads: &Loads,
+        [lambda_start, lambda_end]: [f64; 2],
+        clock: Clock,
+        guess: Option<Guess>,
+    ) -> Result<StepSuccess, StepFailure> {
         let contraction = guess.as_ref().and_then(|guess| guess.contraction);
         let is_expected = guess.as_ref().is_some_and(|guess| guess.was_motion);
         self.kept.contraction = contraction.unwrap_or(f64::INFINITY);

@@ -1,6 +1,8 @@
-//! Motions that led to equilibrium, viscous relaxation or creep: they are counted, the first of each kind is told, and it
-//! is measured how far from each other two ways lead that a step may take: where relaxation has found an equilibrium,
-//! Newton iterations from the tangent, and creep where they stand still, may find another one.
+//! How far from each other two ways lead that a step may take.
+//!
+//! Motions that led to equilibrium, viscous relaxation or creep, are counted, and the first of each kind is told: where
+//! relaxation has found an equilibrium, Newton iterations from the tangent, and creep where they stand still, may find another
+//! one. Where steps are cut back, iterations choose the steps: two halves of one lead elsewhere than the whole.
 
 use super::phase::PhaseEquations;
 use super::{Simulation, UnderWay, Warning, Watch};
@@ -9,9 +11,19 @@ use crate::equilibrium::{Costs, Matrix, Newton, StepSuccess, norm};
 use crate::error::Place;
 use crate::group::{Aside, Group};
 use crate::settings::{Control, Settings};
+use serde::{Deserialize, Serialize};
 
-/// Where a step that relaxation led to equilibrium leads from its tangent, by creep where need be.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Another way that a step is tried on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Trial {
+    /// From its tangent, by creep where Newton iterations stand still.
+    Creep,
+    /// In two halves, by the load alone.
+    Halves,
+}
+
+/// Where a step leads on another way.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Neighbour {
     /// Elsewhere, by these shares of what the step changes (2-norms): of its displacement increments, and of the
     /// changes of the forces that the groups under iteration exert on the nodes.
@@ -43,17 +55,40 @@ impl Simulation {
                 watch.warning(&Warning::Crept(place.clone()));
             }
         } else if phase.record.relaxed - phase.record.crept == 1 {
-            let by_creep = self.neighbour(phase, success, step);
+            let by_creep = self.neighbour(phase, success, step, Trial::Creep);
             watch.warning(&Warning::Relaxed(place.clone(), by_creep));
         }
     }
 
-    /// Where a step leads so that ended in `success`, whose trial state is left as it is. `None` if it was stopped.
+    /// Says of the first step of a phase, in an increment that was cut, whose two halves lead elsewhere how far that is. Before it
+    /// may be steps in which nothing flows.
+    pub(super) fn note_cut_back(
+        &mut self,
+        success: &StepSuccess,
+        step: [f64; 2],
+        (place, phase): (&Place, &mut UnderWay),
+        watch: &mut dyn Watch,
+    ) {
+        let told = phase.record.in_halves;
+        if told.is_some_and(|told| !told.is_the_same()) {
+            return;
+        }
+        phase.record.in_halves = self.neighbour(phase, success, step, Trial::Halves);
+        if let Some(in_halves) = phase.record.in_halves
+            && !in_halves.is_the_same()
+        {
+            watch.warning(&Warning::CutBack(place.clone(), in_halves));
+        }
+    }
+
+    /// Where a step leads on another way that ended in `success`, whose trial state is left as it is. `None` if it was
+    /// stopped.
     fn neighbour(
         &mut self,
         phase: &UnderWay,
         success: &StepSuccess,
         [from, to]: [f64; 2],
+        trial: Trial,
     ) -> Option<Neighbour> {
         let equations = &phase.equations;
         let mut solver = self
@@ -65,14 +100,22 @@ impl Simulation {
         let before = self.forces(equations, Group::add_carried);
         let here = self.forces(equations, Group::add_trial_forces);
         let aside: Vec<Aside> = self.groups.iter_mut().map(Group::put_aside).collect();
-        let settings = Settings {
-            control: Control::Creep,
-            ..self.settings()
+        let settings = match trial {
+            Trial::Creep => Settings {
+                control: Control::Creep,
+                ..self.settings()
+            },
+            Trial::Halves => Settings {
+                control: Control::Load,
+                relaxation: false,
+                tolerated_residual: 0.0,
+                ..self.settings()
+            },
         };
         let mut matrix = Matrix::resumed(equations.matrix.largest());
         let mut costs = Costs::default();
         let clock = self.clock(phase.number);
-        let crept = Newton::new(
+        let mut newton = Newton::new(
             (&equations.system, &equations.places),
             equations.domain.as_ref(),
             (&mut solver, &mut matrix),
@@ -80,13 +123,20 @@ impl Simulation {
             &settings,
             &mut costs,
         )
-        .stopped_by(&self.stop)
-        .step(&phase.course.loads, [from, to], clock, None);
-        let neighbour = match crept {
-            Ok(crept) if crept.tolerated == 0.0 => {
+        .stopped_by(&self.stop);
+        let (loads, history) = (&phase.course.loads, &phase.course.history);
+        let other = match trial {
+            Trial::Creep => newton.step(loads, [from, to], clock, None),
+            Trial::Halves => {
+                let guess = history.guess(0.5 * (to - from));
+                newton.step_in_halves(loads, [from, to], clock, guess)
+            }
+        };
+        let neighbour = match other {
+            Ok(other) if other.tolerated == 0.0 => {
                 let there = self.forces(equations, Group::add_trial_forces);
                 Some(Neighbour::Apart {
-                    displacements: apart(&crept.increment, &success.increment, None),
+                    displacements: apart(&other.increment, &success.increment, None),
                     forces: apart(&there, &here, Some(&before)),
                 })
             }
@@ -113,6 +163,23 @@ impl Simulation {
         }
         fold(&self.tied, &mut forces);
         forces
+    }
+}
+
+/// Two ways that lead a step no further from each other than this, as shares of what it changes, lead to one equilibrium.
+const SAME: f64 = 1e-6;
+
+impl Neighbour {
+    /// Whether it is the state that the step ended in.
+    pub(super) fn is_the_same(self) -> bool {
+        let Self::Apart {
+            displacements,
+            forces,
+        } = self
+        else {
+            return false;
+        };
+        displacements.max(forces) <= SAME
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a phase took.
 
+use super::Neighbour;
 use crate::equilibrium::{Costs, Open};
 use crate::settings::Method;
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,9 @@ pub struct PhaseRecord {
     pub iterations: usize,
     /// Steps repeated with a smaller length.
     pub cut_backs: usize,
+    /// Where two halves of the first step after a cut-back lead; nothing where none was cut.
+    #[serde(default)]
+    pub in_halves: Option<Neighbour>,
     /// Steps with results that a law calls inaccurate.
     pub unreliable: usize,
     /// Steps that a motion led to equilibrium: viscous relaxation, or creep.

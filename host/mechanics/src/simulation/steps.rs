@@ -38,6 +38,8 @@ struct Way<'p> {
     /// So many iterations are few.
     easy: f64,
     lead: Lead,
+    /// A step was cut back.
+    was_cut: bool,
     done: Progress,
 }
 
@@ -74,6 +76,7 @@ impl Simulation {
             smallest: 1.0 / n as f64 / f64::powi(2.0, settings.max_halvings as i32),
             easy: EASY * settings.method.max_iterations() as f64,
             lead: Lead::new(&settings),
+            was_cut: false,
             done: Progress::default(),
         };
         while phase.course.lambda < way.target {
@@ -103,6 +106,10 @@ impl Simulation {
         self.look_after(&success, (self.clock(phase.number), step), watch);
         if success.relaxed {
             self.note_motion(&success, step, way.lead.control, (way.place, phase), watch);
+        }
+        // Of a motion, and of what is tolerated, more is said already.
+        if way.was_cut && !success.relaxed && success.tolerated == 0.0 {
+            self.note_cut_back(&success, step, (way.place, phase), watch);
         }
         way.lead.goes_on();
         // A motion takes many iterations, and steps of any length.
@@ -140,7 +147,10 @@ impl Simulation {
         phase.course.step = factor * (end - start);
         go_on(watch.cut_back(place, end, phase.course.step, &failure.reason))?;
         match self.after(&failure, way, phase) {
-            Then::Shorter => Ok(()),
+            Then::Shorter => {
+                way.was_cut = true;
+                Ok(())
+            }
             Then::End => Err(self.cannot_go_on(phase, place, start, failure)),
             Then::Path => {
                 let goal = [way.n as f64, way.target.min(phase.course.loads.leg[1])];
@@ -152,6 +162,7 @@ impl Simulation {
                 }
             }
             Then::Creep => {
+                way.was_cut = false;
                 if !way.lead.was_in_vain() {
                     phase.course.step = creeping::LONGEST / way.n as f64;
                 }

@@ -54,6 +54,8 @@ pub enum Warning {
     },
     /// Relaxation led to the equilibrium of this increment, the first one of its phase; where another way leads.
     Relaxed(Place, Option<Neighbour>),
+    /// Iterations cut a step back, the first one of its phase; where two halves of the one that follows lead.
+    CutBack(Place, Neighbour),
     /// Creep, which the settings ask for, did so.
     Crept(Place),
     /// Motions did so in several steps of a phase.
@@ -162,6 +164,7 @@ impl fmt::Display for Warning {
                  {left:.1e} is left, which is the last bit of the displacements"
             ),
             Self::Relaxed(place, by_creep) => relaxed(f, place, *by_creep),
+            Self::CutBack(place, in_halves) => cut_back(f, place, *in_halves),
             Self::Unsettled {
                 phase,
                 tolerance,
@@ -274,8 +277,28 @@ fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, crept: usize
     write!(f, "phase `{phase}`: {} in all", told.join(", "))
 }
 
-/// Two ways that lead a step no further from each other than this, as shares of what it changes, lead to one equilibrium.
-const SAME: f64 = 1e-6;
+fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> fmt::Result {
+    write!(
+        f,
+        "{place}: iterations found no equilibrium and the step was cut back; which steps are cut can depend on last bits (another \
+         unit, order of groups, mirror image), and results depend on the steps taken: "
+    )?;
+    match in_halves {
+        Neighbour::Apart {
+            displacements,
+            forces,
+        } => write!(
+            f,
+            "two halves of the next one lead {displacements:.1e} of its displacements and {forces:.1e} of its changes of \
+             forces away"
+        )?,
+        Neighbour::None => write!(f, "two halves of the next one lead to no equilibrium")?,
+    }
+    write!(
+        f,
+        "; run it with more increments and hold the results against each other"
+    )
+}
 
 fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour>) -> fmt::Result {
     write!(
@@ -287,7 +310,7 @@ fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour
         displacements,
         forces,
     }) = by_creep
-        && displacements.max(forces) <= SAME
+        && by_creep.is_some_and(Neighbour::is_the_same)
     {
         return write!(
             f,
@@ -386,6 +409,21 @@ mod tests {
                 "{other}"
             );
         }
+    }
+
+    #[test]
+    fn a_cut_back_is_told_with_what_other_steps_lead_to() {
+        let of = |in_halves| Warning::CutBack(Place::default(), in_halves).to_string();
+        let apart = of(Neighbour::Apart {
+            displacements: 2e-3,
+            forces: 5e-4,
+        });
+        assert!(
+            apart.contains("lead 2.0e-3 of its displacements and 5.0e-4 of its changes"),
+            "{apart}"
+        );
+        let none = of(Neighbour::None);
+        assert!(none.contains("lead to no equilibrium"), "{none}");
     }
 
     #[test]

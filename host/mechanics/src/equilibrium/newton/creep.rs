@@ -225,7 +225,9 @@ impl Newton<'_> {
                 break;
             }
             if step < MAX_STEPS {
-                self.commit(&motion.increment);
+                // The first viscous step takes the time of the step.
+                let (start, length) = task.period;
+                self.commit(&motion.increment, (start + length, 0.0));
                 motion.from.clone_from(&motion.increment);
                 motion.given.fill(0.0);
                 motion.go_on(&went);

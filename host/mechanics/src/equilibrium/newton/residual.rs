@@ -103,11 +103,10 @@ impl Newton<'_> {
     ) -> Result<(Vec<f64>, Option<String>), PointFailure> {
         self.costs.evaluations += 1;
         let mut period = task.period;
-        if let Some(base) = &self.base {
-            // What is committed has taken the time of the step.
+        if let Some((base, left)) = &self.base {
             let since: Vec<f64> = increment.iter().zip(base).map(|(u, u_0)| u - u_0).collect();
             self.places.scatter(&since, &mut self.displacement);
-            period = (period.0 + period.1, 0.0);
+            period = *left;
         } else {
             self.places.scatter(increment, &mut self.displacement);
         }
@@ -118,14 +117,15 @@ impl Newton<'_> {
         Ok((internal, unreliable))
     }
 
-    /// Commits the trial state, which belongs to these displacement increments, within the step.
-    pub(super) fn commit(&mut self, increment: &[f64]) {
+    /// Commits the trial state, which belongs to these displacement increments, within the step; when what is left of
+    /// it starts, and how long that takes.
+    pub(super) fn commit(&mut self, increment: &[f64], left: (f64, f64)) {
         for (number, group) in self.groups.iter_mut().enumerate() {
             if self.system.includes(number) {
                 group.commit();
             }
         }
-        self.base = Some(increment.to_vec());
+        self.base = Some((increment.to_vec(), left));
     }
 
     /// The committed state of the groups.
