@@ -234,7 +234,7 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
     let still = vec![0.0; chamber.prescribed.len()];
     let groups = &chamber.model.groups;
     let internal = domain.internal_forces(groups);
-    domain.start(groups, internal, &chamber.loads, &still);
+    domain.start(groups, internal, &chamber.loads, &still, 1e-9);
     let block = domain.block(&system);
     let solver = LinearSolver::with_block(&system.pattern, None, block);
     let mut solver = solver.expect("a sound pattern");

@@ -64,7 +64,15 @@ impl Pattern {
         let mut met_in = vec![u32::MAX; n];
         for column in 0..n {
             let first = pattern.rows.len();
-            for &element in &of_column[start[column]..start[column + 1]] {
+            let own = &of_column[start[column]..start[column + 1]];
+            // The second unknown of a node has the rows of the first.
+            let before = column.saturating_sub(1);
+            if column > 0 && *own == of_column[start[before]..start[column]] {
+                pattern.rows.extend_from_within(pattern.places(before));
+                pattern.column_start.push(pattern.rows.len() as u32);
+                continue;
+            }
+            for &element in own {
                 for &row in &elements[element as usize] {
                     if met_in[row as usize] != column as u32 {
                         met_in[row as usize] = column as u32;
@@ -164,6 +172,33 @@ mod tests {
             pattern.column_start.push(pattern.rows.len() as u32);
         }
         pattern
+    }
+
+    #[test]
+    fn couples_all_unknowns_of_every_element() {
+        // Nodes of two unknowns each; of the third the first one, of the fifth both are given.
+        let given = [4, 8, 9];
+        let mut equation = vec![None; 12];
+        let free = (0..12).filter(|dof| !given.contains(dof));
+        let free: Vec<usize> = free.collect();
+        for (number, &dof) in free.iter().enumerate() {
+            equation[dof] = Some(number);
+        }
+        let elements: [&[usize]; 3] = [
+            &[0, 1, 6, 7, 4, 5],
+            &[4, 5, 2, 3, 8, 9],
+            &[10, 11, 8, 9, 0, 1],
+        ];
+        let pattern = Pattern::new(free.len(), &equation, elements.into_iter());
+        for (column, a) in free.iter().enumerate() {
+            let near = |b: &usize| {
+                let mut elements = elements.iter();
+                elements.any(|dofs| dofs.contains(a) && dofs.contains(b))
+            };
+            let rows = (0..free.len()).filter(|&row| near(&free[row]));
+            let rows: Vec<u32> = rows.map(|row| row as u32).collect();
+            assert_eq!(pattern.column(column), rows, "{column}");
+        }
     }
 
     #[test]

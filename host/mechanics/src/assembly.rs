@@ -450,9 +450,23 @@ fn find_slots(dofs: &[usize], equation: &[Option<usize>], pattern: &Pattern) -> 
         .filter_map(|i| Some((equation[dofs[i]]? as u32, i)))
         .collect();
     sorted.sort_unstable();
+    let mut before: Option<(u32, usize)> = None;
     for &(column, j) in &sorted {
         let start = pattern.column_start[column as usize];
         let rows = pattern.column(column as usize);
+        // The second unknown of a node has the rows of the first.
+        let alike = before.filter(|(other, _)| pattern.column(*other as usize) == rows);
+        before = Some((column, j));
+        if let Some((other, of_other)) = alike {
+            let apart = start - pattern.column_start[other as usize];
+            for &(_, i) in &sorted {
+                let slot = slots[i * n + of_other];
+                if slot != u32::MAX {
+                    slots[i * n + j] = slot + apart;
+                }
+            }
+            continue;
+        }
         let mut at = 0;
         for &(row, i) in &sorted {
             at += rows[at..].iter().take_while(|&&other| other < row).count();

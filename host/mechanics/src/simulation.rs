@@ -36,6 +36,7 @@ use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::problem::{Material, Problem};
 use crate::settings::{Method, Settings};
+use algebra::mesh_lines;
 use beyond::Beyond;
 use history::History;
 use law::{Moment, Stop, custody};
@@ -103,6 +104,8 @@ pub struct Simulation {
     beyond: Beyond,
     /// Rotations call forth no stresses in any group.
     turns_freely: bool,
+    /// Mesh lines of the nodes.
+    lines: Vec<[u32; 2]>,
     /// Factors of linear parts.
     reuse: Reuse,
     /// Who may want it to stop.
@@ -172,6 +175,7 @@ impl Simulation {
             largest_forces: vec![0.0; n_dofs],
             beyond: Beyond::default(),
             turns_freely,
+            lines: mesh_lines(nodes),
             reuse,
             stop: Stop::never(),
             done: 0,

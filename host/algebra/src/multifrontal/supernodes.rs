@@ -32,8 +32,9 @@ impl Supernodes {
         for (new, &equation) in (0..).zip(eliminated) {
             number[equation as usize] = new;
         }
-        let mut column_start = vec![0_u32];
-        let mut rows = Vec::new();
+        let mut column_start = Vec::with_capacity(eliminated.len() + 1);
+        column_start.push(0_u32);
+        let mut rows = Vec::with_capacity(pattern.rows.len());
         for &equation in eliminated {
             let column = pattern.column(equation as usize).iter();
             rows.extend(

@@ -26,7 +26,7 @@ mod reuse;
 
 pub use reuse::Reuse;
 
-use super::newton::{DomainFailure, Loads, norm};
+use super::newton::{DomainFailure, Loads, noise, norm};
 use crate::assembly::{System, Tie, used};
 use crate::group::Group;
 use algebra::{Block, Dense, Kind, Multifrontal, Pattern, Singular};
@@ -389,25 +389,29 @@ impl LinearDomain {
     }
 
     /// Sets up a phase that starts from the groups' committed state, with these
-    /// [internal forces](Self::internal_forces), and these displacements.
+    /// [internal forces](Self::internal_forces), and these displacements. What is out of balance inside is left if all of it
+    /// is noise beside the tolerance.
     pub fn start(
         &mut self,
         groups: &[Group],
         mut internal: Vec<f64>,
         loads: &Loads,
         displacement: &[f64],
+        tolerance: f64,
     ) {
         let prescribed = loads.prescribed_rate();
         let mut right = vec![0.0; self.system.n_equations()];
         self.system
             .prescribed_forces(groups, &prescribed, &mut right);
         let (at_start, at_end) = (loads.external(0.0), loads.external(1.0));
+        let noise = noise(right.len(), tolerance) * loads.scale;
         let unknowns = self.system.free().iter().zip(&self.on_boundary);
         for (right, (&dof, on_boundary)) in right.iter_mut().zip(unknowns) {
             *right = -*right;
             // External forces on the boundary are left to the equations of the rest.
-            if !on_boundary {
-                *right += at_end[dof] - at_start[dof];
+            let change = at_end[dof] - at_start[dof];
+            if !on_boundary && change.abs() > noise {
+                *right += change;
             }
         }
         // Loads that stay as they are, or act in few places, leave most of it nothing to eliminate.
@@ -424,9 +428,16 @@ impl LinearDomain {
     }
 
     /// As [`Self::start`], within a phase.
-    pub fn restart(&mut self, groups: &[Group], loads: &Loads, standing: &Standing) {
+    pub fn restart(
+        &mut self,
+        groups: &[Group],
+        loads: &Loads,
+        standing: &Standing,
+        tolerance: f64,
+    ) {
         let internal = self.internal_forces(groups);
-        self.start(groups, internal, loads, &standing.complete.displacement);
+        let displacement = &standing.complete.displacement;
+        self.start(groups, internal, loads, displacement, tolerance);
         self.standing = standing.clone();
     }
 
@@ -474,7 +485,10 @@ impl LinearDomain {
         let rise = lambda - latest;
         let forces = self.standing.forces.iter().zip(&self.condensed);
         let mut forces: Vec<f64> = forces.map(|(force, r)| force - rise * r).collect();
-        self.add_product(moved, &mut forces);
+        // At the start of an increment it stands in the latest state.
+        if moved.iter().any(|moved| *moved != 0.0) {
+            self.add_product(moved, &mut forces);
+        }
         forces
     }
 

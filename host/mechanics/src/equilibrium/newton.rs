@@ -40,6 +40,7 @@ pub use failure::{
 };
 pub use loads::Loads;
 pub use matrix::Matrix;
+pub(super) use matrix::noise;
 pub use outcome::{Costs, Guess, Iteration, Open, StepSuccess};
 pub use path::Measure;
 pub(super) use round_off::{ACCEPTED_ROUND_OFF, last_bit_scattered};

@@ -80,8 +80,10 @@ impl Beyond {
             .iter()
             .filter(|g| g.formulation == Formulation::Solid);
         let of_group = |group: &Group| {
+            // No principal strain is larger than one and a half times the largest component.
+            let may_be = |e: &[f64]| e.iter().any(|value| value.abs() > LARGE / 2.0);
             let mut strains = group.strain.committed.chunks_exact(4);
-            strains.any(|e| principal(e) > LARGE)
+            strains.any(|e| may_be(e) && principal(e) > LARGE)
         };
         if !solids.clone().any(of_group) {
             return;

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::group::Group;
 use crate::problem::Axis;
 use crate::settings::Equations;
-use algebra::{LinearSolver, Singular, mesh_lines};
+use algebra::{LinearSolver, Singular};
 
 /// The equations of one phase.
 #[derive(Debug)]
@@ -294,11 +294,13 @@ impl Simulation {
             let beside = domain.as_ref().zip(internal.as_deref());
             self.out_of_balance(&unknowns, beside, &mut loads)
         };
+        let tolerance = self.problem.settings.force_tolerance;
         if let Some(domain) = &mut domain {
             if let Some(standing) = standing {
-                domain.restart(&self.groups, &loads, standing);
+                domain.restart(&self.groups, &loads, standing, tolerance);
             } else if let Some(internal) = internal {
-                domain.start(&self.groups, internal, &loads, &self.displacement);
+                let displacement = &self.displacement;
+                domain.start(&self.groups, internal, &loads, displacement, tolerance);
             }
         }
         let bodies = Bodies::new(
@@ -357,8 +359,7 @@ impl Simulation {
         }
         // Groups that are held by the others alone cannot be condensed.
         let always = wanted == Equations::Condensed;
-        let lines = mesh_lines(&self.problem.mesh.nodes);
-        let (groups, ties) = (&self.groups, &self.tied);
+        let (groups, ties, lines) = (&self.groups, &self.tied, &self.lines);
         let held = Held {
             now: is_prescribed,
             sometimes: &self.sometimes_held,
@@ -373,7 +374,7 @@ impl Simulation {
                 (groups.as_slice(), lasting.as_slice()),
                 Some(&mut self.reuse),
             );
-            let found = LinearDomain::new(of, &held, ties, &lines, false, reuse);
+            let found = LinearDomain::new(of, &held, ties, lines, false, reuse);
             if let Ok(Some(found)) = found {
                 return Some(found);
             }
@@ -382,7 +383,7 @@ impl Simulation {
             (groups.as_slice(), linear.as_slice()),
             Some(&mut self.reuse),
         );
-        LinearDomain::new(of, &held, ties, &lines, always, reuse).unwrap_or(None)
+        LinearDomain::new(of, &held, ties, lines, always, reuse).unwrap_or(None)
     }
 
     /// A solver for these equations.
@@ -391,7 +392,7 @@ impl Simulation {
         system: &System,
         domain: Option<&LinearDomain>,
     ) -> Result<LinearSolver, Singular> {
-        let lines = system.lines(&mesh_lines(&self.problem.mesh.nodes));
+        let lines = system.lines(&self.lines);
         let lines = Some(lines.as_slice());
         if let Some(domain) = domain {
             return LinearSolver::with_block(&system.pattern, lines, domain.block(system));

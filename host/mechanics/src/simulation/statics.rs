@@ -24,8 +24,8 @@ pub(super) struct Balance {
     squares: f64,
     /// Unknowns.
     n: usize,
-    /// Longest lever.
-    lever: f64,
+    /// Square of the longest lever.
+    lever_square: f64,
 }
 
 /// What the residual was measured against, and with what tolerance.
@@ -54,7 +54,7 @@ impl Balance {
         sums[dof % 2] += force;
         sums[2] += lever * force;
         self.squares += force * force;
-        self.lever = self.lever.max(f64::hypot(x, y));
+        self.lever_square = self.lever_square.max(x * x + y * y);
     }
 
     /// What does not add up.
@@ -74,18 +74,24 @@ impl Balance {
             bound.scale
         };
         let allowed = n * (tolerance * scale + ROUND_OFF * own.max(scale).max(bound.last_bit));
+        let lever = |c: usize| {
+            if c == 2 {
+                self.lever_square.sqrt()
+            } else {
+                1.0
+            }
+        };
         let is_off = |&&c: &&usize| {
-            let lever = if c == 2 { self.lever } else { 1.0 };
+            let lever = lever(c);
             let left = self.reactions[c] + self.loads[c];
             left.is_nan() || left.abs() > lever * allowed
         };
         let c = *components.iter().find(is_off)?;
-        let lever = if c == 2 { self.lever } else { 1.0 };
         Some(Imbalance {
             component: c,
             reactions: self.reactions[c],
             loads: self.loads[c],
-            allowed: lever * allowed,
+            allowed: lever(c) * allowed,
         })
     }
 }

@@ -207,7 +207,8 @@ impl Simulation {
         {
             let internal = domain.internal_forces(&self.groups);
             let loads = &phase.course.loads;
-            domain.start(&self.groups, internal, loads, &self.displacement);
+            let tolerance = self.problem.settings.force_tolerance;
+            domain.start(&self.groups, internal, loads, &self.displacement, tolerance);
         }
         Ok(())
     }

@@ -14,6 +14,11 @@ use std::time::Instant;
 const NOISE: f64 = 1e-12;
 const LEFT: f64 = 1e-3;
 
+/// Share of the forces in play that each of `n` entries of a residual may have if all together are noise.
+pub(in crate::equilibrium) fn noise(n: usize, force_tolerance: f64) -> f64 {
+    NOISE.min(LEFT * force_tolerance) / (n.max(1) as f64).sqrt()
+}
+
 /// What the sum of the groups' tangents is to the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Sum {
@@ -205,8 +210,7 @@ impl Newton<'_> {
     /// The matrix is singular.
     pub(super) fn correction_of(&mut self, balance: &Balance) -> Result<Vec<f64>, StepFailure> {
         let of_equation = &self.places.bodies.of_equation;
-        let all = NOISE.min(LEFT * self.settings.force_tolerance);
-        let share = all / (balance.residual.len() as f64).sqrt();
+        let share = noise(balance.residual.len(), self.settings.force_tolerance);
         let left: Vec<f64> = balance.scales.iter().map(|scale| share * scale).collect();
         let entries = balance.residual.iter().enumerate();
         let residual: Vec<f64> = entries
