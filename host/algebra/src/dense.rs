@@ -97,11 +97,13 @@ fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
             parts.push(Beside::Right(part));
             rest = others;
         }
+        let moves = of_block.forward.iter().copied().enumerate();
+        let moves: Vec<(usize, usize)> = moves.filter(|(to, from)| to != from).collect();
         // The left is least work.
         threads::each(parts.into_iter().rev(), |part| match part {
-            Beside::Left(mut columns) => exchange(columns.rb_mut(), &of_block.forward),
+            Beside::Left(columns) => exchange(columns, &moves),
             Beside::Right(mut columns) => {
-                exchange(columns.rb_mut(), &of_block.forward);
+                exchange(columns.rb_mut(), &moves);
                 let (mut above, rest) = columns.split_at_row_mut(width);
                 triangular::solve_unit_lower_triangular_in_place(factor, above.rb_mut(), Par::Seq);
                 matmul(rest, Accum::Add, below, above.rb(), -1.0, Par::Seq);
@@ -126,14 +128,18 @@ enum Beside<'m> {
     Right(MatMut<'m, f64>),
 }
 
-/// Exchanges the rows of some columns.
-fn exchange(columns: MatMut<'_, f64>, forward: &[usize]) {
-    let mut exchanged = vec![0.0; forward.len()];
-    for mut column in columns.col_iter_mut() {
-        for (value, &from) in exchanged.iter_mut().zip(forward) {
+/// Exchanges rows of some columns: those that move, and where they come from.
+fn exchange(columns: MatMut<'_, f64>, moves: &[(usize, usize)]) {
+    let mut moved = vec![0.0; moves.len()];
+    for column in columns.col_iter_mut() {
+        let Some(column) = column.try_as_col_major_mut() else {
+            continue;
+        };
+        let column = column.as_slice_mut();
+        for (value, &(_, from)) in moved.iter_mut().zip(moves) {
             *value = column[from];
         }
-        for (to, &value) in exchanged.iter().enumerate() {
+        for (&value, &(to, _)) in moved.iter().zip(moves) {
             column[to] = value;
         }
     }
