@@ -1,11 +1,12 @@
 //! Dense matrices as L U, with row exchanges.
 
-use crate::Singular;
+use crate::{Singular, threads};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor as kernel;
+use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve as triangular;
-use faer::prelude::ReborrowMut;
-use faer::{MatMut, MatRef, Par, Spec};
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, MatMut, MatRef, Par, Spec};
 
 /// Row exchanges, and their inverse.
 #[derive(Debug, Default)]
@@ -28,6 +29,15 @@ pub fn largest(values: &[f64]) -> f64 {
     all.fold(0.0, larger)
 }
 
+/// Rows from which on a matrix is factorised by blocks of columns, what follows from a block for the columns to its
+/// right being shared among threads; the columns of a block, and how many are left to one thread at the end. Fixed,
+/// so that the result is the same for any number of threads.
+const LARGE: usize = 256;
+const BLOCK: usize = 64;
+const LAST: usize = 128;
+/// Parts that the columns to the right of a block are shared in.
+const PARTS: usize = 4;
+
 /// Factorises a square matrix in place.
 ///
 /// # Errors
@@ -37,22 +47,102 @@ pub(crate) fn factorise(
     exchanges: &mut Exchanges,
 ) -> Result<(), Singular> {
     let n = matrix.nrows();
-    exchanges.forward.resize(n, 0);
-    exchanges.inverse.resize(n, 0);
-    let scratch = kernel::lu_in_place_scratch::<usize, f64>(n, n, Par::Seq, Spec::default());
+    if n < LARGE {
+        factorise_columns(matrix.rb_mut(), exchanges);
+    } else {
+        factorise_by_blocks(matrix.rb_mut(), exchanges);
+    }
+    let vanishes = |pivot: f64| pivot.abs() < f64::MIN_POSITIVE || !pivot.is_finite();
+    if (0..n).any(|i| vanishes(matrix[(i, i)])) {
+        return Err(Singular);
+    }
+    Ok(())
+}
+
+/// Factorises a matrix with no more columns than rows.
+fn factorise_columns(matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
+    let (m, n) = (matrix.nrows(), matrix.ncols());
+    exchanges.forward.resize(m, 0);
+    exchanges.inverse.resize(m, 0);
+    let scratch = kernel::lu_in_place_scratch::<usize, f64>(m, n, Par::Seq, Spec::default());
     kernel::lu_in_place(
-        matrix.rb_mut(),
+        matrix,
         &mut exchanges.forward,
         &mut exchanges.inverse,
         Par::Seq,
         MemStack::new(&mut MemBuffer::new(scratch)),
         Spec::default(),
     );
-    let vanishes = |pivot: f64| pivot.abs() < f64::MIN_POSITIVE || !pivot.is_finite();
-    if (0..n).any(|i| vanishes(matrix[(i, i)])) {
-        return Err(Singular);
+}
+
+fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
+    let n = matrix.nrows();
+    exchanges.forward.clear();
+    exchanges.forward.extend(0..n);
+    let mut of_block = Exchanges::default();
+    let mut start = 0;
+    while start < n {
+        let width = if n - start > LAST { BLOCK } else { n - start };
+        let below = matrix.rb_mut().subrows_mut(start, n - start);
+        let (left, rest) = below.split_at_col_mut(start);
+        let (mut block, right) = rest.split_at_col_mut(width);
+        factorise_columns(block.rb_mut(), &mut of_block);
+        let (factor, below) = block.rb().split_at_row(width);
+        let per_part = right.ncols().div_ceil(PARTS).next_multiple_of(8);
+        let mut rest = right;
+        let mut parts = vec![Beside::Left(left)];
+        while rest.ncols() > 0 {
+            let width = per_part.min(rest.ncols());
+            let (part, others) = rest.split_at_col_mut(width);
+            parts.push(Beside::Right(part));
+            rest = others;
+        }
+        let moves = of_block.forward.iter().copied().enumerate();
+        let moves: Vec<(usize, usize)> = moves.filter(|(to, from)| to != from).collect();
+        // The left is least work.
+        threads::each(parts.into_iter().rev(), |part| match part {
+            Beside::Left(columns) => exchange(columns, &moves),
+            Beside::Right(mut columns) => {
+                exchange(columns.rb_mut(), &moves);
+                let (mut above, rest) = columns.split_at_row_mut(width);
+                triangular::solve_unit_lower_triangular_in_place(factor, above.rb_mut(), Par::Seq);
+                matmul(rest, Accum::Add, below, above.rb(), -1.0, Par::Seq);
+            }
+        });
+        let exchanged = of_block.forward.iter();
+        let exchanged: Vec<usize> = exchanged
+            .map(|&from| exchanges.forward[start + from])
+            .collect();
+        exchanges.forward[start..].copy_from_slice(&exchanged);
+        start += width;
     }
-    Ok(())
+    exchanges.inverse.resize(n, 0);
+    for (to, &from) in exchanges.forward.iter().enumerate() {
+        exchanges.inverse[from] = to;
+    }
+}
+
+/// Columns beside a block that is factorised.
+enum Beside<'m> {
+    Left(MatMut<'m, f64>),
+    Right(MatMut<'m, f64>),
+}
+
+/// Exchanges rows of some columns: those that move, and where they come from.
+fn exchange(columns: MatMut<'_, f64>, moves: &[(usize, usize)]) {
+    let mut moved = vec![0.0; moves.len()];
+    for column in columns.col_iter_mut() {
+        let Some(column) = column.try_as_col_major_mut() else {
+            continue;
+        };
+        let column = column.as_slice_mut();
+        for (value, &(_, from)) in moved.iter_mut().zip(moves) {
+            *value = column[from];
+        }
+        for (&value, &(to, _)) in moved.iter().zip(moves) {
+            column[to] = value;
+        }
+    }
 }
 
 /// Solves with the factors (column-major) of a matrix.
@@ -103,6 +193,48 @@ impl Factors {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Pivots that have to be looked for in all rows.
+    fn unordered(n: usize) -> Vec<f64> {
+        (0..n * n)
+            .map(|at| f64::sin((0.7 * at as f64).powi(2)))
+            .collect()
+    }
+
+    fn factors(n: usize, threads: usize) -> (Vec<f64>, Vec<usize>) {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let (mut values, mut exchanges) = (unordered(n), Exchanges::default());
+            let matrix = MatMut::from_column_major_slice_mut(&mut values, n, n);
+            factorise(matrix, &mut exchanges).unwrap();
+            for (to, &from) in exchanges.forward.iter().enumerate() {
+                assert_eq!(exchanges.inverse[from], to);
+            }
+            (values, exchanges.forward)
+        })
+    }
+
+    #[test]
+    fn large_matrices_are_factorised_by_blocks_with_any_number_of_threads() {
+        for n in [LARGE - 1, LARGE, LARGE + 41, 2 * LARGE] {
+            let (values, forward) = factors(n, 1);
+            let of_factors = DMatrix::from_column_slice(n, n, &values);
+            let l = of_factors.lower_triangle();
+            let l = DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 } else { l[(i, j)] });
+            // Of each column the largest entry was taken.
+            assert!(l.amax() <= 1.0);
+            let matrix = DMatrix::from_column_slice(n, n, &unordered(n));
+            let exchanged = matrix.select_rows(&forward);
+            let left = l * of_factors.upper_triangle() - exchanged;
+            assert!(left.amax() < 1e-11, "{n}: {}", left.amax());
+            let right: Vec<f64> = (0..n).map(|i| f64::cos(i as f64)).collect();
+            let x = Factors::new(unordered(n), n).unwrap().solve(&right);
+            let left = &matrix * DVector::from_vec(x) - DVector::from_vec(right);
+            assert!(left.amax() < 1e-9, "{n}: {}", left.amax());
+            assert_eq!(factors(n, 3), (values, forward), "{n}");
+        }
+    }
 
     #[test]
     fn small_matrices_are_solved_with_and_refused_where_they_are_singular() {

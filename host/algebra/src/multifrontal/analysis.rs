@@ -324,17 +324,27 @@ impl Analysis {
             let entries: Vec<Vec<(u32, u32)>> = fronts.iter().map(entries_of).collect();
             entries
         });
-        let of_fronts = || placed.iter().flatten();
-        let n_entries = of_fronts().map(Vec::len).sum();
-        let (mut sources, mut targets) =
-            (Vec::with_capacity(n_entries), Vec::with_capacity(n_entries));
-        for (shape, entries) in self.fronts.iter_mut().zip(of_fronts()) {
-            shape.entries = targets.len()..targets.len() + entries.len();
-            for &(source, target) in entries {
-                sources.push(source);
-                targets.push(target);
-            }
+        let mut n_entries = 0;
+        for (shape, entries) in self.fronts.iter_mut().zip(placed.iter().flatten()) {
+            shape.entries = n_entries..n_entries + entries.len();
+            n_entries += entries.len();
         }
+        // What is new is given by the system as it is written, which takes as long as writing.
+        let (mut sources, mut targets) = (vec![0; n_entries], vec![0; n_entries]);
+        let (mut of_sources, mut of_targets) = (sources.as_mut_slice(), targets.as_mut_slice());
+        let parts = placed.into_iter().map(|placed| {
+            let len = placed.iter().map(Vec::len).sum();
+            let (sources, targets);
+            (sources, of_sources) = std::mem::take(&mut of_sources).split_at_mut(len);
+            (targets, of_targets) = std::mem::take(&mut of_targets).split_at_mut(len);
+            (placed, sources, targets)
+        });
+        threads::each(parts, |(placed, sources, targets)| {
+            let places = sources.iter_mut().zip(targets);
+            for ((source, target), entry) in places.zip(placed.iter().flatten()) {
+                (*source, *target) = *entry;
+            }
+        });
         (self.sources, self.targets) = (sources, targets);
     }
 

@@ -13,6 +13,8 @@ use std::ops::Range;
 
 /// Elements that one thread takes at a time.
 const PIECE: usize = 256;
+/// Parts of the degrees of freedom that forces are added up in at the same time.
+const PARTS: usize = 4;
 /// Most integration points of an element.
 const MOST_POINTS: usize = 9;
 
@@ -174,6 +176,26 @@ impl<const N: usize> Solid<N> {
     }
 }
 
+/// Adds forces of elements to those of the degrees of freedom from the `first` on. Elements share nodes: their forces
+/// are added in one order, whoever computed them and whoever adds them.
+fn add_up<const N: usize>(
+    first: usize,
+    nodes: &[[usize; N]],
+    forces: &[[[f64; 2]; N]],
+    to: &mut [f64],
+) {
+    for (nodes, forces) in nodes.iter().zip(forces) {
+        for (node, f) in nodes.iter().zip(forces) {
+            // Those before the first wrap around.
+            let at = (2 * node).wrapping_sub(first);
+            if let Some([x, y]) = to.get_mut(at..at.wrapping_add(2)) {
+                *x += f[0];
+                *y += f[1];
+            }
+        }
+    }
+}
+
 impl<const N: usize> Point<N> {
     /// `None` if the Jacobian is not positive.
     fn new(
@@ -293,24 +315,27 @@ impl<const N: usize> Kinematics for Solid<N> {
                 flux,
             })
         };
-        // Elements share nodes: their forces are added in one order, whoever computed them.
-        let mut add = |number: usize, of_piece: Vec<[[f64; 2]; N]>| {
-            for (nodes, forces) in self.nodes[number * PIECE..].iter().zip(of_piece) {
-                for (node, f) in nodes.iter().zip(forces) {
-                    force[2 * node] += f[0];
-                    force[2 * node + 1] += f[1];
+        if self.nodes.len() <= PIECE {
+            return add_up(0, &self.nodes, &forces_of((0, flux)), force);
+        }
+        let pieces = flux
+            .chunks(PIECE * per_element)
+            .zip(self.nodes.chunks(PIECE));
+        let of_pieces = threads::map(pieces.enumerate(), |(number, (flux, nodes))| {
+            let all = || nodes.iter().flatten().map(|node| 2 * node);
+            let span = all().min()..all().max().map(|last| last + 2);
+            (nodes, forces_of((number, flux)), span)
+        });
+        let per_part = 2 * (force.len() / 2).div_ceil(PARTS).max(1);
+        let parts = force.chunks_mut(per_part).enumerate();
+        threads::each(parts, |(part, force)| {
+            let (first, end) = (part * per_part, part * per_part + force.len());
+            for (nodes, forces, span) in &of_pieces {
+                if span.start < Some(end) && span.end > Some(first) {
+                    add_up(first, nodes, forces, force);
                 }
             }
-        };
-        if self.nodes.len() > PIECE {
-            let pieces = flux.chunks(PIECE * per_element).enumerate();
-            threads::map(pieces, forces_of)
-                .into_iter()
-                .enumerate()
-                .for_each(|(number, of_piece)| add(number, of_piece));
-        } else {
-            add(0, forces_of((0, flux)));
-        }
+        });
     }
 
     fn only(&self, elements: &[usize]) -> Option<Box<dyn Kinematics>> {
