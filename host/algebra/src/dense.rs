@@ -131,11 +131,7 @@ enum Beside<'m> {
 /// Exchanges rows of some columns: those that move, and where they come from.
 fn exchange(columns: MatMut<'_, f64>, moves: &[(usize, usize)]) {
     let mut moved = vec![0.0; moves.len()];
-    for column in columns.col_iter_mut() {
-        let Some(column) = column.try_as_col_major_mut() else {
-            continue;
-        };
-        let column = column.as_slice_mut();
+    for mut column in columns.col_iter_mut() {
         for (value, &(_, from)) in moved.iter_mut().zip(moves) {
             *value = column[from];
         }
