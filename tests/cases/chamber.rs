@@ -26,7 +26,10 @@ fn run(name: &str) -> TempDir {
             && !warning.contains("group `interface` ends inside the mesh")
     });
     if name == "chamber_oriented" {
-        warnings.retain(|warning| !warning.contains("viscous relaxation"));
+        // Its README counts both.
+        warnings.retain(|warning| {
+            !warning.contains("viscous relaxation") && !warning.contains("steps were cut back")
+        });
     }
     if name == "chamber_joint" {
         // So does this one's: at the toe's corner both sides stay joined.

@@ -22,7 +22,7 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of the file: the format.
 const NAME: &[u8] = b"pilum checkpoint ";
 /// The same with its version.
-const HEAD: &[u8] = b"pilum checkpoint 10\n";
+const HEAD: &[u8] = b"pilum checkpoint 11\n";
 
 /// Bytes that are summed and written at a time: they stay in the processor's cache.
 const PIECE: usize = 1 << 17;

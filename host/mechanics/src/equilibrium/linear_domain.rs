@@ -389,8 +389,8 @@ impl LinearDomain {
     }
 
     /// Sets up a phase that starts from the groups' committed state, with these
-    /// [internal forces](Self::internal_forces), and these displacements. What is out of balance inside is left if all of it
-    /// is noise beside the tolerance.
+    /// [internal forces](Self::internal_forces), and these displacements. Forces inside that change by noise
+    /// beside the tolerance are taken for unchanged.
     pub fn start(
         &mut self,
         groups: &[Group],
@@ -410,7 +410,7 @@ impl LinearDomain {
             *right = -*right;
             // External forces on the boundary are left to the equations of the rest.
             let change = at_end[dof] - at_start[dof];
-            if !on_boundary && change.abs() > noise {
+            if !on_boundary && (change.is_nan() || change.abs() > noise) {
                 *right += change;
             }
         }

@@ -44,10 +44,11 @@ impl Simulation {
         let tied = self.tied_in(number, held)?;
         let held: Vec<usize> = tied.prescribed.iter().map(|&(dof, ..)| dof).collect();
         let faces = Faces::new(&appeared, &tied.ties, &held, lacking.len());
-        faces.to_equations(&mut lacking);
+        faces.fold(&mut lacking);
         if norm(&lacking) <= self.problem.settings.force_tolerance * play {
             return Ok(Vec::new());
         }
+        faces.to_scale(&mut lacking);
         Ok(faces.tractions(lacking))
     }
 }
@@ -96,9 +97,16 @@ impl<'a> Faces<'a> {
         }
     }
 
-    /// Nodal forces as right-hand sides of the equations.
-    fn to_equations(&self, force: &mut [f64]) {
+    /// Leaves the forces that the faces have to carry.
+    fn fold(&self, force: &mut [f64]) {
         fold(self.ties, force);
+        let both = force.iter_mut().zip(&self.scale);
+        both.filter(|(_, scale)| **scale == 0.0)
+            .for_each(|(force, _)| *force = 0.0);
+    }
+
+    /// Scales forces to right-hand sides of the equations.
+    fn to_scale(&self, force: &mut [f64]) {
         let both = force.iter_mut().zip(&self.scale);
         both.for_each(|(force, scale)| *force *= scale);
     }
@@ -123,7 +131,8 @@ impl<'a> Faces<'a> {
         for (group, tractions) in self.groups.iter().zip(&tractions) {
             group.kinematics.add_forces(tractions, &mut force);
         }
-        self.to_equations(&mut force);
+        self.fold(&mut force);
+        self.to_scale(&mut force);
         force
     }
 

@@ -70,14 +70,15 @@ impl Simulation {
         watch: &mut dyn Watch,
     ) {
         let told = phase.record.in_halves;
-        if told.is_some_and(|told| !told.is_the_same()) {
+        if phase.record.halved == MOST_HALVED || told.is_some_and(|told| !told.is_the_same()) {
             return;
         }
-        phase.record.in_halves = self.neighbour(phase, success, step, Trial::Halves);
-        if let Some(in_halves) = phase.record.in_halves
-            && !in_halves.is_the_same()
-        {
-            watch.warning(&Warning::CutBack(place.clone(), in_halves));
+        phase.record.halved += 1;
+        if let Some(in_halves) = self.neighbour(phase, success, step, Trial::Halves) {
+            phase.record.in_halves = Some(in_halves);
+            if !in_halves.is_the_same() {
+                watch.warning(&Warning::CutBack(place.clone(), in_halves));
+            }
         }
     }
 
@@ -135,9 +136,11 @@ impl Simulation {
         let neighbour = match other {
             Ok(other) if other.tolerated == 0.0 => {
                 let there = self.forces(equations, Group::add_trial_forces);
+                // Where forces no longer change, what the tolerance leaves of them is no difference.
+                let least = self.settings().force_tolerance / SAME * norm(&here);
                 Some(Neighbour::Apart {
-                    displacements: apart(&other.increment, &success.increment, None),
-                    forces: apart(&there, &here, Some(&before)),
+                    displacements: apart(&other.increment, &success.increment, None, 0.0),
+                    forces: apart(&there, &here, Some(&before), least),
                 })
             }
             Ok(_) => Some(Neighbour::None),
@@ -166,6 +169,8 @@ impl Simulation {
     }
 }
 
+/// Steps of a phase that are tried in two halves, at most.
+const MOST_HALVED: usize = 4;
 /// Two ways that lead a step no further from each other than this, as shares of what it changes, lead to one equilibrium.
 const SAME: f64 = 1e-6;
 
@@ -183,12 +188,12 @@ impl Neighbour {
     }
 }
 
-/// ‖a − b‖ / ‖b − start‖.
-fn apart(a: &[f64], b: &[f64], start: Option<&[f64]>) -> f64 {
+/// ‖a − b‖ / ‖b − start‖, or over what the change is at `least`.
+fn apart(a: &[f64], b: &[f64], start: Option<&[f64]>, least: f64) -> f64 {
     let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
     let change: Vec<f64> = match start {
         Some(start) => b.iter().zip(start).map(|(b, start)| b - start).collect(),
         None => b.to_vec(),
     };
-    norm(&difference) / norm(&change).max(f64::MIN_POSITIVE)
+    norm(&difference) / norm(&change).max(least).max(f64::MIN_POSITIVE)
 }

@@ -22,9 +22,11 @@ pub struct PhaseRecord {
     pub iterations: usize,
     /// Steps repeated with a smaller length.
     pub cut_backs: usize,
-    /// Where two halves of the first step after a cut-back lead; nothing where none was cut.
-    #[serde(default)]
+    /// Where two halves of a step lead in an increment that was cut: of the first one whose halves lead elsewhere, or the
+    /// last one tried.
     pub in_halves: Option<Neighbour>,
+    /// Steps that were tried in two halves.
+    pub halved: usize,
     /// Steps with results that a law calls inaccurate.
     pub unreliable: usize,
     /// Steps that a motion led to equilibrium: viscous relaxation, or creep.

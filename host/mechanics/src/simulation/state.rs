@@ -192,7 +192,11 @@ impl Simulation {
         for (group, &is_active) in self.groups.iter_mut().zip(&self.loading[1].active) {
             group.is_active = is_active;
         }
-        let own = state.course.prescribed.clone();
+        // What follows from them is found anew.
+        let own = state.course.prescribed.iter().copied();
+        let own = own
+            .filter(|(dof, ..)| self.prescribed.contains_key(dof))
+            .collect();
         let tied = self.tied_in(state.phase, own)?;
         (self.tied, self.led) = (tied.ties, tied.led);
         self.force = state.force.into_owned();

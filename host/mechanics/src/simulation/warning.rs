@@ -54,7 +54,7 @@ pub enum Warning {
     },
     /// Relaxation led to the equilibrium of this increment, the first one of its phase; where another way leads.
     Relaxed(Place, Option<Neighbour>),
-    /// Iterations cut a step back, the first one of its phase; where two halves of the one that follows lead.
+    /// Steps of an increment were cut back; where two halves of a shorter one lead, the first of its phase that lead elsewhere.
     CutBack(Place, Neighbour),
     /// Creep, which the settings ask for, did so.
     Crept(Place),
@@ -280,8 +280,8 @@ fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, crept: usize
 fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> fmt::Result {
     write!(
         f,
-        "{place}: iterations found no equilibrium and the step was cut back; which steps are cut can depend on last bits (another \
-         unit, order of groups, mirror image), and results depend on the steps taken: "
+        "{place}: steps were cut back; which ones are can depend on last bits (another unit, order of groups, mirror image), and \
+         results depend on the steps taken: "
     )?;
     match in_halves {
         Neighbour::Apart {
@@ -289,10 +289,10 @@ fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> 
             forces,
         } => write!(
             f,
-            "two halves of the next one lead {displacements:.1e} of its displacements and {forces:.1e} of its changes of \
+            "two halves of a shorter one lead {displacements:.1e} of its displacements and {forces:.1e} of its changes of \
              forces away"
         )?,
-        Neighbour::None => write!(f, "two halves of the next one lead to no equilibrium")?,
+        Neighbour::None => write!(f, "two halves of a shorter one lead to no equilibrium")?,
     }
     write!(
         f,
