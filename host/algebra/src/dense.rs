@@ -75,38 +75,60 @@ fn factorise_columns(matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
     );
 }
 
+/// While the columns to the right of a block are worked on, the next block is factorised, too: nothing waits for it.
 fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
     let n = matrix.nrows();
+    let width_at = |start: usize| {
+        if n - start > LAST { BLOCK } else { n - start }
+    };
     exchanges.forward.clear();
     exchanges.forward.extend(0..n);
     let mut of_block = Exchanges::default();
+    factorise_columns(matrix.rb_mut().subcols_mut(0, width_at(0)), &mut of_block);
     let mut start = 0;
     while start < n {
-        let width = if n - start > LAST { BLOCK } else { n - start };
+        let width = width_at(start);
         let below = matrix.rb_mut().subrows_mut(start, n - start);
         let (left, rest) = below.split_at_col_mut(start);
-        let (mut block, right) = rest.split_at_col_mut(width);
-        factorise_columns(block.rb_mut(), &mut of_block);
+        let (block, mut rest) = rest.split_at_col_mut(width);
         let (factor, below) = block.rb().split_at_row(width);
-        let per_part = right.ncols().div_ceil(PARTS).next_multiple_of(8);
-        let mut rest = right;
-        let mut parts = vec![Beside::Left(left)];
-        while rest.ncols() > 0 {
-            let width = per_part.min(rest.ncols());
-            let (part, others) = rest.split_at_col_mut(width);
-            parts.push(Beside::Right(part));
-            rest = others;
+        // The next block is most work, what stands left of this one least.
+        let mut parts = Vec::with_capacity(PARTS + 2);
+        if rest.ncols() > 0 {
+            let next;
+            (next, rest) = rest.split_at_col_mut(width_at(start + width));
+            parts.push(Beside::Next(next));
         }
+        let per_part = rest.ncols().div_ceil(PARTS).next_multiple_of(8);
+        while rest.ncols() > 0 {
+            let part;
+            let width = per_part.min(rest.ncols());
+            (part, rest) = rest.split_at_col_mut(width);
+            parts.push(Beside::Right(part));
+        }
+        parts.push(Beside::Left(left));
         let moves = of_block.forward.iter().copied().enumerate();
         let moves: Vec<(usize, usize)> = moves.filter(|(to, from)| to != from).collect();
-        // The left is least work.
-        threads::each(parts.into_iter().rev(), |part| match part {
-            Beside::Left(columns) => exchange(columns, &moves),
-            Beside::Right(mut columns) => {
-                exchange(columns.rb_mut(), &moves);
-                let (mut above, rest) = columns.split_at_row_mut(width);
-                triangular::solve_unit_lower_triangular_in_place(factor, above.rb_mut(), Par::Seq);
-                matmul(rest, Accum::Add, below, above.rb(), -1.0, Par::Seq);
+        let subtract = |mut columns: MatMut<'_, f64>| {
+            exchange(columns.rb_mut(), &moves);
+            let (mut above, rest) = columns.split_at_row_mut(width);
+            triangular::solve_unit_lower_triangular_in_place(factor, above.rb_mut(), Par::Seq);
+            matmul(rest, Accum::Add, below, above.rb(), -1.0, Par::Seq);
+        };
+        let of_parts = threads::map(parts, |part| match part {
+            Beside::Left(columns) => {
+                exchange(columns, &moves);
+                None
+            }
+            Beside::Right(columns) => {
+                subtract(columns);
+                None
+            }
+            Beside::Next(mut columns) => {
+                subtract(columns.rb_mut());
+                let mut exchanges = Exchanges::default();
+                factorise_columns(columns.split_at_row_mut(width).1, &mut exchanges);
+                Some(exchanges)
             }
         });
         let exchanged = of_block.forward.iter();
@@ -114,6 +136,7 @@ fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
             .map(|&from| exchanges.forward[start + from])
             .collect();
         exchanges.forward[start..].copy_from_slice(&exchanged);
+        of_block = of_parts.into_iter().flatten().next().unwrap_or_default();
         start += width;
     }
     exchanges.inverse.resize(n, 0);
@@ -126,6 +149,8 @@ fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
 enum Beside<'m> {
     Left(MatMut<'m, f64>),
     Right(MatMut<'m, f64>),
+    /// Those of the block that follows.
+    Next(MatMut<'m, f64>),
 }
 
 /// Exchanges rows of some columns: those that move, and where they come from.

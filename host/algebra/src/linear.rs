@@ -53,7 +53,7 @@ impl Dense {
 }
 
 /// A dense matrix that stands beside the sparse one: the condensed stiffness of a domain.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Block {
     /// Its equations, ascending.
     equations: Vec<usize>,
@@ -163,9 +163,27 @@ impl LinearSolver {
         for &equation in block.iter().flat_map(|block| &block.equations) {
             kept[equation] = true;
         }
-        Ok(Self {
-            multifrontal: Multifrontal::new(pattern, kind, &kept, lines)?,
-            pattern: Arc::clone(pattern),
+        let multifrontal = Multifrontal::new(pattern, kind, &kept, lines)?;
+        Ok(Self::of(multifrontal, Arc::clone(pattern), block))
+    }
+
+    /// Another one for matrices of its own on the same equations, which need not be symmetric. If these need not either,
+    /// nothing is analysed again.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn another(&self) -> Result<Self, Singular> {
+        if self.multifrontal.is_symmetric() {
+            return Self::of_kind(Kind::Unsymmetric, &self.pattern, None, self.block.clone());
+        }
+        let (pattern, block) = (Arc::clone(&self.pattern), self.block.clone());
+        Ok(Self::of(self.multifrontal.alike(), pattern, block))
+    }
+
+    fn of(multifrontal: Multifrontal, pattern: Arc<Pattern>, block: Option<Block>) -> Self {
+        Self {
+            multifrontal,
+            pattern,
             block,
             exchanges: Exchanges::default(),
             values: Vec::new(),
@@ -175,7 +193,7 @@ impl LinearSolver {
             row_exchanges: None,
             factorisations: 0,
             fallbacks: 0,
-        })
+        }
     }
 
     /// Bytes that a factorisation takes, by the analysis.

@@ -29,7 +29,7 @@ pub(crate) use analysis::work;
 
 use crate::{Pattern, Singular, dense};
 use analysis::Analysis;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use updates::Pile;
 
 /// Which half of the matrix counts.
@@ -72,7 +72,7 @@ pub struct Gathered(Vec<f64>);
 /// A factorised matrix.
 #[derive(Debug)]
 pub struct Multifrontal {
-    analysis: Analysis,
+    analysis: Arc<Analysis>,
     fronts: Vec<Mutex<Front>>,
     /// Where the updates of small branches wait, for one thread each.
     memory: Mutex<Vec<[Pile; 2]>>,
@@ -96,15 +96,24 @@ impl Multifrontal {
         lines: Option<&[[u32; 2]]>,
     ) -> Result<Self, Singular> {
         let analysis = Analysis::new(pattern, kind, kept, lines)?;
-        let fronts = analysis.fronts.iter().map(|_| Mutex::default()).collect();
-        Ok(Self {
+        Ok(Self::of(Arc::new(analysis)))
+    }
+
+    fn of(analysis: Arc<Analysis>) -> Self {
+        Self {
+            fronts: analysis.fronts.iter().map(|_| Mutex::default()).collect(),
             analysis,
-            fronts,
             memory: Mutex::default(),
             schur: Vec::new(),
             is_complete: false,
             computed: 0,
-        })
+        }
+    }
+
+    /// Another one of the same pattern, kind and order, for matrices of its own.
+    #[must_use]
+    pub fn alike(&self) -> Self {
+        Self::of(Arc::clone(&self.analysis))
     }
 
     /// Bytes that a factorisation takes, by the analysis.

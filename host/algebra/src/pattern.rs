@@ -86,6 +86,24 @@ impl Pattern {
         pattern
     }
 
+    /// What it is among some of the equations, ascending.
+    pub(crate) fn among(&self, equations: &[u32]) -> Self {
+        let mut number = vec![u32::MAX; self.n()];
+        for (new, &equation) in (0..).zip(equations) {
+            number[equation as usize] = new;
+        }
+        let mut column_start = Vec::with_capacity(equations.len() + 1);
+        column_start.push(0);
+        let mut rows = Vec::with_capacity(self.rows.len());
+        for &equation in equations {
+            let column = self.column(equation as usize).iter();
+            let own = column.map(|&row| number[row as usize]);
+            rows.extend(own.filter(|&row| row != u32::MAX));
+            column_start.push(rows.len() as u32);
+        }
+        Self { column_start, rows }
+    }
+
     /// Number of rows and columns.
     pub fn n(&self) -> usize {
         self.column_start.len() - 1

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::case::{CaseFile, Coordinate, LineInput, PartInput, RegionInput};
-use mechanics::mesh::{Line, Mesh};
+use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{Analysis, Formulation};
 use text::{Source, suggestion};
 use toml::Spanned;
@@ -276,10 +276,12 @@ fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, 
         (Some(Coordinate::At(at)), _) | (_, Some(Coordinate::At(at))) => {
             let along_y = matches!(line.x, Some(Coordinate::At(_)));
             grid_line(grids[usize::from(!along_y)], at, tolerance)?;
+            let is_on: Vec<bool> = (0..mesh.nodes.len()).map(on).collect();
+            let touches = |quad: &Solid| quad.nodes().iter().any(|&node| is_on[node]);
             let mut edges = Vec::new();
-            for (q, quad) in mesh.solids.iter().enumerate() {
+            for (q, quad) in mesh.solids.iter().enumerate().filter(|(_, s)| touches(s)) {
                 for (e, edge) in quad.edges().enumerate() {
-                    if edge.into_iter().all(on) {
+                    if edge.into_iter().all(|node| is_on[node]) {
                         edges.push((q, e));
                     }
                 }

@@ -252,12 +252,24 @@ impl System {
         ties: &[Tie],
         domain: Option<&System>,
     ) -> Self {
+        Self::new_with(groups, takes_part, prescribed, ties, domain, |_| ()).0
+    }
+
+    /// The same, and what becomes of its pattern and its unknowns while its elements find their places in the pattern.
+    pub fn new_with<R: Send>(
+        groups: &[Group],
+        takes_part: impl Fn(usize, &Group) -> bool,
+        prescribed: &[bool],
+        ties: &[Tie],
+        domain: Option<&System>,
+        act: impl FnOnce(&Self) -> R + Send,
+    ) -> (Self, R) {
         let n_dofs = prescribed.len();
         let mut tie_of = vec![None; n_dofs];
         for (i, tie) in ties.iter().enumerate() {
             tie_of[tie.dof] = Some(i);
         }
-        let mut elements: Vec<Vec<ElementMap>> = groups
+        let elements: Vec<Vec<ElementMap>> = groups
             .iter()
             .enumerate()
             .map(|(number, group)| {
@@ -287,26 +299,34 @@ impl System {
         let boundary: Vec<usize> = free.iter().copied().filter(is_shared).collect();
         let of_elements = elements.iter().flatten().map(|map| map.dofs.as_slice());
         let pattern = Pattern::new(free.len(), &equation, of_elements);
-        let place = |map: &mut ElementMap| {
-            map.slots = find_slots(&map.dofs, &equation, &pattern);
-            let filled = map.slots.iter().filter(|&&slot| slot != u32::MAX);
-            map.span = filled.fold([u32::MAX, 0], |[first, last], &slot| {
-                [first.min(slot), last.max(slot)]
-            });
-        };
-        for maps in &mut elements {
-            threads::each(maps.chunks_mut(PIECE), |maps| {
-                maps.iter_mut().for_each(place);
-            });
-        }
-        Self {
+        let mut system = Self {
             equation,
             free,
             ties: ties.to_vec(),
             elements,
             boundary,
             pattern: Arc::new(pattern),
+        };
+        let (result, slots) = rayon::join(|| act(&system), || system.slots());
+        let maps = system.elements.iter_mut().flatten();
+        for (map, (slots, span)) in maps.zip(slots.into_iter().flatten()) {
+            (map.slots, map.span) = (slots, span);
         }
+        (system, result)
+    }
+
+    /// Of all elements the positions of their entries in the matrix, and the first and the last of them; in pieces.
+    fn slots(&self) -> Vec<Vec<(Vec<u32>, [u32; 2])>> {
+        let pieces = self.elements.iter().flat_map(|maps| maps.chunks(PIECE));
+        let of_map = |map: &ElementMap| {
+            let slots = find_slots(&map.dofs, &self.equation, &self.pattern);
+            let filled = slots.iter().filter(|&&slot| slot != u32::MAX);
+            let span = filled.fold([u32::MAX, 0], |[first, last], &slot| {
+                [first.min(slot), last.max(slot)]
+            });
+            (slots, span)
+        };
+        threads::map(pieces, |maps| maps.iter().map(of_map).collect())
     }
 
     /// Whether a group takes part.

@@ -686,6 +686,17 @@ impl Group {
         &self.tangent[first * n * n..(first + points.len()) * n * n]
     }
 
+    /// Tangents of consecutive elements, at least one, where they differ from point to point.
+    pub fn tangents_of(&self, elements: Range<usize>) -> &[f64] {
+        let n = self.kinematics.n_components();
+        let points_of = |element| self.kinematics.points_of(element);
+        let (first, end) = (
+            points_of(elements.start).start,
+            points_of(elements.end - 1).end,
+        );
+        &self.tangent[first * n * n..end * n * n]
+    }
+
     /// Nodes of its elements; most of them several times.
     pub fn nodes(&self) -> impl Iterator<Item = usize> {
         let elements = 0..self.kinematics.n_elements();

@@ -24,8 +24,9 @@ const NAME: &[u8] = b"pilum checkpoint ";
 /// The same with its version.
 const HEAD: &[u8] = b"pilum checkpoint 11\n";
 
-/// Bytes that are summed and written at a time: they stay in the processor's cache.
-const PIECE: usize = 1 << 17;
+/// Bytes that are summed and written at a time, by two threads if there are two: few enough to stay in the processor's
+/// cache, and as long in work as waking a thread is worth.
+const PIECE: usize = 1 << 19;
 
 /// Removes the checkpoint of a folder, if there is one.
 ///
@@ -153,8 +154,8 @@ struct Summed {
 impl Write for Summed {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.outcome.is_ok() {
-            self.sum.update(bytes);
-            self.outcome = self.file.write_all(bytes);
+            let Self { file, sum, .. } = self;
+            (_, self.outcome) = rayon::join(|| sum.update(bytes), || file.write_all(bytes));
         }
         Ok(bytes.len())
     }

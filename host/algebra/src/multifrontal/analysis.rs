@@ -8,7 +8,7 @@ use crate::{Pattern, Singular, threads};
 use std::ops::Range;
 
 /// The order of elimination and the shape of everything that follows from it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Analysis {
     pub(super) kind: Kind,
     /// Equations that are eliminated, in this order.
@@ -35,7 +35,7 @@ pub(super) struct Analysis {
 }
 
 /// A front with all its descendants.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Branch {
     /// Ascending: it is the last one.
     pub(super) fronts: Vec<usize>,
@@ -58,7 +58,7 @@ pub(super) struct Entry {
 }
 
 /// A supernode with the rows it touches.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Shape {
     /// Positions of its pivots.
     pub(super) pivots: Range<usize>,
@@ -107,12 +107,17 @@ impl Analysis {
             position[equation as usize] = at;
         }
         if !eliminated.is_empty() {
-            let supernodes = Supernodes::new(pattern, &eliminated, lines)?;
+            // For entries above the diagonal rows of the matrix are needed: the transposed pattern is the same.
+            let transpose = || (kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
+            let find = || Supernodes::new(pattern, &eliminated, lines);
+            let (supernodes, transposed) = rayon::join(find, transpose);
+            let supernodes = supernodes?;
             analysis.order = supernodes.order;
             for (at, &equation) in (0..).zip(&analysis.order) {
                 position[equation as usize] = at;
             }
             analysis.add_fronts(pattern, &position, &supernodes.starts, &supernodes.rows);
+            analysis.place_entries(pattern, transposed.as_deref(), &position);
         }
         analysis.add_kept_entries(pattern, &position);
         Ok(analysis)
@@ -227,7 +232,6 @@ impl Analysis {
         }
         self.find_branches(&parent);
         self.place_rows(&parent);
-        self.place_entries(pattern, position);
     }
 
     /// Shares the fronts among branches and what is above them.
@@ -308,78 +312,71 @@ impl Analysis {
     }
 
     /// Where the entries of the matrix go: each to the front that eliminates its row or its
-    /// column first.
-    fn place_entries(&mut self, pattern: &Pattern, position: &[u32]) {
-        // Rows of the matrix, for entries above the diagonal: the transposed pattern is the same.
-        let transposed = (self.kind == Kind::Unsymmetric).then(|| pattern.transposed_places());
+    /// column first. `transposed` are the places across the diagonal, in a matrix that is not symmetric.
+    fn place_entries(&mut self, pattern: &Pattern, transposed: Option<&[u32]>, position: &[u32]) {
         let per_task = self.fronts.len().div_ceil(TASKS).max(1);
         let numbers: Vec<usize> = (0..self.fronts.len()).collect();
-        let placed = threads::map(numbers.chunks(per_task), |fronts| {
-            let mut place = vec![0_u32; position.len()];
-            let entries_of = |&front: &usize| {
+        let counted = threads::map(numbers.chunks(per_task), |fronts| {
+            let count = |&front: &usize| {
                 let shape = &self.fronts[front];
-                self.place_front(shape.pivots.clone(), shape.rows.clone(), &mut place);
-                self.entries_of(shape, (pattern, transposed.as_deref()), position, &place)
+                let counts =
+                    |(_, _, row)| 1 + usize::from(transposed.is_some() && row >= shape.pivots.end);
+                self.entries_of(shape, pattern, position).map(counts).sum()
             };
-            let entries: Vec<Vec<(u32, u32)>> = fronts.iter().map(entries_of).collect();
-            entries
+            let counts: Vec<usize> = fronts.iter().map(count).collect();
+            counts
         });
         let mut n_entries = 0;
-        for (shape, entries) in self.fronts.iter_mut().zip(placed.iter().flatten()) {
-            shape.entries = n_entries..n_entries + entries.len();
-            n_entries += entries.len();
+        for (shape, n) in self.fronts.iter_mut().zip(counted.iter().flatten()) {
+            shape.entries = n_entries..n_entries + n;
+            n_entries += n;
         }
         // What is new is given by the system as it is written, which takes as long as writing.
         let (mut sources, mut targets) = (vec![0; n_entries], vec![0; n_entries]);
         let (mut of_sources, mut of_targets) = (sources.as_mut_slice(), targets.as_mut_slice());
-        let parts = placed.into_iter().map(|placed| {
-            let len = placed.iter().map(Vec::len).sum();
+        let tasks = numbers.chunks(per_task).zip(&counted);
+        let tasks = tasks.map(|(fronts, counts)| {
+            let len = counts.iter().sum();
             let (sources, targets);
             (sources, of_sources) = std::mem::take(&mut of_sources).split_at_mut(len);
             (targets, of_targets) = std::mem::take(&mut of_targets).split_at_mut(len);
-            (placed, sources, targets)
+            (fronts, sources, targets)
         });
-        threads::each(parts, |(placed, sources, targets)| {
-            let places = sources.iter_mut().zip(targets);
-            for ((source, target), entry) in places.zip(placed.iter().flatten()) {
-                (*source, *target) = *entry;
+        threads::each(tasks, |(fronts, sources, targets)| {
+            let mut place = vec![0_u32; position.len()];
+            let mut places = sources.iter_mut().zip(targets);
+            let mut entries = Vec::new();
+            for &front in fronts {
+                let shape = &self.fronts[front];
+                self.place_front(shape.pivots.clone(), shape.rows.clone(), &mut place);
+                let all = self.entries_of(shape, pattern, position);
+                put_in_order(shape, all, transposed, &place, &mut entries);
+                for (&entry, (source, target)) in entries.iter().zip(&mut places) {
+                    (*source, *target) = ((entry >> u32::BITS) as u32, entry as u32);
+                }
             }
         });
         (self.sources, self.targets) = (sources, targets);
     }
 
-    /// Entries of a front whose rows have these places in it: where they come from and where they go, in the order
-    /// in which they stand in memory.
+    /// Entries in the columns of the pivots of a front: which of the pivots, where the entry stands in the pattern, and
+    /// the position of its row. Of a symmetric matrix those of the lower half.
     fn entries_of(
         &self,
         shape: &Shape,
-        (pattern, transposed): (&Pattern, Option<&[u32]>),
+        pattern: &Pattern,
         position: &[u32],
-        place: &[u32],
-    ) -> Vec<(u32, u32)> {
-        let pivots = &shape.pivots;
-        let (k, n) = (pivots.len(), pivots.len() + shape.rows.len());
-        let mut entries = Vec::new();
-        for (column, pivot) in pivots.clone().enumerate() {
-            let equation = self.order[pivot] as usize;
-            for at in pattern.places(equation) {
+    ) -> impl Iterator<Item = (usize, usize, usize)> {
+        let pivots = shape.pivots.clone();
+        let is_symmetric = self.kind == Kind::Symmetric;
+        pivots.clone().enumerate().flat_map(move |(column, pivot)| {
+            let first = if is_symmetric { pivot } else { pivots.start };
+            let places = pattern.places(self.order[pivot] as usize);
+            places.filter_map(move |at| {
                 let row = position[pattern.rows[at] as usize] as usize;
-                let lower = self.kind == Kind::Unsymmetric || row >= pivot;
-                if row >= pivots.start && lower {
-                    let target = column * n + place[row] as usize;
-                    entries.push((at as u32, target as u32));
-                }
-                // The entry across the diagonal, in the row of this pivot.
-                if let Some(transposed) = transposed
-                    && row >= pivots.end
-                {
-                    let target = n * k + (place[row] as usize - k) * k + column;
-                    entries.push((transposed[at], target as u32));
-                }
-            }
-        }
-        entries.sort_unstable();
-        entries
+                (row >= first).then_some((column, at, row))
+            })
+        })
     }
 
     fn add_kept_entries(&mut self, pattern: &Pattern, position: &[u32]) {
@@ -399,6 +396,32 @@ impl Analysis {
             }
         }
     }
+}
+
+/// Entries of a front whose rows have these places in it: where they come from and, in the lower half of the number,
+/// where they go; in the order in which they stand in memory.
+fn put_in_order(
+    shape: &Shape,
+    of_columns: impl Iterator<Item = (usize, usize, usize)>,
+    transposed: Option<&[u32]>,
+    place: &[u32],
+    entries: &mut Vec<u64>,
+) {
+    let (k, n) = (shape.pivots.len(), shape.pivots.len() + shape.rows.len());
+    let entry = |source: u32, target: usize| u64::from(source) << u32::BITS | target as u64;
+    entries.clear();
+    for (column, at, row) in of_columns {
+        let in_front = place[row] as usize;
+        entries.push(entry(at as u32, column * n + in_front));
+        // The entry across the diagonal, in the row of this pivot.
+        if let Some(transposed) = transposed
+            && row >= shape.pivots.end
+        {
+            let target = n * k + (in_front - k) * k + column;
+            entries.push(entry(transposed[at], target));
+        }
+    }
+    entries.sort_unstable();
 }
 
 /// Floating-point operations that eliminate k pivots with m rows below them, as L U; of a symmetric

@@ -13,7 +13,7 @@ use faer::MatRef;
 use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Fronts whose entries one thread compares at a time.
 const PER_TASK: usize = 64;
@@ -92,8 +92,9 @@ impl Multifrontal {
     pub fn gather(&mut self, values: &[f64]) -> Gathered {
         self.clear_schur();
         self.add_kept(values);
-        self.analysis.kept_entries = Vec::new();
-        let sources = std::mem::take(&mut self.analysis.sources);
+        let analysis = Arc::make_mut(&mut self.analysis);
+        analysis.kept_entries = Vec::new();
+        let sources = std::mem::take(&mut analysis.sources);
         Gathered(sources.iter().map(|&at| values[at as usize]).collect())
     }
 
@@ -103,8 +104,9 @@ impl Multifrontal {
     /// As [`Self::factorise`].
     pub fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
         self.eliminate_all(&Before::Values(&[]), Values::OfFronts(&values.0))?;
-        self.analysis.targets = Vec::new();
-        self.analysis.runs = Vec::new();
+        let analysis = Arc::make_mut(&mut self.analysis);
+        analysis.targets = Vec::new();
+        analysis.runs = Vec::new();
         self.memory = Mutex::default();
         Ok(())
     }

@@ -28,24 +28,16 @@ impl Supernodes {
         eliminated: &[u32],
         lines: Option<&[[u32; 2]]>,
     ) -> Result<Self, Singular> {
-        let mut number = vec![u32::MAX; pattern.n()];
-        for (new, &equation) in (0..).zip(eliminated) {
-            number[equation as usize] = new;
-        }
-        let mut column_start = Vec::with_capacity(eliminated.len() + 1);
-        column_start.push(0_u32);
-        let mut rows = Vec::with_capacity(pattern.rows.len());
-        for &equation in eliminated {
-            let column = pattern.column(equation as usize).iter();
-            rows.extend(
-                column
-                    .map(|&row| number[row as usize])
-                    .filter(|&row| row != u32::MAX),
-            );
-            column_start.push(rows.len() as u32);
-        }
+        let own;
+        let among = if eliminated.len() == pattern.n() {
+            pattern
+        } else {
+            own = pattern.among(eliminated);
+            &own
+        };
         let n = eliminated.len();
-        let matrix = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &rows);
+        let matrix =
+            SymbolicSparseColMatRef::new_checked(n, n, &among.column_start, None, &among.rows);
         let settings = CholeskySymbolicParams {
             // Also of equations that are not coupled, which cost nothing.
             supernodal_flop_ratio_threshold: SupernodalThreshold(f64::NEG_INFINITY),

@@ -8,6 +8,8 @@ use std::cmp::Ordering;
 
 /// Sets within so few mesh lines each way are not cut any more.
 const SMALLEST: u32 = 4;
+/// Unknowns from which on both sides of a cut are worth a thread each.
+const WORTH_SHARING: usize = 10_000;
 
 /// Numbers of the mesh lines through every position, by coordinate: equal coordinates have equal
 /// numbers. Corners of 8-node elements have even numbers, their mid-side nodes odd ones.
@@ -51,6 +53,22 @@ pub(super) fn order(lines: &[[u32; 2]]) -> Vec<u32> {
     order
 }
 
+/// Appends two sets to the order, which do not touch each other.
+fn dissect_both(lines: &[[u32; 2]], sets: [&[u32]; 2], order: &mut Vec<u32>) {
+    if sets.iter().any(|set| set.len() < WORTH_SHARING) {
+        for set in sets {
+            dissect(lines, set, order);
+        }
+        return;
+    }
+    let mut of_second = Vec::with_capacity(sets[1].len());
+    rayon::join(
+        || dissect(lines, sets[0], order),
+        || dissect(lines, sets[1], &mut of_second),
+    );
+    order.append(&mut of_second);
+}
+
 /// Appends a set to the order: one side, the other side, and what separates them.
 fn dissect(lines: &[[u32; 2]], set: &[u32], order: &mut Vec<u32>) {
     let Some([(low, high), (low_y, high_y)]) = extents(lines, set) else {
@@ -85,8 +103,7 @@ fn dissect(lines: &[[u32; 2]], set: &[u32], order: &mut Vec<u32>) {
         order.extend(below);
         order.extend(above);
     } else {
-        dissect(lines, &below, order);
-        dissect(lines, &above, order);
+        dissect_both(lines, [&below, &above], order);
     }
     order.extend(separator);
 }

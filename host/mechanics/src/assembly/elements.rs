@@ -146,6 +146,31 @@ impl System {
         });
     }
 
+    /// Whether what [`Self::assemble_after`] has added up last is the matrix of the tangents that the groups hold.
+    pub fn is_sum_of_tangents(&self, kept: &Elements, groups: &[Group]) -> bool {
+        if kept.pieces.is_empty() {
+            return false;
+        }
+        let of_groups = groups.iter().zip(&self.elements).zip(&kept.pieces);
+        let pieces = of_groups.flat_map(|((group, maps), pieces)| {
+            let elements = (0..maps.len()).step_by(PIECE);
+            elements.zip(pieces).map(move |(first, piece)| {
+                let last = maps.len().min(first + PIECE);
+                (group, first..last, piece)
+            })
+        });
+        let is_of_tangents = |(group, elements, piece): (&Group, _, &Piece)| {
+            let kept = piece.tangents.as_deref().unwrap_or_default();
+            match group.constant_tangents() {
+                Some(constant) => is_same(kept, constant),
+                None => is_same(kept, group.tangents_of(elements)),
+            }
+        };
+        threads::map(pieces, is_of_tangents)
+            .into_iter()
+            .all(|is| is)
+    }
+
     /// The values of the matrix, and what is there for every column, in parts of some columns.
     fn parts<'v>(&self, mut values: &'v mut [f64], mut largest: &'v mut [f64]) -> Vec<Part<'v>> {
         let starts = &self.pattern.column_start;

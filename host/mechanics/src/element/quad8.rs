@@ -22,7 +22,7 @@ impl Quad8 {
         nodes: Vec<[usize; 8]>,
         axes: Vec<Axes>,
         strains: Strains,
-        rule: impl Fn(usize) -> (usize, usize),
+        rule: impl Fn(usize) -> (usize, usize) + Sync,
     ) -> Result<Self, BadShape> {
         let rule = |element: usize| {
             let (n_xi, n_eta) = rule(element);

@@ -28,7 +28,8 @@ pub struct Solid<const N: usize> {
     volumes: Vec<[f64; N]>,
     has_linear_volume: bool,
     points_per_element: usize,
-    points: Vec<Point<N>>,
+    /// Those of the elements of a piece together, piece after piece.
+    points: Vec<Vec<Point<N>>>,
 }
 
 /// A point where the law is evaluated. With displacement components u₁, u₂ along the element's axes:
@@ -72,6 +73,14 @@ pub struct BadShape {
     pub element: usize,
 }
 
+/// What follows from the nodes of one element.
+struct Geometry<const N: usize> {
+    points: Vec<Point<N>>,
+    /// ∫ N dV.
+    volumes: [f64; N],
+    length: f64,
+}
+
 impl<const N: usize> Solid<N> {
     /// Elements with the integration points of a rule, in the given axes. `rule` gives the points
     /// of an element, of all as many.
@@ -84,87 +93,37 @@ impl<const N: usize> Solid<N> {
         coordinates: &[[f64; 2]],
         nodes: Vec<[usize; N]>,
         axes: Vec<Axes>,
-        rule: impl Fn(usize) -> Rule,
+        rule: impl Fn(usize) -> Rule + Sync,
     ) -> Result<Self, BadShape> {
-        let mut points = Vec::new();
-        let mut points_per_element = 0;
-        let mut lengths = Vec::with_capacity(nodes.len());
-        let mut volumes = Vec::with_capacity(nodes.len());
-        let mut has_linear_volume = false;
-        let n_elements = nodes.len();
-        for (element, nodes) in nodes.iter().enumerate() {
-            let places = nodes.map(|n| coordinates[n]);
-            let bad = BadShape { element };
-            let at = |points: &[RulePoint]| -> Option<Vec<Point<N>>> {
-                let point = |&RulePoint { at, weights }: &RulePoint| {
-                    let shape = (reference.shape)(at);
-                    let point = Point::new(analysis, &places, &axes[element], shape)?;
-                    Some(Point {
-                        weight: point.weight * weights[0] * weights[1],
-                        ..point
-                    })
-                };
-                points.iter().map(point).collect()
-            };
-            let Rule {
-                points: rule,
-                strains,
-            } = rule(element);
-            let curved = strains == Strains::Projected && reference.is_curved(&places);
-            let exact = if curved {
-                (reference.exact_curved)()
-            } else {
-                (reference.exact)()
-            };
-            let fine = at(&exact).ok_or(bad)?;
-            let mut own = if rule == exact {
-                fine.clone()
-            } else {
-                at(&rule).ok_or(bad)?
-            };
-            match strains {
-                Strains::AtPoints => {}
-                Strains::LinearVolume => has_linear_volume = true,
-                Strains::Projected if curved => {
-                    let beyond = |point: &RulePoint| Some((reference.beyond_linear?)(point.at));
-                    let basis = |rule: &[RulePoint], points: &[Point<N>]| -> Vec<Vec<f64>> {
-                        let both = rule.iter().zip(points);
-                        both.map(|(at, point)| {
-                            let linear = [1.0, point.position[0], point.position[1]];
-                            linear.into_iter().chain(beyond(at)).collect()
-                        })
-                        .collect()
-                    };
-                    let (at_own, at_fine) = (basis(&rule, &own), basis(&exact, &fine));
-                    let values = projection::cardinal(&at_own, &at_fine).ok_or(bad)?;
-                    projection::project(&mut own, &fine, |q, fine| values[fine][q]).ok_or(bad)?;
-                }
-                Strains::Projected => {
-                    let of_point = |q: usize, at: [f64; 2]| (reference.function)(rule[q].at, at);
-                    let value = |q: usize, fine: usize| of_point(q, exact[fine].at);
-                    projection::project(&mut own, &fine, value).ok_or(bad)?;
-                }
+        let first = (!nodes.is_empty()).then(|| rule(0));
+        let points_per_element = first.as_ref().map_or(0, |first| first.points.len());
+        let strains = first.map(|first| first.strains);
+        let geometry = |element: usize| -> Result<Geometry<N>, BadShape> {
+            let places = nodes[element].map(|n| coordinates[n]);
+            let geometry =
+                Geometry::new(reference, analysis, &places, &axes[element], rule(element));
+            geometry.ok_or(BadShape { element })
+        };
+        let elements: Vec<usize> = (0..nodes.len()).collect();
+        let pieces = threads::map(elements.chunks(PIECE), |elements| {
+            let mut points = Vec::with_capacity(elements.len() * points_per_element);
+            let mut sizes = Vec::with_capacity(elements.len());
+            for &element in elements {
+                let geometry = geometry(element)?;
+                points.extend(geometry.points);
+                sizes.push((geometry.volumes, geometry.length));
             }
-            let volume = |i: usize| {
-                let weights = exact.iter().zip(&fine);
-                weights
-                    .map(|(at, point)| (reference.shape)(at.at).0[i] * point.weight)
-                    .sum()
-            };
-            volumes.push(std::array::from_fn(volume));
-            points_per_element = own.len();
-            if element == 0 {
-                points.reserve_exact(n_elements * own.len());
-            }
-            points.extend(own);
-            lengths.push((reference.area)(&places).sqrt());
-        }
+            Ok((points, sizes))
+        });
+        let pieces: Vec<_> = pieces.into_iter().collect::<Result<_, BadShape>>()?;
+        let (points, sizes): (Vec<_>, Vec<_>) = pieces.into_iter().unzip();
+        let (volumes, lengths) = sizes.into_iter().flatten().unzip();
         Ok(Self {
             nodes,
             axes,
             lengths,
             volumes,
-            has_linear_volume,
+            has_linear_volume: strains == Some(Strains::LinearVolume),
             points_per_element,
             points,
         })
@@ -172,7 +131,84 @@ impl<const N: usize> Solid<N> {
 
     /// Points of an element.
     fn own(&self, element: usize) -> &[Point<N>] {
-        &self.points[self.points_of(element)]
+        let start = element % PIECE * self.points_per_element;
+        &self.points[element / PIECE][start..start + self.points_per_element]
+    }
+
+    fn point(&self, point: usize) -> &Point<N> {
+        let (element, at) = self.place_of(point);
+        &self.own(element)[at]
+    }
+}
+
+impl<const N: usize> Geometry<N> {
+    /// `None` if a Jacobian is not positive.
+    fn new(
+        reference: &Reference<N>,
+        analysis: Analysis,
+        places: &[[f64; 2]; N],
+        axes: &Axes,
+        Rule {
+            points: rule,
+            strains,
+        }: Rule,
+    ) -> Option<Self> {
+        let at = |points: &[RulePoint]| -> Option<Vec<Point<N>>> {
+            let point = |&RulePoint { at, weights }: &RulePoint| {
+                let shape = (reference.shape)(at);
+                let point = Point::new(analysis, places, axes, shape)?;
+                Some(Point {
+                    weight: point.weight * weights[0] * weights[1],
+                    ..point
+                })
+            };
+            points.iter().map(point).collect()
+        };
+        let curved = strains == Strains::Projected && reference.is_curved(places);
+        let exact = if curved {
+            (reference.exact_curved)()
+        } else {
+            (reference.exact)()
+        };
+        let fine = at(&exact)?;
+        let mut own = if rule == exact {
+            fine.clone()
+        } else {
+            at(&rule)?
+        };
+        match strains {
+            Strains::AtPoints | Strains::LinearVolume => {}
+            Strains::Projected if curved => {
+                let beyond = |point: &RulePoint| Some((reference.beyond_linear?)(point.at));
+                let basis = |rule: &[RulePoint], points: &[Point<N>]| -> Vec<Vec<f64>> {
+                    let both = rule.iter().zip(points);
+                    both.map(|(at, point)| {
+                        let linear = [1.0, point.position[0], point.position[1]];
+                        linear.into_iter().chain(beyond(at)).collect()
+                    })
+                    .collect()
+                };
+                let (at_own, at_fine) = (basis(&rule, &own), basis(&exact, &fine));
+                let values = projection::cardinal(&at_own, &at_fine)?;
+                projection::project(&mut own, &fine, |q, fine| values[fine][q])?;
+            }
+            Strains::Projected => {
+                let of_point = |q: usize, at: [f64; 2]| (reference.function)(rule[q].at, at);
+                let value = |q: usize, fine: usize| of_point(q, exact[fine].at);
+                projection::project(&mut own, &fine, value)?;
+            }
+        }
+        let volume = |i: usize| {
+            let weights = exact.iter().zip(&fine);
+            weights
+                .map(|(at, point)| (reference.shape)(at.at).0[i] * point.weight)
+                .sum()
+        };
+        Some(Self {
+            volumes: std::array::from_fn(volume),
+            length: (reference.area)(places).sqrt(),
+            points: own,
+        })
     }
 }
 
@@ -243,7 +279,7 @@ impl<const N: usize> Kinematics for Solid<N> {
     }
 
     fn n_points(&self) -> usize {
-        self.points.len()
+        self.nodes.len() * self.points_per_element
     }
 
     fn points_of(&self, element: usize) -> Range<usize> {
@@ -266,11 +302,11 @@ impl<const N: usize> Kinematics for Solid<N> {
     }
 
     fn position(&self, point: usize) -> [f64; 2] {
-        self.points[point].position
+        self.point(point).position
     }
 
     fn weight(&self, point: usize) -> f64 {
-        self.points[point].weight
+        self.point(point).weight
     }
 
     fn volumes(&self, element: usize) -> &[f64] {
@@ -339,7 +375,10 @@ impl<const N: usize> Kinematics for Solid<N> {
     }
 
     fn only(&self, elements: &[usize]) -> Option<Box<dyn Kinematics>> {
-        let points = elements.iter().flat_map(|&element| self.own(element));
+        let of_piece = |elements: &[usize]| {
+            let points = elements.iter().flat_map(|&element| self.own(element));
+            points.cloned().collect()
+        };
         Some(Box::new(Self {
             nodes: elements.iter().map(|&e| self.nodes[e]).collect(),
             axes: elements.iter().map(|&e| self.axes[e]).collect(),
@@ -347,7 +386,7 @@ impl<const N: usize> Kinematics for Solid<N> {
             volumes: elements.iter().map(|&e| self.volumes[e]).collect(),
             has_linear_volume: self.has_linear_volume,
             points_per_element: self.points_per_element,
-            points: points.cloned().collect(),
+            points: elements.chunks(PIECE).map(of_piece).collect(),
         }))
     }
 

@@ -152,6 +152,9 @@ impl Mesh {
     /// # Errors
     /// The first line that cannot be taken; the mesh is then as it was.
     pub fn insert_joints(&mut self, along: &[Along]) -> Result<(), CannotInsert> {
+        if along.is_empty() {
+            return Ok(());
+        }
         let mut interfaces = Vec::new();
         for (number, along) in along.iter().enumerate() {
             let line = self.lines.get(&along.line);
@@ -188,12 +191,16 @@ impl Mesh {
             });
         }
         let mut copies: HashMap<usize, Vec<usize>> = HashMap::new();
-        for (node, &original) in split.original.iter().enumerate() {
+        let copied = split.original.iter().enumerate();
+        for (node, &original) in copied.filter(|&(node, &original)| node != original) {
             copies.entry(original).or_default().push(node);
         }
         for line in self.lines.values_mut() {
-            let known = line.nodes.iter().flat_map(|node| copies[node].clone());
-            line.nodes = known.collect();
+            let of = |node| copies.get(&node).into_iter().flatten().copied();
+            let known = line.nodes.iter();
+            line.nodes = known
+                .flat_map(|&node| std::iter::once(node).chain(of(node)))
+                .collect();
         }
         Ok(())
     }
@@ -300,8 +307,9 @@ impl Cuts {
         Ok(cuts)
     }
 
-    fn has(&self, node: usize) -> bool {
-        self.ends.contains_key(&node) || self.interface.contains_key(&node)
+    /// Nodes of the cut edges.
+    fn nodes(&self) -> impl Iterator<Item = usize> {
+        self.ends.keys().chain(self.interface.keys()).copied()
     }
 
     /// Whether a line ends at a node and leaves it as it is. Inside the mesh there is one sector
@@ -319,7 +327,11 @@ struct Around {
 }
 
 fn elements_around(n_nodes: usize, elements: &[Solid], cuts: &Cuts) -> Around {
-    let is_on_line: Vec<bool> = (0..n_nodes).map(|node| cuts.has(node)).collect();
+    let mut is_on_line = vec![false; n_nodes];
+    // A wrong edge may name nodes that there are not.
+    for node in cuts.nodes().filter(|&node| node < n_nodes) {
+        is_on_line[node] = true;
+    }
     let mut start = vec![0; n_nodes + 1];
     let on_lines = |element: &Solid| {
         let nodes = element.nodes().iter().copied();

@@ -267,20 +267,16 @@ impl Simulation {
         let condensed = self.condensed(number, is_prescribed);
         let (groups, ties) = (&self.groups, &self.tied);
         self.reuse.forget();
-        let (system, mut domain) = match condensed {
-            Some((domain, system)) => (system, Some(domain)),
-            None => (
-                System::new(
-                    groups,
-                    |_, group| group.is_active,
-                    is_prescribed,
-                    ties,
-                    None,
-                ),
-                None,
-            ),
+        let (system, mut domain, solver) = if let Some((domain, system)) = condensed {
+            let solver = self.solver(&system, Some(&domain))?;
+            (system, Some(domain), solver)
+        } else {
+            let takes_part = |_: usize, group: &Group| group.is_active;
+            let sparse = self.sparse();
+            let (system, solver) =
+                System::new_with(groups, takes_part, is_prescribed, ties, None, sparse);
+            (system, None, solver?)
         };
-        let solver = self.solver(&system, domain.as_ref())?;
         let bytes = solver.bytes() + system.bytes_of_elements(groups);
         self.reuse.announce(bytes, "factorising the equations");
         let of_domain = domain.iter().flat_map(LinearDomain::unknowns);
@@ -392,14 +388,22 @@ impl Simulation {
         system: &System,
         domain: Option<&LinearDomain>,
     ) -> Result<LinearSolver, Singular> {
-        let lines = system.lines(&self.lines);
-        let lines = Some(lines.as_slice());
         if let Some(domain) = domain {
-            return LinearSolver::with_block(&system.pattern, lines, domain.block(system));
+            let lines = system.lines(&self.lines);
+            return LinearSolver::with_block(&system.pattern, Some(&lines), domain.block(system));
         }
+        self.sparse()(system)
+    }
+
+    /// What makes a solver for equations without a domain.
+    fn sparse(&self) -> impl FnOnce(&System) -> Result<LinearSolver, Singular> + Send + use<'_> {
         let mut active = self.groups.iter().filter(|group| group.is_active);
         let is_symmetric = active.all(|group| group.is_linear() && group.is_symmetric());
-        LinearSolver::new(&system.pattern, is_symmetric, lines)
+        let lines = &self.lines;
+        move |system| {
+            let lines = system.lines(lines);
+            LinearSolver::new(&system.pattern, is_symmetric, Some(&lines))
+        }
     }
 
     /// Internal less external forces at the start of a phase where nothing holds them (after a

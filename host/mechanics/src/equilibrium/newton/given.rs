@@ -2,8 +2,8 @@
 //!
 //! Found out when it is asked for. In ordinary steps the loads or the last equilibrium already
 //! exceed a tenth of the forces in play, and nothing more is computed. Where they do not (a start
-//! without stress, a load that grows tenfold), the step is answered elastically once: with equations
-//! of its own, so that what the iterations hold factorised stays as it is.
+//! without stress, a load that grows tenfold), the step is answered elastically once: with what the iterations hold
+//! factorised, if that is the elastic matrix, else with equations of its own, so that it stays as it is.
 
 use super::Newton;
 use super::acceptance::{Change, Forces, MOVES};
@@ -11,7 +11,7 @@ use super::failure::{Runaway, Singularity};
 use super::residual::Task;
 use crate::assembly::norms;
 use crate::group::Group;
-use algebra::LinearSolver;
+use algebra::{LinearSolver, Singular};
 use law::Operator;
 
 /// Bytes of a factorisation that stays beside that of the iterations.
@@ -247,7 +247,7 @@ impl Newton<'_> {
     }
 
     fn answer(&mut self, operator: Operator, task: &Task) -> Option<Elastic> {
-        let (mut solver, mut internal) = self.factorise_at_start(operator, task.period).ok()?;
+        let (solver, mut internal) = self.factorise_at_start(operator, task.period).ok()?;
         if self.domain.is_some() {
             for (&place, force) in self.places.boundary.iter().zip(&self.domain_forces) {
                 internal[place] += force;
@@ -262,9 +262,7 @@ impl Newton<'_> {
         let right: Vec<f64> = free
             .map(|(&place, coupling)| task.external[place] - internal[place] - coupling)
             .collect();
-        let solution = solver.solve(&right);
-        self.put_aside(solver);
-        let solution = solution.ok()?;
+        let solution = self.solve_at_start(solver, &right).ok()?;
         let mut increment = task.prescribed.clone();
         for (&place, value) in self.places.free.iter().zip(solution) {
             increment[place] = value;
@@ -288,27 +286,25 @@ impl Newton<'_> {
         })
     }
 
-    /// Factorises the tangents at the start of a step beside the matrix that is held: the equations, and
-    /// the internal forces there.
+    /// Factorises the tangents at the start of a step beside the matrix that is held: the equations, if that one is
+    /// another, and the internal forces there.
     fn factorise_at_start(
         &mut self,
         operator: Operator,
         period: (f64, f64),
-    ) -> Result<(LinearSolver, Vec<f64>), Singularity> {
+    ) -> Result<(Option<LinearSolver>, Vec<f64>), Singularity> {
         self.displacement.fill(0.0);
         let outcome = self.evaluate_groups(period, operator);
         let mut internal = self.places.take(&mut self.force);
         outcome.map_err(|_| Singularity::Unknown)?;
         self.places.fold(&mut internal);
-        let pattern = &self.system.pattern;
+        if self.matrix.is_of_tangents(self.system, self.groups) {
+            return Ok((None, internal));
+        }
         let mut solver = if let Some(solver) = self.matrix.beside.take() {
             solver
         } else {
-            let solver = match self.domain {
-                Some(domain) => LinearSolver::with_block(pattern, None, domain.block(self.system)),
-                None => LinearSolver::new(pattern, false, None),
-            };
-            let solver = solver.map_err(|_| Singularity::Free)?;
+            let solver = self.solver.another().map_err(|_| Singularity::Free)?;
             self.matrix.announce_beside(solver.bytes());
             solver
         };
@@ -316,14 +312,24 @@ impl Newton<'_> {
         self.system.assemble(self.groups, &mut values);
         let outcome = solver.factorise(values);
         outcome.map_err(|_| Singularity::Free)?;
-        Ok((solver, internal))
+        Ok((Some(solver), internal))
     }
 
-    /// Keeps the equations beside those of the iterations for the next time, if they are not large.
-    fn put_aside(&mut self, solver: LinearSolver) {
+    /// Solves with the equations that [`Self::factorise_at_start`] gave. Keeps those beside the iterations' own for the
+    /// next time, if they are not large.
+    fn solve_at_start(
+        &mut self,
+        beside: Option<LinearSolver>,
+        right: &[f64],
+    ) -> Result<Vec<f64>, Singular> {
+        let Some(mut solver) = beside else {
+            return self.solver.solve(right);
+        };
+        let solution = solver.solve(right);
         if solver.bytes() <= MOST_BESIDE && !solver.has_fallen_back() {
             self.matrix.beside = Some(solver);
         }
+        solution
     }
 
     /// What a singular tangent matrix says of the model: whether it is held elastically, at the
@@ -331,11 +337,9 @@ impl Newton<'_> {
     pub(super) fn singularity(&mut self, period: (f64, f64)) -> Singularity {
         match self.factorise_at_start(Operator::Elastic, period) {
             Err(singularity) => singularity,
-            Ok((mut solver, _)) => {
+            Ok((solver, _)) => {
                 let right = vec![1.0; self.places.free.len()];
-                let is_held = solver.solve(&right).is_ok();
-                self.put_aside(solver);
-                if is_held {
+                if self.solve_at_start(solver, &right).is_ok() {
                     Singularity::Limit
                 } else {
                     Singularity::Free

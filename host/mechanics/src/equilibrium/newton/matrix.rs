@@ -3,7 +3,8 @@
 use super::Newton;
 use super::failure::{Reason, StepFailure};
 use super::residual::Balance;
-use crate::assembly::Elements;
+use crate::assembly::{Elements, System};
+use crate::group::Group;
 use crate::settings::Method;
 use algebra::{LinearSolver, Singular, largest};
 use law::Operator;
@@ -92,6 +93,11 @@ impl Matrix {
     pub(super) fn hold(&mut self) {
         self.held = true;
         self.has_tangents = true;
+    }
+
+    /// Whether it is made of the tangents that the groups hold now.
+    pub(super) fn is_of_tangents(&self, system: &System, groups: &[Group]) -> bool {
+        self.held && self.sum == Sum::Last && system.is_sum_of_tangents(&self.elements, groups)
     }
 
     /// Whether this matrix outlives the step under this method.
