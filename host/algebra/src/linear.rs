@@ -196,6 +196,11 @@ impl LinearSolver {
         }
     }
 
+    /// Keeps from now on what makes matrices cheap that differ from the last one in some entries only.
+    pub fn expect_others(&mut self) {
+        self.multifrontal.expect_others();
+    }
+
     /// Bytes that a factorisation takes, by the analysis.
     pub fn bytes(&self) -> u64 {
         self.multifrontal.bytes()

@@ -11,7 +11,9 @@
 //!
 //! A matrix that differs from the last one in some entries only costs the supernodes that eliminate
 //! them and those above; what the others leave is taken over, bit for bit. So a body pays for what
-//! yields, not for what stays elastic.
+//! yields, not for what stays elastic. What large supernodes leave is kept for it where [other matrices
+//! follow](Multifrontal::expect_others); what a small one leaves is computed once more when it is wanted
+//! for the first time, with all below it, and then kept.
 //!
 //! Symmetric matrices are factorised as L Lᵀ and have to be positive definite; others as L U with
 //! row exchanges inside a supernode only. The caller checks the first solution by its residual and
@@ -52,7 +54,7 @@ struct Front {
     /// What it leaves to its parent (m × m, column-major; the lower half if symmetric), until that
     /// has taken it.
     update: Vec<f64>,
-    /// The update stays for the next matrix.
+    /// The update stays for the next matrix, once it is there.
     is_retained: bool,
 }
 
@@ -77,6 +79,8 @@ pub struct Multifrontal {
     /// Where the updates of small branches wait, for one thread each.
     memory: Mutex<Vec<[Pile; 2]>>,
     schur: Vec<f64>,
+    /// What is worth keeping for other matrices is kept.
+    others_follow: bool,
     /// All fronts hold the factors of one matrix.
     is_complete: bool,
     /// Fronts that the last factorisation computed.
@@ -105,6 +109,7 @@ impl Multifrontal {
             analysis,
             memory: Mutex::default(),
             schur: Vec::new(),
+            others_follow: false,
             is_complete: false,
             computed: 0,
         }
@@ -116,9 +121,19 @@ impl Multifrontal {
         Self::of(Arc::clone(&self.analysis))
     }
 
+    /// Keeps from now on what makes other matrices cheap that differ from the last one in some entries only.
+    pub fn expect_others(&mut self) {
+        self.others_follow = true;
+    }
+
     /// Bytes that a factorisation takes, by the analysis.
     pub fn bytes(&self) -> u64 {
-        self.analysis.bytes()
+        let kept = if self.others_follow {
+            self.analysis.bytes_worth_keeping()
+        } else {
+            0
+        };
+        self.analysis.bytes() + kept
     }
 
     /// Floating-point operations of a factorisation, by the analysis.

@@ -26,6 +26,8 @@ pub(super) struct Analysis {
     /// Entries between kept equations; targets in the column-major Schur complement.
     pub(super) kept_entries: Vec<Entry>,
     pub(super) roots: Vec<usize>,
+    /// Floating-point operations of all of them, as L U.
+    work: f64,
     /// Branches that are solved with at the same time; the same for any number of threads.
     pub(super) branches: Vec<Branch>,
     /// Fronts of no branch, ascending.
@@ -46,6 +48,10 @@ pub(super) struct Branch {
 /// Operations from which on solutions are shared among threads, and the largest share of a branch.
 const WORTH_SHARING: f64 = 2e7;
 const LARGEST_SHARE: f64 = 0.125;
+
+/// Share of all operations from which on what a front leaves is worth keeping: less is soon computed again. Kept by all
+/// fronts it would take more memory than the factors.
+const WORTH_KEEPING: f64 = 1.0 / 64.0;
 
 /// Tasks that fronts are shared among where their entries are placed.
 const TASKS: usize = 16;
@@ -97,6 +103,7 @@ impl Analysis {
             targets: Vec::new(),
             kept_entries: Vec::new(),
             roots: Vec::new(),
+            work: 0.0,
             branches: Vec::new(),
             top: Vec::new(),
             in_branch: Vec::new(),
@@ -125,12 +132,26 @@ impl Analysis {
 
     /// Floating-point operations of a factorisation.
     pub(super) fn operations(&self) -> f64 {
-        let of_roots = self.roots.iter().map(|&root| self.fronts[root].work);
         let share = match self.kind {
             Kind::Symmetric => 0.5,
             Kind::Unsymmetric => 1.0,
         };
-        share * of_roots.sum::<f64>()
+        share * self.work
+    }
+
+    /// Whether what a front leaves is kept for other matrices: by all fronts where there is little to do.
+    pub(super) fn is_worth_keeping(&self, shape: &Shape) -> bool {
+        self.work < WORTH_SHARING || shape.work >= WORTH_KEEPING * self.work
+    }
+
+    /// Memory of what is kept for other matrices.
+    pub(super) fn bytes_worth_keeping(&self) -> u64 {
+        let kept = self
+            .fronts
+            .iter()
+            .filter(|shape| self.is_worth_keeping(shape));
+        let words = kept.map(|shape| (shape.rows.len() as u64).pow(2));
+        words.sum::<u64>() * size_of::<f64>() as u64
     }
 
     /// Memory that a factorisation takes: factors, the Schur complement, and the updates that wait
@@ -230,6 +251,8 @@ impl Analysis {
                 work: own + below,
             });
         }
+        let of_roots = self.roots.iter().map(|&root| self.fronts[root].work);
+        self.work = of_roots.sum();
         self.find_branches(&parent);
         self.place_rows(&parent);
     }
@@ -237,9 +260,8 @@ impl Analysis {
     /// Shares the fronts among branches and what is above them.
     fn find_branches(&mut self, parent: &[Option<usize>]) {
         let fronts = &self.fronts;
-        let all: f64 = self.roots.iter().map(|&root| fronts[root].work).sum();
-        let largest = if all > WORTH_SHARING {
-            LARGEST_SHARE * all
+        let largest = if self.work > WORTH_SHARING {
+            LARGEST_SHARE * self.work
         } else {
             0.0
         };

@@ -38,6 +38,8 @@ enum Task {
     TakeOver,
     /// As [`Self::TakeOver`], but its update is gone and wanted again, and kept from now on.
     Restore,
+    /// The same for the sake of a front that is restored itself: not kept.
+    Repeat,
     /// Its entries have changed, or those of a descendant.
     Compute,
 }
@@ -167,24 +169,27 @@ impl Multifrontal {
         }
         // The Schur complement is added up anew, and so is what a computed front takes from below.
         let fronts = &mut self.fronts;
-        let mut want = |front: usize, tasks: &mut Vec<Task>| {
+        let mut want = |front: usize, task: Task, tasks: &mut Vec<Task>| {
             let front_of = fronts[front]
                 .get_mut()
                 .unwrap_or_else(PoisonError::into_inner);
             if tasks[front] == Task::TakeOver && !front_of.is_retained {
-                tasks[front] = Task::Restore;
+                tasks[front] = task;
             }
         };
         for &root in &self.analysis.roots {
             if !shapes[root].rows.is_empty() {
-                want(root, &mut tasks);
+                want(root, Task::Restore, &mut tasks);
             }
         }
         for (front, shape) in shapes.iter().enumerate().rev() {
-            if tasks[front] != Task::TakeOver {
-                for &child in &shape.children {
-                    want(child, &mut tasks);
-                }
+            let of_children = match tasks[front] {
+                Task::TakeOver => continue,
+                Task::Compute => Task::Restore,
+                Task::Restore | Task::Repeat => Task::Repeat,
+            };
+            for &child in &shape.children {
+                want(child, of_children, &mut tasks);
             }
         }
         tasks
@@ -317,7 +322,8 @@ impl Multifrontal {
         let (k, m) = (shape.pivots.len(), shape.rows.len());
         let mut guard = self.front(number);
         let front = &mut *guard;
-        front.is_retained = task == Task::Restore;
+        front.is_retained =
+            task == Task::Restore || self.others_follow && analysis.is_worth_keeping(shape);
         front.assemble(analysis, shape, values);
         let mut children: Vec<_> = shape.children.iter().map(|&c| self.front(c)).collect();
         let numbered = || shape.children.iter().zip(&children);
@@ -325,7 +331,7 @@ impl Multifrontal {
         let size_of = |child: usize| analysis.fronts[child].rows.len().pow(2);
         let on_pile: usize = on_pile.map(|(&number, _)| size_of(number)).sum();
         let update = match own {
-            Some(pile) if task != Task::Restore => {
+            Some(pile) if !front.is_retained => {
                 front.update = Vec::new();
                 pile.add(m * m)
             }

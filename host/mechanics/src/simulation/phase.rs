@@ -267,7 +267,7 @@ impl Simulation {
         let condensed = self.condensed(number, is_prescribed);
         let (groups, ties) = (&self.groups, &self.tied);
         self.reuse.forget();
-        let (system, mut domain, solver) = if let Some((domain, system)) = condensed {
+        let (system, mut domain, mut solver) = if let Some((domain, system)) = condensed {
             let solver = self.solver(&system, Some(&domain))?;
             (system, Some(domain), solver)
         } else {
@@ -277,6 +277,9 @@ impl Simulation {
                 System::new_with(groups, takes_part, is_prescribed, ties, None, sparse);
             (system, None, solver?)
         };
+        if !system.is_constant(groups) {
+            solver.expect_others();
+        }
         let bytes = solver.bytes() + system.bytes_of_elements(groups);
         self.reuse.announce(bytes, "factorising the equations");
         let of_domain = domain.iter().flat_map(LinearDomain::unknowns);
