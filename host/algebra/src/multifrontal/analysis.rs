@@ -30,8 +30,9 @@ pub(super) struct Analysis {
     work: f64,
     /// Branches that are solved with at the same time; the same for any number of threads.
     pub(super) branches: Vec<Branch>,
-    /// Fronts of no branch, ascending.
-    pub(super) top: Vec<usize>,
+    /// Fronts of no branch, in levels that come one after the other: those above others first, and of each level none
+    /// above another one.
+    pub(super) top: Vec<Vec<usize>>,
     /// Where every pivot stands among those of its branch.
     pub(super) in_branch: Vec<u32>,
 }
@@ -275,11 +276,22 @@ impl Analysis {
                 n_branches += 1;
             }
         }
+        // By the distance from the root; where nothing is shared every front is a level.
+        let mut level = vec![0; fronts.len()];
+        for front in (0..fronts.len()).rev() {
+            level[front] = if largest > 0.0 {
+                parent[front].map_or(0, |parent| level[parent] + 1)
+            } else {
+                fronts.len() - 1 - front
+            };
+        }
         self.branches.resize_with(n_branches, Branch::default);
         self.in_branch = vec![0; self.order.len()];
         for (front, branch) in branch_of.into_iter().enumerate() {
             let Some(branch) = branch else {
-                self.top.push(front);
+                let n_levels = self.top.len().max(level[front] + 1);
+                self.top.resize_with(n_levels, Vec::new);
+                self.top[level[front]].push(front);
                 continue;
             };
             let branch = &mut self.branches[branch];

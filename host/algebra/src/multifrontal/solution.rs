@@ -43,12 +43,24 @@ impl Multifrontal {
             }
         }
         let mut own = Vec::new();
-        for &number in analysis.top.iter().filter(|&&number| is_wanted(number)) {
-            let (pivots, rows) = analysis.shape(number);
-            let k = pivots.len();
-            self.forward_front(number, &mut y[pivots], rows.len(), &mut own);
-            for (&row, value) in rows.iter().zip(&own[k..]) {
-                y[row as usize] += value;
+        for level in analysis.top.iter().rev() {
+            if let [number] = level[..] {
+                if is_wanted(number) {
+                    let (pivots, rows) = analysis.shape(number);
+                    self.forward_front(number, &y[pivots], rows.len(), &mut own);
+                    analysis.leave(number, &own, &mut y);
+                }
+                continue;
+            }
+            let wanted = level.iter().filter(|&&number| is_wanted(number));
+            let solved = threads::map(wanted, |&number| {
+                let (pivots, rows) = analysis.shape(number);
+                let mut own = Vec::new();
+                self.forward_front(number, &y[pivots], rows.len(), &mut own);
+                (number, own)
+            });
+            for (number, own) in solved {
+                analysis.leave(number, &own, &mut y);
             }
         }
         let kept = y.split_off(n_eliminated);
@@ -69,7 +81,8 @@ impl Multifrontal {
         for &number in branch.fronts.iter().filter(|&&number| is_wanted(number)) {
             let (pivots, rows) = analysis.shape(number);
             let (k, at) = (pivots.len(), analysis.in_branch[pivots.start] as usize);
-            self.forward_front(number, &mut y[at..at + k], rows.len(), &mut own);
+            self.forward_front(number, &y[at..at + k], rows.len(), &mut own);
+            y[at..at + k].copy_from_slice(&own[..k]);
             let mut places = Places::new(analysis, branch);
             for (&row, value) in rows.iter().zip(&own[k..]) {
                 match places.of(row) {
@@ -81,8 +94,8 @@ impl Multifrontal {
         (y, left)
     }
 
-    /// Eliminates the pivots of a front; what is left to its `m` rows stands behind them in `own`.
-    fn forward_front(&self, number: usize, pivots: &mut [f64], m: usize, own: &mut Vec<f64>) {
+    /// Eliminates the pivots of a front: their values in `own`, and behind them what is left to its `m` rows.
+    fn forward_front(&self, number: usize, pivots: &[f64], m: usize, own: &mut Vec<f64>) {
         let front = self.front(number);
         let k = pivots.len();
         let n = k + m;
@@ -101,7 +114,6 @@ impl Multifrontal {
             own: own.as_mut_slice(),
             k,
         });
-        pivots.copy_from_slice(&own[..k]);
     }
 
     /// Values of all equations from `y` of [`Self::forward`] and those of the kept ones.
@@ -159,12 +171,27 @@ impl Multifrontal {
         let analysis = &self.analysis;
         let is_wanted = |number: usize| fronts.is_none_or(|fronts| fronts[number]);
         let mut below = Vec::new();
-        let top = analysis.top.iter().rev();
-        for &number in top.filter(|&&number| is_wanted(number)) {
-            let (pivots, rows) = analysis.shape(number);
-            below.clear();
-            below.extend(rows.iter().map(|&row| x[row as usize]));
-            self.backward_front(number, &mut x[pivots], &below);
+        for level in &analysis.top {
+            if let [number] = level[..] {
+                if is_wanted(number) {
+                    let (pivots, rows) = analysis.shape(number);
+                    below.clear();
+                    below.extend(rows.iter().map(|&row| x[row as usize]));
+                    self.backward_front(number, &mut x[pivots], &below);
+                }
+                continue;
+            }
+            let wanted = level.iter().filter(|&&number| is_wanted(number));
+            let solved = threads::map(wanted, |&number| {
+                let (pivots, rows) = analysis.shape(number);
+                let below: Vec<f64> = rows.iter().map(|&row| x[row as usize]).collect();
+                let mut own = x[pivots].to_vec();
+                self.backward_front(number, &mut own, &below);
+                (number, own)
+            });
+            for (number, own) in solved {
+                x[analysis.shape(number).0].copy_from_slice(&own);
+            }
         }
         let has_wanted = |branch: &&Branch| branch.fronts.iter().any(|&number| is_wanted(number));
         let branches: Vec<&Branch> = analysis.branches.iter().filter(has_wanted).collect();
@@ -217,6 +244,16 @@ impl Analysis {
     fn shape(&self, front: usize) -> (Range<usize>, &[u32]) {
         let shape = &self.fronts[front];
         (shape.pivots.clone(), &self.rows[shape.rows.clone()])
+    }
+
+    /// Puts the values of the pivots of a front among all, and adds what it leaves to its rows.
+    fn leave(&self, front: usize, own: &[f64], all: &mut [f64]) {
+        let (pivots, rows) = self.shape(front);
+        let (of_pivots, left) = own.split_at(pivots.len());
+        all[pivots].copy_from_slice(of_pivots);
+        for (&row, value) in rows.iter().zip(left) {
+            all[row as usize] += value;
+        }
     }
 
     /// Rows above a branch that it touches: those of its last front.

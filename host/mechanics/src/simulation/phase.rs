@@ -267,7 +267,7 @@ impl Simulation {
         let condensed = self.condensed(number, is_prescribed);
         let (groups, ties) = (&self.groups, &self.tied);
         self.reuse.forget();
-        let (system, mut domain, mut solver) = if let Some((domain, system)) = condensed {
+        let (system, mut domain, solver) = if let Some((domain, system)) = condensed {
             let solver = self.solver(&system, Some(&domain))?;
             (system, Some(domain), solver)
         } else {
@@ -277,9 +277,6 @@ impl Simulation {
                 System::new_with(groups, takes_part, is_prescribed, ties, None, sparse);
             (system, None, solver?)
         };
-        if !system.is_constant(groups) {
-            solver.expect_others();
-        }
         let bytes = solver.bytes() + system.bytes_of_elements(groups);
         self.reuse.announce(bytes, "factorising the equations");
         let of_domain = domain.iter().flat_map(LinearDomain::unknowns);
@@ -392,20 +389,29 @@ impl Simulation {
         domain: Option<&LinearDomain>,
     ) -> Result<LinearSolver, Singular> {
         if let Some(domain) = domain {
-            let lines = system.lines(&self.lines);
-            return LinearSolver::with_block(&system.pattern, Some(&lines), domain.block(system));
+            let (lines, block) = (system.lines(&self.lines), domain.block(system));
+            let mut solver = LinearSolver::with_block(&system.pattern, Some(&lines), block)?;
+            if !system.is_constant(&self.groups) {
+                solver.expect_others();
+            }
+            return Ok(solver);
         }
         self.sparse()(system)
     }
 
     /// What makes a solver for equations without a domain.
     fn sparse(&self) -> impl FnOnce(&System) -> Result<LinearSolver, Singular> + Send + use<'_> {
-        let mut active = self.groups.iter().filter(|group| group.is_active);
-        let is_symmetric = active.all(|group| group.is_linear() && group.is_symmetric());
+        let active = self.groups.iter().filter(|group| group.is_active);
+        let is_linear = active.clone().all(Group::is_linear);
+        let is_symmetric = is_linear && active.clone().all(Group::is_symmetric);
         let lines = &self.lines;
         move |system| {
             let lines = system.lines(lines);
-            LinearSolver::new(&system.pattern, is_symmetric, Some(&lines))
+            let mut solver = LinearSolver::new(&system.pattern, is_symmetric, Some(&lines))?;
+            if !is_linear {
+                solver.expect_others();
+            }
+            Ok(solver)
         }
     }
 
