@@ -352,6 +352,47 @@ mod tests {
     }
 
     #[test]
+    fn what_large_fronts_leave_is_kept_where_other_matrices_follow() {
+        let mesh = crate::meshes::grid(60);
+        let (pattern, lines) = (mesh.pattern(), mesh.lines());
+        let values = crate::meshes::values(&pattern, 0.2);
+        let kept = vec![false; pattern.n()];
+        let analysed = || Multifrontal::new(&pattern, Kind::Unsymmetric, &kept, Some(&lines));
+        // Where a corner yields.
+        let mut now = values.clone();
+        for at in (0..20).flat_map(|equation| pattern.places(equation)) {
+            now[at] *= if pattern.rows[at] < 20 { 1.5 } else { 1.0 };
+        }
+        let solution = |factors: &Multifrontal| {
+            let (y, left) = factors.forward(&right_side(pattern.n()), None);
+            factors.backward(&y, &left, None)
+        };
+        let mut anew = analysed().unwrap();
+        anew.factorise(&now).unwrap();
+        for others_follow in [false, true] {
+            let mut factors = analysed().unwrap();
+            let bytes = factors.bytes();
+            if others_follow {
+                factors.expect_others();
+            }
+            assert_eq!(factors.bytes() > bytes, others_follow);
+            factors.factorise(&values).unwrap();
+            factors
+                .factorise_after(&Before::Values(&values), &now)
+                .unwrap();
+            // Beside the way to the root less than 1/64 of the operations is done once more, and little of that twice.
+            let most = if others_follow { 0.1 } else { 1.0 };
+            assert!(factors.computed() <= most, "{}", factors.computed());
+            assert_eq!(factors.computed() < 1.0, others_follow);
+            assert_eq!(solution(&factors), solution(&anew));
+            factors
+                .factorise_after(&Before::Values(&now), &values)
+                .unwrap();
+            assert!(factors.computed() < 0.02, "{}", factors.computed());
+        }
+    }
+
+    #[test]
     fn begins_anew_after_a_singular_matrix() {
         let (pattern, values, _) = grid(12, 0.3);
         let mut factors =

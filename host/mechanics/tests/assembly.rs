@@ -85,9 +85,12 @@ fn kept_matrices_give_the_bits_of_new_ones() {
         let mut anew = Vec::new();
         let before = kept.values().to_vec();
         system.assemble(&model.groups, &mut anew);
-        system.assemble_after(&mut kept, &model.groups);
-        let values = kept.values();
         let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let is_known = system.is_sum_of_tangents(&kept, &model.groups);
+        assert_eq!(is_known, bits(&anew) == last);
+        system.assemble_after(&mut kept, &model.groups);
+        assert!(system.is_sum_of_tangents(&kept, &model.groups));
+        let values = kept.values();
         assert_eq!(bits(&anew), bits(values));
         for (column, &largest) in kept.largest().iter().enumerate() {
             let column = &values[system.pattern.places(column)];
