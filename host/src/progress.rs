@@ -125,12 +125,17 @@ impl Observer for Progress {
     fn pile(&mut self, resistances: &Resistances) {
         self.finish();
         let unit = resistances.unit;
+        // Nothing has no sign.
+        let tenths = |force: &f64| (10.0 * force).round() / 10.0 + 0.0;
         let line = match &resistances.ten_percent {
-            Ok([head, shaft, base]) => format!(
-                "pile: resistance at 10 % of the diameter ({:.4} m) {head:.1} {unit}, of it shaft {shaft:.1} \
+            Ok(forces) => {
+                let [head, shaft, base] = forces.each_ref().map(tenths);
+                format!(
+                    "pile: resistance at 10 % of the diameter ({:.4} m) {head:.1} {unit}, of it shaft {shaft:.1} \
                  and base {base:.1}",
-                0.1 * resistances.diameter
-            ),
+                    0.1 * resistances.diameter
+                )
+            }
             Err(why) => format!("pile: no resistance at 10 % of the diameter: {why}"),
         };
         let _ = writeln!(supervision::stdout(), "{line}");

@@ -317,6 +317,25 @@ fn quantities_of_the_water_are_suggested_where_there_is_some() {
     );
 }
 
+/// Nothing would be left to compute: that was a run without rows.
+#[test]
+fn a_phase_without_groups_is_refused() {
+    let taken = "deactivate = [\"left\", \"joint\"]";
+    let everything = CASE.replace(taken, "deactivate = [\"left\", \"right\", \"joint\"]");
+    let never_there = CASE.replace("initial_stress = { k_0 = 0.5 }", "active = false");
+    for (case, phase) in [(everything, "dug"), (never_there, "ground")] {
+        let place = place();
+        let outcome = place.run_case(&case);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        let says = format!("no group is active in phase `{phase}`");
+        assert!(
+            outcome.says(&says) && outcome.says("case.toml:"),
+            "{}",
+            outcome.stderr
+        );
+    }
+}
+
 #[test]
 fn a_dry_run_shows_the_model_and_computes_nothing() {
     let place = place();

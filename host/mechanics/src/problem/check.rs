@@ -465,7 +465,19 @@ fn activation(
         }
         active[group] = is_activated;
     }
-    Ok(())
+    if active.contains(&true) {
+        return Ok(());
+    }
+    // Taken away last, or never there.
+    let item = phase.deactivate.last().map_or(Item::Group(0), |&group| {
+        let (phase, is_activated) = (number, false);
+        Item::Activation {
+            phase,
+            group,
+            is_activated,
+        }
+    });
+    Err(Refusal::new(item, Cause::NothingThere(phase.name.clone())))
 }
 
 fn ground(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal> {

@@ -269,6 +269,8 @@ pub enum Cause {
     },
     /// A group is activated and deactivated in one phase.
     BothWays(String),
+    /// No group is active in a phase.
+    NothingThere(String),
     /// A line has two forces in one phase.
     TwoForces(String),
     /// A line lies on elements that are not there.
@@ -539,6 +541,7 @@ impl fmt::Display for Cause {
                     "group `{group}` is activated and deactivated in one phase"
                 )
             }
+            Self::NothingThere(phase) => write!(f, "no group is active in phase `{phase}`"),
             Self::TwoForces(line) => write!(f, "line `{line}` has two forces in this phase"),
             Self::NotThere(line) => {
                 write!(
