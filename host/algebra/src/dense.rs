@@ -75,7 +75,7 @@ fn factorise_columns(matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
     );
 }
 
-/// While the columns to the right of a block are worked on, the next block is factorised, too: nothing waits for it.
+/// While the columns to the right of a block are worked on, the next block is factorised, too: seldom is it waited for.
 fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
     let n = matrix.nrows();
     let width_at = |start: usize| {

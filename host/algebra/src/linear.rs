@@ -201,7 +201,7 @@ impl LinearSolver {
         self.multifrontal.expect_others();
     }
 
-    /// Bytes that a factorisation takes, by the analysis.
+    /// Bytes that a factorisation takes, by the analysis, and what is kept for other matrices.
     pub fn bytes(&self) -> u64 {
         self.multifrontal.bytes()
     }

@@ -12,8 +12,8 @@
 //! A matrix that differs from the last one in some entries only costs the supernodes that eliminate
 //! them and those above; what the others leave is taken over, bit for bit. So a body pays for what
 //! yields, not for what stays elastic. What large supernodes leave is kept for it where [other matrices
-//! follow](Multifrontal::expect_others); what a small one leaves is computed once more when it is wanted
-//! for the first time, with all below it, and then kept.
+//! follow](Multifrontal::expect_others); what a small one leaves beside those that have changed is
+//! computed once more, with all below it, and kept until it changes itself.
 //!
 //! Symmetric matrices are factorised as L Lᵀ and have to be positive definite; others as L U with
 //! row exchanges inside a supernode only. The caller checks the first solution by its residual and
@@ -115,7 +115,7 @@ impl Multifrontal {
         }
     }
 
-    /// Another one of the same pattern, kind and order, for matrices of its own.
+    /// Another one of the same pattern, kind and order, for matrices of its own. Not of one that has been gathered.
     #[must_use]
     pub fn alike(&self) -> Self {
         Self::of(Arc::clone(&self.analysis))
@@ -126,7 +126,7 @@ impl Multifrontal {
         self.others_follow = true;
     }
 
-    /// Bytes that a factorisation takes, by the analysis.
+    /// Bytes that a factorisation takes, by the analysis, and what is kept for other matrices.
     pub fn bytes(&self) -> u64 {
         let kept = if self.others_follow {
             self.analysis.bytes_worth_keeping()
@@ -314,7 +314,7 @@ mod tests {
                 let mut before = values.clone();
                 factors.factorise(&before).unwrap();
                 told.factorise(&before).unwrap();
-                // A corner yields (what the others leave is computed once more, and kept), goes on,
+                // A corner yields (what the others leave is computed once more), goes on,
                 // spreads, unloads, changes in one equation, not at all, and everywhere.
                 for (equations, factor, most) in [
                     (0..40, 1.5, 1.0),
@@ -380,7 +380,7 @@ mod tests {
             factors
                 .factorise_after(&Before::Values(&values), &now)
                 .unwrap();
-            // Beside the way to the root less than 1/64 of the operations is done once more, and little of that twice.
+            // Beside the way to the root a few small fronts are computed once more, with those below them.
             let most = if others_follow { 0.1 } else { 1.0 };
             assert!(factors.computed() <= most, "{}", factors.computed());
             assert_eq!(factors.computed() < 1.0, others_follow);

@@ -154,8 +154,9 @@ struct Summed {
 impl Write for Summed {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.outcome.is_ok() {
+            // It is the run's own thread that writes.
             let Self { file, sum, .. } = self;
-            (_, self.outcome) = rayon::join(|| sum.update(bytes), || file.write_all(bytes));
+            ((), self.outcome) = rayon::join(|| sum.update(bytes), || file.write_all(bytes));
         }
         Ok(bytes.len())
     }

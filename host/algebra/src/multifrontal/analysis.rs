@@ -8,7 +8,7 @@ use crate::{Pattern, Singular, threads};
 use std::ops::Range;
 
 /// The order of elimination and the shape of everything that follows from it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Analysis {
     pub(super) kind: Kind,
     /// Equations that are eliminated, in this order.
@@ -38,7 +38,7 @@ pub(super) struct Analysis {
 }
 
 /// A front with all its descendants.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Branch {
     /// Ascending: it is the last one.
     pub(super) fronts: Vec<usize>,
@@ -46,7 +46,8 @@ pub(super) struct Branch {
     pub(super) n_pivots: usize,
 }
 
-/// Operations from which on solutions are shared among threads, and the largest share of a branch.
+/// Operations from which on solutions are shared among threads and not everything is kept for other matrices, and the
+/// largest share of a branch.
 const WORTH_SHARING: f64 = 2e7;
 const LARGEST_SHARE: f64 = 0.125;
 
@@ -65,7 +66,7 @@ pub(super) struct Entry {
 }
 
 /// A supernode with the rows it touches.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Shape {
     /// Positions of its pivots.
     pub(super) pivots: Range<usize>,
@@ -442,7 +443,10 @@ fn put_in_order(
     entries: &mut Vec<u64>,
 ) {
     let (k, n) = (shape.pivots.len(), shape.pivots.len() + shape.rows.len());
-    let entry = |source: u32, target: usize| u64::from(source) << u32::BITS | target as u64;
+    let entry = |source: u32, target: usize| {
+        debug_assert!(u32::try_from(target).is_ok());
+        u64::from(source) << u32::BITS | target as u64
+    };
     entries.clear();
     for (column, at, row) in of_columns {
         let in_front = place[row] as usize;

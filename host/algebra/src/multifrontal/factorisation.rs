@@ -38,7 +38,7 @@ enum Task {
     TakeOver,
     /// As [`Self::TakeOver`], but its update is gone and wanted again, and kept from now on.
     Restore,
-    /// The same for the sake of a front that is restored itself: not kept.
+    /// The same for the sake of a front that is restored itself: not kept for that.
     Repeat,
     /// Its entries have changed, or those of a descendant.
     Compute,
@@ -94,10 +94,13 @@ impl Multifrontal {
     pub fn gather(&mut self, values: &[f64]) -> Gathered {
         self.clear_schur();
         self.add_kept(values);
-        let analysis = Arc::make_mut(&mut self.analysis);
-        analysis.kept_entries = Vec::new();
-        let sources = std::mem::take(&mut analysis.sources);
-        Gathered(sources.iter().map(|&at| values[at as usize]).collect())
+        let sources = self.analysis.sources.iter();
+        let gathered = Gathered(sources.map(|&at| values[at as usize]).collect());
+        if let Some(analysis) = Arc::get_mut(&mut self.analysis) {
+            analysis.kept_entries = Vec::new();
+            analysis.sources = Vec::new();
+        }
+        gathered
     }
 
     /// Factorises the last matrix.
@@ -106,9 +109,10 @@ impl Multifrontal {
     /// As [`Self::factorise`].
     pub fn factorise_gathered(&mut self, values: &Gathered) -> Result<(), Singular> {
         self.eliminate_all(&Before::Values(&[]), Values::OfFronts(&values.0))?;
-        let analysis = Arc::make_mut(&mut self.analysis);
-        analysis.targets = Vec::new();
-        analysis.runs = Vec::new();
+        if let Some(analysis) = Arc::get_mut(&mut self.analysis) {
+            analysis.targets = Vec::new();
+            analysis.runs = Vec::new();
+        }
         self.memory = Mutex::default();
         Ok(())
     }

@@ -83,7 +83,7 @@ struct Geometry<const N: usize> {
 
 impl<const N: usize> Solid<N> {
     /// Elements with the integration points of a rule, in the given axes. `rule` gives the points
-    /// of an element, of all as many.
+    /// of an element, of all as many and with the same strains.
     ///
     /// # Errors
     /// An element whose Jacobian is not positive.
@@ -110,6 +110,7 @@ impl<const N: usize> Solid<N> {
             let mut sizes = Vec::with_capacity(elements.len());
             for &element in elements {
                 let geometry = geometry(element)?;
+                debug_assert_eq!(geometry.points.len(), points_per_element);
                 points.extend(geometry.points);
                 sizes.push((geometry.volumes, geometry.length));
             }

@@ -92,9 +92,8 @@ impl Simulation {
         trial: Trial,
     ) -> Option<Neighbour> {
         let equations = &phase.equations;
-        let mut solver = self
-            .solver(&equations.system, equations.domain.as_ref())
-            .ok()?;
+        let mut solver = equations.solver.another().ok()?;
+        solver.expect_others();
         let bytes = solver.bytes() + equations.system.bytes_of_elements(&self.groups);
         self.reuse
             .announce(bytes, "factorising the equations once more");

@@ -10,7 +10,7 @@ use crate::equilibrium::{Costs, Held, LinearDomain, Loads, Matrix, Newton, ROUND
 use crate::error::Error;
 use crate::group::Group;
 use crate::problem::Axis;
-use crate::settings::Equations;
+use crate::settings::{Equations, Method, Settings};
 use algebra::{LinearSolver, Singular};
 
 /// The equations of one phase.
@@ -55,6 +55,11 @@ impl PhaseEquations {
             ..record.clone()
         }
     }
+}
+
+/// Whether the first matrix of a phase is not the only one.
+fn matrices_follow(system: &System, groups: &[Group], settings: &Settings) -> bool {
+    !system.is_constant(groups) && settings.method != Method::InitialStress
 }
 
 impl Simulation {
@@ -391,7 +396,7 @@ impl Simulation {
         if let Some(domain) = domain {
             let (lines, block) = (system.lines(&self.lines), domain.block(system));
             let mut solver = LinearSolver::with_block(&system.pattern, Some(&lines), block)?;
-            if !system.is_constant(&self.groups) {
+            if matrices_follow(system, &self.groups, &self.settings()) {
                 solver.expect_others();
             }
             return Ok(solver);
@@ -401,14 +406,13 @@ impl Simulation {
 
     /// What makes a solver for equations without a domain.
     fn sparse(&self) -> impl FnOnce(&System) -> Result<LinearSolver, Singular> + Send + use<'_> {
-        let active = self.groups.iter().filter(|group| group.is_active);
-        let is_linear = active.clone().all(Group::is_linear);
-        let is_symmetric = is_linear && active.clone().all(Group::is_symmetric);
-        let lines = &self.lines;
+        let mut active = self.groups.iter().filter(|group| group.is_active);
+        let is_symmetric = active.all(|group| group.is_linear() && group.is_symmetric());
+        let (lines, groups, settings) = (&self.lines, &self.groups, self.settings());
         move |system| {
             let lines = system.lines(lines);
             let mut solver = LinearSolver::new(&system.pattern, is_symmetric, Some(&lines))?;
-            if !is_linear {
+            if matrices_follow(system, groups, &settings) {
                 solver.expect_others();
             }
             Ok(solver)

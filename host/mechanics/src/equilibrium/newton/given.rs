@@ -316,7 +316,8 @@ impl Newton<'_> {
     }
 
     /// Solves with the equations that [`Self::factorise_at_start`] gave. Keeps those beside the iterations' own for the
-    /// next time, if they are not large.
+    /// next time, if they are not large. Where the iterations' own need full row exchanges for it, they have them from
+    /// then on.
     fn solve_at_start(
         &mut self,
         beside: Option<LinearSolver>,
