@@ -445,6 +445,125 @@ fn laws_that_no_group_takes_are_noted() {
     assert!(!outcome.says("no group takes"), "{}", outcome.stderr);
 }
 
+/// Warnings of a run of the case with another law that nothing takes, and of a dry run.
+fn said_of_spare(place: &Place, law: &str) -> [Vec<String>; 2] {
+    let spare = format!("[laws.spare]\n{law}\n\n[laws.soil]");
+    let text = crate::program::CASE.replacen("[laws.soil]", &spare, 1);
+    place.write("case.toml", text);
+    [("run", "--checkpoint=0"), ("dry", "--dry-run")]
+        .map(|(out, option)| said(place, "case.toml", out, option))
+}
+
+fn said(place: &Place, file: &str, out: &str, option: &str) -> Vec<String> {
+    drop(std::fs::remove_dir_all(place.path(out)));
+    let outcome = place.run(&["run", file, "--out", out, option]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let lines = outcome.stderr.lines();
+    let of_spare = lines.filter(|line| line.contains("law `spare` of [laws]"));
+    of_spare.map(str::to_owned).collect()
+}
+
+#[test]
+fn what_is_wrong_with_laws_that_nothing_takes_is_a_warning() {
+    let place = Place::new();
+    let right = "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }";
+    for looked in said_of_spare(&place, right) {
+        assert!(looked.is_empty(), "{looked:?}");
+    }
+    let joint = right.replace("elastic", "coulomb_joint");
+    // What a run says, of laws that it knows anyway, and a dry run of all.
+    for (law, line, says, in_run) in [
+        (
+            right.replace("young_modulus", "young_module"),
+            29,
+            "did you mean `young_modulus`?",
+            true,
+        ),
+        (
+            right.replace("0.3", "0.7"),
+            29,
+            "0.7 is outside (-1, 0.5)",
+            true,
+        ),
+        (
+            right.replace(", poisson_ratio = 0.3", ""),
+            28,
+            "needs parameter `poisson_ratio`",
+            true,
+        ),
+        (
+            right.to_owned() + "\ninitial = { gap = 1.0 }",
+            30,
+            "has no internal variable `gap`",
+            true,
+        ),
+        (
+            joint,
+            29,
+            "`coulomb_joint` has no parameter `young_modulus`",
+            true,
+        ),
+        (
+            right.replace("1e4", "{ z = [[0, 1e4], [1, -2e4]] }"),
+            29,
+            "-20000 kPa is outside",
+            false,
+        ),
+        (
+            right.replace("elastic", "elastc"),
+            28,
+            "did you mean `elastic`?",
+            false,
+        ),
+        (
+            right
+                .replace("elastic", "mohr_coulomb")
+                .replace("0.3", "0.7"),
+            29,
+            "0.7 is outside",
+            false,
+        ),
+        (
+            right.to_owned() + "\nadapter = \"umat\"\nlibrary = \"none.so\"",
+            31,
+            "there is no file",
+            false,
+        ),
+    ] {
+        let [run, dry] = said_of_spare(&place, &law);
+        assert_eq!(run.len(), usize::from(in_run), "{law}\n{run:?}");
+        assert_eq!(dry.len(), 1, "{law}\n{dry:?}");
+        for said in run.iter().chain(&dry) {
+            assert!(said.contains(says), "{says}\n{said}");
+            assert!(said.contains(&format!("case.toml:{line}:")), "{said}");
+        }
+    }
+}
+
+/// A law is looked at as a whole where its file is: another file may complete it, and a zone its filler.
+#[test]
+fn laws_that_others_complete_may_lack_parameters() {
+    let place = Place::new();
+    let lacks = "law = \"elastic\"\nparameters = { young_modulus = 1e4 }";
+    let [_, alone] = said_of_spare(&place, lacks);
+    assert_eq!(alone.len(), 1);
+    place.write("more.toml", "base = \"case.toml\"\n");
+    assert!(said(&place, "more.toml", "dry", "--dry-run").is_empty());
+    place.write(
+        "more.toml",
+        "base = \"case.toml\"\nlaws.spare.parameters.poisson_ratio = 0.7\n",
+    );
+    let wrong = said(&place, "more.toml", "dry", "--dry-run");
+    assert!(
+        wrong.len() == 1 && wrong[0].contains("more.toml:2:"),
+        "{wrong:?}"
+    );
+    let zone = "\n\n[laws.zone]\nadapter = \"shear_zone\"\nlaw = \"spare\"\nthickness = 0.01\n\
+                parameters = { poisson_ratio = 0.3 }";
+    let [_, filler] = said_of_spare(&place, &format!("{lacks}{zone}"));
+    assert!(filler.is_empty(), "{filler:?}");
+}
+
 #[test]
 fn a_report_of_a_folder_without_results_says_what_is_missing() {
     let place = Place::new();

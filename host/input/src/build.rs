@@ -1,6 +1,9 @@
 //! From a case file to a problem in memory and the results that are wanted of it; and back: which place
 //! of the file an error of the problem is about.
 
+mod spare;
+
+use self::spare::Look;
 use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
 use crate::ground::{ProfileInput, level};
 use crate::material::{
@@ -67,6 +70,18 @@ impl Case {
     /// # Errors
     /// [`text::Error::Input`] at the place that does not fit; [`law::Error::Library`].
     pub fn pose(&self) -> Result<Posed, Error> {
+        self.posed(Look::Known)
+    }
+
+    /// As [`Self::pose`]; laws that nothing takes are opened and built, too, for what would be refused of them.
+    ///
+    /// # Errors
+    /// As [`Self::pose`].
+    pub fn pose_closely(&self) -> Result<Posed, Error> {
+        self.posed(Look::Close)
+    }
+
+    fn posed(&self, look: Look) -> Result<Posed, Error> {
         let Self { source, file, .. } = self;
         let Built {
             mesh,
@@ -134,6 +149,7 @@ impl Case {
                     .map_or(0.495, |ratio| *ratio.get_ref()),
             });
         }
+        let spare = shelf.spare(look, self.stands_alone())?;
         let supports = file.supports.iter().map(|support| Support {
             line: support.line.get_ref().clone(),
             fixed: support.fixed.iter().map(|&axis| axis.into()).collect(),
@@ -157,6 +173,7 @@ impl Case {
                 .iter()
                 .flat_map(|file| file.notes.clone())
                 .chain(self.unused_laws())
+                .chain(spare)
                 .collect(),
             mesh_file,
         })
@@ -165,8 +182,8 @@ impl Case {
     /// Laws that no group takes, where the file stands alone: those of a base, or of a file with variants,
     /// may be for others.
     fn unused_laws(&self) -> Option<String> {
-        let Self { source, file, .. } = self;
-        if self.variant.is_some() || source.files().count() > 1 {
+        let file = &self.file;
+        if !self.stands_alone() {
             return None;
         }
         let own = file
@@ -175,14 +192,23 @@ impl Case {
             .map(|group| group.get_ref().law.get_ref());
         let later = file.phases.iter().flat_map(|phase| phase.laws.values());
         let used: Vec<&String> = own.chain(later.map(Spanned::get_ref)).collect();
+        let tables = LawTables {
+            source: &self.source,
+            tables: &file.laws,
+        };
         let unused = file
             .laws
-            .keys()
-            .map(Spanned::get_ref)
+            .iter()
+            .filter(|(_, entry)| !tables.is_filler(entry.get_ref()))
+            .map(|(name, _)| name.get_ref())
             .filter(|name| !used.contains(name));
         let names: Vec<String> = unused.map(|name| format!("`{name}`")).collect();
         (!names.is_empty())
             .then(|| format!("no group takes the laws {} of [laws]", names.join(", ")))
+    }
+
+    fn stands_alone(&self) -> bool {
+        self.variant.is_none() && self.source.files().count() == 1
     }
 
     /// The results that the file asks for, of its simulation.
@@ -669,16 +695,18 @@ impl<'a> LawShelf<'a> {
                 .starting_with(id, *value.get_ref())
                 .ok_or_else(|| {
                     let variables = &law.law.formulation().internal_variables;
-                    let ids: Vec<&str> = variables.iter().map(|v| v.id.as_str()).collect();
-                    let message = format!(
-                        "law `{}` has no internal variable `{id}`",
-                        law.law.description().id
-                    );
-                    let error = self.source.error(variable.span(), message);
-                    Error::from(error.hint(suggestion(id, ids)))
+                    let ids = variables.iter().map(|v| v.id.as_str()).collect();
+                    self.no_variable(&law.law.description().id, variable, ids)
                 })?;
         }
         Ok(material)
+    }
+
+    fn no_variable(&self, law: &str, variable: &Spanned<String>, ids: Vec<&str>) -> Error {
+        let id = variable.get_ref();
+        let message = format!("law `{law}` has no internal variable `{id}`");
+        let error = self.source.error(variable.span(), message);
+        error.hint(suggestion(id, ids)).into()
     }
 
     /// Parameters of a law that vary with the height; every value is held against its bounds.

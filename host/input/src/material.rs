@@ -97,9 +97,15 @@ pub(crate) fn try_law(
     hypothesis: Hypothesis,
     parameters: &ParameterTable,
 ) -> Result<BuiltLaw, BuildFailure> {
+    loaded.with(hypothesis, &given(parameters))
+}
+
+/// Parameters as a law takes them.
+pub(crate) fn given(parameters: &ParameterTable) -> Vec<(&str, Value)> {
     let given = parameters.iter();
-    let given = given.map(|(key, value)| (key.get_ref().as_str(), Value::from(value.get_ref())));
-    loaded.with(hypothesis, &given.collect::<Vec<_>>())
+    given
+        .map(|(key, value)| (key.get_ref().as_str(), Value::from(value.get_ref())))
+        .collect()
 }
 
 /// The error of a law that cannot be built, at its place in the file.
@@ -248,6 +254,15 @@ impl<'a> LawTables<'a> {
         let table = named.map(|(_, table)| table.get_ref());
         // A zone may be called like the law of the contract that fills it.
         table.filter(|table| !std::ptr::eq(*table, entry))
+    }
+
+    /// Whether a table is there for zones that it fills.
+    pub(crate) fn is_filler(self, entry: &LawInput) -> bool {
+        let mut tables = self.tables.values();
+        tables.any(|zone| {
+            let filler = self.filler(zone.get_ref());
+            filler.is_some_and(|filler| std::ptr::eq(filler, entry))
+        })
     }
 
     /// Parameters of a table: of a zone those of the law that fills it, and its own over them.

@@ -180,28 +180,58 @@ impl LoadedLaw {
         given: &[(&str, Value)],
     ) -> Result<BuiltLaw, BuildFailure> {
         let description = self.description();
-        let failure = |parameter: Option<&str>, cause| BuildFailure {
-            law: description.id.clone(),
-            parameter: parameter.map(str::to_owned),
-            cause,
-        };
         if description.formulation(hypothesis).is_none() {
-            return Err(failure(None, not_offered(description, hypothesis)));
+            let cause = not_offered(description, hypothesis);
+            return Err(self.failure(None, cause));
         }
-        let mut warnings = self.library().warnings().to_vec();
+        let (used, unusual) = self.values(given)?;
+        let warnings = self.library().warnings().iter().cloned();
+        let mut warnings: Vec<String> = warnings.chain(unusual).collect();
+        let values: Vec<f64> = used.iter().map(|p| p.value).collect();
+        let law = self.build(hypothesis, &values).map_err(|refusal| {
+            if refusal.library_at_fault {
+                let library = self.library().path().display().to_string();
+                let reason = refusal.reason;
+                return self.failure(None, BuildCause::Library { library, reason });
+            }
+            let parameter = refusal.parameter.as_deref();
+            self.failure(parameter, BuildCause::Refused(refusal.reason.clone()))
+        })?;
+        let id = &description.id;
+        let zone = self.shear_zone();
+        warnings.extend(zone.and_then(|zone| zone.implausible(id)));
+        warnings.extend(law.changes().iter().map(|it| format!("law `{id}`: {it}")));
+        Ok(BuiltLaw {
+            law,
+            parameters: used,
+            warnings,
+        })
+    }
+
+    /// Values of all parameters in declared order, each held against what the law says of it, and what is unusual
+    /// about them, in words. The law is not called.
+    ///
+    /// # Errors
+    /// A value does not fit, or is missing.
+    pub fn values(
+        &self,
+        given: &[(&str, Value)],
+    ) -> Result<(Vec<UsedParameter>, Vec<String>), BuildFailure> {
+        let description = self.description();
+        let mut unusual = Vec::new();
         let ids = || description.parameters.iter().map(|p| p.id.clone());
         if let Some((key, _)) = given.iter().find(|(key, _)| !ids().any(|id| id == *key)) {
-            return Err(failure(Some(key), BuildCause::Unknown(ids().collect())));
+            return Err(self.failure(Some(key), BuildCause::Unknown(ids().collect())));
         }
         let mut used = Vec::new();
         for declared in &description.parameters {
             let value = given.iter().find(|(key, _)| *key == declared.id);
             let number = match value {
                 Some((_, value)) => {
-                    let wrong = |cause| failure(Some(&declared.id), cause);
+                    let wrong = |cause| self.failure(Some(&declared.id), cause);
                     let number = number(declared, value).map_err(wrong)?;
                     if !declared.usual.contain(number) {
-                        warnings.push(format!(
+                        unusual.push(format!(
                             "law `{}`: {} = {} is outside its usual range {}",
                             description.id,
                             declared.id,
@@ -220,7 +250,7 @@ impl LoadedLaw {
                             doc: declared.doc.clone(),
                             needed: needed(description),
                         };
-                        return Err(failure(Some(&declared.id), missing));
+                        return Err(self.failure(Some(&declared.id), missing));
                     }
                 },
             };
@@ -231,27 +261,17 @@ impl LoadedLaw {
             });
         }
         if let Some(UsedParameter { id, value, .. }) = radians(description, &used) {
-            return Err(failure(Some(id), BuildCause::Radians(*value)));
+            return Err(self.failure(Some(id), BuildCause::Radians(*value)));
         }
-        let values: Vec<f64> = used.iter().map(|p| p.value).collect();
-        let law = self.build(hypothesis, &values).map_err(|refusal| {
-            if refusal.library_at_fault {
-                let library = self.library().path().display().to_string();
-                let reason = refusal.reason;
-                return failure(None, BuildCause::Library { library, reason });
-            }
-            let parameter = refusal.parameter.as_deref();
-            failure(parameter, BuildCause::Refused(refusal.reason.clone()))
-        })?;
-        let id = &description.id;
-        let zone = self.shear_zone();
-        warnings.extend(zone.and_then(|zone| zone.implausible(id)));
-        warnings.extend(law.changes().iter().map(|it| format!("law `{id}`: {it}")));
-        Ok(BuiltLaw {
-            law,
-            parameters: used,
-            warnings,
-        })
+        Ok((used, unusual))
+    }
+
+    fn failure(&self, parameter: Option<&str>, cause: BuildCause) -> BuildFailure {
+        BuildFailure {
+            law: self.description().id.clone(),
+            parameter: parameter.map(str::to_owned),
+            cause,
+        }
     }
 }
 

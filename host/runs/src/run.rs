@@ -93,7 +93,7 @@ pub fn dry_run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Resul
         laws,
         mesh_file,
         notes,
-    } = case.pose()?;
+    } = case.pose_closely()?;
     let simulation = Simulation::new(problem.clone()).map_err(|error| case.place(error))?;
     let wanted = case.wanted(&simulation)?;
     let about = case.about(&laws, mesh_file.as_ref());
