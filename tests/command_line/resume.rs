@@ -5,6 +5,7 @@ use crate::program::{BAD_INPUT, CASE, DONE, Place, edited};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use tests::case::column;
 
 /// Increments of each of the two phases.
 const INCREMENTS: usize = 60;
@@ -269,6 +270,35 @@ fn a_run_without_any_force_resumes_to_the_same_bits() {
         let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
         assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
         stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
+    }
+}
+
+/// One node takes a rigid line with it, and its reaction is that of the whole line.
+#[test]
+fn a_node_that_leads_a_rigid_line_goes_on_to_the_same_bits() {
+    let text = [
+        ("top = {", "pole = { x = 0.0, y = 2.0 }\ntop = {"),
+        ("increments = 1500", "increments = 1500\nrigid = [\"top\"]"),
+        ("line = \"top\", y = 0.1", "line = \"pole\", y = -0.1"),
+        ("line = \"top\", quantity", "line = \"pole\", quantity"),
+    ]
+    .iter()
+    .fold(FORCELESS.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    for text in [&text, &text.replace("equations = \"sparse\"\n", "")] {
+        let undisturbed = Place::new();
+        undisturbed.write("block.toml", text);
+        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        // Friction of all of the layer, which is pressed together by a tenth of a metre.
+        let reaction = *column(&undisturbed.path("out/history.csv"), "q")
+            .last()
+            .unwrap();
+        let expected = 1e3 * 0.1 * f64::to_radians(30.0).tan();
+        assert!((reaction - expected).abs() < 1e-4 * expected, "{reaction}");
+        stopped_and_resumed(text, &results(&undisturbed.path("out")), "led");
     }
 }
 
