@@ -408,3 +408,82 @@ fn a_boundary_may_have_no_unknowns() {
         }
     }
 }
+
+/// Confined ground under the pressure that its initial stress balances, and from then on under a billionth more. All
+/// that is linear hangs on nodes that do not move, so nothing but its own forces moves it. That billionth is the force
+/// tolerance: noise is far below.
+const AT_REST: &str = r#"analysis = "plane_strain"
+[mesh]
+columns = [{ n = 7, to = 1.0, ratio = 1.3 }]
+rows = [{ n = 2, to = 0.3 }, { n = 5, to = 0.9, ratio = 1.2 }, { n = 2, to = 1.1 }]
+[[mesh.region]]
+group = "soil"
+[[mesh.region]]
+group = "yielding"
+y = [0.0, 0.3]
+[mesh.lines]
+left = { x = 0.0 }
+right = { x = 1.0 }
+base = { y = 0.0 }
+seam = { y = 0.3 }
+top = { y = 1.1 }
+inside = { y = 0.9 }
+[laws]
+soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.2 } }
+[laws.yielding]
+law = "mohr_coulomb"
+parameters = { young_modulus = 1e4, poisson_ratio = 0.2, cohesion = 1e3, friction_angle = 30.0, dilatancy_angle = 0.0 }
+[groups]
+soil = { formulation = "solid", integration = "full", law = "soil", initial_stress = { 11 = -77.7, 22 = -77.7, 33 = -77.7 } }
+yielding = { formulation = "solid", integration = "full", law = "yielding", initial_stress = { 11 = -77.7, 22 = -77.7, 33 = -77.7 } }
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[supports]]
+line = "right"
+fixed = ["x"]
+[[supports]]
+line = "seam"
+fixed = ["x", "y"]
+[[supports]]
+line = "base"
+fixed = ["y"]
+[[phase]]
+name = "rest"
+increments = 1
+pressure = [{ line = "top", value = 77.7 }]
+[[phase]]
+name = "more"
+increments = 1
+pressure = [{ line = "top", value = 77.7000000777 }]
+[solver]
+equations = "EQUATIONS"
+[probes]
+top = { line = "top", quantity = "displacement_y" }
+inside = { line = "inside", quantity = "displacement_y" }
+"#;
+
+#[test]
+fn what_rounding_leaves_as_a_phase_begins_moves_no_condensed_ground_and_what_is_more_does() {
+    // E (1 − ν)/((1 + ν)(1 − 2ν)), and the share of the pressure that comes.
+    let modulus = 1e4 * 0.8 / (1.2 * 0.6);
+    let more = 77.700_000_077_7 - 77.7;
+    for equations in ["condensed", "sparse"] {
+        let results = crate::setup::run(&AT_REST.replace("EQUATIONS", equations));
+        for (probe, height) in [("inside", 0.6), ("top", 0.8)] {
+            let moved = results.history(probe);
+            let [rest, end] = moved[..] else {
+                panic!("{moved:?}");
+            };
+            // Elsewhere rounding moves all nodes: 1e-16 of the stress, over the modulus.
+            let least = if equations == "condensed" { 0.0 } else { 1e-16 };
+            assert!(rest.abs() <= least, "{equations}, {probe}: {rest:e}");
+            // The rounding of the stress is 1e-6 of what comes.
+            let expected = -more * height / modulus;
+            assert!(
+                (end - expected).abs() < 1e-5 * expected.abs(),
+                "{equations}, {probe}: {end:e} for {expected:e}"
+            );
+        }
+    }
+}
