@@ -312,18 +312,8 @@ fn both_sides_of_a_pile_in_plane_strain_count() {
     }
 }
 
-/// Pull-out of an elastic bar from rigid surroundings, bond elastic to τ at the slip τ/k and level from
-/// there. P = 2πaτ (x + tanh β(L − x)/β) where the plastic length is x, at the displacement
-/// u = τ/k (1 + βx tanh β(L − x) + β²x²/2), with β² = 2πak/(EA).
-#[test]
-#[expect(
-    clippy::too_many_lines,
-    reason = "one problem, from its file to its rows"
-)]
-fn a_bar_is_pulled_out_by_its_shear_lag() {
-    let (a, length, modulus, k, tau) = (0.0125, 1.0, 2e8, 2e5, 500.0);
-    let beta = f64::sqrt(2.0 * k / (modulus * a));
-    let text = r#"
+/// An elastic bar of a radius of 12.5 mm in rigid surroundings, 1 m of bond, confined by 100 kPa.
+const BAR: &str = r#"
 analysis = "axisymmetric"
 [mesh]
 columns = [{ n = 1, to = 0.0125 }, { n = 1, to = 0.05 }]
@@ -367,7 +357,58 @@ shaft = "bond"
 base = "foot"
 head = "head"
 "#;
-    let (place, _) = run(text);
+
+/// Without normal stress, and without strength against tension, its sign in a last bit would decide where the bar holds.
+#[test]
+fn a_bond_that_begins_without_normal_stress_is_warned_of_where_it_opens() {
+    let end = BAR.find("[[phase]]\nname = \"on\"").unwrap();
+    let pile = BAR.find("[pile]").unwrap();
+    let confined = format!("{}{}", &BAR[..end], &BAR[pile..]);
+    let bare = confined.replace("stress_11 = -100.0, stress_33 = -100.0", "stress_33 = 0.0");
+    let glued = bare.replace(
+        "dilatancy_angle = 0.0 }",
+        "dilatancy_angle = 0.0, tensile_strength = 500.0 }",
+    );
+    let says =
+        "interface `bond` began without normal stress, and the bond of its law `bond` breaks";
+    // All of the bond is elastic up to a slip of τ/k at the head: P = 2πaτ tanh(βL)/β, β = 0.4/m.
+    let expected = 2.0 * PI * 0.0125 * 500.0 * f64::tanh(0.4) / 0.4;
+    for text in [&confined, &glued] {
+        let place = Place::new();
+        let outcome = place.run_case(text);
+        assert!(
+            !outcome.says("began without normal stress"),
+            "{}",
+            outcome.stderr
+        );
+        let rows = rows(&place.path("out/history.csv"));
+        let head = -value(rows.last().unwrap(), "pile_head_load");
+        assert!((head - expected).abs() < 1e-3 * expected, "{head}");
+    }
+    for increments in ["increments = 2", "increments = 1"] {
+        let place = Place::new();
+        let outcome = place.run_case(bare.replace("increments = 2", increments));
+        assert!(outcome.says(says), "{}", outcome.stderr);
+    }
+    // Joined by friction alone it would not have held either.
+    let loose = bare.replace("cohesion = 500.0", "cohesion = 0.0");
+    let place = Place::new();
+    let outcome = place.run_case(loose);
+    assert!(
+        !outcome.says("began without normal stress"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+/// Pull-out of an elastic bar from rigid surroundings, bond elastic to τ at the slip τ/k and level from
+/// there. P = 2πaτ (x + tanh β(L − x)/β) where the plastic length is x, at the displacement
+/// u = τ/k (1 + βx tanh β(L − x) + β²x²/2), with β² = 2πak/(EA).
+#[test]
+fn a_bar_is_pulled_out_by_its_shear_lag() {
+    let (a, length, modulus, k, tau) = (0.0125, 1.0, 2e8, 2e5, 500.0);
+    let beta = f64::sqrt(2.0 * k / (modulus * a));
+    let (place, _) = run(BAR);
     assert_closes(&place, |_| 0.0);
     let stations = rows(&place.path("out/pile.csv"));
     for row in rows(&place.path("out/history.csv")) {

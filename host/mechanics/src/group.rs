@@ -14,6 +14,7 @@ mod operator;
 mod state;
 mod takeover;
 mod tangent;
+mod torn;
 mod varying;
 mod water;
 
@@ -35,6 +36,8 @@ use layer::Layer;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 pub use takeover::TakeOver;
+use torn::Bond;
+pub use torn::Torn;
 use varying::Varying;
 use water::Pores;
 
@@ -243,6 +246,8 @@ pub struct Group {
     /// The trial state is what the law, which starts now, makes of the committed one over a nil
     /// increment.
     is_asked: bool,
+    /// What its law started as.
+    bond: Bond,
 }
 
 impl Group {
@@ -283,6 +288,7 @@ impl Group {
             tangents_are_constant: false,
             origin: Origin::default(),
             is_asked: false,
+            bond: Bond::default(),
         };
         group.start_law(law, None)?;
         Ok(group)
@@ -394,6 +400,12 @@ impl Group {
         if starts_anew && self.formulation == Formulation::ZeroThickness {
             self.strain.committed.fill(0.0);
         }
+        self.bond = if starts_anew {
+            self.bond()
+        } else {
+            Bond::Other
+        };
+        let law = &self.law.built.law;
         let n = law.n_components();
         let element_n = self.kinematics.n_components();
         let is_uniform = self.varying.is_none() && self.pores.is_none();

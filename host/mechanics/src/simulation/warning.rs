@@ -3,7 +3,7 @@
 use super::Neighbour;
 use crate::equilibrium::Open;
 use crate::error::Place;
-use crate::group::{Notice, Parted, TakeOver};
+use crate::group::{Notice, Parted, TakeOver, Torn};
 use law::TimeDependence;
 use std::fmt;
 
@@ -118,6 +118,8 @@ pub enum Warning {
         /// Lowest and highest load factor on the path.
         between: [f64; 2],
     },
+    /// A bond that the first tension breaks began without normal stress; said in the first increment.
+    Torn(Place, Torn),
 }
 
 impl Warning {
@@ -131,16 +133,8 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Note(note) => write!(f, "{note}"),
-            Self::OutOfBalance(phase, share) => write!(
-                f,
-                "phase `{phase}` starts out of balance: {} % of the forces in play, carried to \
-                 equilibrium in its course",
-                if *share < 1e-4 {
-                    format!("{:.1e}", 100.0 * share)
-                } else {
-                    format!("{:.2}", 100.0 * share)
-                }
-            ),
+            Self::OutOfBalance(phase, share) => out_of_balance(f, phase, *share),
+            Self::Torn(place, torn) => write!(f, "{place}: {torn}"),
             Self::Approximate(law) => write!(
                 f,
                 "the tangents of law `{law}` are approximate: they are made by differences of its \
@@ -275,6 +269,18 @@ fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, crept: usize
         .map(|(by, n)| format!("{by} led to the next equilibrium in {}", steps(*n)))
         .collect();
     write!(f, "phase `{phase}`: {} in all", told.join(", "))
+}
+
+fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::Result {
+    write!(
+        f,
+        "phase `{phase}` starts out of balance: {} % of the forces in play, carried to equilibrium in its course",
+        if share < 1e-4 {
+            format!("{:.1e}", 100.0 * share)
+        } else {
+            format!("{:.2}", 100.0 * share)
+        }
+    )
 }
 
 fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> fmt::Result {
