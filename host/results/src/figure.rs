@@ -14,6 +14,12 @@ use text::write::replace;
 
 /// Size of a figure in points.
 const SIZE: (u32, u32) = (640, 420);
+/// Margins around a plot with its labels, in points; on the right half of a number of seven digits has room.
+const MARGIN: u32 = 12;
+const MARGIN_RIGHT: u32 = 24;
+/// Room for the numbers and the name of the axis below a plot, and beside it.
+const BELOW: u32 = 38;
+const BESIDE: u32 = 58;
 /// Radius of the marker of a measured point, in points.
 const MARKER: i32 = 3;
 /// Colours that stay apart for most eyes and in grey (Okabe & Ito), then some more.
@@ -306,9 +312,10 @@ fn draw(
     let (left, right) = area.split_horizontally(SIZE.0);
     let mut chart = ChartBuilder::on(&left)
         .caption(&labels.title, ("sans-serif", 15))
-        .margin(12)
-        .x_label_area_size(38)
-        .y_label_area_size(58)
+        .margin(MARGIN)
+        .margin_right(MARGIN_RIGHT)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(BESIDE)
         .build_cartesian_2d(x, y)?;
     chart
         .configure_mesh()
@@ -374,7 +381,8 @@ fn empty_corner(
     legend: [usize; 2],
 ) -> Option<SeriesLabelPosition> {
     // Parts of the plot, which is what labels and margins leave of the figure.
-    let width = (legend[0] + 10) as f64 / f64::from(SIZE.0 - 82);
+    let plot = SIZE.0 - BESIDE - MARGIN - MARGIN_RIGHT;
+    let width = (legend[0] + 10) as f64 / f64::from(plot);
     let height = (legend[1] + 10) as f64 / f64::from(SIZE.1 - 84);
     let part = |v: f64, range: &std::ops::Range<f64>| (v - range.start) / (range.end - range.start);
     let covered = |right: bool, upper: bool| {
