@@ -528,7 +528,7 @@ pub struct PhaseInput {
     #[schemars(with = "Vec<String>")]
     pub activate: Vec<Spanned<String>>,
     /// Groups that are gone from this phase on; what they carried is released in its course. An interface
-    /// goes with the ground beside it, and is named as well.
+    /// goes with the ground beside it, and is named as well. One group at least stays.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub deactivate: Vec<Spanned<String>>,
