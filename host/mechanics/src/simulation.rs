@@ -412,8 +412,9 @@ impl Simulation {
             Ok(done) => done,
             Err(error) => {
                 let _ = custody::restore();
-                let failed = matches!(error, Error::NoEquilibrium(_));
-                self.tell_torn(&place, phase, failed, watch);
+                if matches!(error, Error::NoEquilibrium(_)) {
+                    self.tell_torn(&place, false, watch);
+                }
                 // What led here matters more than trouble with the state before it.
                 self.hand_out_last(&place, phase, watch);
                 return Err(error);
@@ -427,7 +428,7 @@ impl Simulation {
         let lambda = phase.course.lambda;
         self.complete(phase, looked_at.as_ref())
             .map_err(|reason| self.incomplete(phase, &place, lambda, reason))?;
-        self.tell_torn(&place, phase, false, watch);
+        self.tell_torn(&place, true, watch);
         let restored = custody::restore().map_err(|why| Error::Process {
             place: place.clone(),
             why,
@@ -449,15 +450,10 @@ impl Simulation {
         Ok(done)
     }
 
-    /// Says in the first increment of all which bonds began without normal stress, and are open or are in the way.
-    fn tell_torn(&self, place: &Place, phase: &UnderWay, failed: bool, watch: &mut dyn Watch) {
-        if phase.number > 0 || phase.course.increment > 0 {
-            return;
-        }
-        for group in self.groups.iter().filter(|group| group.is_active) {
-            if let Some(torn) = group.torn()
-                && (failed || torn.open > 0)
-            {
+    /// Says, once of each, which bonds that began without normal stress have opened.
+    fn tell_torn(&mut self, place: &Place, reached: bool, watch: &mut dyn Watch) {
+        for group in self.groups.iter_mut().filter(|group| group.is_active) {
+            if let Some(torn) = group.torn(reached) {
                 watch.warning(&Warning::Torn(place.clone(), torn));
             }
         }

@@ -1,5 +1,6 @@
 //! What a group carries from one increment to the next: taken, held against the group, and taken up again.
 
+use super::torn::Bond;
 use super::water::Pores;
 use super::{Field, Group, LawCalls, Origin};
 use crate::problem::Material;
@@ -25,6 +26,7 @@ pub struct GroupState<'g> {
     tangent: Option<Cow<'g, [f64]>>,
     pores: Option<Cow<'g, Pores>>,
     origin: Origin,
+    bond: Bond,
 }
 
 impl GroupState<'_> {
@@ -41,6 +43,7 @@ impl GroupState<'_> {
             tangent: self.tangent.map(|tangent| Cow::Owned(tangent.into_owned())),
             pores: self.pores.map(|pores| Cow::Owned(pores.into_owned())),
             origin: self.origin,
+            bond: self.bond,
         }
     }
 }
@@ -60,6 +63,7 @@ impl Group {
             tangent: with_tangents.then(|| (&self.tangent).into()),
             pores: self.pores.as_ref().map(Cow::Borrowed),
             origin: self.origin,
+            bond: self.bond,
         }
     }
 
@@ -118,6 +122,7 @@ impl Group {
         }
         self.law_calls = state.law_calls.into_owned();
         self.origin = state.origin;
+        self.bond = state.bond;
         self.forget_trial();
         Ok(())
     }

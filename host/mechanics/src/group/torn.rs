@@ -3,16 +3,17 @@
 
 use super::Group;
 use law::{End, Operator, Start, Strided};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Slip that a bond is tried with, m, and a trace of opening beside it.
 const SLIP: f64 = 1e-9;
 const TRACE: f64 = 1e-12;
 
-/// What an interface's law is as it starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What is known of an interface's bond.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Bond {
-    /// Kept by a normal stress or a tensile strength, or none.
+    /// Kept by a normal stress or a tensile strength, or none; or what has become of it has been said.
     #[default]
     Other,
     /// The first tension breaks it, and no stress is there that keeps it.
@@ -43,8 +44,16 @@ impl fmt::Display for Torn {
         write!(
             f,
             "interface `{group}` began without normal stress, and the bond of its law `{law}` breaks at the first tension, \
-             if only that of rounding: {open} of {of} points are open and carry no shear; a normal stress to begin with, or a \
-             tensile strength, keeps it"
+             however small: "
+        )?;
+        if *open > 0 {
+            write!(f, "{open} of {of} points are open and carry no shear")?;
+        } else {
+            write!(f, "nothing presses it together")?;
+        }
+        write!(
+            f,
+            "; a normal stress to begin with, or a tensile strength, keeps it"
         )
     }
 }
@@ -54,23 +63,34 @@ fn is_nothing(traction: &[f64]) -> bool {
 }
 
 impl Group {
-    /// What has become of a bond that began so.
-    pub fn torn(&self) -> Option<Torn> {
-        let n_points = self.kinematics.n_points();
-        let is_open = |point: &usize| {
-            let both = self.jump_and_traction(*point);
-            both.is_some_and(|(jump, traction)| jump[0] > 0.0 && is_nothing(&traction))
-        };
-        (self.bond == Bond::Bare).then(|| Torn {
+    /// What has become of a bond that began so, once: where points have opened, and those that have not carry more shear
+    /// than normal traction; where no equilibrium was `reached`, as long as nothing presses it together.
+    pub fn torn(&mut self, reached: bool) -> Option<Torn> {
+        if self.bond != Bond::Bare {
+            return None;
+        }
+        let of = self.kinematics.n_points();
+        let (mut open, mut pressed, mut closed) = (0, 0, [0.0, 0.0]);
+        for (jump, traction) in (0..of).filter_map(|point| self.jump_and_traction(point)) {
+            open += usize::from(jump[0] > 0.0 && is_nothing(&traction));
+            pressed += usize::from(traction[0].abs() > 0.0);
+            closed = [0, 1].map(|c| closed[c] + traction[c].abs());
+        }
+        let is_lost = open > 0 && closed[0] <= closed[1];
+        let is_in_the_way = !reached && open == 0 && pressed < of;
+        if open > 0 || pressed == of {
+            self.bond = Bond::Other;
+        }
+        (is_lost || is_in_the_way).then(|| Torn {
             group: self.name.clone(),
             law: self.law.name.clone(),
-            open: (0..n_points).filter(is_open).count(),
-            of: n_points,
+            open,
+            of,
         })
     }
 
-    /// What holds where no point has a normal traction, and the law carries shear there that a trace of opening
-    /// takes away.
+    /// What holds where most points have no normal traction, and the law carries shear there that a trace of opening
+    /// takes away. (At the surface of ground a point or two have none.)
     pub(super) fn bond(&self) -> Bond {
         let law = &self.law.built.law;
         let is_plain = law.library().foreign().is_none() && law.loaded().shear_zone().is_none();
@@ -78,8 +98,9 @@ impl Group {
             return Bond::Other;
         }
         let n = self.kinematics.n_components();
-        let mut normal = self.stress.committed.iter().skip(n / 4).step_by(n);
-        if normal.any(|traction| traction.abs() > 0.0) {
+        let normal = self.stress.committed.iter().skip(n / 4).step_by(n);
+        let kept = normal.filter(|traction| traction.abs() > 0.0).count();
+        if 2 * kept >= self.kinematics.n_points() {
             return Bond::Other;
         }
         let carries = |jump| self.tried(jump).map(|traction| !is_nothing(&traction));

@@ -118,7 +118,7 @@ pub enum Warning {
         /// Lowest and highest load factor on the path.
         between: [f64; 2],
     },
-    /// A bond that the first tension breaks began without normal stress; said in the first increment.
+    /// A bond that the first tension breaks began without normal stress, and has opened.
     Torn(Place, Torn),
 }
 
