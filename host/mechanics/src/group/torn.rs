@@ -64,7 +64,8 @@ fn is_nothing(traction: &[f64]) -> bool {
 
 impl Group {
     /// What has become of a bond that began so, once: where points have opened, and those that have not carry more shear
-    /// than normal traction; where no equilibrium was `reached`, as long as nothing presses it together.
+    /// than normal traction (where pressure holds them the others have been lifted off); where no equilibrium was
+    /// `reached`, as long as nothing presses it together.
     pub fn torn(&mut self, reached: bool) -> Option<Torn> {
         if self.bond != Bond::Bare {
             return None;
