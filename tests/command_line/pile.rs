@@ -390,6 +390,14 @@ fn a_bond_that_begins_without_normal_stress_is_warned_of_where_it_opens() {
         let outcome = place.run_case(bare.replace("increments = 2", increments));
         assert!(outcome.says(says), "{}", outcome.stderr);
     }
+    // A phase in which nothing happens leaves the bond as it was.
+    let later = bare.replacen(
+        "[[phase]]\n",
+        "[[phase]]\nname = \"rest\"\nincrements = 1\n[[phase]]\n",
+        1,
+    );
+    let outcome = Place::new().run_case(later);
+    assert!(outcome.says(says), "{}", outcome.stderr);
     // Joined by friction alone it would not have held either.
     let loose = bare.replace("cohesion = 500.0", "cohesion = 0.0");
     let place = Place::new();

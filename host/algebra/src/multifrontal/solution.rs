@@ -44,6 +44,7 @@ impl Multifrontal {
         }
         let mut own = Vec::new();
         for level in analysis.top.iter().rev() {
+            // Small ones are levels each: nothing is allocated for them.
             if let [number] = level[..] {
                 if is_wanted(number) {
                     let (pivots, rows) = analysis.shape(number);
@@ -172,6 +173,7 @@ impl Multifrontal {
         let is_wanted = |number: usize| fronts.is_none_or(|fronts| fronts[number]);
         let mut below = Vec::new();
         for level in &analysis.top {
+            // As in [`Self::forward`].
             if let [number] = level[..] {
                 if is_wanted(number) {
                     let (pivots, rows) = analysis.shape(number);

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::group::Group;
 use crate::problem::Axis;
 use crate::settings::{Equations, Method, Settings};
-use algebra::{LinearSolver, Singular};
+use algebra::{Block, LinearSolver, Singular};
 
 /// The equations of one phase.
 #[derive(Debug)]
@@ -270,19 +270,9 @@ impl Simulation {
         course: Option<&PhaseCourse>,
     ) -> Result<(PhaseEquations, Loads), Singular> {
         let condensed = self.condensed(number, is_prescribed);
-        let (groups, ties) = (&self.groups, &self.tied);
         self.reuse.forget();
-        let (system, mut domain, solver) = if let Some((domain, system)) = condensed {
-            let solver = self.solver(&system, Some(&domain))?;
-            (system, Some(domain), solver)
-        } else {
-            let takes_part = |_: usize, group: &Group| group.is_active;
-            let sparse = self.sparse();
-            let (system, solver) =
-                System::new_with(groups, takes_part, is_prescribed, ties, None, sparse);
-            (system, None, solver?)
-        };
-        let bytes = solver.bytes() + system.bytes_of_elements(groups);
+        let (system, mut domain, solver) = self.unknowns(condensed, is_prescribed)?;
+        let bytes = solver.bytes() + system.bytes_of_elements(&self.groups);
         self.reuse.announce(bytes, "factorising the equations");
         let of_domain = domain.iter().flat_map(LinearDomain::unknowns);
         let unknowns = among_both(system.free(), of_domain, system.n_dofs());
@@ -387,31 +377,38 @@ impl Simulation {
         LinearDomain::new(of, &held, ties, lines, always, reuse).unwrap_or(None)
     }
 
-    /// A solver for these equations.
-    pub(super) fn solver(
+    /// Unknowns with their solver, of what is not condensed or of all.
+    fn unknowns(
         &self,
-        system: &System,
-        domain: Option<&LinearDomain>,
-    ) -> Result<LinearSolver, Singular> {
-        if let Some(domain) = domain {
-            let (lines, block) = (system.lines(&self.lines), domain.block(system));
-            let mut solver = LinearSolver::with_block(&system.pattern, Some(&lines), block)?;
-            if matrices_follow(system, &self.groups, &self.settings()) {
-                solver.expect_others();
-            }
-            return Ok(solver);
+        condensed: Option<(LinearDomain, System)>,
+        is_prescribed: &[bool],
+    ) -> Result<(System, Option<LinearDomain>, LinearSolver), Singular> {
+        let solver = self.solver();
+        if let Some((domain, system)) = condensed {
+            let solver = solver(&system, Some(domain.block(&system)))?;
+            return Ok((system, Some(domain), solver));
         }
-        self.sparse()(system)
+        let (groups, ties) = (&self.groups, &self.tied);
+        let takes_part = |_: usize, group: &Group| group.is_active;
+        let of_all = |system: &System| solver(system, None);
+        let (system, solver) =
+            System::new_with(groups, takes_part, is_prescribed, ties, None, of_all);
+        Ok((system, None, solver?))
     }
 
-    /// What makes a solver for equations without a domain.
-    fn sparse(&self) -> impl FnOnce(&System) -> Result<LinearSolver, Singular> + Send + use<'_> {
+    /// What makes a solver for equations, with the block of a domain beside them if there is one.
+    fn solver(
+        &self,
+    ) -> impl Fn(&System, Option<Block>) -> Result<LinearSolver, Singular> + Sync + use<'_> {
         let mut active = self.groups.iter().filter(|group| group.is_active);
         let is_symmetric = active.all(|group| group.is_linear() && group.is_symmetric());
         let (lines, groups, settings) = (&self.lines, &self.groups, self.settings());
-        move |system| {
-            let lines = system.lines(lines);
-            let mut solver = LinearSolver::new(&system.pattern, is_symmetric, Some(&lines))?;
+        move |system, block| {
+            let (pattern, lines) = (&system.pattern, system.lines(lines));
+            let mut solver = match block {
+                Some(block) => LinearSolver::with_block(pattern, Some(&lines), block),
+                None => LinearSolver::new(pattern, is_symmetric, Some(&lines)),
+            }?;
             if matrices_follow(system, groups, &settings) {
                 solver.expect_others();
             }
