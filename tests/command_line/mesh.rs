@@ -447,8 +447,8 @@ fn refuses_mesh_files_that_are_wrong() {
         ),
         (
             "5 16 2 4 2",
-            "5 3 2 4 2",
-            "line 34: an element of type 3 is a quad of 4 nodes",
+            "5 36 2 4 2",
+            "line 34: an element of type 36 is a quad of higher order",
         ),
         ("$EndNodes", "$EndKnots", "line 27: expected `$EndNodes`"),
     ] {
@@ -466,6 +466,76 @@ fn refuses_mesh_files_that_are_wrong() {
     assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
     for says in ["cannot read none.msh: ", "mesh.file = \"none.msh\""] {
         assert!(outcome.says(says), "{}", outcome.stderr);
+    }
+}
+
+/// The mesh of the tutorial's pile, and the same one without the nodes in the middles of its sides.
+fn pile_meshes() -> [String; 2] {
+    const FILE: &str = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../host/docs/tutorial/my_pile.msh"
+    );
+    let second = std::fs::read_to_string(FILE).unwrap();
+    let (head, elements) = second.split_once("$Elements\n").unwrap();
+    let mut first = head.to_owned() + "$Elements\n";
+    let mut lines = elements.lines();
+    first += &format!("{}\n", lines.next().unwrap());
+    while let Some(line) = lines.next().filter(|line| !line.starts_with('$')) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (kind, n) = match words[2] {
+            "8" => ("1", 2),
+            "9" => ("2", 3),
+            other => (other, 1),
+        };
+        first += &format!("{} {} {kind} {}\n", words[0], words[1], words[3]);
+        for _ in 0..words[3].parse().unwrap() {
+            let words: Vec<&str> = lines.next().unwrap().split_whitespace().collect();
+            first += &format!("{}\n", words[..=n].join(" "));
+        }
+    }
+    first += "$EndElements\n";
+    [second, first]
+}
+
+/// A mesh of first order gets its middles where Gmsh puts them on straight sides: the pile, with interfaces along
+/// lines of two nodes, settles as on that of second order.
+#[test]
+fn a_pile_on_a_mesh_of_first_order_is_that_of_second_order() {
+    const CASE: &str = r#"
+analysis = "axisymmetric"
+mesh.file = "pile.msh"
+laws.soil = { law = "mohr_coulomb", parameters = { young_modulus = 12e3, poisson_ratio = 0.3, cohesion = 10.0, friction_angle = 23.0, dilatancy_angle = 0.0 } }
+laws.concrete = { law = "elastic", parameters = { young_modulus = 30e6, poisson_ratio = 0.2 } }
+laws.skin = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_stiffness = 1e5, cohesion = 0.0, friction_angle = 28.0, dilatancy_angle = 0.0 } }
+groups.pile = { formulation = "solid", law = "concrete", unit_weight = 19.0, initial_stress = { k_0 = 0.6 } }
+groups.clay = { formulation = "solid", law = "soil", unit_weight = 19.0, initial_stress = { k_0 = 0.6 } }
+groups.sand = { formulation = "solid", law = "soil", unit_weight = 19.0, initial_stress = { k_0 = 0.6 } }
+groups.upper = { formulation = "zero_thickness", line = "shaft_clay", law = "skin" }
+groups.lower = { formulation = "zero_thickness", line = "shaft_sand", law = "skin" }
+groups.base = { formulation = "zero_thickness", line = "base", law = "skin" }
+supports = [{ line = "axis", fixed = ["r"] }, { line = "far", fixed = ["r"] }, { line = "bottom", fixed = ["r", "z"] }]
+phase = [{ name = "test", increments = 3, rigid = ["head"], force = [{ line = "head", z = -600.0 }] }]
+[probes]
+settlement = { line = "head", quantity = "displacement_z", scale = -1000.0 }
+shaft = { group = "lower", quantity = "traction_t", reduce = "integral" }
+base = { group = "base", quantity = "traction_n", reduce = "integral" }
+"#;
+    let place = Place::new();
+    let mut is_first = false;
+    let [second, first] = pile_meshes().map(|mesh| {
+        place.write("pile.msh", mesh);
+        let outcome = place.run_case(CASE);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let said = "628 elements are of first order";
+        assert_eq!(outcome.says(said), is_first, "{}", outcome.stderr);
+        is_first = true;
+        let columns = ["settlement", "shaft", "base"];
+        columns
+            .map(|c| tests::case::column(&place.path("out/history.csv"), c))
+            .concat()
+    });
+    for (first, second) in first.iter().zip(&second) {
+        approx::assert_relative_eq!(first, second, epsilon = 1e-9, max_relative = 1e-9);
     }
 }
 

@@ -124,10 +124,72 @@ def test_meshio_comes_to_the_same_bits(tmp_path: Path) -> None:
     meshio.write(tmp_path / "slice.msh", by_tags, file_format="gmsh22", binary=False)
     from_file = {**slice_case(), "mesh": {"file": tmp_path / "slice.msh"}}
     np.testing.assert_allclose(pushed(pilum.Problem(from_file).start()), expected, rtol=1e-9)
-    linear = meshio.Mesh(mesh.nodes, [("quad", mesh.groups["pile"][0][:, :4])], cell_sets={"pile": [[0]]})
-    with pytest.raises(pilum.InputError, match="cells `quad`") as caught:
-        pilum.Problem(slice_case(), linear)
-    assert "ElementOrder" in str(caught.value.hint)
+
+
+def test_meshio_keeps_names_of_entities_that_are_turned_round(tmp_path: Path) -> None:
+    """Format 4.1 writes the number of a physical curve with a minus where it is drawn the other way round."""
+    meshio = pytest.importorskip("meshio")
+    path = tmp_path / "turned.msh"
+    path.write_text(
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+        '$PhysicalNames\n4\n1 1 "bottom"\n1 2 "top"\n2 3 "block"\n2 4 "whole"\n$EndPhysicalNames\n'
+        "$Entities\n0 3 1 0\n1 0 0 0 1 0 0 1 1 0\n2 0 1 0 1 1 0 1 -2 0\n4 0 0 0 0 1 0 1 -2 0\n"
+        "1 0 0 0 1 1 0 2 -3 4 0\n$EndEntities\n"
+        "$Nodes\n1 4 1 4\n2 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n$EndNodes\n"
+        "$Elements\n4 4 1 4\n1 1 1 1\n1 1 2\n1 2 1 1\n2 3 4\n1 4 1 1\n3 4 1\n2 1 3 1\n4 1 2 3 4\n$EndElements\n"
+    )
+    mesh = pilum.Mesh.from_meshio(meshio.read(path))
+    assert {name: sum(map(len, parts)) for name, parts in mesh.lines.items()} == {"bottom": 1, "top": 2}
+    assert sorted(mesh.groups) == ["block", "whole"]
+    # What is in no physical group has the number 0, and no name.
+    nameless = meshio.Mesh(
+        mesh.nodes, [("quad", [[0, 1, 2, 3]])], cell_data={"gmsh:physical": [np.array([0])]}
+    )
+    with pytest.raises(pilum.InputError, match="no named groups"):
+        pilum.Mesh.from_meshio(nameless)
+    prism = meshio.Mesh(np.zeros((6, 3)), [("wedge", [[0, 1, 2, 3, 4, 5]])], cell_sets={"a": [[0]]})
+    with pytest.raises(pilum.InputError, match="cells `wedge`, which Pilum has not"):
+        pilum.Mesh.from_meshio(prism)
+
+
+def test_cells_of_first_order_get_middles() -> None:
+    """Quads of 4 and of 9 nodes, and lines of two, come to what quads of 8 come to."""
+    meshio = pytest.importorskip("meshio")
+    mesh = slice_mesh()
+    expected = pushed(pilum.Problem(slice_case(), mesh).start())
+    lines = {name: [part[:, :2] for part in parts] for name, parts in mesh.lines.items()}
+    groups = {name: [part[:, :4] for part in parts] for name, parts in mesh.groups.items()}
+    first = pilum.Mesh(mesh.nodes, groups, lines)
+    simulation = pilum.Problem(slice_case(), first).start()
+    np.testing.assert_allclose(pushed(simulation), expected, rtol=1e-9)
+    rows = simulation.mesh_rows
+    assert len(rows) == len(simulation.nodes) and 0 < np.sum(rows >= 0) < len(rows)
+    np.testing.assert_array_equal(simulation.nodes[rows >= 0], mesh.nodes[rows[rows >= 0]])
+    # By meshio, with the nodes that are needed no more left in place.
+    cells = [("quad", np.concatenate(parts)) for parts in groups.values()]
+    cells += [("line", np.concatenate(parts)) for parts in lines.values()]
+    sets = {
+        name: [np.arange(len(c)) if i == number else np.array([], dtype=int) for i, (_, c) in enumerate(cells)]
+        for number, name in enumerate([*groups, *lines])
+    }
+    linear = meshio.Mesh(mesh.nodes, cells, cell_sets=sets)
+    np.testing.assert_allclose(pushed(pilum.Problem(slice_case(), linear).start()), expected, rtol=1e-9)
+    # Lines by a condition, on a mesh of both orders.
+    mixed = pilum.Mesh(mesh.nodes, {**mesh.groups, "pile": groups["pile"]})
+    for name, parts in mesh.lines.items():
+        at = {tuple(place) for part in parts for place in mesh.nodes[part].reshape(-1, 2).tolist()}
+        on = np.vectorize(lambda x, y, at=at: (x, y) in at)
+        mixed.name_line(name, on)
+    np.testing.assert_allclose(pushed(pilum.Problem(slice_case(), mixed).start()), expected, rtol=1e-9)
+    # A middle more.
+    nodes, groups9 = mesh.nodes, {}
+    for name, parts in mesh.groups.items():
+        quads = np.concatenate(parts)
+        middle = len(nodes) + np.arange(len(quads))
+        nodes = np.vstack([nodes, mesh.nodes[quads[:, :4]].mean(axis=1)])
+        groups9[name] = np.column_stack([quads, middle])
+    nine = pilum.Mesh(nodes, groups9, mesh.lines)
+    assert pushed(pilum.Problem(slice_case(), nine).start()) == expected
 
 
 def test_triangles_and_an_interface_without_thickness() -> None:
@@ -239,7 +301,7 @@ def test_ctrl_c_leaves_a_simulation_that_goes_on() -> None:
     [
         (lambda: pilum.Mesh([[0.0]], {}), "nodes: found shape"),
         (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0, 1, 2, 3, 4, 5]]}), "node 5 is none of 0 to 0"),
-        (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0, 0, 0, 0]]}), r"expected whole numbers of shape \(m, 8\)"),
+        (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0, 0, 0, 0, 0]]}), r"expected whole numbers of shape \(m, 8\)"),
         (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[0.0] * 6]}), "expected whole numbers"),
         (lambda: pilum.Mesh([[0.0, 0.0]], {'a"': [[0] * 6]}), "neither quotes"),
         (lambda: pilum.Mesh([[0.0, 0.0]], {"a": [[-3] * 6]}), "node -3 is none of 0 to 0"),

@@ -239,7 +239,7 @@ impl CaseFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
-    /// Instead of a grid: a file of Gmsh (4.1 or 2.2), relative to the case file.
+    /// Instead of a grid: a file of Gmsh (4.1, 4.0, 2.0 to 2.2), relative to the case file.
     #[schemars(with = "Option<PathBuf>")]
     pub file: Option<Spanned<PathBuf>>,
     /// Metres in a unit of that file; 1 if left out.

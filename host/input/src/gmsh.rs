@@ -1,9 +1,10 @@
-//! Meshes from files of Gmsh: formats 4.1 and 2.2, as text or bytes. Physical surfaces are groups,
+//! Meshes from files of Gmsh: formats 4.0, 4.1 and 2.0 to 2.2, as text or bytes. Physical surfaces are groups,
 //! physical curves lines, physical points points.
 
 mod assemble;
 mod contents;
 mod cursor;
+mod format;
 mod kind;
 
 use crate::Error;
@@ -154,7 +155,18 @@ fn wanted<'c>(
         if group.get_ref().formulation == Formulation::ZeroThickness {
             continue;
         }
-        if !surfaces.contains_key(name.get_ref()) {
+        let n_elements = surfaces.get(name.get_ref());
+        if n_elements == Some(&0) && !contents.cursor.is_of_arrays {
+            let message = format!(
+                "{} has no element in the physical surface `{}`",
+                path.display(),
+                name.get_ref()
+            );
+            let hint = "in format 2.2 `Mesh.SaveAll = 1` writes elements without their groups: take \
+                        format 4.1, or `Mesh.SaveAll = 0`";
+            return Err(source.error(name.span(), message).hint(hint).into());
+        }
+        if n_elements.is_none() {
             let message = format!(
                 "{} has no physical surface `{}`",
                 path.display(),
@@ -168,14 +180,6 @@ fn wanted<'c>(
     for name in file.line_names() {
         let is_curve = curves.contains_key(name.get_ref());
         let is_point = points.contains_key(name.get_ref());
-        if is_curve && is_point {
-            let message = format!(
-                "{} has both a physical curve and a physical point `{}`",
-                path.display(),
-                name.get_ref()
-            );
-            return Err(source.error(name.span(), message).into());
-        }
         if !is_curve && !is_point {
             let message = format!("there is no line `{}`", name.get_ref());
             let kinds = [(&curves, "edge", "edges"), (&points, "point", "points")];

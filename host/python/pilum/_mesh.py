@@ -13,14 +13,24 @@ from ._errors import InputError
 __all__ = ["Mesh"]
 
 # Nodes of a cell, and Gmsh's number of its kind.
-_SOLIDS = {8: 16, 6: 9}
-_LINES = {3: 8, 1: 15}
-_EDGES = {
-    8: np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
-    6: np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]]),
+_SOLIDS = {8: 16, 6: 9, 4: 3, 3: 2, 9: 10}
+_LINES = {3: 8, 2: 1, 1: 15}
+# Ends of the edges of a cell, by its number of corners; the middles follow the corners in the same order.
+_ENDS = {
+    4: np.array([[0, 1], [1, 2], [2, 3], [3, 0]]),
+    3: np.array([[0, 1], [1, 2], [2, 0]]),
 }
-_MESHIO = {"quad8": 8, "triangle6": 6, "line3": 3, "vertex": 1}
-_LINEAR = {"line", "triangle", "quad", "quad9"}
+# Nodes and dimension of meshio's cells.
+_MESHIO = {
+    "quad8": (8, 2),
+    "triangle6": (6, 2),
+    "quad": (4, 2),
+    "triangle": (3, 2),
+    "quad9": (9, 2),
+    "line3": (3, 1),
+    "line": (2, 1),
+    "vertex": (1, 0),
+}
 
 
 class Mesh:
@@ -28,8 +38,10 @@ class Mesh:
 
     `nodes` has coordinates, shape (n, 2), m. `groups` gives by name the nodes of cells, counted from 0: shape
     (m, 8) of quads or (m, 6) of triangles, corners in a round, then the mid-sides that follow them; or a list of
-    both. `lines` gives by name edges, shape (m, 3): two ends and the middle; or points, shape (m, 1). Interfaces
-    without thickness are no part of it: they are inserted along lines.
+    both. `lines` gives by name edges, shape (m, 3): two ends and the middle; or points, shape (m, 1). Cells and
+    edges of first order, (m, 4), (m, 3) and (m, 2), get nodes in the middle of straight sides, behind all others;
+    of quads of 9 nodes the last one is left out. Interfaces without thickness are no part of it: they are inserted
+    along lines.
     """
 
     def __init__(
@@ -105,31 +117,30 @@ class Mesh:
 
     @classmethod
     def from_meshio(cls, mesh: Any) -> Mesh:
-        """A mesh of meshio, of second order: groups and lines by `cell_sets`, or by Gmsh's physical names."""
+        """A mesh of meshio: groups and lines by `cell_sets`, or by Gmsh's physical names."""
         groups: dict[str, list[Any]] = {}
         lines: dict[str, list[Any]] = {}
         names = {(int(dim), int(tag)): name for name, (tag, dim) in mesh.field_data.items()}
         tags = mesh.cell_data.get("gmsh:physical")
         for number, block in enumerate(mesh.cells):
-            if block.type in _LINEAR:
+            if block.type not in _MESHIO:
                 raise InputError(
-                    f"the mesh has cells `{block.type}`, expected {', '.join(_MESHIO)}",
-                    hint="in Gmsh `Mesh.ElementOrder = 2` and `Mesh.SecondOrderIncomplete = 1`",
+                    f"the mesh has cells `{block.type}`, which Pilum has not, expected {', '.join(_MESHIO)}"
                 )
-            n = _MESHIO.get(block.type)
-            if n is None:
-                raise InputError(f"the mesh has cells `{block.type}`, which Pilum has not")
-            to, dim = (groups, 2) if n in _SOLIDS else (lines, 1 if n == 3 else 0)
+            _, dim = _MESHIO[block.type]
+            to = groups if dim == 2 else lines
             sets = {
-                name: chosen[number]
+                name: np.arange(len(block.data))[chosen[number]]
                 for name, chosen in mesh.cell_sets.items()
                 if not name.startswith("gmsh:") and chosen[number] is not None
             }
             if tags is not None:
-                of_block = np.asarray(tags[number])
-                for tag in np.unique(of_block):
+                # A negative number is that of a part of the geometry that is turned round; 0 is that of no group.
+                of_block = np.abs(np.asarray(tags[number]))
+                for tag in np.unique(of_block[of_block != 0]):
                     name = names.get((dim, int(tag)), str(tag))
-                    sets.setdefault(name, np.flatnonzero(of_block == tag))
+                    chosen, known = np.flatnonzero(of_block == tag), sets.get(name, np.arange(0))
+                    sets[name] = np.concatenate([known, np.setdiff1d(chosen, known)])
             for name, chosen in sets.items():
                 if len(chosen):
                     to.setdefault(name, []).append(np.asarray(block.data)[chosen])
@@ -138,19 +149,18 @@ class Mesh:
         return cls(mesh.points, groups, lines)
 
     def name_line(self, name: str, where: Callable[[Any, Any], Any]) -> None:
-        """Names a line after the edges all of whose three nodes fulfil a condition on their coordinates.
+        """Names a line after the edges whose ends and middle fulfil a condition on their coordinates.
 
         `mesh.name_line("top", lambda x, y: y == 1.0)`; `where` takes arrays, and gives as many of true and false.
         """
         if not callable(where):
             raise InputError(f"line `{name}`: expected a condition, a function of x and y")
-        found = [
-            part[:, _EDGES[part.shape[1]]].reshape(-1, 3)
-            for parts in self.groups.values()
-            for part in parts
-        ]
+        # Edges of first order have no middle, which is -1.
+        found = [_edges(part) for parts in self.groups.values() for part in parts]
         edges = np.concatenate(found) if found else np.empty((0, 3), dtype=np.int64)
         at = self.nodes[edges]
+        is_first = edges[:, 2] < 0
+        at[is_first, 2] = (at[is_first, 0] + at[is_first, 1]) / 2
         fulfilled = np.asarray(where(at[..., 0], at[..., 1]))
         if fulfilled.ndim == 0:
             fulfilled = np.broadcast_to(fulfilled, edges.shape)
@@ -163,8 +173,12 @@ class Mesh:
         chosen = edges[np.all(fulfilled, axis=1)]
         if not len(chosen):
             raise InputError(f"line `{name}`: there is no such edge")
-        _, first = np.unique(chosen[:, 2], return_index=True)
-        self.lines[name] = [chosen[np.sort(first)]]
+        own = np.column_stack([np.sort(chosen[:, :2], axis=1), chosen[:, 2]])
+        _, first = np.unique(own, axis=0, return_index=True)
+        chosen = chosen[np.sort(first)]
+        is_first = chosen[:, 2] < 0
+        parts = [chosen[~is_first], chosen[is_first, :2]]
+        self.lines[name] = [part for part in parts if len(part)]
 
     def _content(self) -> bytes:
         """The mesh as a file of Gmsh, format 2.2 in bytes: what reads files reads it."""
@@ -173,7 +187,7 @@ class Mesh:
         for kinds, parts_of in ((_SOLIDS, self.groups), (_LINES, self.lines)):
             for name, parts in parts_of.items():
                 tag = len(named) + 1
-                for dim in sorted({_dimension(part.shape[1]) for part in parts}):
+                for dim in sorted({_dimension(kinds[part.shape[1]]) for part in parts}):
                     named.append((dim, tag, name))
                 blocks += [(kinds[part.shape[1]], tag, part) for part in parts if len(part)]
         text = [b"$MeshFormat\n2.2 1 8\n", np.int32(1).tobytes(), b"\n$EndMeshFormat\n"]
@@ -219,8 +233,19 @@ def _numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
-def _dimension(n_nodes: int) -> int:
-    return {8: 2, 6: 2, 3: 1, 1: 0}[n_nodes]
+def _edges(part: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Edges of cells: two ends, and the middle or -1."""
+    n = 3 if part.shape[1] in (3, 6) else 4
+    edges = np.full((len(part), n, 3), -1, dtype=np.int64)
+    edges[..., :2] = part[:, _ENDS[n]]
+    if part.shape[1] > n:
+        edges[..., 2] = part[:, n : 2 * n]
+    return edges.reshape(-1, 3)
+
+
+def _dimension(kind: int) -> int:
+    """Of one of Gmsh's kinds."""
+    return {15: 0, 1: 1, 8: 1}.get(kind, 2)
 
 
 def _count(parts: Sequence[NDArray[np.int64]]) -> int:

@@ -3,7 +3,7 @@
 use super::Wanted;
 use super::contents::{Contents, Element};
 use super::cursor::Fault;
-use super::kind::Kind;
+use super::kind::{Kind, MOST_NODES};
 use indexmap::IndexMap;
 use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::Analysis;
@@ -11,6 +11,10 @@ use std::collections::{HashMap, HashSet};
 
 /// Nodes of a mesh, and their numbers by those of the file.
 type Numbered = (Vec<[f64; 2]>, HashMap<usize, usize>);
+/// Nodes of an element of the file, by their place in it: first those that the mesh takes.
+type Nodes = [usize; MOST_NODES];
+/// Ends of a side, the smaller one first.
+type Ends = [usize; 2];
 
 /// Largest coordinate, m.
 const FARTHEST: f64 = 1e9;
@@ -42,11 +46,15 @@ struct Assembly<'a> {
     contents: &'a Contents<'a>,
     wanted: &'a Wanted<'a>,
     /// Elements of the file that the case has, as those of the mesh; by their nodes in the file.
-    own: HashMap<[usize; 8], usize>,
-    /// Those elements, with their nodes in the file.
-    taken: Vec<(&'a Element, [usize; 8], usize)>,
-    /// Whether a node of the file belongs to an element that the case leaves out.
+    own: HashMap<Nodes, usize>,
+    /// Those elements, with their nodes in the file and those that are put in, and their groups.
+    taken: Vec<(&'a Element, Nodes, usize)>,
+    /// Ends of the sides that get a node in their middle; such nodes are counted on from those of the file.
+    put_in: Vec<Ends>,
+    /// Whether a node of the file belongs to an element that leaves it out, or that the case leaves out.
     is_outside: Vec<bool>,
+    /// Sides of elements that the case leaves out.
+    outside: HashSet<Ends>,
     notes: Vec<String>,
 }
 
@@ -60,11 +68,14 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
         wanted,
         own: HashMap::new(),
         taken: Vec::new(),
+        put_in: Vec::new(),
         is_outside: vec![false; contents.nodes.len()],
+        outside: HashSet::new(),
         notes: Vec::new(),
     };
     assembly.take_elements()?;
     assembly.leave_out()?;
+    assembly.put_in_middles();
     let (nodes, number) = assembly.nodes()?;
     let mut mesh = Mesh {
         nodes,
@@ -79,7 +90,8 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
     assembly.lines(&mut mesh, &number, &sides)?;
     assembly.note_lines();
     assembly.note_cracks(&mesh);
-    let mut kept: Vec<usize> = number.into_keys().collect();
+    let n_of_file = contents.nodes.len();
+    let mut kept: Vec<usize> = number.into_keys().filter(|&n| n < n_of_file).collect();
     kept.sort_unstable();
     Ok(Assembled {
         mesh,
@@ -162,6 +174,8 @@ impl Assembly<'_> {
             for node in &nodes[..element.kind.n_nodes()] {
                 self.is_outside[*node] = true;
             }
+            self.outside
+                .extend(sides(element.kind, &nodes).map(|(ends, _)| ends));
             let entry = left.entry(Contents::set_of(element));
             entry.or_insert((element, 0)).1 += 1;
         }
@@ -194,15 +208,54 @@ impl Assembly<'_> {
         Ok(())
     }
 
+    /// Puts nodes in the middles of the sides of elements of first order. Elements share those of their sides, also
+    /// with elements of second order.
+    fn put_in_middles(&mut self) {
+        let n_of_file = self.contents.nodes.len();
+        let is_first = |element: &Element| element.kind.is_first_order();
+        let taken = self.taken.iter().map(|(element, ..)| element.kind);
+        let n_nine = taken.clone().filter(|kind| *kind == Kind::Quad9).count();
+        if n_nine > 0 {
+            self.notes.push(format!(
+                "{} of 9 nodes: the one in the middle is left out",
+                counted(n_nine, "quad", " is", "s are")
+            ));
+        }
+        let n_first = taken.filter(|kind| kind.is_first_order()).count();
+        if n_first == 0 {
+            return;
+        }
+        self.notes.push(format!(
+            "{} of first order: the middles of sides get nodes, straight between the corners \
+             (`Mesh.ElementOrder = 2` in Gmsh follows curves)",
+            counted(n_first, "element", " is", "s are")
+        ));
+        let mut known: HashMap<Ends, usize> = HashMap::new();
+        for (element, nodes, _) in self.taken.iter().filter(|(e, ..)| !is_first(e)) {
+            known.extend(sides(element.kind, nodes).map(|(ends, at)| (ends, nodes[at])));
+        }
+        for (element, nodes, _) in self.taken.iter_mut().filter(|(e, ..)| is_first(e)) {
+            let of_file = *nodes;
+            for (ends, at) in sides(element.kind, &of_file) {
+                nodes[at] = *known.entry(ends).or_insert_with(|| {
+                    self.put_in.push(ends);
+                    n_of_file + self.put_in.len() - 1
+                });
+            }
+        }
+    }
+
     /// The nodes of the mesh, and their numbers by those of the file.
     fn nodes(&mut self) -> Result<Numbered, Fault> {
-        let Self {
-            contents, wanted, ..
-        } = *self;
+        let (contents, wanted) = (self.contents, self.wanted);
         let mut is_used = vec![false; contents.nodes.len()];
         for (element, nodes, _) in &self.taken {
-            for node in &nodes[..element.kind.n_nodes()] {
+            let (own, rest) = nodes.split_at(element.kind.n_taken());
+            for node in own {
                 is_used[*node] = true;
+            }
+            if element.kind == Kind::Quad9 {
+                self.is_outside[rest[0]] = true;
             }
         }
         let used = || {
@@ -257,6 +310,11 @@ impl Assembly<'_> {
             }
             number.insert(place, nodes.len());
             nodes.push([x, y]);
+        }
+        for (ends, place) in self.put_in.iter().zip(contents.nodes.len()..) {
+            let [p, q] = ends.map(|end| nodes[number[&end]]);
+            number.insert(place, nodes.len());
+            nodes.push([0, 1].map(|c| f64::midpoint(p[c], q[c])));
         }
         let left_out = is_used.iter().zip(&self.is_outside);
         let left_out = left_out.filter(|(used, outside)| !**used && !**outside);
@@ -338,8 +396,11 @@ impl Assembly<'_> {
         let mut seen: HashSet<(String, usize)> = HashSet::new();
         let mut of_name: IndexMap<String, (Line, &Element)> = IndexMap::new();
         let mut is_curve: HashSet<String> = HashSet::new();
-        for kind in [Kind::Line, Kind::Point] {
-            for element in contents.elements.iter().filter(|e| e.kind == kind) {
+        let has_first = contents.elements.iter().any(|e| e.kind == Kind::Line2);
+        let of_ends = middles(if has_first { sides } else { &[] });
+        for dimension in [1, 0] {
+            let own = |e: &&Element| e.kind.dimension() == dimension;
+            for element in contents.elements.iter().filter(own) {
                 let names: Vec<String> = contents.groups_of(element).collect();
                 if names.is_empty() {
                     continue;
@@ -347,16 +408,16 @@ impl Assembly<'_> {
                 let nodes = contents.nodes_of(element)?;
                 let own = nodes.map(|node| number.get(&node).copied());
                 for name in names {
-                    if kind == Kind::Line {
+                    if dimension == 1 {
                         is_curve.insert(name.clone());
                     } else if is_curve.contains(&name) {
-                        // A curve of this name; that the case does not use it was seen to.
+                        // The curve of this name is taken.
                         continue;
                     }
                     let (line, _) = of_name
                         .entry(name.clone())
                         .or_insert_with(|| (Line::default(), element));
-                    if kind == Kind::Point {
+                    if dimension == 0 {
                         if let Some(node) = own[0]
                             && seen.insert((name, node))
                         {
@@ -364,9 +425,14 @@ impl Assembly<'_> {
                         }
                         continue;
                     }
-                    if let [Some(a), Some(b), Some(middle), ..] = own
+                    let ends = [own[0], own[1]];
+                    if let [Some(a), Some(b)] = ends
+                        && let Some(middle) = own[2].or_else(|| {
+                            let is_first = element.kind.is_first_order();
+                            of_ends.get(&ends_of(a, b)).copied().filter(|_| is_first)
+                        })
                         && let Some(side) = &sides[middle]
-                        && (side.ends == [a, b] || side.ends == [b, a])
+                        && ends_of(side.ends[0], side.ends[1]) == ends_of(a, b)
                     {
                         if seen.insert((name, middle)) {
                             line.edges.extend(side.owners.iter().flatten());
@@ -374,7 +440,7 @@ impl Assembly<'_> {
                         continue;
                     }
                     // Where a surface is left out, its outline is.
-                    let is_outside = self.is_outside[nodes[2]];
+                    let is_outside = self.outside.contains(&ends_of(nodes[0], nodes[1]));
                     if self.wanted.lines.contains(name.as_str()) && !is_outside {
                         let message = format!(
                             "{} of the physical curve `{name}` is no side of an element of the case's groups",
@@ -399,6 +465,16 @@ impl Assembly<'_> {
     /// Says which names of lines and points the case does not use.
     fn note_lines(&mut self) {
         let [points, curves, _] = super::counts(self.contents);
+        let both = curves.iter().filter(|(name, n)| {
+            **n > 0 && points.contains_key(*name) && self.wanted.lines.contains(name.as_str())
+        });
+        let both: Vec<String> = both.map(|(name, _)| format!("`{name}`")).collect();
+        if !both.is_empty() {
+            self.notes.push(format!(
+                "physical curves whose names are also those of points: the curves are taken: {}",
+                list(both.into_iter())
+            ));
+        }
         let unused = |name: &&String| !self.wanted.lines.contains(name.as_str());
         let unused: Vec<&String> = curves.keys().chain(points.keys()).filter(unused).collect();
         if !unused.is_empty() {
@@ -452,17 +528,35 @@ fn list(names: impl ExactSizeIterator<Item = String>) -> String {
     }
 }
 
-/// An element of the mesh, its nodes counter-clockwise. They are the first ones of eight.
-fn turned(kind: Kind, at: &[[f64; 2]], nodes: [usize; 8], group: usize) -> Solid {
-    let [a, b, c, d, e, f, g, h] = nodes;
-    if kind == Kind::Triangle {
+/// Ends of a side.
+fn ends_of(a: usize, b: usize) -> Ends {
+    [a.min(b), a.max(b)]
+}
+
+/// Sides of a triangle or quad: their ends, and where its nodes have the middle.
+fn sides(kind: Kind, nodes: &Nodes) -> impl Iterator<Item = (Ends, usize)> + use<'_> {
+    let n = kind.n_corners();
+    (0..n).map(move |side| (ends_of(nodes[side], nodes[(side + 1) % n]), n + side))
+}
+
+/// Middles of sides, by their ends.
+fn middles(sides: &[Option<Side>]) -> HashMap<Ends, usize> {
+    let sides = sides.iter().enumerate();
+    let known = sides.filter_map(|(at, side)| side.map(|side| (side.ends, at)));
+    known.map(|([a, b], at)| (ends_of(a, b), at)).collect()
+}
+
+/// An element of the mesh, its nodes counter-clockwise.
+fn turned(kind: Kind, at: &[[f64; 2]], nodes: Nodes, group: usize) -> Solid {
+    let [a, b, c, d, e, f, g, h, _] = nodes;
+    if kind.n_corners() == 3 {
         let solid = Solid::triangle([a, b, c, d, e, f], group);
         if area(at, &solid) < 0.0 {
             return Solid::triangle([a, c, b, f, e, d], group);
         }
         return solid;
     }
-    let solid = Solid::quad(nodes, group);
+    let solid = Solid::quad([a, b, c, d, e, f, g, h], group);
     if area(at, &solid) < 0.0 {
         return Solid::quad([a, d, c, b, h, g, f, e], group);
     }

@@ -77,6 +77,17 @@ impl<'a> Cursor<'a> {
         }
     }
 
+    /// Whether the file begins with a text.
+    pub(super) fn begins_with(&self, text: &str) -> bool {
+        self.bytes.starts_with(text.as_bytes())
+    }
+
+    /// Whether this is the next byte that is no blank.
+    pub(super) fn is_at(&self, byte: u8) -> bool {
+        let mut rest = self.rest().iter();
+        rest.find(|b| !b.is_ascii_whitespace()) == Some(&byte)
+    }
+
     fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..).unwrap_or_default()
     }
@@ -200,13 +211,21 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A number of things, or a number that names a node or an element (format 4.1).
+    /// A number of things, or in format 4.1 one that names a node or an element.
     pub(super) fn size(&mut self, what: &str) -> Result<u64, Fault> {
         match self.encoding {
             Encoding::Text => self.parsed(what),
             Encoding::Binary { big_endian: true } => Ok(u64::from_be_bytes(self.taken(what)?)),
             Encoding::Binary { big_endian: false } => Ok(u64::from_le_bytes(self.taken(what)?)),
         }
+    }
+
+    /// A whole number that is not negative.
+    pub(super) fn natural(&mut self, what: &str) -> Result<u64, Fault> {
+        let at = self.at();
+        let number = self.integer(what)?;
+        u64::try_from(number)
+            .map_err(|_| self.fault(at, &format!("{what} is {number}, expected 0 or more")))
     }
 
     /// A number of things, of which each takes `numbers` numbers and `bytes` bytes at least.

@@ -6,6 +6,11 @@ use crate::mesh::{Built, build};
 use mechanics::mesh::Shape;
 use std::fmt::Write as _;
 
+#[path = "tests/first_order.rs"]
+mod first_order;
+#[path = "tests/formats.rs"]
+mod formats;
+
 /// A part of the geometry: dimension, number, physical groups.
 type Entity = (u8, i32, Vec<i32>);
 
@@ -26,13 +31,17 @@ enum Bytes {
     Big,
 }
 
-const FORMATS: [(f64, Bytes); 6] = [
+const FORMATS: [(f64, Bytes); 10] = [
     (4.1, Bytes::Text),
     (4.1, Bytes::Little),
     (4.1, Bytes::Big),
     (2.2, Bytes::Text),
     (2.2, Bytes::Little),
     (2.2, Bytes::Big),
+    (4.0, Bytes::Text),
+    (4.0, Bytes::Little),
+    (4.0, Bytes::Big),
+    (2.1, Bytes::Text),
 ];
 
 /// The square [0, 1]² as a quad, beside it [1, 2] × [0, 1] as two triangles, one of them inside out,
@@ -160,15 +169,29 @@ impl Model {
         }
         w.text(&names);
         w.text("$EndPhysicalNames\n");
-        if version > 4.0 {
-            self.write_4(&mut w);
+        if version >= 4.0 {
+            self.write_4(&mut w, version > 4.0);
         } else {
             self.write_2(&mut w);
         }
         w.0
     }
 
-    fn write_4(&self, w: &mut Writer) {
+    /// Format 4.1, or 4.0.
+    fn write_4(&self, w: &mut Writer, is_new: bool) {
+        // The number of a node or element.
+        let number = |w: &mut Writer, n: u64| {
+            if is_new {
+                w.size(n);
+            } else {
+                w.int(n as i64);
+            }
+        };
+        let entity = |w: &mut Writer, dimension: i64, entity: i64| {
+            let both = [dimension, entity];
+            w.int(both[usize::from(!is_new)]);
+            w.int(both[usize::from(is_new)]);
+        };
         w.text("$Entities\n");
         for dimension in 0..4 {
             let own = self.entities.iter().filter(|e| e.0 == dimension);
@@ -177,7 +200,8 @@ impl Model {
         w.new_line();
         for (dimension, number, groups) in &self.entities {
             w.int((*number).into());
-            w.reals(&[0.0; 6][..if *dimension == 0 { 3 } else { 6 }]);
+            let is_place = *dimension == 0 && is_new;
+            w.reals(&[0.0; 6][..if is_place { 3 } else { 6 }]);
             w.size(groups.len() as u64);
             for group in groups {
                 w.int((*group).into());
@@ -193,21 +217,23 @@ impl Model {
         w.text("$Nodes\n");
         // Two blocks, the second of nodes with a parameter.
         let (first, second) = self.nodes.split_at(5);
-        for n in [2, self.nodes.len() as u64, 10, 150] {
-            w.size(n);
+        for n in &[2, self.nodes.len() as u64, 10, 150][..if is_new { 4 } else { 2 }] {
+            w.size(*n);
         }
         w.new_line();
         for (dimension, block) in [(2, first), (1, second)] {
-            w.int(dimension);
-            w.int(1);
+            entity(w, dimension, 1);
             w.int((dimension == 1).into());
             w.size(block.len() as u64);
             w.new_line();
-            for (number, _) in block {
-                w.size(*number);
+            for (n, _) in block.iter().filter(|_| is_new) {
+                number(w, *n);
                 w.new_line();
             }
-            for (_, at) in block {
+            for (n, at) in block {
+                if !is_new {
+                    number(w, *n);
+                }
                 w.reals(at);
                 if dimension == 1 {
                     w.reals(&[0.25]);
@@ -218,19 +244,18 @@ impl Model {
         w.end("Nodes");
         w.text("$Elements\n");
         let n = self.elements.len() as u64;
-        for n in [n, n, 1, n] {
-            w.size(n);
+        for n in &[n, n, 1, n][..if is_new { 4 } else { 2 }] {
+            w.size(*n);
         }
         w.new_line();
-        for (number, (dimension, entity, kind, nodes)) in self.elements.iter().enumerate() {
-            w.int((*dimension).into());
-            w.int((*entity).into());
+        for (n, (dimension, own, kind, nodes)) in self.elements.iter().enumerate() {
+            entity(w, (*dimension).into(), (*own).into());
             w.int((*kind).into());
             w.size(1);
             w.new_line();
-            w.size(number as u64 + 1);
+            number(w, n as u64 + 1);
             for node in nodes {
-                w.size(*node);
+                number(w, *node);
             }
             w.new_line();
         }
@@ -381,12 +406,12 @@ fn broken_files_are_refused() {
 /// What is wrong, a part of a file and what replaces it, and what the error says.
 type Mistake = (&'static str, &'static str, &'static str, &'static str);
 
-const MISTAKES: [Mistake; 19] = [
+const MISTAKES: [Mistake; 18] = [
     (
-        "an older format",
+        "another format",
         "2.2 0 8",
-        "2.0 0 8",
-        "line 2: the format has version 2; 4.1 and 2.2",
+        "3.0 0 8",
+        "line 2: the format has version 3; 4.1, 4.0 and 2.0 to 2.2 are read: `gmsh old.msh -save",
     ),
     (
         "short numbers",
@@ -449,16 +474,10 @@ const MISTAKES: [Mistake; 19] = [
         "has the node 50, which is not among the nodes",
     ),
     (
-        "first order",
-        "8 9 2 2 2 20 50 60 110 120 140",
-        "8 2 2 2 2 20 50 60",
-        "line 40: an element of type 2 is a triangle of 3 nodes; set `Mesh.ElementOrder = 2`",
-    ),
-    (
-        "nine nodes",
+        "third order",
         "7 16 2",
-        "7 10 2",
-        "line 39: an element of type 10 is a quad of 9 nodes; set `Mesh.SecondOrderIncomplete = 1`",
+        "7 36 2",
+        "line 39: an element of type 36 is a quad of higher order; a mesh has triangles, quads, lines",
     ),
     (
         "a solid",
@@ -650,9 +669,13 @@ phase = [{ name = "only", increments = 1 }]
 
 /// The mesh of a case beside a file.
 fn built(name: &str, case: &str) -> Result<Built, String> {
+    built_of(name, case, &model().write(4.1, Bytes::Big))
+}
+
+fn built_of(name: &str, case: &str, bytes: &[u8]) -> Result<Built, String> {
     let folder = std::env::temp_dir().join(format!("pilum-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join("part.msh"), model().write(4.1, Bytes::Big)).unwrap();
+    std::fs::write(folder.join("part.msh"), bytes).unwrap();
     let source = Source::new(folder.join("case.toml"), case);
     let case = Case::of(source).unwrap().remove(0);
     let built = build(&case.source, &case.file);
