@@ -32,6 +32,8 @@ const MAX_SEGMENTS: usize = 200_000;
 #[derive(Clone, Debug)]
 struct Step {
     increments: usize,
+    /// Every how many of them a row is written.
+    every: usize,
     /// Time of the whole step.
     time: f64,
     frame: Frame,
@@ -274,10 +276,10 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
         let error = lines.source.error(at, message);
         return Err(error.hint(format!("known are {}", known.join(", "))).into());
     }
-    let (at, [increments, _, time]) =
-        lines.numbers("number of increments, most iterations, time of the step")?;
+    let (at, [increments, _, time], every) = lines.step()?;
     let mut step = Step {
         increments: lines.whole(&at, increments, "the number of increments")?,
+        every,
         time,
         frame: Frame::Cartesian,
         linear: [(false, 0.0); N_MAX],
@@ -381,6 +383,7 @@ impl Step {
             frame: self.frame,
             time: Some(self.time * (increments as f64 / n as f64)),
             restrictions: self.restrictions.clone(),
+            every: self.every,
         };
         let Some(harmonic) = &self.harmonic else {
             return vec![segment(n, 0, &|i| self.linear[i].1)];

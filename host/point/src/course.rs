@@ -23,6 +23,8 @@ pub struct Row<'a> {
     pub internal: &'a [f64],
     /// Calls of the law that the increment took.
     pub iterations: usize,
+    /// Whether it is for the table: its [`Segment`] may say that not every one is.
+    pub is_written: bool,
 }
 
 /// What came of a path that was followed to its end.
@@ -69,7 +71,7 @@ impl Driver {
         let mut walk = Walk::new(point, search);
         let (mut strayed, mut blurred) = (None, None);
         let n = self.law.n_components();
-        let mut row = |point: &Point, (increment, time), iterations| {
+        let mut row = |point: &Point, (increment, time), iterations, is_written| {
             sink(&Row {
                 increment,
                 time,
@@ -77,9 +79,10 @@ impl Driver {
                 flux: &point.flux[..n],
                 internal: &point.internal,
                 iterations,
+                is_written,
             })
         };
-        row(&walk.point, (0, 0.0), 0)?;
+        row(&walk.point, (0, 0.0), 0, true)?;
         let mut increment = 0;
         let mut time = 0.0;
         let mut moment = Moment::default();
@@ -129,7 +132,8 @@ impl Driver {
                 }
                 increment += 1;
                 time = start + k as f64 * share;
-                row(&point, (increment, time), walk.search.calls - calls)?;
+                let calls = walk.search.calls - calls;
+                row(&point, (increment, time), calls, self.is_written(number, k))?;
                 goal = next;
             }
             // A flux that was led keeps its goal; what is left of its residual does not pile up.
@@ -162,6 +166,14 @@ impl Driver {
             last: last.copied().collect(),
             warnings,
         })
+    }
+
+    /// Whether the increment `k` of a segment is for the table.
+    fn is_written(&self, number: usize, k: usize) -> bool {
+        let segment = &self.segments[number];
+        let next = self.segments.get(number + 1);
+        let ends = k == segment.increments && next.is_none_or(|next| next.step != segment.step);
+        ends || (segment.first + k).is_multiple_of(segment.every)
     }
 
     /// How long the step takes that starts with a segment: one, or several that follow each other.

@@ -88,6 +88,8 @@ pub struct Segment {
     pub time: Option<f64>,
     /// What holds in place of the controls, in three dimensions only.
     pub restrictions: Option<Restrictions>,
+    /// Every how many increments of its step a row is for the table, 1 if all; the end of the step is in any case.
+    pub every: usize,
 }
 
 impl Segment {
@@ -106,6 +108,7 @@ impl Segment {
             frame: Frame::Cartesian,
             time: None,
             restrictions: None,
+            every: 1,
         }
     }
 

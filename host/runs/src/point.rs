@@ -376,6 +376,9 @@ fn follow(
     let mut table = Table::new(out, point, !driver.path().is_file());
     let has_figures = !driver.figures().is_empty();
     let result = point.run(|row| {
+        if !row.is_written {
+            return Ok(());
+        }
         if has_figures {
             draw_row(point, figures, row);
         }

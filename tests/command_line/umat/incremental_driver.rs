@@ -25,7 +25,7 @@ fn input_of_the_incremental_driver_is_followed() {
     incremental(
         &place,
         "*OedometricE1\n4 100 1.0\n-1.0d-3\n*OedometricS1\n4 100 1.0\n-20.0\n\
-         *TriaxialE1\n4 100 2.0 : 2\n-1e-3\n*TriaxialS1\n4 100 1.0\n-30.\n\
+         *TriaxialE1\n4 100 2.0 : a remark\n-1e-3\n*TriaxialS1\n4 100 1.0\n-30.\n\
          *TriaxialUq\n4 100 1.0\n24.0\n*TriaxialUEq\n4 100 1.0\n1e-3\n\
          *PureRelaxation\n2 100 1.0\n*PureCreep\n2 100 1.0\n*UndrainedCreep\n2 100 1.0\n\
          *CirculatingLoad\n8 100 1.0\n*Cartesian\n0 0 0 0\n0 0 0 0\n0 0 0 0\n0 1e-3 0 0\n\
@@ -88,6 +88,53 @@ fn input_of_the_incremental_driver_is_followed() {
     close(38, 47, "stress_11", -15.0);
     close(38, 47, "strain_22", 0.0);
     close(38, 47, "strain_11", -15.0 / (lambda + 2.0 * g));
+}
+
+/// After a colon the numbers of a step say which states are written: every N-th of the step, and its end.
+#[test]
+fn every_so_many_states_are_written() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let run = |every: [&str; 3]| {
+        let [first, wave, repeated] = every;
+        incremental(
+            &place,
+            &format!(
+                "*TriaxialE1\n10 50 10{first}\n-0.01\n*CirculatingLoad\n8 100 1.0{wave}\n*Cartesian\n\
+                 0 0 0 0\n0 0 0 0\n0 0 0 0\n0 1e-3 0 0\n0 0 0 0\n0 0 0 0\n\
+                 *Repetition\n1 2\n*TriaxialS1\n7 50 1.0{repeated}\n-5.0\n"
+            ),
+        );
+        let command = [
+            "point",
+            "test.inp",
+            "--umat",
+            "libelastic.so",
+            "--csv",
+            "out.csv",
+        ];
+        let outcome = place.run(&command);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        table(&place.path("out.csv"))
+    };
+    let all = run([""; 3]);
+    assert_eq!(all.len(), 1 + 10 + 8 + 2 * 7);
+    let increments = |every: [&str; 3]| -> Vec<usize> {
+        let rows = run(every);
+        // Each row is the same as where all are written.
+        for row in &rows {
+            assert_eq!(row, &all[number(row, "increment") as usize]);
+        }
+        let numbers = rows.iter().map(|row| number(row, "increment") as usize);
+        numbers.collect()
+    };
+    let expected = [0, 5, 10, 14, 18, 21, 24, 25, 28, 31, 32];
+    assert_eq!(increments([": 5", " : 4 # a remark", ":3"]), expected);
+    // The numbers of increments are not many enough; all are written; words are a remark.
+    let expected: Vec<usize> = [0, 10].into_iter().chain(11..=18).chain(19..=32).collect();
+    assert_eq!(increments([": 100", ": 1", " : every state"]), expected);
+    assert_eq!(increments([":100", ": 0", " # written: 5"]), expected);
 }
 
 #[test]
@@ -277,6 +324,18 @@ fn what_is_not_read_of_the_incremental_driver_is_said() {
         (
             "*TriaxialE1\n10 1 1\n1 2\n",
             &["test.inp:4:1", "`2` is a number too many"],
+        ),
+        (
+            "*TriaxialE1\n10 1 1: 2.5\n1\n",
+            &["test.inp:3:1", "2.5 is no number for every how many"],
+        ),
+        (
+            "*TriaxialE1\n10 1 1: -2\n1\n",
+            &["test.inp:3:1", "-2 is no number for every how many"],
+        ),
+        (
+            "*TriaxialE1\n10 1 1: 5 T 20.0\n1\n",
+            &["test.inp:3:1", "a change of temperature"],
         ),
         (
             "*Repetition\n1 0\n*PureCreep\n1 1 1\n",

@@ -51,6 +51,35 @@ impl<'a> Lines<'a> {
         Ok((at, numbers))
     }
 
+    /// The line that steps have in common: number of increments, most iterations and time, and every how many
+    /// increments a state is written, after a colon if at all.
+    pub(super) fn step(&mut self) -> Result<(Range<usize>, [f64; 3], usize), Error> {
+        let what = "number of increments, most iterations, time of the step";
+        let (at, line) = self.expect(what)?;
+        if let Some((_, change)) = line.split_once('T')
+            && words(change).next().and_then(real).is_some()
+        {
+            return self.refuse(
+                at,
+                "a change of temperature, after `T`, is not understood here",
+            );
+        }
+        // A colon behind other words, or before them, is part of a remark.
+        let parts = line.split_once(':').filter(|(numbers, every)| {
+            let is_number = words(every).next().is_some_and(|word| real(word).is_some());
+            is_number && words(numbers).count() <= 3
+        });
+        let Some((numbers, every)) = parts else {
+            let numbers = self.numbers_of(&at, line, what)?;
+            return Ok((at, numbers, 1));
+        };
+        let numbers = self.numbers_of(&at, numbers, what)?;
+        let what = "every how many increments a state is written, after the colon";
+        let [every] = self.numbers_of(&at, every, what)?;
+        let every = self.whole(&at, every, what)?;
+        Ok((at, numbers, every.max(1)))
+    }
+
     /// `N` numbers at the start of a line.
     pub(super) fn numbers_of<const N: usize>(
         &self,
@@ -58,9 +87,7 @@ impl<'a> Lines<'a> {
         line: &str,
         what: &str,
     ) -> Result<[f64; N], Error> {
-        let mut words = line
-            .split(|c: char| c.is_whitespace() || c == ',')
-            .filter(|word| !word.is_empty());
+        let mut words = words(line);
         let mut numbers = [0.0; N];
         for number in &mut numbers {
             let Some(value) = words.next().and_then(real) else {
@@ -97,6 +124,12 @@ impl<'a> Lines<'a> {
     ) -> Result<T, Error> {
         Err(self.source.error(at, message).into())
     }
+}
+
+/// What blanks and commas separate.
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    let words = line.split(|c: char| c.is_whitespace() || c == ',');
+    words.filter(|word| !word.is_empty())
 }
 
 /// A number as Fortran writes it: `1.5d-3` too. A colon ends it.
