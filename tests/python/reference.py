@@ -22,7 +22,7 @@ Units are kN, m, kPa, angles in degrees; tension and opening are positive, shear
 ORDER = [
     ("Laws", ["Law", "State", "describe", "laws", "point"]),
     ("Runs and their results", ["run", "Progress", "Results", "Table", "Fields", "Field"]),
-    ("Problems, step by step", ["Problem", "Mesh", "Simulation", "SimulationState"]),
+    ("Problems, step by step", ["Problem", "Mesh", "Simulation", "Step", "SimulationState"]),
     ("Errors", ["Error", "InputError", "NoEquilibriumError", "LawError", "InternalError", "PilumWarning"]),
     ("Where things are", ["program", "include", "cases"]),
 ]

@@ -6,6 +6,7 @@ import ast
 import doctest
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -112,6 +113,38 @@ def test_types_are_checked(here: Path) -> None:
     for check in (["mypy", "--strict", "-p", "pilum"], ["mypy.stubtest", "pilum._pilum", "--ignore-missing-stub"]):
         done = subprocess.run([sys.executable, "-m", *check], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
+
+
+def flagged(checker: str, file: Path) -> list[int]:
+    """Lines that a type checker finds wrong."""
+    if importlib.util.find_spec(checker) is None:
+        missing(checker)
+    options = ["--strict", "--no-pretty"] if checker == "mypy" else ["--outputjson", "--pythonpath", sys.executable]
+    command = [sys.executable, "-m", checker, *options, str(file)]
+    said = subprocess.run(command, capture_output=True, text=True)
+    if checker == "mypy":
+        assert said.returncode in (0, 1), said.stdout + said.stderr
+        lines = re.findall(rf"^.*{re.escape(file.name)}:(\d+): error:", said.stdout, re.MULTILINE)
+    else:
+        told = json.loads(said.stdout)
+        assert told["summary"]["filesAnalyzed"] == 1, said.stdout
+        errors = (one for one in told["generalDiagnostics"] if one["severity"] == "error")
+        lines = [one["range"]["start"]["line"] + 1 for one in errors]
+    return sorted({int(line) for line in lines})
+
+
+@pytest.mark.parametrize("checker", ["mypy", "pyright"])
+def test_types_are_used(checker: str, here: Path) -> None:
+    """Right uses pass, with the types that `assert_type` names; each line of wrong ones is found, and no other."""
+    folder = Path(__file__).resolve().parent / "types"
+    assert flagged(checker, folder / "right.py") == []
+    wrong = (folder / "wrong.py").read_text().splitlines()
+    expected = [number for number, line in enumerate(wrong, 1) if line.endswith("# wrong")]
+    assert len(expected) > 25 and flagged(checker, folder / "wrong.py") == expected
+    (here / "loose.py").write_text(
+        'from typing_extensions import assert_type\nimport pilum\nassert_type(pilum.run("case"), pilum.Results)\n'
+    )
+    assert flagged(checker, here / "loose.py") == [3]
 
 
 def test_the_package_needs_numpy_alone() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import multiprocessing
+import pickle
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -224,8 +225,6 @@ def test_a_state_that_was_given_as_out_is_none_any_more() -> None:
 
 
 def test_laws_and_states_travel_between_processes() -> None:
-    import pickle
-
     law = pilum.Law("mepi", **TABLE_4)
     start = law.initial(4, flux=[-100.0, 0.0])
     tractions, _, state = law.integrate(slips(4), start)
@@ -413,6 +412,77 @@ def test_shapes_are_checked() -> None:
 def test_warnings_are_warnings() -> None:
     with pytest.warns(pilum.PilumWarning, match="outside its usual range"):
         pilum.Law("elastic", hypothesis="3d", young_modulus=1e20, poisson_ratio=0.3)
+
+
+def test_a_warning_points_at_the_line_of_the_caller() -> None:
+    import inspect
+
+    with pytest.warns(pilum.PilumWarning) as caught:
+        line = inspect.currentframe().f_lineno + 1  # type: ignore[union-attr]
+        pilum.Law("elastic", hypothesis="3d", young_modulus=1e20, poisson_ratio=0.3)
+    assert {(one.filename, one.lineno) for one in caught} == {(__file__, line)}
+
+
+def misaligned(values: np.ndarray) -> np.ndarray:
+    """The same numbers, a byte further than where a number should lie."""
+    memory = np.zeros(values.nbytes + 1, dtype=np.uint8)[1:]
+    array = memory.view(np.float64).reshape(values.shape)
+    array[...] = values
+    assert array.flags.c_contiguous and (not array.size or not array.flags.aligned)
+    return array
+
+
+def test_arrays_that_are_not_aligned_are_named() -> None:
+    law = pilum.Law("coulomb_joint", **COULOMB)
+    start, jumps = law.initial(4, flux=[-100.0, 0.0]), misaligned(slips(4))
+    for name, call in [
+        ("gradient", lambda: law.integrate(jumps, start)),
+        ("gradient", lambda: law.integrate(jumps, start, copy=False)),
+        ("positions", lambda: law.integrate(slips(4), start, positions=jumps)),
+        ("flux", lambda: law.initial(flux=jumps)),
+        ("gradient", lambda: law.initial(gradient=jumps)),
+        ("internal", lambda: law.initial(4, internal=misaligned(np.zeros((4, len(law.variables)))))),
+    ]:
+        with pytest.raises(pilum.Error, match=rf"^{name}: .*not aligned.*`{name}.copy\(\)`"):
+            call()
+    assert np.array_equal(law.integrate(jumps.copy(), start)[0], law.integrate(slips(4), start)[0])
+    # What is copied in any case is copied here too; what has no numbers lies nowhere.
+    assert np.array_equal(law.integrate(jumps[::2], law.initial(2))[0], law.integrate(slips(4)[::2], law.initial(2))[0])
+    assert len(law.integrate(misaligned(np.zeros((0, 2))))[0]) == 0
+
+
+def test_whatever_pilum_refuses_is_an_error_of_pilum() -> None:
+    """And one of the classes of Python that it was before there were others."""
+    law = pilum.Law("coulomb_joint", **COULOMB)
+    start = law.initial(4)
+    table = pilum.Table({"a": np.zeros(3)})
+    for kind, call in [
+        (ValueError, lambda: law.integrate(np.zeros((4, 3)), start)),
+        (ValueError, lambda: law.integrate(np.zeros((5, 2)), start)),
+        (ValueError, lambda: law.integrate(np.zeros((2, 2, 2)), start)),
+        (ValueError, lambda: law.integrate([["a", "b"]], start)),
+        (ValueError, lambda: law.integrate([[0.0, 1.0], [0.0]], start)),
+        (ValueError, lambda: law.integrate(slips(4), start, positions=np.zeros((4, 3)))),
+        (ValueError, lambda: law.integrate(slips(4), start, dt=-1.0)),
+        (ValueError, lambda: law.integrate(slips(4), start, tangent="secant")),
+        (ValueError, lambda: law.integrate(slips(4), start, out=start)),
+        (ValueError, lambda: law.initial(4, flux=np.zeros((3, 2)))),
+        (ValueError, lambda: law.initial(time=-1.0)),
+        (ValueError, lambda: pilum.Law("mepi", hypothesis="2d", **TABLE_4)),
+        (ValueError, lambda: pilum.Law("mepi", isolate=-1.0, **TABLE_4)),
+        (ValueError, lambda: pilum.Table({"a": np.zeros((3, 2))})),
+        (TypeError, lambda: pilum.Law("mepi", **{**TABLE_4, "k_n": object()})),
+        (TypeError, lambda: pilum.run({"mesh": [None]})),
+        (KeyError, lambda: start["plastic"]),
+        (KeyError, lambda: table["b"]),
+        (MemoryError, lambda: law.initial(2**62)),
+    ]:
+        with pytest.raises(kind) as caught:
+            call()
+        error = caught.value
+        assert isinstance(error, pilum.Error) and str(error) == error.message != "", repr(error)
+        again = pickle.loads(pickle.dumps(error))
+        assert type(again) is type(error) and str(again) == str(error)
 
 
 def test_laws_describe_themselves() -> None:

@@ -10,6 +10,7 @@ import signal
 import threading
 import time
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -237,6 +238,15 @@ def test_steps_are_those_of_a_run(here: Path) -> None:
     assert not (here / "results").exists()
 
 
+def test_a_step_has_the_keys_of_its_type() -> None:
+    simulation = pilum.Problem(slice_case(), slice_mesh()).start()
+    kinds = get_type_hints(pilum.Step)
+    for told in (simulation.step(), next(simulation)):
+        assert told is not None and told.keys() == kinds.keys()
+        for key, value in told.items():
+            assert isinstance(value, kinds[key]), key
+
+
 def test_copies_go_their_own_ways() -> None:
     simulation = pilum.Problem(slice_case(), slice_mesh()).start()
     fresh = copy.copy(simulation)
@@ -268,16 +278,16 @@ def test_another_problem_takes_no_state() -> None:
 
 def test_two_threads_do_not_share_one_simulation() -> None:
     simulation = pilum.Problem(CHAMBER, set={"phase.loading.increments": 200}).start()
-    refused: list[str] = []
+    refused: list[RuntimeError] = []
     worker = threading.Thread(target=simulation.run)
     worker.start()
     while worker.is_alive() and not refused:
         try:
             simulation.time  # noqa: B018
         except RuntimeError as error:
-            refused.append(str(error))
+            refused.append(error)
     worker.join()
-    assert refused and "another thread" in refused[0]
+    assert refused and "another thread" in str(refused[0]) and isinstance(refused[0], pilum.Error)
     assert simulation.step() is None
 
 
@@ -332,8 +342,9 @@ def test_what_the_mesh_lacks_is_said() -> None:
     simulation = pilum.Problem(slice_case(), slice_mesh()).start()
     with pytest.raises(KeyError, match="there is no line `heads`.*head"):
         simulation.reaction("heads")
-    with pytest.raises(KeyError, match="there is no group `sand`"):
+    with pytest.raises(KeyError, match="there is no group `sand`") as caught:
         simulation.group("sand")
+    assert isinstance(caught.value, pilum.Error)
 
 
 def test_a_law_that_crashes_says_where(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import pilum
-from conftest import compiled, missing
+from conftest import ROOT, TABLE_4, compiled, missing
 
 CHAMBER = pilum.cases() / "chamber_mesh1"
 SHORT = {"phase.loading.increments": 10}
@@ -120,6 +120,74 @@ def test_pandas_and_polars_take_tables(chamber: pilum.Results) -> None:
         chamber.profile.__arrow_c_stream__()
     read = pandas.DataFrame.from_arrow(chamber.history) if hasattr(pandas.DataFrame, "from_arrow") else frame
     assert read["tau_shaft"].tolist() == chamber.history["tau_shaft"].tolist()
+
+
+@pytest.fixture(scope="module")
+def named(tmp_path_factory: pytest.TempPathFactory) -> pilum.Results:
+    """Phases and a group of names that others take for missing values or numbers; a law that is not there for 100 rows."""
+    joint = pilum.Law(
+        "coulomb_joint", normal_stiffness=1e6, shear_stiffness=1e6, cohesion=0.0, friction_angle=30.0, dilatancy_angle=0.0
+    )
+    case = {
+        **COLUMN,
+        "mesh": {**COLUMN["mesh"], "lines": {**COLUMN["mesh"]["lines"], "joint": dict(y=1.0)}},
+        "laws": dict(soil=SOIL, joint=joint, mepi=pilum.Law("mepi", **TABLE_4)),
+        "groups": {**COLUMN["groups"], "1": dict(formulation="zero_thickness", line="joint", law="joint")},
+        "supports": [dict(line="base", fixed=["x", "y"]), dict(line="top", fixed=["x"])],
+        "phase": [
+            dict(name="null", increments=50, pressure=[dict(line="top", value=100.0)]),
+            dict(name="NA", increments=2, laws={"1": "mepi"}),
+            dict(name="None", increments=1),
+            dict(name="1", increments=1),
+        ],
+        "output": dict(profile="increments"),
+    }
+    folder = tmp_path_factory.mktemp("named") / "results/pile"
+    return pilum.run(case, results=folder)
+
+
+def test_names_are_texts_and_empty_cells_are_missing(named: pilum.Results) -> None:
+    pandas, polars, pyarrow = (pytest.importorskip(tool) for tool in ("pandas", "polars", "pyarrow"))
+    profile = named.profile
+    expected = [("null", 50), ("NA", 2), ("None", 1), ("1", 1)]
+    rows = len(profile) // 54
+    phases = [name for name, increments in expected for _ in range(increments * rows)]
+    law = next(name for name, values in profile.items() if values.dtype.kind == "f" and np.isnan(values[:100]).all())
+    assert profile["phase"].tolist() == phases and set(profile["group"]) == {"1"}
+    assert np.isnan(profile[law]).sum() == 50 * rows > 100
+    assert named.history["phase"].tolist() == [name for name, increments in expected for _ in range(increments)]
+    assert len(profile.where(phase="1", group="1")) == rows
+    for frame in (pandas.DataFrame(profile), polars.DataFrame(profile), polars.DataFrame(pyarrow.table(profile))):
+        assert frame["phase"].to_list() == phases and set(frame["group"].to_list()) == {"1"}
+        np.testing.assert_array_equal(frame[law].to_numpy(), profile[law])
+
+
+@pytest.mark.parametrize("tool", ["pandas", "polars"])
+def test_the_page_says_what_to_pass(tool: str, named: pilum.Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of the page, in a folder with those results. Without their options both read something else."""
+    module = pytest.importorskip(tool)
+    page = (ROOT / "host/docs/how-to/read-results.md").read_text()
+    block = page.split(f"# with_{tool}.py\n")[1].split("```")[0]
+    monkeypatch.chdir(named.folder.parents[1])
+    space: dict = {}
+    exec(block, space)
+    read, profile = space["profile"], named.profile
+    assert list(read.columns) == profile.names
+    for name, values in profile.items():
+        if values.dtype.kind == "U":
+            assert read[name].to_list() == values.tolist()
+        else:
+            np.testing.assert_array_equal(read[name].to_numpy(), values)
+    careless = module.read_csv("results/pile/profile.csv")
+    assert any(careless[name].dtype != read[name].dtype for name in profile)
+
+
+def test_a_table_that_is_not_aligned_goes_to_others() -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    numbers = np.zeros(25, dtype=np.uint8)[1:].view(np.float64)
+    numbers[:] = [1.0, 2.0, 3.0]
+    assert not numbers.flags.aligned
+    assert pyarrow.table(pilum.Table({"a": numbers}))["a"].to_pylist() == [1.0, 2.0, 3.0]
 
 
 def test_notebooks_show_the_report(chamber: pilum.Results, tmp_path: Path) -> None:
@@ -290,6 +358,28 @@ def test_warnings_name_keys_of_what_nobody_wrote_as_a_file(here: Path) -> None:
         pilum.run(slow)
     messages = [str(warning.message) for warning in caught]
     assert any(message.startswith("`phase.load.name`: ") for message in messages), messages
+
+
+def test_warnings_point_at_the_line_of_the_caller(here: Path) -> None:
+    """However deep in the package they come up."""
+    stiff = dict(law="elastic", parameters=dict(young_modulus=1e20, poisson_ratio=0.3))
+    case, slow = {**COLUMN, "laws": {"soil": stiff}}, {**COLUMN, "laws": {"soil": SLOW}}
+    problem, simulation = pilum.Problem(case), pilum.Problem(slow).start()
+    driver = {
+        **stiff,
+        "hypothesis": "plane_strain",
+        "segment": [{"increments": 1, "control": {"22": {"strain": -1e-3}}}],
+    }
+    for call in (
+        lambda: pilum.run(case),
+        lambda: problem.run(),
+        lambda: problem.start(),
+        lambda: simulation.step(),
+        lambda: pilum.point(driver),
+    ):
+        with pytest.warns(pilum.PilumWarning) as caught:
+            call()
+        assert {(one.filename, one.lineno) for one in caught} == {(__file__, call.__code__.co_firstlineno)}
 
 
 def test_values_of_no_file_are_refused() -> None:

@@ -22,7 +22,7 @@ from ._fields import Field, Fields
 from ._mesh import Mesh
 from ._pilum import Law, Simulation, SimulationState, State, describe, laws
 from ._results import Results
-from ._run import Problem, Progress, point, run
+from ._run import Problem, Progress, Step, point, run
 from ._table import Table
 from ._where import _ready, cases, include, program
 
@@ -45,6 +45,7 @@ __all__ = [
     "Simulation",
     "SimulationState",
     "State",
+    "Step",
     "Table",
     "cases",
     "describe",

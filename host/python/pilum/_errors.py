@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,8 +21,20 @@ class PilumWarning(UserWarning):
     """Something that the user should know: a value outside its usual range, say."""
 
 
+def warn(message: str) -> None:
+    """Warns at the line of the caller: the innermost one that is not of this package."""
+    level, frame = 1, sys._getframe().f_back
+    while frame is not None and f"{frame.f_globals.get('__name__')}.".startswith("pilum."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, PilumWarning, stacklevel=level + 1)
+
+
 class Error(Exception):
-    """Anything that Pilum cannot do. What an attribute does not apply to has None."""
+    """Anything that Pilum cannot do. What an attribute does not apply to has None.
+
+    What Python has a class for is of that class, too: a wrong value or shape is a ValueError as well, a wrong type a
+    TypeError, a name that is not there a KeyError, memory that is not there a MemoryError.
+    """
 
     message: str
     """What is wrong."""
@@ -94,6 +108,26 @@ def _again(kind: type[Error], message: str, attributes: dict[str, Any]) -> Error
 
 class InputError(Error, ValueError):
     """A file, a dictionary or what was asked for is wrong: whoever wrote it has to act."""
+
+
+class WrongTypeError(InputError, TypeError):
+    """Something of this type is not taken."""
+
+
+class NoSuchNameError(InputError, KeyError):
+    """There is nothing of this name."""
+
+
+class NoSuchItemError(InputError, IndexError):
+    """There is nothing at this place of a sequence."""
+
+
+class BusyError(Error, RuntimeError):
+    """Another thread is at work there."""
+
+
+class NoMemoryError(Error, MemoryError):
+    """There is no memory for so much."""
 
 
 class NoEquilibriumError(Error):

@@ -10,6 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ._errors import InputError, NoSuchItemError, NoSuchNameError
 from ._table import Table
 
 __all__ = ["Field", "Fields"]
@@ -30,7 +31,7 @@ class Field(Mapping[str, NDArray[np.float64]]):
         """The time of the run."""
         piece = ElementTree.parse(path).getroot().find("UnstructuredGrid/Piece")
         if piece is None:
-            raise ValueError(f"{path}: no unstructured grid")
+            raise InputError(f"{path}: no unstructured grid")
         points = _numbers(piece.find("Points/DataArray"), np.float64)
         self.nodes: NDArray[np.float64] = points.reshape(-1, 3)[:, :2].copy()
         """Coordinates of the nodes, m, shape (n, 2)."""
@@ -64,7 +65,8 @@ class Field(Mapping[str, NDArray[np.float64]]):
         try:
             return self._values[name]
         except KeyError:
-            raise KeyError(f"there is no field `{name}`: {', '.join(self)}") from None
+            message = f"there is no field `{name}`: {', '.join(self)}"
+            raise NoSuchNameError(message) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)
@@ -111,7 +113,7 @@ class Fields(Sequence[Field]):
         if isinstance(key, slice):
             return [Field(path, time) for time, path in self._files[key]]
         if not self._files:
-            raise IndexError(
+            raise NoSuchItemError(
                 'the run has written no fields: set={"output.fields": "phases"} or "increments"'
             )
         time, path = self._files[key]

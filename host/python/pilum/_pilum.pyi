@@ -3,15 +3,18 @@
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, final
+from typing import Any, Literal, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from ._run import Step
 
 __version__: str
 
 _Hypothesis = Literal["plane_strain", "axisymmetric", "3d", "interface_2d", "interface_3d"]
 _Folders = Sequence[str | os.PathLike[str]]
+_Operator = Literal["consistent", "elastic"]
 
 @final
 class Law:
@@ -54,17 +57,42 @@ class Law:
         time: float = 0.0,
         increment: int = 0,
     ) -> State: ...
+    @overload
     def integrate(
         self,
         gradient: ArrayLike,
         state: State | None = None,
         *,
         dt: float = 1.0,
-        tangent: Literal["consistent", "elastic"] | None = "consistent",
+        tangent: _Operator = "consistent",
         out: State | None = None,
         copy: bool = True,
         positions: ArrayLike | None = None,
-    ) -> tuple[NDArray[np.float64], Any, State]: ...
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], State]: ...
+    @overload
+    def integrate(
+        self,
+        gradient: ArrayLike,
+        state: State | None = None,
+        *,
+        dt: float = 1.0,
+        tangent: None,
+        out: State | None = None,
+        copy: bool = True,
+        positions: ArrayLike | None = None,
+    ) -> tuple[NDArray[np.float64], None, State]: ...
+    @overload
+    def integrate(
+        self,
+        gradient: ArrayLike,
+        state: State | None = None,
+        *,
+        dt: float = 1.0,
+        tangent: _Operator | None,
+        out: State | None = None,
+        copy: bool = True,
+        positions: ArrayLike | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, State]: ...
 
 @final
 class State:
@@ -119,15 +147,15 @@ class Simulation:
     def reaction(self, line: str) -> list[float]: ...
     def displacement(self, line: str) -> list[float]: ...
     def group(self, name: str) -> dict[str, NDArray[Any]]: ...
-    def step(self) -> dict[str, Any] | None: ...
+    def step(self) -> Step | None: ...
     def run(self) -> None: ...
     def state(self) -> SimulationState | None: ...
     def go_to(self, state: SimulationState) -> None: ...
     def copy(self) -> Simulation: ...
     def __copy__(self) -> Simulation: ...
     def __deepcopy__(self, _memo: Any) -> Simulation: ...
-    def __iter__(self) -> Iterator[dict[str, Any]]: ...
-    def __next__(self) -> dict[str, Any]: ...
+    def __iter__(self) -> Iterator[Step]: ...
+    def __next__(self) -> Step: ...
 
 def state_of(
     gradient: NDArray[np.float64],

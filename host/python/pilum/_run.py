@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Union
+from typing import Any, NamedTuple, TypeAlias, TypedDict, Union, overload
 
 from . import _pilum
 from ._errors import InputError
@@ -13,9 +13,9 @@ from ._mesh import Mesh
 from ._results import Results
 from ._table import Table
 
-__all__ = ["Problem", "Progress", "point", "run"]
+__all__ = ["Problem", "Progress", "Step", "point", "run"]
 
-Case = Union[str, "os.PathLike[str]", Mapping[str, Any]]
+Case: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any]]
 
 
 class Progress(NamedTuple):
@@ -31,6 +31,23 @@ class Progress(NamedTuple):
     """Iterations of the increment, failed attempts included."""
     cut_backs: int
     """Steps of the phase so far that were repeated with a smaller size."""
+
+
+class Step(TypedDict):
+    """An increment that has reached equilibrium: the dictionary that `Simulation.step` returns."""
+
+    phase: str
+    """Name of the phase."""
+    increment: int
+    """Number of the increment in it, from 1."""
+    of: int
+    """Increments of the phase."""
+    time: float
+    """The time at its end."""
+    iterations: int
+    """Iterations of the increment, failed attempts included."""
+    unreliable: str | None
+    """Why a law calls a result inaccurate; None if none does."""
 
 
 class Problem:
@@ -99,7 +116,7 @@ class Problem:
         watch: Callable[[Progress], object] | None = None,
         resume: bool = False,
         checkpoints: float | None = 1.0,
-    ) -> Any:
+    ) -> Results | Any:
         """Runs it as the command does, with results in a folder: see `pilum.run`."""
         done = _pilum.run(
             self._case,
@@ -122,6 +139,30 @@ class Problem:
         return f"<pilum.Problem {self.name}: {what}>"
 
 
+@overload
+def run(
+    case: Case,
+    *,
+    set: Mapping[str, Any] | None = None,
+    watch: Callable[[Progress], object] | None = None,
+    results: str | os.PathLike[str] | None = None,
+    variant: str,
+    resume: bool = False,
+    checkpoints: float | None = 1.0,
+    isolate: float | None = None,
+) -> Results: ...
+@overload
+def run(
+    case: Case | Problem,
+    *,
+    set: Mapping[str, Any] | None = None,
+    watch: Callable[[Progress], object] | None = None,
+    results: str | os.PathLike[str] | None = None,
+    variant: None = None,
+    resume: bool = False,
+    checkpoints: float | None = 1.0,
+    isolate: float | None = None,
+) -> Results | Any: ...
 def run(
     case: Case | Problem,
     *,
@@ -132,7 +173,7 @@ def run(
     resume: bool = False,
     checkpoints: float | None = 1.0,
     isolate: float | None = None,
-) -> Any:
+) -> Results | Any:
     """Runs a case and returns its `Results`; of a case with variants a dictionary of them by their names.
 
     `case` is a file, a folder with `case.toml`, a dictionary with the keys of a case file, or a `Problem`. `set`
@@ -143,6 +184,9 @@ def run(
     Results go into `results`, or where the command puts them: `results/<case>`. `checkpoints` are written so many
     seconds after one another. With `isolate` laws are called in processes of their own, for at most so many
     seconds a call: a law that crashes raises LawError.
+
+    A type checker sees `Results`, since it does not read the case: with variants,
+    `runs = typing.cast("dict[str, pilum.Results]", pilum.run(case))`.
 
     Raises InputError, NoEquilibriumError or LawError, with their places as attributes. Warnings are PilumWarning.
     """
@@ -155,13 +199,29 @@ def run(
     return problem.run(results, watch=watch, resume=resume, checkpoints=checkpoints)
 
 
+@overload
+def point(
+    driver: Case,
+    *,
+    set: Mapping[str, Any] | None = None,
+    variant: str,
+    isolate: float | None = None,
+) -> Table: ...
+@overload
+def point(
+    driver: Case,
+    *,
+    set: Mapping[str, Any] | None = None,
+    variant: None = None,
+    isolate: float | None = None,
+) -> Table | Any: ...
 def point(
     driver: Case,
     *,
     set: Mapping[str, Any] | None = None,
     variant: str | None = None,
     isolate: float | None = None,
-) -> Any:
+) -> Table | Any:
     """Leads a law along a path at one point and returns the `Table` of its increments.
 
     `driver` is a driver file, or a dictionary with the keys of one; of a driver with variants a dictionary of

@@ -13,17 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _pilum
+from ._errors import InputError, NoSuchNameError
 
 __all__ = ["Table"]
 
 _WHOLE = {"increment", "iterations", "element", "point"}
+_TEXTS = {"phase", "group"}
 _SHOWN = 10
 
 
 class Table(dict[str, NDArray[Any]]):
     """Columns of arrays by name, all of one length; what is missing is NaN.
 
-    A dictionary of names and one-dimensional arrays: float64, int64 of numbers that count, texts of names. Its length
+    A dictionary of names and one-dimensional arrays: float64, int64 of numbers that count, texts of names (a phase may be called `None` or `1`). Its length
     is the number of rows. pandas and polars take it as it is: `pandas.DataFrame(table)`, `polars.DataFrame(table)`; by the Arrow C stream
     interface so do pyarrow, DuckDB and others.
     """
@@ -33,7 +35,7 @@ class Table(dict[str, NDArray[Any]]):
         for name, values in self.items():
             if values.shape != (len(self),):
                 message = f"column `{name}` has shape {values.shape}, expected ({len(self)},)"
-                raise ValueError(message)
+                raise InputError(message)
 
     @classmethod
     def read(cls, path: str | Path) -> Table:
@@ -61,7 +63,7 @@ class Table(dict[str, NDArray[Any]]):
         return list(self.keys())
 
     def __missing__(self, name: str) -> NDArray[Any]:
-        raise KeyError(f"there is no column `{name}`: {', '.join(self.names)}")
+        raise NoSuchNameError(f"there is no column `{name}`: {', '.join(self.names)}")
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -81,9 +83,9 @@ class Table(dict[str, NDArray[Any]]):
         columns: list[tuple[str, Any]] = []
         for name, values in self.items():
             if values.dtype.kind == "f":
-                columns.append((name, np.ascontiguousarray(values, dtype=np.float64)))
+                columns.append((name, np.require(values, np.float64, ["C", "A"])))
             elif values.dtype.kind in "iub":
-                columns.append((name, np.ascontiguousarray(values, dtype=np.int64)))
+                columns.append((name, np.require(values, np.int64, ["C", "A"])))
             else:
                 columns.append((name, [str(value) for value in values]))
         return _pilum.stream(columns)
@@ -117,7 +119,9 @@ def _short(value: Any) -> str:
 
 
 def _array(name: str, values: tuple[str, ...]) -> NDArray[Any]:
-    """Numbers where all are numbers or nothing, else texts."""
+    """Numbers where all are numbers or nothing, else texts; names are texts."""
+    if name in _TEXTS:
+        return np.array(values, dtype=np.str_)
     try:
         numbers = np.array([value if value else "nan" for value in values], dtype=np.float64)
     except ValueError:

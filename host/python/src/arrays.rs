@@ -1,8 +1,8 @@
 //! Arrays of numbers between NumPy and the rooms: read where they lie, and handed out so that nobody writes in them.
 
+use crate::error::InputError;
 use law::Strided;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMemoryView};
 
@@ -31,20 +31,25 @@ impl<'py> Rows<'py> {
                 array
             };
             array.cast_into::<PyArray2<f64>>().map_err(|_| {
-                PyValueError::new_err(format!(
+                InputError::new_err(format!(
                     "{name}: expected an array of shape (n, {n_columns})"
                 ))
             })?
         };
         if array.shape()[1] != n_columns {
             let [n, found] = [array.shape()[0], array.shape()[1]];
-            return Err(PyValueError::new_err(format!(
+            return Err(InputError::new_err(format!(
                 "{name}: found shape ({n}, {found}), expected (n, {n_columns})"
+            )));
+        }
+        if !array.is_aligned() && !array.is_empty() {
+            return Err(InputError::new_err(format!(
+                "{name}: its numbers do not lie at multiples of 8 bytes (they are not aligned); a copy does: `{name}.copy()`"
             )));
         }
         let array = array
             .try_readonly()
-            .map_err(|_| PyValueError::new_err(format!("{name}: the array is being written to")))?;
+            .map_err(|_| InputError::new_err(format!("{name}: the array is being written to")))?;
         Ok(Self { array })
     }
 
@@ -61,7 +66,7 @@ impl<'py> Rows<'py> {
         if rows.n_rows() == n_rows {
             return Ok(rows);
         }
-        Err(PyValueError::new_err(format!(
+        Err(InputError::new_err(format!(
             "{name}: found {} rows, expected {n_rows}",
             rows.n_rows()
         )))
@@ -91,7 +96,7 @@ impl<'py> Rows<'py> {
         let values = self
             .array
             .as_slice()
-            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+            .map_err(|error| InputError::new_err(error.to_string()))?;
         let [n_rows, n_columns] = [self.array.shape()[0], self.array.shape()[1]];
         let place = if self.array.is_c_contiguous() {
             Strided::rows(n_columns)
@@ -115,7 +120,7 @@ fn refuse_masked(written: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
     if numpy.call_method1("is_masked", (written,))?.is_truthy()? {
         let message =
             format!("{name}: some values of the array are masked; `filled` gives them some");
-        return Err(PyValueError::new_err(message));
+        return Err(InputError::new_err(message));
     }
     Ok(())
 }
@@ -125,13 +130,13 @@ fn refuse_masked(written: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
 fn as_numbers<'py>(written: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     let py = written.py();
     let numpy = py.import("numpy")?;
-    let wrong = |error: PyErr| PyValueError::new_err(format!("{name}: {}", error.value(py)));
+    let wrong = |error: PyErr| InputError::new_err(format!("{name}: {}", error.value(py)));
     let array = numpy.call_method1("asarray", (written,)).map_err(wrong)?;
     let dtype = array.getattr("dtype")?;
     let kind: String = dtype.getattr("kind")?.extract()?;
     if !"biuf".contains(&kind) {
         let message = format!("{name}: found an array of {dtype}, expected numbers");
-        return Err(PyValueError::new_err(message));
+        return Err(InputError::new_err(message));
     }
     let options = PyDict::new(py);
     options.set_item("dtype", "float64")?;

@@ -1,11 +1,11 @@
 //! Tables for programs that take them by the Arrow C stream interface, such as pandas, polars and `DuckDB`.
 
+use crate::error::InputError;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{
     ArrayRef, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, StringArray,
 };
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub(crate) fn stream<'py>(
         };
         named.push((name, array));
     }
-    let wrong = |error: arrow_schema::ArrowError| PyValueError::new_err(error.to_string());
+    let wrong = |error: arrow_schema::ArrowError| InputError::new_err(error.to_string());
     let batch = RecordBatch::try_from_iter(named).map_err(wrong)?;
     let schema = batch.schema();
     let batches = RecordBatchIterator::new([Ok(batch)], schema);

@@ -9,6 +9,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::error::Error as _;
 
+pyo3::import_exception!(pilum._errors, BusyError);
+pyo3::import_exception!(pilum._errors, InputError);
+pyo3::import_exception!(pilum._errors, NoMemoryError);
+pyo3::import_exception!(pilum._errors, NoSuchNameError);
+pyo3::import_exception!(pilum._errors, WrongTypeError);
+
 /// Name of an outcome.
 fn outcome_name(outcome: Outcome) -> &'static str {
     match outcome {

@@ -4,7 +4,7 @@ mod batch;
 pub(crate) mod found;
 
 use crate::arrays::{Rows, looked_at};
-use crate::error::{exception, of_batch};
+use crate::error::{InputError, exception, of_batch};
 use crate::state::{Memory, State};
 use crate::{task, value};
 use abi::Hypothesis;
@@ -12,10 +12,8 @@ use batch::{copied, has_room};
 use input::material::law_alone;
 use law::{BatchFailure, BuiltLaw, End, Moment, Opener, Operator, Start, Strided};
 use numpy::{PyArrayMethods, PyReadwriteArray1};
-use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,7 +23,7 @@ use text::Source;
 pub(crate) fn opener(isolate: Option<f64>) -> PyResult<Opener> {
     let isolate = isolate.map(Duration::try_from_secs_f64).transpose();
     let isolate = isolate
-        .map_err(|_| PyValueError::new_err("isolate: expected the seconds that a call may take"))?;
+        .map_err(|_| InputError::new_err("isolate: expected the seconds that a call may take"))?;
     Ok(Opener::new(law::Trust {
         probe: true,
         isolate,
@@ -37,10 +35,8 @@ pub(crate) fn opener(isolate: Option<f64>) -> PyResult<Opener> {
 /// # Errors
 /// Where warnings are errors, the warning.
 pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
-    let class = py.import("pilum._errors")?.getattr("PilumWarning");
-    let class = class.unwrap_or_else(|_| py.get_type::<PyUserWarning>().into_any());
-    let message = CString::new(message.replace('\0', " "))?;
-    PyErr::warn(py, &class, &message, 2)
+    let warn = py.import("pilum._errors")?.getattr("warn")?;
+    warn.call1((message,)).map(|_| ())
 }
 
 /// A constitutive law with its parameters fixed, for any number of points.
@@ -86,7 +82,7 @@ fn hypothesis_named(name: &str) -> PyResult<Hypothesis> {
     all.find(|one| one.name() == name).ok_or_else(|| {
         let names = Hypothesis::ALL.map(Hypothesis::name);
         let hint = text::suggestion(name, names.to_vec());
-        PyValueError::new_err(format!("there is no hypothesis `{name}`: {hint}"))
+        InputError::new_err(format!("there is no hypothesis `{name}`: {hint}"))
     })
 }
 
@@ -95,7 +91,7 @@ fn operator_named(name: Option<&str>) -> PyResult<Operator> {
         None => Ok(Operator::None),
         Some("consistent") => Ok(Operator::Consistent),
         Some("elastic") => Ok(Operator::Elastic),
-        Some(other) => Err(PyValueError::new_err(format!(
+        Some(other) => Err(InputError::new_err(format!(
             "tangent: `{other}` is none of \"consistent\", \"elastic\" and None"
         ))),
     }
@@ -246,7 +242,7 @@ impl Law {
     ) -> PyResult<State> {
         let n = self.law().n_components();
         if !(time >= 0.0 && time.is_finite()) {
-            return Err(PyValueError::new_err(format!("time: {time} is no time")));
+            return Err(InputError::new_err(format!("time: {time} is no time")));
         }
         let n_variables = self.variables.len();
         let internal = internal
@@ -277,7 +273,7 @@ impl Law {
                 Ok(one.repeat(n_points))
             } else {
                 let message = format!("{name}: found {} rows, expected {n_points}", rows.n_rows());
-                Err(PyValueError::new_err(message))
+                Err(InputError::new_err(message))
             }
         };
         let flux = full(flux, "flux", n)?;
@@ -335,7 +331,7 @@ impl Law {
         let law = self.law();
         let n = law.n_components();
         if !(dt >= 0.0 && dt.is_finite()) {
-            return Err(PyValueError::new_err(format!("dt: {dt} is no time")));
+            return Err(InputError::new_err(format!("dt: {dt} is no time")));
         }
         let wanted = operator_named(tangent)?;
         let n_operator = if wanted == Operator::None { 0 } else { n * n };
@@ -350,7 +346,7 @@ impl Law {
         let n_points = from.n_points(py);
         let gradient = Rows::exactly(gradient, "gradient", [n_points, n])?;
         if from.names != self.variables || from.n_components(py) != n {
-            return Err(PyValueError::new_err(
+            return Err(InputError::new_err(
                 "state: it is one of another law, or of another hypothesis",
             ));
         }
@@ -359,7 +355,7 @@ impl Law {
         {
             let message =
                 "out: the increment starts from this state; give one that is not needed any more";
-            return Err(PyValueError::new_err(message));
+            return Err(InputError::new_err(message));
         }
         let mut end = self.memory_for(py, from, (&gradient, copy), out, n_operator)?;
         end.time = from.time + dt;
@@ -367,7 +363,7 @@ impl Law {
         let sites = self.sites(n_points, positions)?;
         {
             let [start_gradient, start_flux, start_internal] = from.read(py)?;
-            let busy = |_| PyValueError::new_err("out: its memory is in use");
+            let busy = |_| InputError::new_err("out: its memory is in use");
             let own = (!end.is_lent).then(|| end.gradient.bind(py).try_readwrite());
             let mut own = own.transpose().map_err(busy)?;
             let mut end_flux = end.flux.bind(py).try_readwrite().map_err(busy)?;

@@ -1,7 +1,7 @@
 //! Simulations that are led from Python, increment by increment.
 
 use crate::arrays::of_rows;
-use crate::error::exception;
+use crate::error::{BusyError, NoSuchNameError, WrongTypeError, exception};
 use crate::law::warn;
 use crate::posed::Posed;
 use crate::task::{Caller, carry_out};
@@ -12,7 +12,6 @@ use mechanics::problem::Likeness;
 use mechanics::simulation::{Increment, Warning};
 use mechanics::{State, Watch};
 use numpy::PyArray1;
-use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
@@ -60,7 +59,7 @@ pub(crate) struct SimulationState {
 impl SimulationState {
     #[expect(clippy::unused_self, reason = "of an object, in Python")]
     fn __reduce__(&self) -> PyResult<()> {
-        Err(PyTypeError::new_err(
+        Err(WrongTypeError::new_err(
             "a state of a simulation cannot be pickled; `pilum.run` keeps checkpoints, and `resume=True` goes on from them",
         ))
     }
@@ -102,7 +101,7 @@ impl Simulation {
             Err(TryLockError::Poisoned(inner)) => Ok(inner.into_inner()),
             Err(TryLockError::WouldBlock) => {
                 let message = "the simulation is at work in another thread";
-                Err(PyRuntimeError::new_err(message))
+                Err(BusyError::new_err(message))
             }
         }
     }
@@ -160,14 +159,14 @@ impl Inner {
             let groups = self.simulation.groups().iter();
             let known: Vec<&str> = groups.map(|group| group.name.as_str()).collect();
             let hint = text::suggestion(name, known);
-            PyKeyError::new_err(format!("there is no group `{name}`: {hint}"))
+            NoSuchNameError::new_err(format!("there is no group `{name}`: {hint}"))
         })
     }
 
     fn no_line(&self, name: &str) -> PyErr {
         let lines = self.simulation.problem().mesh.lines.keys();
         let hint = text::suggestion(name, lines.map(String::as_str).collect::<Vec<_>>());
-        PyKeyError::new_err(format!("there is no line `{name}`: {hint}"))
+        NoSuchNameError::new_err(format!("there is no line `{name}`: {hint}"))
     }
 }
 
@@ -473,7 +472,7 @@ impl Simulation {
 
     #[expect(clippy::unused_self, reason = "of an object, in Python")]
     fn __reduce__(&self) -> PyResult<()> {
-        Err(PyTypeError::new_err(
+        Err(WrongTypeError::new_err(
             "a simulation cannot be pickled: its laws are at work in this process; pickle its Problem, and start it there",
         ))
     }

@@ -1,8 +1,8 @@
 //! Points on their way: what a law needs to carry them over an increment.
 
 use crate::arrays::looked_at;
+use crate::error::{InputError, NoSuchNameError};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -81,7 +81,7 @@ impl State {
     /// One internal variable of all points, shape (n,).
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let Some(column) = self.names.iter().position(|known| known == name) else {
-            return Err(pyo3::exceptions::PyKeyError::new_err(format!(
+            return Err(NoSuchNameError::new_err(format!(
                 "there is no internal variable `{name}`: {}",
                 text::suggestion(
                     name,
@@ -147,7 +147,7 @@ pub(crate) fn state_of(
             && columns(&internal) == names.len()
     });
     if !of_both {
-        return Err(PyValueError::new_err("these are no arrays of one state"));
+        return Err(InputError::new_err("these are no arrays of one state"));
     }
     let operator = Python::attach(|py| PyArray1::zeros(py, 0, false).unbind());
     Ok(State {
@@ -187,10 +187,10 @@ impl State {
     fn refuse_given(&self) -> PyResult<()> {
         match self.memory() {
             Memory::Own => Ok(()),
-            Memory::Spoilt => Err(PyValueError::new_err(
+            Memory::Spoilt => Err(InputError::new_err(
                 "the state was given as `out` of an increment that came to no end: it has no values any more",
             )),
-            Memory::Given => Err(PyValueError::new_err(
+            Memory::Given => Err(InputError::new_err(
                 "the state was given as `out`: its memory is that of the state which was returned",
             )),
         }
@@ -203,7 +203,7 @@ impl State {
     pub(crate) fn read<'py>(&self, py: Python<'py>) -> PyResult<[PyReadonlyArray2<'py, f64>; 3]> {
         self.refuse_given()?;
         let read = |array: &Py<PyArray2<f64>>| {
-            let busy = |_| PyValueError::new_err("state: its memory is in use");
+            let busy = |_| InputError::new_err("state: its memory is in use");
             array.bind(py).try_readonly().map_err(busy)
         };
         Ok([

@@ -1,6 +1,6 @@
 //! Python's values as those of files, so that a dictionary says what a file would.
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use crate::error::{InputError, WrongTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyMapping, PyString};
 use std::path::PathBuf;
@@ -31,13 +31,13 @@ fn table_at(written: &Bound<'_, PyAny>, depth: usize) -> PyResult<Table> {
 
 fn in_key(value: &Bound<'_, PyAny>, key: &str, error: PyErr) -> PyErr {
     let py = value.py();
-    PyTypeError::new_err(format!("{key}: {}", error.value(py)))
+    WrongTypeError::new_err(format!("{key}: {}", error.value(py)))
 }
 
 /// A value; nothing of `None`.
 fn value_of(written: &Bound<'_, PyAny>, depth: usize) -> PyResult<Option<Value>> {
     if depth > DEPTH {
-        return Err(PyTypeError::new_err(format!(
+        return Err(WrongTypeError::new_err(format!(
             "dictionaries and lists are more than {DEPTH} deep, or hold themselves"
         )));
     }
@@ -70,17 +70,17 @@ fn value_of(written: &Bound<'_, PyAny>, depth: usize) -> PyResult<Option<Value>>
     if written.hasattr("__fspath__")? {
         let path: PathBuf = written.extract()?;
         let text = path.to_str();
-        let text = text.ok_or_else(|| PyValueError::new_err("the path is not Unicode"))?;
+        let text = text.ok_or_else(|| InputError::new_err("the path is not Unicode"))?;
         return Ok(Some(Value::String(text.to_owned())));
     }
     let Ok(items) = written.try_iter() else {
         let kind = written.get_type().name()?;
         let message = format!("a file has no values of the type `{kind}`");
-        return Err(PyTypeError::new_err(message));
+        return Err(WrongTypeError::new_err(message));
     };
     let items = items.map(|item| {
         let value = value_of(&item?, depth + 1)?;
-        value.ok_or_else(|| PyTypeError::new_err("None in a list"))
+        value.ok_or_else(|| WrongTypeError::new_err("None in a list"))
     });
     Ok(Some(Value::Array(items.collect::<PyResult<_>>()?)))
 }
@@ -90,7 +90,7 @@ fn value_of(written: &Bound<'_, PyAny>, depth: usize) -> PyResult<Option<Value>>
 /// # Errors
 /// `ValueError` if they cannot be written.
 pub(crate) fn text_of(table: &Table) -> PyResult<String> {
-    toml::to_string(table).map_err(|error| PyValueError::new_err(error.to_string()))
+    toml::to_string(table).map_err(|error| InputError::new_err(error.to_string()))
 }
 
 /// Settings over a file, as the command line has them: `KEY=VALUE`.

@@ -2,10 +2,10 @@
 
 use super::Law;
 use crate::arrays::Rows;
+use crate::error::{InputError, NoMemoryError};
 use crate::state::{Memory, State};
 use law::{Site, Strided};
 use numpy::PyArray2;
-use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
 /// Whether there is memory for so many points with so many values.
@@ -16,7 +16,7 @@ pub(super) fn has_room(n_points: usize, n_values: usize) -> PyResult<()> {
     let all = n_points.saturating_mul(n_values);
     Vec::<f64>::new()
         .try_reserve_exact(all)
-        .map_err(|_| PyMemoryError::new_err(format!("points: no memory for {n_points} of them")))
+        .map_err(|_| NoMemoryError::new_err(format!("points: no memory for {n_points} of them")))
 }
 
 /// Copies values point by point.
@@ -59,7 +59,7 @@ impl Law {
         let is_own = !end.is_lent && is_shared(&end.gradient);
         if out.is_some() && (is_own || is_shared(&end.flux) || is_shared(&end.internal)) {
             let message = "out: its memory is in use, by `gradient`";
-            return Err(PyValueError::new_err(message));
+            return Err(InputError::new_err(message));
         }
         Ok(end)
     }
@@ -93,8 +93,8 @@ fn reused(py: Python<'_>, out: &State, from: &State) -> PyResult<State> {
     if out.memory() == Memory::Given {
         let message =
             "out: the state was given as `out` before: give the one that was returned then";
-        return Err(PyValueError::new_err(message));
+        return Err(InputError::new_err(message));
     }
     out.reused(py, from)
-        .ok_or_else(|| PyValueError::new_err("out: a state of other points, or of another law"))
+        .ok_or_else(|| InputError::new_err("out: a state of other points, or of another law"))
 }

@@ -1,9 +1,8 @@
 //! The laws that there are, and what they say of themselves.
 
 use super::opener;
-use crate::error::exception;
+use crate::error::{InputError, exception};
 use law::SearchPath;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -22,7 +21,7 @@ pub(crate) fn describe(
     let found = py.detach(|| SearchPath::of(&opener, &folders).law(id));
     let found = found.map_err(|error| exception(py, &error.into(), None))?;
     let text = serde_json::to_string(found.description());
-    let text = text.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let text = text.map_err(|error| InputError::new_err(error.to_string()))?;
     Ok(py.import("json")?.call_method1("loads", (text,))?.unbind())
 }
 
