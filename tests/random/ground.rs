@@ -6,7 +6,7 @@ use crate::seeds::{End, hold};
 use law::{Hypothesis, SearchPath};
 use mechanics::mesh::{Along, Solid};
 use mechanics::problem::{
-    Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation,
+    Analysis, AtRest, Axis, Cause, Displacement, Drainage, ElementGroup, Force, Formulation,
     InitialStress, Integration, Phase, Pressure, Profile, Ratio, Support, Water,
 };
 use mechanics::{Error, Material, Mesh, Problem, Simulation};
@@ -30,7 +30,7 @@ enum Change {
     Pressure(f64),
     /// kN on the block's head, which is rigid from then on.
     Force(f64),
-    /// m of the block's head.
+    /// m of the block's head, which is rigid from then on if there are several increments.
     Push(f64),
     /// The water table, parts of the height.
     Water(f64),
@@ -259,7 +259,7 @@ impl Ground {
             };
             InitialStress::AtRest(AtRest {
                 ratio,
-                surcharge: 0.0,
+                surcharge: None,
             })
         };
         let group = |name: &str, material: &Material, layer: usize| {
@@ -315,6 +315,9 @@ impl Ground {
                     }];
                 }
                 Change::Push(value) => {
+                    if is_rigid(increments) {
+                        phase.rigid = vec![line("head")];
+                    }
                     phase.displacement = vec![Displacement {
                         line: line("head"),
                         x: None,
@@ -439,6 +442,10 @@ impl Ground {
     /// Settlements of the head after each phase; or why there are none.
     fn run(&self, posed: Posed) -> Result<Result<Vec<f64>, String>, String> {
         let fails = |error: Error| match &error {
+            // Weight tilts a head before it is rigid: that is no reason not to push it.
+            Error::Refused(refusal) if matches!(refusal.cause, Cause::MovesAlike(..)) => {
+                Err(error.to_string())
+            }
             Error::NoEquilibrium(_) | Error::Refused(_) => Ok(Err(error.to_string())),
             _ => Err(format!("{error:?}")),
         };
@@ -477,9 +484,27 @@ impl Ground {
                 return Err(format!("{place}: reactions {vertical:e} carry {carried:e}"));
             }
             let head = simulation.displacement_of("head").map_or(0.0, |u| u[1]);
+            let change = settlements.len().checked_sub(1).map(|n| self.changes[n]);
+            if let Some((Change::Push(value), n)) = change
+                && is_rigid(n)
+            {
+                let nodes = &simulation.problem().mesh.lines["head"].nodes;
+                let is_off = |node: &&usize| state.displacement[2 * **node + 1] != -value;
+                if let Some(node) = nodes.iter().find(is_off) {
+                    let at = state.displacement[2 * node + 1];
+                    return Err(format!(
+                        "{place}: the head is pushed by {value:e}, a node is at {at:e}"
+                    ));
+                }
+            }
             settlements.push(head);
         }
     }
+}
+
+/// Whether a head that is pushed in so many increments is rigid.
+fn is_rigid(increments: usize) -> bool {
+    increments > 1
 }
 
 /// The changes that can be made in this order: what carries a load is not dug away.

@@ -5,7 +5,7 @@ mod spare;
 
 use self::spare::Look;
 use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
-use crate::ground::{ProfileInput, level};
+use crate::ground::{LevelInput, ProfileInput, level};
 use crate::material::{
     LawTables, ParameterValue, ZONE, is_solid_at_interface, place_failure, try_law,
 };
@@ -30,6 +30,9 @@ use std::ops::Range;
 use std::sync::Arc;
 use text::{Source, suggestion};
 use toml::Spanned;
+
+/// Water stands above the ground where it is higher by this part of the ground's height.
+const ABOVE: f64 = 1e-9;
 
 /// Laws by name and hypothesis.
 pub type Laws = IndexMap<(String, &'static str), Arc<BuiltLaw>>;
@@ -150,6 +153,7 @@ impl Case {
             });
         }
         let spare = shelf.spare(look, self.stands_alone())?;
+        let water_levels = water_levels(source, file, &mesh, &phases)?;
         let supports = file.supports.iter().map(|support| Support {
             line: support.line.get_ref().clone(),
             fixed: support.fixed.iter().map(|&axis| axis.into()).collect(),
@@ -172,6 +176,7 @@ impl Case {
             notes: mesh_file
                 .iter()
                 .flat_map(|file| file.notes.clone())
+                .chain(water_levels)
                 .chain(self.unused_laws())
                 .chain(spare)
                 .collect(),
@@ -524,6 +529,67 @@ fn refuse_unknown_groups(source: &Source, file: &CaseFile) -> Result<(), Error> 
         }
     }
     Ok(())
+}
+
+/// Water tables below the mesh, and above the ground.
+fn water_levels(
+    source: &Source,
+    file: &CaseFile,
+    mesh: &Mesh,
+    phases: &[Phase],
+) -> Result<Vec<String>, Error> {
+    let groups = || file.groups.values().map(Spanned::get_ref);
+    let mut active: Vec<bool> = groups().map(|group| group.active.unwrap_or(true)).collect();
+    let is_wet: Vec<bool> = groups()
+        .map(|group| group.pore_water.unwrap_or(true))
+        .collect();
+    let first = phases.first();
+    let mut notes = Vec::new();
+    let mut note = |written: &Spanned<LevelInput>, active: &[bool]| -> Result<(), Error> {
+        let highest = level(source, written)?
+            .values()
+            .fold(f64::NEG_INFINITY, f64::max);
+        let heights = mesh.solids.iter().flat_map(|solid| {
+            let is_ground = active[solid.group] && is_wet[solid.group];
+            let nodes = solid.nodes().iter();
+            nodes.map(move |&node| (mesh.nodes[node][1], is_ground))
+        });
+        let (lowest, top) = heights.fold(
+            (f64::INFINITY, f64::NEG_INFINITY),
+            |(lowest, top), (at, is_ground)| {
+                (lowest.min(at), if is_ground { top.max(at) } else { top })
+            },
+        );
+        let place = source.place(&written.span());
+        if highest < lowest {
+            notes.push(format!(
+                "{place}: the water table, {highest} m at its highest, lies below the mesh, which starts at {lowest} m: \
+                 the site is dry"
+            ));
+        } else if highest > top + ABOVE * (top - lowest) && top.is_finite() {
+            notes.push(format!(
+                "{place}: the water table, {highest} m at its highest, stands above the ground, which ends at {top} m: \
+                 water stands on it"
+            ));
+        }
+        Ok(())
+    };
+    if let Some(water) = &file.water {
+        // What the first phase changes is there from its start on.
+        let mut active = active.clone();
+        if let Some(phase) = first {
+            phase.activate.iter().for_each(|&of| active[of] = true);
+        }
+        note(&water.get_ref().level, &active)?;
+    }
+    for (input, phase) in file.phases.iter().zip(phases) {
+        phase.activate.iter().for_each(|&of| active[of] = true);
+        phase.deactivate.iter().for_each(|&of| active[of] = false);
+        if let Some(water) = &input.water {
+            note(&water.get_ref().level, &active)?;
+        }
+    }
+    Ok(notes)
 }
 
 /// A phase without its laws.

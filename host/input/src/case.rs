@@ -609,8 +609,8 @@ pub struct PressureInput {
     pub value: Spanned<ProfileInput>,
 }
 
-/// A force on a line, spread evenly over it: kN over the whole turn, in plane strain kN/m. Where an interface
-/// stands along the line, half of it acts on either face.
+/// A force on a line, spread evenly over it: kN over the whole turn, in plane strain kN/m. Refused where an
+/// interface stands along the line.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]

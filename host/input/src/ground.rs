@@ -150,7 +150,8 @@ pub struct StressInput {
     pub pop: Option<Spanned<ProfileInput>>,
     /// At rest: Poisson's ratio of unloading; needed where `ocr` or `pop` is given.
     pub poisson_ratio: Option<f64>,
-    /// At rest: added to the vertical effective stress, kPa.
+    /// At rest: added to the vertical effective stress here and below, on the same vertical, kPa. A group's own
+    /// wins over what is carried to it.
     pub surcharge: Option<f64>,
 }
 
@@ -223,7 +224,7 @@ impl StressInput {
         };
         Ok(InitialStress::AtRest(AtRest {
             ratio,
-            surcharge: self.surcharge.unwrap_or(0.0),
+            surcharge: self.surcharge,
         }))
     }
 }

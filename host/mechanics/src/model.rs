@@ -506,9 +506,9 @@ impl GroupBuilder<'_> {
         kinematics: &dyn Kinematics,
         stress: &[f64],
     ) -> Result<(), Refusal> {
-        let Some(InitialStress::AtRest(at_rest)) = &self.group.initial_stress else {
+        if !matches!(self.group.initial_stress, Some(InitialStress::AtRest(_))) {
             return Ok(());
-        };
+        }
         let refuse = |cause| Err(self.refuse_key(Key::InitialStress, cause));
         for (point, stress) in stress.chunks_exact(kinematics.n_components()).enumerate() {
             let [horizontal, vertical] = [-stress[0], -stress[1]];
@@ -516,8 +516,7 @@ impl GroupBuilder<'_> {
             // Where nothing is left of the vertical one, there may be less than nothing.
             if vertical <= 0.0 {
                 let [above, pore] = self.initial.on_a_plane(self.number, at);
-                let left = above + at_rest.surcharge - pore;
-                if left < -ROUND_OFF_AT_REST * (above.abs() + pore) {
+                if above - pore < -ROUND_OFF_AT_REST * (above.abs() + pore) {
                     return refuse(Cause::LiftedAtRest { at, above, pore });
                 }
             }

@@ -1,8 +1,12 @@
 //! What is to be computed, as plain values: mesh, groups with their laws, supports, phases with their
 //! loads, settings. Units: kN, m, kPa; tension positive.
 
+pub(crate) mod alike;
+mod bared;
 pub(crate) mod check;
 pub(crate) mod constraints;
+mod faces;
+mod futile;
 mod ground;
 mod held;
 mod likeness;

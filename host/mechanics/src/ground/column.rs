@@ -85,10 +85,41 @@ impl<'m> Columns<'m> {
     pub fn above(&self, [x, y]: [f64; 2]) -> f64 {
         let level = self.water.map(|water| water.level.at(x));
         let (mut sum, mut top) = (0.0, y);
+        self.for_chords_above([x, y], |_, [above_water, below_water], [from, to]| {
+            top = top.max(to);
+            let wet = level.map_or(from, |level| level.clamp(from, to));
+            sum += below_water * (wet - from) + above_water * (to - wet);
+        });
+        let stands = self.water.zip(level);
+        sum + stands.map_or(0.0, |(water, level)| {
+            water.unit_weight * (level - top).max(0.0)
+        })
+    }
+
+    /// What `of` says of the lowest group above a point, on the same vertical, of which it says anything.
+    pub(super) fn nearest_above(
+        &self,
+        at: [f64; 2],
+        of: impl Fn(usize) -> Option<f64>,
+    ) -> Option<f64> {
+        let mut nearest: Option<(f64, f64)> = None;
+        self.for_chords_above(at, |number, _, [from, _]| {
+            if let Some(said) = of(self.mesh.solids[number].group)
+                && nearest.is_none_or(|(lowest, _)| from < lowest)
+            {
+                nearest = Some((from, said));
+            }
+        });
+        nearest.map(|(_, said)| said)
+    }
+
+    /// Calls with every element that is there above a point, its unit weights, and between which heights
+    /// the vertical runs in it.
+    fn for_chords_above(&self, [x, y]: [f64; 2], mut call: impl FnMut(usize, [f64; 2], [f64; 2])) {
         for &number in &self.strips[self.strip(x)] {
             let number = number as usize;
             let [low, high] = self.boxes[number];
-            let Some([above_water, below_water]) = self.weights[number] else {
+            let Some(weights) = self.weights[number] else {
                 continue;
             };
             if x < low[0] || x > high[0] || high[1] <= y {
@@ -97,18 +128,11 @@ impl<'m> Columns<'m> {
             let mut crossings = self.crossings(&self.mesh.solids[number], x);
             for &[from, to] in crossings.chords() {
                 let from = from.max(y);
-                if to <= from {
-                    continue;
+                if to > from {
+                    call(number, weights, [from, to]);
                 }
-                top = top.max(to);
-                let wet = level.map_or(from, |level| level.clamp(from, to));
-                sum += below_water * (wet - from) + above_water * (to - wet);
             }
         }
-        let stands = self.water.zip(level);
-        sum + stands.map_or(0.0, |(water, level)| {
-            water.unit_weight * (level - top).max(0.0)
-        })
     }
 
     /// Where a vertical crosses the outline of an element.

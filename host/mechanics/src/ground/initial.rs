@@ -13,6 +13,8 @@ const INSIDE: f64 = 1e-9;
 pub(crate) struct InitialStresses<'p> {
     problem: &'p Problem,
     columns: Option<Columns<'p>>,
+    /// Of every group, its own.
+    surcharges: Vec<Option<f64>>,
     /// Element on the outside of a joint's face, by the node in the face's middle.
     beside: HashMap<usize, usize>,
 }
@@ -32,9 +34,15 @@ impl<'p> InitialStresses<'p> {
                     group.is_active.then_some([group.unit_weight, wet])
                 })
             });
+        let surcharge = |stress: &Option<InitialStress>| match stress {
+            Some(InitialStress::AtRest(at_rest)) => at_rest.surcharge,
+            _ => None,
+        };
+        let surcharges = groups.iter().map(|group| surcharge(&group.initial_stress));
         Self {
             problem,
             columns,
+            surcharges: surcharges.collect(),
             beside: beside_joints(&problem.mesh),
         }
     }
@@ -48,20 +56,28 @@ impl<'p> InitialStresses<'p> {
             InitialStress::Profiles(profiles) => [0, 1, 2, 3].map(|c| profiles[c].at(at[1])),
             InitialStress::AtRest(at_rest) => {
                 let [total, pore] = self.on_a_plane(number, at);
-                let vertical = (total + at_rest.surcharge - pore).max(0.0);
+                let vertical = (total - pore).max(0.0);
                 let horizontal = at_rest.ratio.horizontal(vertical, at[1]);
                 [-horizontal, -vertical, -horizontal, 0.0]
             }
         })
     }
 
-    /// What stands above a point of a group, and the pressure in its pores, compression positive, kPa.
+    /// What stands above a point of a group at rest, with the surcharge, and the pressure in its pores,
+    /// compression positive, kPa.
     pub(crate) fn on_a_plane(&self, number: usize, at: [f64; 2]) -> [f64; 2] {
         let columns = self.columns.as_ref();
+        let own = self.surcharges[number];
+        let is_carried = || self.surcharges.iter().any(Option::is_some);
+        let from_above = || {
+            let columns = columns.filter(|_| is_carried())?;
+            columns.nearest_above(at, |group| self.surcharges[group])
+        };
+        let surcharge = own.or_else(from_above);
         let has_water = self.problem.groups[number].pore_water;
         let water = self.problem.water.as_ref().filter(|_| has_water);
         [
-            columns.map_or(0.0, |columns| columns.above(at)),
+            columns.map_or(0.0, |columns| columns.above(at)) + surcharge.unwrap_or(0.0),
             water.map_or(0.0, |water| water.pressure(at)),
         ]
     }

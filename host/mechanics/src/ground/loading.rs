@@ -135,7 +135,9 @@ impl Loading {
             };
             // Beside ground that is not there the line has the edges of both sides.
             let is_there = |(solid, _): &&(usize, usize)| self.active[mesh.solids[*solid].group];
-            let edges: Vec<(usize, usize)> = line.edges.iter().filter(is_there).copied().collect();
+            let mut edges: Vec<(usize, usize)> =
+                line.edges.iter().filter(is_there).copied().collect();
+            leave_out_touching(mesh, &mut edges);
             let own = pressure_on(analysis, mesh, &edges, value);
             force
                 .iter_mut()
@@ -351,6 +353,20 @@ fn add_cut_weights(
         }
     }
     kinematics.add_forces(&flux, force);
+}
+
+/// Leaves out edges that an interface joins to each other: what is between them is no surface, whether their faces
+/// move alike or not.
+fn leave_out_touching(mesh: &Mesh, edges: &mut Vec<(usize, usize)>) {
+    if mesh.joints.is_empty() {
+        return;
+    }
+    let own: HashSet<usize> = edges.iter().map(|&edge| mesh.edge(edge)[2]).collect();
+    let faces = mesh.joints.iter();
+    let faces = faces.map(|joint| [joint.minus[2], joint.plus[2]]);
+    let touch = faces.filter(|faces| faces.iter().all(|face| own.contains(face)));
+    let touch: HashSet<usize> = touch.flatten().collect();
+    edges.retain(|&edge| !touch.contains(&mesh.edge(edge)[2]));
 }
 
 /// Adds a force that is spread evenly over a line; on a point, evenly over its nodes.

@@ -44,31 +44,14 @@ pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
         check_group(number, group, is_undrained)?;
     }
     if let Some(water) = &problem.water {
-        let refuse = |cause| Err(Refusal::new(Item::Water(None), cause));
         if !(water.unit_weight.is_finite() && water.unit_weight > 0.0) {
             let what = "the water's `unit_weight`";
-            return refuse(Cause::OutOfBounds(
-                what,
-                water.unit_weight,
-                "a positive number",
-            ));
-        }
-        let lowest = problem
-            .mesh
-            .nodes
-            .iter()
-            .map(|[_, y]| *y)
-            .fold(f64::INFINITY, f64::min);
-        let highest = water.level.values().fold(f64::NEG_INFINITY, f64::max);
-        let later = problem
-            .phases
-            .iter()
-            .any(|phase| phase.water_level.is_some());
-        if highest < lowest && !later {
-            return refuse(Cause::WaterBelow(highest, lowest));
+            let cause = Cause::OutOfBounds(what, water.unit_weight, "a positive number");
+            return Err(Refusal::new(Item::Water(None), cause));
         }
     }
-    phases(problem, &faces)
+    phases(problem, &faces)?;
+    super::faces::check(problem)
 }
 
 /// A face of a zero-thickness element: its group, the solid beside it, its middle.
@@ -282,7 +265,7 @@ fn check_group(number: usize, group: &ElementGroup, is_undrained: bool) -> Resul
         }
         Some(InitialStress::AtRest(at_rest)) => match unlikely(&at_rest.ratio) {
             Some(cause) => refuse(Key::InitialStress, cause),
-            None if !at_rest.surcharge.is_finite() => {
+            None if at_rest.surcharge.is_some_and(|kpa| !kpa.is_finite()) => {
                 refuse(Key::InitialStress, Cause::NotFinite("`surcharge`"))
             }
             None => Ok(()),
@@ -559,9 +542,15 @@ fn pressures(
         }
         let line = constraints::line(mesh, name, &item)?;
         let middles = || line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
+        let earlier = problem.phases[..number].iter();
+        let mut earlier = earlier.flat_map(|phase| &phase.pressure);
+        let is_away = || middles().all(|middle| !there.contains_key(&middle));
+        if input.is_none() && (earlier.any(|other| other.line == name) || is_away()) {
+            continue;
+        }
         let opposite = |middle: &usize| faces.get(middle).filter(|face| there.contains_key(*face));
         if middles().any(|middle| there.contains_key(&middle) && opposite(&middle).is_some()) {
-            return refuse(Cause::OnInterface(name.to_owned()));
+            return refuse(Cause::OnInterface("pressure", name.to_owned()));
         }
         if line.edges.is_empty()
             || middles().any(|middle| there.get(&middle).is_some_and(|n| *n > 1))
@@ -602,11 +591,8 @@ fn forces(
         {
             return refuse(Cause::NotFinite("the force"));
         }
-        let middles = line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
-        if middles
-            .into_iter()
-            .any(|middle| !there.contains_key(&middle))
-        {
+        let mut middles = line.edges.iter().map(|&edge| mesh.edge(edge)[2]);
+        if !input.is_none() && middles.any(|middle| !there.contains_key(&middle)) {
             return refuse(Cause::NotThere(name.to_owned()));
         }
     }

@@ -1,18 +1,15 @@
 //! Whether supports and prescribed displacements fit together, phase by phase.
 
+use super::alike::Alike;
+use super::futile::{self, Holder};
 use super::held::{Motion, Part, loose, parts};
-use super::{
-    Analysis, Axis, Cause, Displacement, Force, Free, Item, Phase, Pressure, Problem, Refusal,
-};
+use super::{Analysis, Axis, Cause, Displacement, Free, Item, Phase, Problem, Refusal};
 use crate::assembly::Tie;
-use crate::ground::unit_pressure;
 use crate::mesh::{Line, Mesh};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 /// A node is on the axis of symmetry within this fraction of the largest radius.
 const ON_AXIS: f64 = 1e-9;
-/// A part of a load that is smaller than this fraction of it is round-off.
-const NOTHING: f64 = 1e-9;
 
 /// Follows the constraints through the phases. Refuses what contradicts itself or has no effect,
 /// and phases in which a part of the model is not held. Returns what is plausible but seldom meant.
@@ -43,7 +40,7 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
     }
     let mut warnings = Vec::new();
     // What is held in each phase.
-    let mut held: Vec<HashSet<usize>> = Vec::new();
+    let mut held: Vec<HashMap<usize, Holder>> = Vec::new();
     for (number, phase) in problem.phases.iter().enumerate() {
         if !phase.activate.is_empty() || !phase.deactivate.is_empty() {
             phase
@@ -76,29 +73,9 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
         if warnings.is_empty() {
             warnings.extend(constraints.free_axis(phase));
         }
-        held.push(constraints.held.keys().copied().collect());
+        held.push(constraints.held_in(number, &active));
     }
-    for (number, phase) in problem.phases.iter().enumerate() {
-        for (place, pressure) in phase.pressure.iter().enumerate() {
-            let again = problem.phases[number + 1..].iter().position(|later| {
-                let mut lines = later.pressure.iter();
-                lines.any(|other| other.line == pressure.line)
-            });
-            let end = again.map_or(held.len(), |later| number + 1 + later);
-            let while_it_lasts = &held[number..end];
-            let item = Item::Pressure(number, place);
-            let warning = constraints.lost_pressure(item, phase, pressure, while_it_lasts)?;
-            warnings.extend(warning);
-        }
-        for (place, force) in phase.force.iter().enumerate() {
-            let again = problem.phases[number + 1..].iter().position(|later| {
-                let mut lines = later.force.iter();
-                lines.any(|other| other.line == force.line)
-            });
-            let end = again.map_or(held.len(), |later| number + 1 + later);
-            constraints.refuse_lost_force(Item::Force(number, place), force, &held[number..end])?;
-        }
-    }
+    warnings.extend(futile::check(problem, &held)?);
     Ok(warnings)
 }
 
@@ -111,13 +88,6 @@ pub(crate) fn line<'m>(mesh: &'m Mesh, name: &str, item: &Item) -> Result<&'m Li
         };
         Refusal::new(item.clone(), cause)
     })
-}
-
-/// What holds a degree of freedom.
-#[derive(Clone, Copy, PartialEq)]
-enum Holder {
-    Support,
-    Prescribed,
 }
 
 /// A component of a line that a phase frees, though an earlier phase prescribed it.
@@ -214,82 +184,21 @@ impl<'a> Constraints<'a> {
         Ok(())
     }
 
-    /// A pressure on nodes that are held against it changes nothing but their reactions. Refuses one
-    /// that does nothing else as long as it lasts; returns how much of another is lost so.
-    fn lost_pressure(
-        &self,
-        item: Item,
-        phase: &Phase,
-        input: &Pressure,
-        held: &[HashSet<usize>],
-    ) -> Result<Option<String>, Refusal> {
-        let largest = input.value.values().fold(0.0, |a: f64, b| a.max(b.abs()));
-        if largest == 0.0 {
-            return Ok(None);
+    /// What is held in a phase: with one of some degrees of freedom that move alike all are.
+    fn held_in(&self, number: usize, active: &[bool]) -> HashMap<usize, Holder> {
+        let mut held = self.held.clone();
+        let alike = Alike::in_phase(self.problem, number, |group| active[group]);
+        for dof in &alike.still {
+            held.entry(*dof).or_insert(Holder::Support);
         }
-        let line = line(self.mesh, &input.line, &item)?;
-        let is_lost = |edge: (usize, usize)| {
-            let nodes = self.mesh.edge(edge);
-            let at = nodes.map(|node| self.mesh.nodes[node]);
-            // What the edge faces, by component: the other one of its directions.
-            let reach = |c: usize| {
-                let step = |a: usize, b: usize| (at[b][c] - at[a][c]).abs();
-                step(0, 2).max(step(2, 1))
-            };
-            let across = [reach(1), reach(0)];
-            let least = NOTHING * across[0].max(across[1]);
-            (0..2).filter(|&c| across[c] > least).all(|c| {
-                let dofs = nodes.map(|node| 2 * node + c);
-                let all = |held: &HashSet<usize>| dofs.iter().all(|dof| held.contains(dof));
-                held.iter().all(all)
-            })
-        };
-        let lost: Vec<(usize, usize)> =
-            line.edges.iter().copied().filter(|&e| is_lost(e)).collect();
-        if lost.is_empty() {
-            return Ok(None);
+        for members in alike.classes() {
+            if let Some(holder) = members.iter().find_map(|dof| held.get(dof).copied()) {
+                for dof in members {
+                    held.entry(dof).or_insert(holder);
+                }
+            }
         }
-        let name = &input.line;
-        if lost.len() == line.edges.len() {
-            return Err(Refusal::new(item, Cause::LostPressure(name.clone())));
-        }
-        let analysis = self.problem.analysis;
-        let size = |edges: &[(usize, usize)]| -> f64 {
-            let force = unit_pressure(analysis, self.mesh, edges);
-            let node = |f: &[f64]| f[0].hypot(f[1]);
-            force.chunks_exact(2).map(node).sum()
-        };
-        let (lost, all) = (size(&lost), size(&line.edges));
-        let unit = analysis.force_unit();
-        Ok(Some(format!(
-            "phase `{}`: {:.3} % of the pressure on line `{name}` ({:.4e} {unit}) has no effect but \
-             on reactions: it acts where the displacement is held or prescribed",
-            phase.name,
-            100.0 * lost / all,
-            largest * lost
-        )))
-    }
-
-    /// A force on nodes that are held against it, as long as it lasts, changes nothing but their reactions.
-    fn refuse_lost_force(
-        &self,
-        item: Item,
-        input: &Force,
-        held: &[HashSet<usize>],
-    ) -> Result<(), Refusal> {
-        let nodes = &line(self.mesh, &input.line, &item)?.nodes;
-        let parts = [input.x, input.y].into_iter().enumerate();
-        let acting = parts.filter(|(_, force)| force.is_some_and(|force| force != 0.0));
-        let acting: Vec<usize> = acting.map(|(c, _)| c).collect();
-        let is_held = |c: &usize| {
-            let all =
-                |held: &HashSet<usize>| nodes.iter().all(|node| held.contains(&(2 * node + c)));
-            held.iter().all(all)
-        };
-        if !acting.is_empty() && acting.iter().all(is_held) {
-            return Err(Refusal::new(item, Cause::LostForce(input.line.clone())));
-        }
-        Ok(())
+        held
     }
 
     /// Nodes on the axis of symmetry have nowhere to go.

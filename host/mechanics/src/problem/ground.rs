@@ -83,8 +83,9 @@ impl From<[f64; 4]> for InitialStress {
 pub struct AtRest {
     /// What σ'_h is of σ'_v.
     pub ratio: Ratio,
-    /// Added to σ'_v, kPa.
-    pub surcharge: f64,
+    /// Added to σ'_v here, and on the same vertical in all groups below that have none of their own, kPa.
+    /// `None`: what is carried down from above.
+    pub surcharge: Option<f64>,
 }
 
 /// What the horizontal effective stress at rest is of the vertical one.

@@ -30,6 +30,7 @@ pub(crate) fn warnings(
     let mut warnings = far(problem);
     warnings.extend(light(problem));
     warnings.extend(lost(problem));
+    warnings.extend(super::bared::warnings(problem));
     warnings.extend(beside_undrained(problem));
     warnings.extend(water_inside(problem));
     for (number, group) in groups.iter().enumerate() {
@@ -161,12 +162,9 @@ fn light(problem: &Problem) -> Vec<String> {
     light.collect()
 }
 
-/// What is said of ground and has no effect, or loses it.
+/// What is said of ground and has no effect.
 fn lost(problem: &Problem) -> Vec<String> {
     let mut warnings = Vec::new();
-    let mut active: Vec<bool> = problem.groups.iter().map(|group| group.is_active).collect();
-    // Lines that carry a pressure or a force.
-    let mut loaded: Vec<(&'static str, &str)> = Vec::new();
     for phase in &problem.phases {
         for &number in &phase.activate {
             let group = &problem.groups[number];
@@ -178,44 +176,7 @@ fn lost(problem: &Problem) -> Vec<String> {
                     phase.name, group.name
                 ));
             }
-            active[number] = true;
         }
-        for &number in &phase.deactivate {
-            active[number] = false;
-        }
-        let pressures = phase.pressure.iter().map(|input| ("pressure", &input.line));
-        let forces = phase.force.iter().map(|input| ("force", &input.line));
-        for (kind, line) in pressures.chain(forces) {
-            if !loaded.contains(&(kind, line)) {
-                loaded.push((kind, line));
-            }
-        }
-        let there = super::check::edges_there(&problem.mesh, &active);
-        loaded.retain(|(kind, name)| {
-            let line = problem.mesh.lines.get(*name);
-            let mut edges = line.iter().flat_map(|line| &line.edges);
-            let is_lost = edges.any(|&edge| !there.contains_key(&problem.mesh.edge(edge)[2]));
-            if is_lost {
-                warnings.push(format!(
-                    "phase `{}` removes ground that the {kind} on line `{name}` acts upon: it goes with it",
-                    phase.name
-                ));
-            }
-            !is_lost
-        });
-        loaded.retain(|(kind, name)| {
-            let line = problem.mesh.lines.get(*name);
-            let mut edges = line.iter().flat_map(|line| &line.edges);
-            let of_both = |&edge: &_| there.get(&problem.mesh.edge(edge)[2]) == Some(&2);
-            let is_covered = *kind == "pressure" && edges.any(of_both);
-            if is_covered {
-                warnings.push(format!(
-                    "phase `{}` brings ground upon line `{name}`: the pressure there ends",
-                    phase.name
-                ));
-            }
-            !is_covered
-        });
     }
     for (number, group) in problem.groups.iter().enumerate() {
         let mut phases = problem.phases.iter();

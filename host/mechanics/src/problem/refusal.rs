@@ -283,8 +283,6 @@ pub enum Cause {
     CourseOfArcLength,
     /// A phase changes the water of a problem that has none.
     NoWater,
-    /// The water table lies below the mesh everywhere: its level and the mesh's lowest node, m.
-    WaterBelow(f64, f64),
     /// Earth pressure at rest that the law cannot carry.
     AtRestOutsideStrength {
         /// The group.
@@ -318,8 +316,8 @@ pub enum Cause {
     UndrainedWithoutWater(String),
     /// A rigid line along an interface would tie its two faces.
     RigidInterface(String),
-    /// A force on a line that is held against it.
-    LostForce(String),
+    /// A force on a line that is held against it, and its direction.
+    LostForce(String, &'static str),
     /// ν_u of undrained ground does not exceed ν of its law.
     NoPoreStiffness {
         /// The group.
@@ -333,8 +331,8 @@ pub enum Cause {
     OtherElements(String, Formulation),
     /// An element or a line refers to what there is not.
     OutOfRange(&'static str),
-    /// A pressure on an interface acts on one of its faces only.
-    OnInterface(String),
+    /// This (a pressure, force, displacement or support) of a line along which an interface stands: which face is meant?
+    OnInterface(&'static str, String),
     /// A part of the model is not held.
     Loose {
         /// The phase.
@@ -487,8 +485,7 @@ impl fmt::Display for Cause {
             Self::MovesAlike([x, y], [a, b]) => write!(
                 f,
                 "the node at ({x}, {y}) moves alike with others that are prescribed differently: by \
-                 {a} and {b} m in this phase; if they were apart before they became one, `reset_displacements` in \
-                 this phase counts both from here"
+                 {a} and {b} m in this phase, and not to one place; `reset_displacements` in this phase counts both from here"
             ),
             Self::TwoGroups(name) => write!(f, "two groups are called `{name}`"),
             Self::GivenTwice(what, group) => {
@@ -564,10 +561,6 @@ impl fmt::Display for Cause {
                 )
             }
             Self::NoWater => write!(f, "this phase changes the water, and there is none"),
-            Self::WaterBelow(level, lowest) => write!(
-                f,
-                "the water table, {level} m at its highest, lies below the mesh, which starts at {lowest} m"
-            ),
             Self::AtRestOutsideStrength {
                 group,
                 material,
@@ -606,10 +599,10 @@ impl fmt::Display for Cause {
                 "line `{line}`, along which zero-thickness elements stand, would be rigid on both of their \
                  faces, and nothing could slip or open there"
             ),
-            Self::LostForce(line) => write!(
+            Self::LostForce(line, axis) => write!(
                 f,
-                "the force on line `{line}` acts only where the displacement is held or prescribed: it would \
-                 change nothing but reactions"
+                "the force on line `{line}` has no effect in {axis}: its displacement there is held or prescribed as long \
+                 as it lasts"
             ),
             Self::NoPoreStiffness {
                 group,
@@ -626,10 +619,14 @@ impl fmt::Display for Cause {
                 formulation.name()
             ),
             Self::OutOfRange(what) => write!(f, "{what} refers to what there is not"),
-            Self::OnInterface(line) => write!(
+            Self::OnInterface(what, line) => write!(
                 f,
-                "a pressure on line `{line}`, along which zero-thickness elements stand, would act on \
-                 one of their faces only"
+                "a {what} on line `{line}`, along which zero-thickness elements stand, would {}",
+                match *what {
+                    "pressure" => "act on one of their faces only",
+                    "force" => "act on both of their faces, half of it on each",
+                    _ => "hold both of their faces, and nothing could slip or open there",
+                }
             ),
             Self::Loose { phase, part, axis } => {
                 write!(f, "phase `{phase}`: nothing holds ")?;
@@ -660,8 +657,8 @@ impl Cause {
     pub fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::LostPressure(_) => {
-                "leave the pressure or the displacement out; `reaction_…` of the line is what it \
-                 takes to hold it"
+                "leave the pressure or the displacement out, or give the displacement up with `free`; `reaction_…` of \
+                 the line is what it takes to hold it"
             }
             Self::FaceGone { interface, .. } => {
                 return Some(format!(
@@ -695,9 +692,13 @@ impl Cause {
                 "`unit_weight` and `saturated_unit_weight` are those of ground and water together, not under \
                  buoyancy"
             }
-            Self::LostForce(_) => {
-                "leave the force or the displacement out, or give the displacement up with [[phase.free]]"
+            Self::LostForce(line, axis) => {
+                return Some(format!(
+                    "`free = [{{ line = \"{line}\", components = [\"{axis}\"] }}]` in this phase gives the displacement up; \
+                     `reaction_{axis}` of the line is what it takes to hold it"
+                ));
             }
+            Self::OnInterface(..) => "name a line of the body that is meant, beside the interface",
             Self::TensionAtRest { .. } => {
                 "with much unloading (`ocr`, `pop`) a smaller `poisson_ratio`, or give `k_0` itself"
             }

@@ -3,9 +3,9 @@
 //! A phase may follow a course: pairs of time and factor on what it changes. Between two of them, a leg,
 //! loads are linear in the time; legs follow one another within the phase.
 
-use super::Simulation;
 use super::state::PhaseCourse;
 use super::ties::Tied;
+use super::{Simulation, Warning, Watch};
 use crate::assembly::fold;
 use crate::equilibrium::Loads;
 use crate::error::Error;
@@ -28,7 +28,11 @@ impl Simulation {
     ///
     /// # Errors
     /// Lines that move alike are prescribed to move differently.
-    pub(super) fn take_loads(&mut self, number: usize) -> Result<Vec<Prescribed>, Error> {
+    pub(super) fn take_loads(
+        &mut self,
+        number: usize,
+        watch: &mut dyn Watch,
+    ) -> Result<Vec<Prescribed>, Error> {
         self.prescribe(number);
         let own = self.prescribed.iter();
         let own = own.map(|(&dof, &end)| (dof, self.displacement[dof], end));
@@ -37,7 +41,12 @@ impl Simulation {
             ties,
             prescribed,
             led,
+            apart,
         } = self.tied_in(number, own)?;
+        if let Some((by, at)) = apart {
+            let phase = self.problem.phases[number].name.clone();
+            watch.warning(&Warning::LedTogether { phase, by, at });
+        }
         (self.tied, self.led) = (ties, led);
         Ok(prescribed)
     }

@@ -118,7 +118,7 @@ impl Simulation {
                 }
             }
         }
-        let prescribed = self.take_loads(number)?;
+        let prescribed = self.take_loads(number, watch)?;
         // The equations of the phase are set up in the room of trial states.
         self.groups.iter_mut().for_each(Group::forget_trial);
         Ok(prescribed)

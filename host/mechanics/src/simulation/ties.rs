@@ -4,13 +4,15 @@ use super::Simulation;
 use super::loads::{Prescribed, part};
 use crate::assembly::Tie;
 use crate::error::Error;
-use crate::problem::{Analysis, Cause, Item, Refusal};
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use crate::problem::alike::Alike;
+use crate::problem::{Cause, Item, Refusal};
+use std::collections::{HashMap, HashSet};
 
-/// A node is on the axis of symmetry within this fraction of the mesh's longer side.
-const ON_AXIS: f64 = 1e-9;
-/// Two prescribed increments that differ by less, as a fraction of the larger, are the same.
+/// Two prescribed displacements that differ by less, as a fraction of the larger, are the same.
 const SAME: f64 = 1e-12;
+/// Nodes that stood further apart, as a fraction of the way to the one place they are led to and of the mesh's longer
+/// side, are worth a word.
+const APART: [f64; 2] = [1e-2, 1e-6];
 
 /// What follows from what.
 pub(super) struct Tied {
@@ -19,6 +21,8 @@ pub(super) struct Tied {
     pub(super) prescribed: Vec<Prescribed>,
     /// Those that follow from them, and from which: what holds one of them holds it for all.
     pub(super) led: Vec<Tie>,
+    /// The most by which nodes stand apart that are led to one place, m, and a node where they do, if it is much.
+    pub(super) apart: Option<(f64, [f64; 2])>,
 }
 
 impl Simulation {
@@ -57,73 +61,56 @@ impl Simulation {
     }
 
     /// Ties of a phase whose own prescribed displacements these are. Where one of some displacements that
-    /// move alike is prescribed, all are.
+    /// move alike is prescribed, all are: they move by the same, or, where nodes that stand apart are prescribed to stand
+    /// at one place, to that place.
     ///
     /// # Errors
-    /// Two of them are prescribed to move differently.
+    /// Two of them are prescribed to move differently, and not to one place.
     pub(super) fn tied_in(
         &self,
         number: usize,
         mut prescribed: Vec<Prescribed>,
     ) -> Result<Tied, Error> {
-        let mut alike = Alike::default();
-        for joint in &self.problem.mesh.joints {
-            if !self.groups[joint.group].is_active {
-                for (&minus, &plus) in joint.minus.iter().zip(&joint.plus) {
-                    for c in 0..2 {
-                        alike.join(2 * minus + c, 2 * plus + c);
-                    }
-                }
-            }
-        }
-        let mut held = Vec::new();
-        for line in self.rigid_in(number) {
-            let nodes = self
-                .problem
-                .mesh
-                .lines
-                .get(line)
-                .map(|line| &line.nodes[..]);
-            let nodes = nodes.unwrap_or_default();
-            let axis = ON_AXIS * self.problem.mesh.longer_side();
-            let is_on_axis = |&node: &usize| self.problem.mesh.nodes[node][0] <= axis;
-            let reaches_axis =
-                self.problem.analysis == Analysis::Axisymmetric && nodes.iter().any(is_on_axis);
-            for pair in nodes.windows(2) {
-                alike.join(2 * pair[0], 2 * pair[1]);
-                alike.join(2 * pair[0] + 1, 2 * pair[1] + 1);
-            }
-            if reaches_axis {
-                held.extend(nodes.iter().map(|node| 2 * node));
-            }
-        }
-        let own: HashMap<usize, f64> = prescribed
+        let alike = Alike::in_phase(&self.problem, number, |group| self.groups[group].is_active);
+        let held = alike.still.clone();
+        let own: HashMap<usize, [f64; 2]> = prescribed
             .iter()
-            .map(|&(dof, start, end)| (dof, end - start))
+            .map(|&(dof, start, end)| (dof, [start, end]))
             .collect();
         let layers: HashMap<usize, [(usize, f64); 2]> =
             self.ties.iter().map(|tie| (tie.dof, tie.masters)).collect();
-        let (mut ties, mut led) = (Vec::new(), Vec::new());
+        let (mut ties, mut led, mut apart) = (Vec::new(), Vec::new(), None);
         let mut follows: HashMap<usize, usize> = HashMap::new();
         for members in alike.classes() {
             let moves = |dof: &usize| {
-                let still = held.contains(dof).then_some(0.0);
+                let still = held.contains(dof).then(|| [self.displacement[*dof]; 2]);
                 own.get(dof).copied().or(still)
             };
-            let given: Vec<f64> = members.iter().filter_map(moves).collect();
-            if let Some(&increment) = given.first() {
-                let differs = |other: &&f64| {
-                    (**other - increment).abs() > SAME * increment.abs().max(other.abs())
-                };
-                if let Some(&other) = given.iter().find(differs) {
+            let given: Vec<[f64; 2]> = members.iter().filter_map(moves).collect();
+            if let Some(&[start, end]) = given.first() {
+                let differs = |a: f64, b: f64| (a - b).abs() > SAME * a.abs().max(b.abs());
+                let increment = end - start;
+                let others = given.iter().map(|[start, end]| end - start);
+                let other = others.clone().find(|&other| differs(increment, other));
+                if let Some(other) = other {
                     let at = self.problem.mesh.nodes[members[0] / 2];
-                    let cause = Cause::MovesAlike(at, [increment, other]);
-                    return Err(Refusal::new(Item::Phase(number), cause).into());
+                    if given.iter().any(|&[_, to]| differs(end, to)) {
+                        let cause = Cause::MovesAlike(at, [increment, other]);
+                        return Err(Refusal::new(Item::Phase(number), cause).into());
+                    }
+                    let most = others.clone().fold(0.0, |most: f64, by| most.max(by.abs()));
+                    let off = others.fold(0.0, |off: f64, by| off.max((by - increment).abs()));
+                    let least = APART[1] * self.problem.mesh.longer_side();
+                    if off > least.max(APART[0] * most) && apart.is_none_or(|(by, _)| off > by) {
+                        apart = Some((off, at));
+                    }
                 }
                 let leader = members.iter().copied().find(|dof| own.contains_key(dof));
                 for &dof in members.iter().filter(|dof| !own.contains_key(dof)) {
-                    let start = self.displacement[dof];
-                    prescribed.push((dof, start, start + increment));
+                    let from = self.displacement[dof];
+                    // Where they stand apart and are led to one place, all go there.
+                    let to = other.map_or(from + increment, |_| end);
+                    prescribed.push((dof, from, to));
                     led.extend(leader.map(|leader| Tie::alike(dof, leader)));
                 }
                 continue;
@@ -157,6 +144,7 @@ impl Simulation {
             ties,
             prescribed,
             led,
+            apart,
         })
     }
 
@@ -178,8 +166,6 @@ impl Simulation {
 
     fn follow_alike(&mut self) -> Result<(), Error> {
         let mut is_known = vec![true; self.displacement.len()];
-        // Directions of rigid lines whose nodes may stand apart.
-        let mut apart: BTreeSet<(String, usize)> = BTreeSet::new();
         for number in 0..self.problem.phases.len() {
             let phase = &self.problem.phases[number];
             let factor = phase.course.last().map_or(1.0, |&[_, factor]| factor);
@@ -190,34 +176,6 @@ impl Simulation {
             }
             if phase.reset_displacements {
                 is_known.fill(true);
-                apart.clear();
-            }
-            let standing: Vec<_> = self.displacement.iter().zip(&is_known).collect();
-            for (line, c) in phase.rigid.iter().flat_map(|line| [(line, 0), (line, 1)]) {
-                let nodes = &self.problem.mesh.lines[line].nodes;
-                let mut standing = nodes.iter().map(|node| standing[2 * node + c]);
-                let first = standing.next();
-                let is_level = |is: (&f64, &bool)| *is.1 && Some(is) == first;
-                if !phase.reset_displacements && !standing.all(is_level) {
-                    apart.insert((line.clone(), c));
-                }
-            }
-            for (line, c) in &apart {
-                let nodes = &self.problem.mesh.lines[line].nodes;
-                let given = phase
-                    .displacement
-                    .iter()
-                    .filter(|given| [given.x, given.y][*c].is_some());
-                let lines = given.map(|given| &self.problem.mesh.lines[&given.line].nodes);
-                let moved: HashSet<&usize> = lines.flatten().collect();
-                if nodes.iter().filter(|node| moved.contains(node)).count() > 1 {
-                    self.warnings.push(format!(
-                        "phase `{}` leads line `{line}` to one displacement, and before that line became rigid its \
-                         nodes may have moved apart: the run ends there if they have. `reset_displacements` in this \
-                         phase counts from where they stand",
-                        phase.name
-                    ));
-                }
             }
             self.prescribe(number);
             let known = self.prescribed.iter().filter(|(dof, _)| is_known[**dof]);
@@ -242,48 +200,5 @@ impl Simulation {
             }
         }
         Ok(())
-    }
-
-    /// Lines that are rigid in a phase: those that it or an earlier one names.
-    fn rigid_in(&self, number: usize) -> impl Iterator<Item = &String> {
-        self.problem.phases[..=number]
-            .iter()
-            .flat_map(|phase| &phase.rigid)
-    }
-}
-
-/// Degrees of freedom that move alike.
-#[derive(Default)]
-struct Alike {
-    root: BTreeMap<usize, usize>,
-}
-
-impl Alike {
-    fn find(&mut self, dof: usize) -> usize {
-        let above = *self.root.entry(dof).or_insert(dof);
-        if above == dof {
-            return dof;
-        }
-        let top = self.find(above);
-        self.root.insert(dof, top);
-        top
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.find(a), self.find(b));
-        self.root.insert(a.max(b), a.min(b));
-    }
-
-    /// Those of more than one, members ascending.
-    fn classes(mut self) -> Vec<Vec<usize>> {
-        let dofs: Vec<usize> = self.root.keys().copied().collect();
-        let mut classes: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for dof in dofs {
-            classes.entry(self.find(dof)).or_default().push(dof);
-        }
-        classes
-            .into_values()
-            .filter(|members| members.len() > 1)
-            .collect()
     }
 }

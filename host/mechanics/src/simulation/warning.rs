@@ -58,6 +58,15 @@ pub enum Warning {
     CutBack(Place, Neighbour),
     /// Creep, which the settings ask for, did so.
     Crept(Place),
+    /// Nodes that stand apart move alike, and are prescribed to stand at one place.
+    LedTogether {
+        /// The phase.
+        phase: String,
+        /// How far they stand apart, m.
+        by: f64,
+        /// One of them.
+        at: [f64; 2],
+    },
     /// Motions did so in several steps of a phase.
     RelaxedOften {
         /// The phase.
@@ -196,6 +205,16 @@ impl fmt::Display for Warning {
                 tolerance,
             } => tolerated(f, place, [*residual, *force, *tolerance]),
             Self::ByForce { phase, steps, open } => by_force(f, phase, *steps, open),
+            Self::LedTogether {
+                phase,
+                by,
+                at: [x, y],
+            } => write!(
+                f,
+                "phase `{phase}`: nodes that move alike, one at ({x:.4}, {y:.4}), had moved {by:.3e} m apart before they \
+                 became one; `displacement` leads them to one place, which bends them straight; `reset_displacements` \
+                 in this phase counts from where they stand"
+            ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::Parted(phase, parted) => write!(f, "phase `{phase}`: {parted}"),
             Self::TookOver(phase, change) => write!(
