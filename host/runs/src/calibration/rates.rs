@@ -110,6 +110,7 @@ fn values(driver: &Driver, state: &State) -> Vec<f64> {
         flux: &state.flux,
         internal: &state.internal,
         iterations: 0,
+        is_written: true,
     };
     let all = drawn(driver.point(), &row).into_iter();
     all.map(|value| value.unwrap_or(f64::NAN)).collect()
