@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const REPETITIONS: usize = 200;
 
 /// Normal noise: SplitMix64, and Box and Muller.
-struct Noise(u64);
+pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
     fn unit(&mut self) -> f64 {
@@ -24,10 +24,23 @@ impl Noise {
         ((z >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let (radius, angle) = (self.unit(), self.unit());
         (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
     }
+}
+
+/// Hits of so many at this probability that only one repetition in a thousand goes beyond.
+pub(crate) fn at_most(n: usize, p: f64) -> usize {
+    let mut chance = (1.0 - p).powi(n as i32);
+    let mut sum = chance;
+    let mut hits = 0;
+    while sum < 1.0 - 1e-3 {
+        chance *= (n - hits) as f64 / (hits + 1) as f64 * p / (1.0 - p);
+        hits += 1;
+        sum += chance;
+    }
+    hits
 }
 
 /// Numbers of hits of 200 at 95 % between which all but a thousandth on either side lie.

@@ -3,7 +3,7 @@
 //! Goal        values and intervals from tests whose truth is known; words where tests do not tell
 //! Set-up      drivers of interface laws with synthetic scatter; the calibrations in `cases/`
 //! Asserts     true values inside the intervals at the nominal rate; derivatives by a law's rates; standard errors of closed
-//!             forms; no interval where nothing is determined
+//!             forms; no interval where nothing is determined; systematic errors said aloud, honest noise not
 #![allow(
     clippy::unwrap_used,
     clippy::format_push_string,
@@ -16,6 +16,7 @@ mod coverage;
 mod honest;
 mod rates;
 mod stages;
+mod systematic;
 mod words;
 
 use input::calibration::Calibration;

@@ -75,14 +75,28 @@ fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
         outcome.stdout
     );
     let runs = std::fs::read_to_string(place.path("out/runs.csv")).unwrap();
-    let expected = "index,folder,cohesion,push,state,reason\n\
-                    1,00001,2.0,0.00001,done,\n2,00002,2.0,0.00002,done,\n\
-                    3,00003,5.0,0.00001,done,\n4,00004,5.0,0.00002,done,\n\
-                    5,00005,10.0,0.00001,done,\n6,00006,10.0,0.00002,done,\n";
+    let header = "index,folder,cohesion,push,tau_max,tau_at,first,state,reason\n";
+    assert!(runs.starts_with(header), "{runs}");
+    let cells = |name: &str| column(&runs, name);
     assert_eq!(
-        runs.replace("1e-5", "0.00001").replace("2e-5", "0.00002"),
-        expected
+        cells("cohesion"),
+        ["2.0", "2.0", "5.0", "5.0", "10.0", "10.0"]
     );
+    let pushes: Vec<f64> = cells("push")
+        .iter()
+        .map(|cell| cell.parse().unwrap())
+        .collect();
+    assert_eq!(pushes, [1e-5, 2e-5, 1e-5, 2e-5, 1e-5, 2e-5]);
+    assert_eq!(cells("state"), ["done"; 6]);
+    // What counts of the results is in it, as `pilum table` has it.
+    for output in ["tau_max", "tau_at", "first"] {
+        let of_table = table(&place);
+        assert_eq!(cells(output), column(&of_table, output));
+        assert_eq!(
+            cells(output).iter().all(|cell| cell.is_empty()),
+            output == "tau_at"
+        );
+    }
     // A run of the study is the run of the case with these settings.
     let alone = [
         "run",
@@ -213,6 +227,64 @@ fn the_table_does_not_depend_on_who_carries_it_out() {
     assert!(scattered.path("out/report.html").is_file());
 }
 
+/// Chance has the same points at every call; `saltelli` has the runs for indices, which stand in `effects.csv`. With the
+/// cohesion τ = c in the end: it brings everything, the title nothing.
+#[test]
+fn saltelli_gives_indices_with_intervals() {
+    let study_of = |method: &str| {
+        format!(
+            "case = \"case.toml\"\nmethod = \"{method}\"\nruns = 8\n\
+             [[parameter]]\nname = \"cohesion\"\nkey = \"laws.joint.parameters.cohesion\"\nuniform = [2.0, 3.0]\n\
+             [[parameter]]\nname = \"title\"\nkey = \"title\"\nvalues = [\"a\", \"b\"]\n\
+             [outputs]\ntau = {{ probe = \"tau\" }}\n"
+        )
+    };
+    let place = place(&study_of("saltelli"));
+    let outcome = study(&place, &["--plan"]);
+    done(&outcome);
+    assert!(outcome.stdout.contains("32 runs"), "{}", outcome.stdout);
+    let plan = std::fs::read(place.path("out/runs.csv")).unwrap();
+    done(&study(&place, &["--plan"]));
+    assert_eq!(std::fs::read(place.path("out/runs.csv")).unwrap(), plan);
+    done(&study(&place, &[]));
+    let effects = std::fs::read_to_string(place.path("out/effects.csv")).unwrap();
+    assert_eq!(column(&effects, "parameter"), ["cohesion", "title"]);
+    let of = |name: &str| -> Vec<f64> {
+        let cells = column(&effects, name).into_iter();
+        cells.map(|cell| cell.parse().unwrap()).collect()
+    };
+    let [first, total] = ["share", "total"].map(of);
+    assert!(
+        (total[0] - 1.0).abs() < 0.5 && total[1].abs() < 1e-12,
+        "{total:?}"
+    );
+    assert!(
+        (first[0] - total[0]).abs() < 0.5 && first[1].abs() < 1e-12,
+        "{first:?}"
+    );
+    assert!(of("share_lower")[0] <= first[0] && first[0] <= of("share_upper")[0]);
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    for part in [
+        "first-order index",
+        "total index",
+        "not distinguishable from 0 (at most 0.0 %)",
+    ] {
+        assert!(report.contains(part), "{part}");
+    }
+    // Eight points without order: what does nothing is not called 0.0 %.
+    let other = self::place(&study_of("sobol"));
+    done(&study(&other, &[]));
+    let report = std::fs::read_to_string(other.path("out/report.html")).unwrap();
+    assert!(
+        report.contains("not distinguishable from 0 (at most"),
+        "{report}"
+    );
+    assert!(!report.contains(">0.0 %<"));
+    assert!(report.contains("digital shift, seed 0"));
+    let runs = std::fs::read_to_string(other.path("out/runs.csv")).unwrap();
+    assert_ne!(column(&runs, "cohesion")[0], "2.0");
+}
+
 /// What is wrong, the edit of the study that makes it so, and what the message says; `^` marks the place.
 const MISTAKES: &[(&str, &str, &str, &str)] = &[
     ("an unknown key", "title", "^titel", "unknown key `titel`"),
@@ -240,6 +312,12 @@ const MISTAKES: &[(&str, &str, &str, &str)] = &[
         "\"grid\"",
         "\"sobol\"",
         "missing key `runs`",
+    ),
+    (
+        "too many base points",
+        "method = \"grid\"",
+        "method = \"saltelli\"\nruns = ^30000",
+        "30000 base points of 4 runs each, at most 99999",
     ),
     (
         "no levels",

@@ -4,8 +4,10 @@
 
 use crate::program::{DONE, Place};
 use std::ffi::OsString;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use tests::needs;
 
 fn case(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -150,5 +152,69 @@ fn tasks_of_a_job_array_carry_out_their_runs() {
             "planned"
         };
         assert_eq!(state, expected, "{number}");
+    }
+}
+
+/// Indices of sensitivity of the chamber's study: SALib, given the outputs of `runs.csv`, finds those of `effects.csv`.
+#[test]
+fn indices_of_the_chamber_are_those_of_salib() {
+    const SALIB: &str = "salib/bin/python";
+    if !needs::is_there(SALIB) {
+        return;
+    }
+    let place = Place::new();
+    let study = std::fs::read_to_string(Path::new(&case("study_parallel")).join("saltelli.toml"));
+    let study = study.unwrap();
+    let chamber = format!("{}/chamber.toml", case("study_parallel"));
+    let runs = study.lines().find(|line| line.starts_with("runs = "));
+    let study = study.replace(runs.unwrap(), "runs = 4");
+    place.write("study.toml", study.replace("chamber.toml", &chamber));
+    let outcome = place.run(&["study", "study.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    // The column of a table whose cells have no commas.
+    let read = |name: &str| {
+        let text = std::fs::read_to_string(place.path("out").join(name)).unwrap();
+        let rows = text
+            .lines()
+            .map(|row| row.split(',').map(str::to_owned).collect());
+        let mut rows: Vec<Vec<String>> = rows.collect();
+        (rows.remove(0), rows)
+    };
+    let at = |names: &[String], name: &str| names.iter().position(|other| other == name).unwrap();
+    let ((names, runs), (of_effects, effects)) = (read("runs.csv"), read("effects.csv"));
+    assert_eq!(runs.len(), 4 * (3 + 2));
+    for output in ["q_s", "sigma_n"] {
+        let numbers = runs
+            .iter()
+            .map(|row| row[at(&names, output)].clone() + "\n");
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("interoperability/salib.py");
+        let mut command = Command::new(needs::installed(SALIB));
+        command.arg(script).args(["given", "3"]);
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let numbers: String = numbers.collect();
+        child
+            .stdin
+            .take()
+            .unwrap()
+            .write_all(numbers.as_bytes())
+            .unwrap();
+        let said = child.wait_with_output().unwrap().stdout;
+        let theirs: serde_json::Value = serde_json::from_slice(&said).unwrap();
+        for (i, parameter) in ["mu_p", "a", "E_sand"].into_iter().enumerate() {
+            let mut rows = effects.iter();
+            let row = rows
+                .find(|row| row[0] == output && row[1] == parameter)
+                .unwrap();
+            for (ours, key) in [("share", "S1"), ("total", "ST")] {
+                let found: f64 = row[at(&of_effects, ours)].parse().unwrap();
+                let expected = theirs[key][i].as_f64().unwrap();
+                let is_close = (found - expected).abs() < 1e-9;
+                assert!(is_close, "{output}, {parameter}, {key}: {found} {expected}");
+            }
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Laws in other programs, and laws of other programs here. Routes and traps: abi/interoperability.md.
 //!
-//! What needs OpenGeoSys or Kratos is passed over with a remark where they are not installed, or
+//! What needs OpenGeoSys, Kratos or SALib is passed over with a remark where they are not installed, or
 //! fails (`tests::needs`): `install.sh` beside this file installs them. What needs DOLFINx is passed over
 //! with a remark in any case: `cases/distributed/install.sh` installs it.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
@@ -10,12 +10,13 @@ mod entries;
 mod kratos;
 mod mfront;
 mod opengeosys;
+mod salib;
 mod zone;
 
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tests::needs;
+use tests::needs::{self, installed, is_there};
 
 /// The library of a law, where the test program was built.
 fn library(law: &str) -> PathBuf {
@@ -34,32 +35,16 @@ fn beside(name: &str) -> PathBuf {
 const OPENGEOSYS: &str = "opengeosys/bin/ogs";
 const KRATOS: &str = "kratos/bin/python";
 
-/// A file of an installed program.
-fn installed(name: &str) -> PathBuf {
-    let folder = env::var_os("PILUM_INTEROPERABILITY").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/interoperability"),
-        PathBuf::from,
-    );
-    folder.join(name)
-}
-
-/// Whether a program is installed; if not, a remark, or a failure where nothing may be passed over.
-#[track_caller]
-fn is_there(program: &str) -> bool {
-    let there = installed(program).is_file();
-    if !there {
-        let (name, _) = program.split_once('/').unwrap();
-        needs::missing(&format!("{name} (tests/interoperability/install.sh)"));
-    }
-    there
-}
-
 #[test]
 fn a_missing_program_is_named() {
     for (test, program) in [
         ("opengeosys::elastic_gives_our_stresses", "opengeosys"),
         ("mfront::other_behaviours_of_opengeosys_run", "opengeosys"),
         ("kratos::mohr_coulomb_gives_our_head_force", "kratos"),
+        (
+            "salib::indices_of_the_ishigami_function_are_those_of_salib",
+            "salib",
+        ),
     ] {
         let what = format!("{program} (tests/interoperability/install.sh)");
         needs::assert_named(test, &what);

@@ -2,6 +2,7 @@
 //! so and does nothing; where `PILUM_REQUIRE_ALL` or `CI` is set, as in `.ci/run`, it fails.
 
 use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Variables that forbid passing over a test.
@@ -58,6 +59,29 @@ pub fn compiler(variable: &str, default: &str) -> Option<String> {
     let name = std::env::var(variable).unwrap_or_else(|_| default.to_owned());
     output(Command::new(&name).arg("--version"))?;
     Some(name)
+}
+
+/// A file of a program that `tests/interoperability/install.sh` installs.
+pub fn installed(name: &str) -> PathBuf {
+    let folder = std::env::var_os("PILUM_INTEROPERABILITY").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/interoperability"),
+        PathBuf::from,
+    );
+    folder.join(name)
+}
+
+/// Whether such a program is there; if not it is [`missing`].
+///
+/// # Panics
+/// If nothing may be passed over.
+#[track_caller]
+pub fn is_there(program: &str) -> bool {
+    let there = installed(program).is_file();
+    if !there {
+        let name = program.split('/').next().unwrap_or(program);
+        missing(&format!("{name} (tests/interoperability/install.sh)"));
+    }
+    there
 }
 
 /// Runs one test of the present test program where no other program is found: it has to pass with a

@@ -218,11 +218,48 @@ pub struct CurveInput {
     /// A part of it that grows with the value measured.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub relative_noise: Option<Spanned<f64>>,
+    /// Slack, or a wrong zero: what every measured `x` has too much, looked for together with the parameters. Before its
+    /// start the computed curve then keeps its first value. 0 if left out.
+    #[schemars(with = "Option<ReadingInput>")]
+    pub offset_x: Option<Spanned<ReadingInput>>,
+    /// What every measured `x` is multiplied by, before the offset, looked for likewise. 1 if left out.
+    #[schemars(with = "Option<ReadingInput>")]
+    pub scale_x: Option<Spanned<ReadingInput>>,
+    /// What every measured `y` has too much, looked for likewise. 0 if left out.
+    #[schemars(with = "Option<ReadingInput>")]
+    pub offset_y: Option<Spanned<ReadingInput>>,
+    /// What every measured `y` is multiplied by, before the offset, looked for likewise. 1 if left out.
+    #[schemars(with = "Option<ReadingInput>")]
+    pub scale_y: Option<Spanned<ReadingInput>>,
     /// How much its squared residuals count. It moves the values found, and is no information: equal weights change
     /// no interval.
     #[serde(default = "weight")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub weight: Spanned<f64>,
+}
+
+/// How a curve was read, where that is looked for: between which values.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReadingInput {
+    /// Least value; above 0 of a scale.
+    pub min: f64,
+    /// Greatest value.
+    pub max: f64,
+    /// Where the search starts; no offset and no scale, or the nearest that there may be, if left out.
+    pub start: Option<f64>,
+}
+
+impl CurveInput {
+    /// What is looked for of how it was read: its key, what it is where it is left out, what is given.
+    pub fn readings(&self) -> [(&'static str, f64, Option<&Spanned<ReadingInput>>); 4] {
+        [
+            ("offset_x", 0.0, self.offset_x.as_ref()),
+            ("scale_x", 1.0, self.scale_x.as_ref()),
+            ("offset_y", 0.0, self.offset_y.as_ref()),
+            ("scale_y", 1.0, self.scale_y.as_ref()),
+        ]
+    }
 }
 
 /// Parameters that are fitted together; those of earlier stages keep what was found, those of later ones
@@ -392,6 +429,23 @@ impl Calibration {
                 return Err(self.error(noise.span(), message));
             }
         }
+        for (key, _, reading) in curve.readings() {
+            let Some(given) = reading else { continue };
+            let ReadingInput { min, max, start } = *given.get_ref();
+            let is_scale = key.starts_with("scale");
+            let message = if test.predict {
+                format!("`{key}`: nothing is looked for in a test with `predict = true`")
+            } else if !(min.is_finite() && max.is_finite() && min < max) {
+                format!("`{key}`: `min` is {min}, expected a number below `max`, {max}")
+            } else if is_scale && min <= 0.0 {
+                format!("`{key}`: `min` is {min}, expected a number above 0")
+            } else if let Some(start) = start.filter(|start| !(min..=max).contains(start)) {
+                format!("`{key}`: `start` is {start}, expected {min} to {max}")
+            } else {
+                continue;
+            };
+            return Err(self.error(given.span(), message));
+        }
         if let (Some(phase), Some(_)) = (&curve.phase, &test.driver) {
             let message = "a driver has no phases; `segment` chooses a part of its path";
             return Err(self.error(phase.span(), message));
@@ -448,6 +502,28 @@ impl Calibration {
             let mut all = file.stage.iter().flat_map(|stage| &stage.free);
             all.any(|other| other.get_ref() == name.get_ref())
         };
+        let is_read = |test: &&TestInput| {
+            let mut readings = test.curve.iter().flat_map(CurveInput::readings);
+            readings.any(|(.., reading)| reading.is_some())
+        };
+        let has_stage = |test: &TestInput| {
+            let name = test.name.get_ref();
+            let takes = |stage: &StageInput| {
+                stage.tests.is_empty() || stage.tests.iter().any(|other| other.get_ref() == name)
+            };
+            file.stage.iter().any(takes)
+        };
+        if let Some(test) = file
+            .test
+            .iter()
+            .filter(is_read)
+            .find(|test| !has_stage(test))
+        {
+            let name = test.name.get_ref();
+            let message =
+                format!("test `{name}` is in no stage, which would look for its offset or scale");
+            return Err(self.error(test.name.span(), message));
+        }
         match file.free.keys().find(|name| !is_fitted(name)) {
             None => Ok(()),
             Some(name) => {

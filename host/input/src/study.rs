@@ -42,11 +42,11 @@ pub struct StudyFile {
     pub variant: Option<Spanned<String>>,
     /// How the values of the runs are chosen.
     pub method: Method,
-    /// How many runs: of `latin_hypercube` and `sobol`.
+    /// How many runs: of `latin_hypercube` and `sobol`. Of `saltelli` how many base points, each of which is one run more
+    /// than there are parameters, and another.
     #[schemars(with = "Option<usize>", extend("minimum" = 1))]
     pub runs: Option<Spanned<usize>>,
-    /// What random numbers begin with; the same seed gives the same runs. 0 if left out; a `sobol` study
-    /// without one has the points of the sequence itself.
+    /// What random numbers begin with; the same seed gives the same runs. 0 if left out.
     #[schemars(with = "Option<u64>")]
     pub seed: Option<Spanned<u64>>,
     /// Whether each run has a report and the figures of its case; they can be written later, too.
@@ -73,8 +73,12 @@ pub enum Method {
     /// Random points: of as many equally probable parts as there are runs, each parameter has one value in
     /// each.
     LatinHypercube,
-    /// The points of Sobol', which fill the space evenly however many there are; best are 2, 4, 8, … runs.
+    /// The points of Sobol', which fill the space evenly however many there are, shifted by random digits (a digital
+    /// shift), the same for one `seed`; best are 2, 4, 8, … runs.
     Sobol,
+    /// For the indices of sensitivity: two samples of such points, and the first one with the values of one parameter
+    /// from the second, for each parameter. Best are 2, 4, 8, … base points.
+    Saltelli,
 }
 
 impl Method {
@@ -85,12 +89,13 @@ impl Method {
             Self::List => "list",
             Self::LatinHypercube => "latin_hypercube",
             Self::Sobol => "sobol",
+            Self::Saltelli => "saltelli",
         }
     }
 
     /// Whether it chooses so many points as it is asked for.
     fn is_sampled(self) -> bool {
-        matches!(self, Self::LatinHypercube | Self::Sobol)
+        matches!(self, Self::LatinHypercube | Self::Sobol | Self::Saltelli)
     }
 }
 
@@ -508,6 +513,17 @@ fn check_counts(source: &Source, file: &StudyFile) -> Result<(), Error> {
         }
         Some(runs) if !(1..=MOST_RUNS).contains(runs.get_ref()) => {
             let message = format!("`runs`: {}, expected 1 to {MOST_RUNS}", runs.get_ref());
+            return wrong(runs.span(), message);
+        }
+        Some(runs)
+            if file.method == Method::Saltelli
+                && runs.get_ref() * (file.parameters.len() + 2) > MOST_RUNS =>
+        {
+            let message = format!(
+                "`runs`: {} base points of {} runs each, at most {MOST_RUNS} runs are possible",
+                runs.get_ref(),
+                file.parameters.len() + 2
+            );
             return wrong(runs.span(), message);
         }
         None if file.method.is_sampled() => {

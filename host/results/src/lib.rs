@@ -14,6 +14,7 @@ mod points;
 pub mod pressures;
 pub mod probe;
 mod profile;
+pub mod random;
 mod record;
 mod recorder;
 pub mod report;

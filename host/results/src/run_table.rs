@@ -263,7 +263,7 @@ fn written(names: &[String], runs: &[Run]) -> Result<String, Box<dyn std::error:
 }
 
 /// A value in a cell; nothing, where there is none. A number has all its digits.
-fn shown(value: &Value) -> String {
+pub(crate) fn shown(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
         Value::String(text) => text.clone(),

@@ -1,13 +1,18 @@
-//! A study in a folder: `study.json`, what it is; `runs.csv`, its runs, a row each, made at the start;
+//! A study in a folder: `study.json`, what it is; `runs.csv`, its runs, a row each, made at the start, with what counts of
+//! their results as they come to an end; `effects.csv`, what each parameter does to that, written with the report;
 //! and in the folder of each run `run.json`, how far it has come. The folders know best: the table's
 //! column `state` follows them.
 
+mod bootstrap;
 mod effects;
 mod history;
+mod indices;
 
-pub use effects::{Effect, Level, effects};
+pub use effects::{Design, Effect, Level, effects};
 pub use history::History;
+pub use indices::{Estimate, Indices, indices};
 
+use crate::run_table::shown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,6 +26,8 @@ use text::write::replace_whole;
 pub const RECORD: &str = "study.json";
 /// Its runs.
 pub const TABLE: &str = "runs.csv";
+/// What each parameter does.
+pub const EFFECTS: &str = "effects.csv";
 /// How far a run has come, in its folder.
 const RUN: &str = "run.json";
 /// Held by whoever carries the run out, or writes the table.
@@ -40,6 +47,9 @@ pub struct Record {
     pub design: String,
     /// Whether its runs are all combinations of the parameters' values.
     pub is_grid: bool,
+    /// Whether its runs are those of base points, for [`indices`].
+    #[serde(default)]
+    pub is_saltelli: bool,
     /// Texts of study and case, and the program, as one number.
     pub texts: String,
     /// What all runs depend on: these texts and the libraries.
@@ -320,7 +330,7 @@ pub fn end_run(folder: &Path, standing: &Standing) -> Result<bool, Error> {
 }
 
 /// A row of the table of runs.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Its number, from 1.
     pub index: usize,
@@ -328,6 +338,8 @@ pub struct Row {
     pub folder: String,
     /// Values of the parameters: texts without quotes, all else as the case file has it.
     pub values: Vec<String>,
+    /// What counts of its results, by output; `None` as long as there is none.
+    pub numbers: Vec<Option<f64>>,
     /// How far it has come.
     pub standing: Standing,
 }
@@ -386,19 +398,49 @@ impl Record {
 
     fn table(&self, rows: &[Row]) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
         let mut table = csv::Writer::from_writer(Vec::new());
-        let names = self
-            .parameters
-            .iter()
-            .map(|parameter| parameter.name.as_str());
-        table.write_record(FIRST.into_iter().chain(names).chain(LAST))?;
+        table.write_record(self.columns())?;
         for row in rows {
             let index = row.index.to_string();
             let first = [index.as_str(), &row.folder].into_iter();
             let values = row.values.iter().map(String::as_str);
+            let numbers = row.numbers.iter();
+            let numbers: Vec<String> = numbers.map(|number| shown(&(*number).into())).collect();
+            let numbers = numbers.iter().map(String::as_str);
             let last = [row.standing.state.word(), &row.standing.reason];
-            table.write_record(first.chain(values).chain(last))?;
+            table.write_record(first.chain(values).chain(numbers).chain(last))?;
         }
         Ok(table.into_inner()?)
+    }
+
+    /// Names of the table's columns, each once: an output that is called as a column before it is marked.
+    fn columns(&self) -> Vec<String> {
+        let parameters = self
+            .parameters
+            .iter()
+            .map(|parameter| parameter.name.clone());
+        let mut names: Vec<String> = FIRST.iter().map(|name| (*name).to_owned()).collect();
+        names.extend(parameters);
+        for output in &self.outputs {
+            let is_taken = names.contains(&output.name) || LAST.contains(&output.name.as_str());
+            names.push(if is_taken {
+                format!("{} (output)", output.name)
+            } else {
+                output.name.clone()
+            });
+        }
+        names.extend(LAST.iter().map(|name| (*name).to_owned()));
+        names
+    }
+
+    /// Notes in a row how far its run has come, and what counts of its results as soon as it has an end.
+    pub fn note(&self, folder: &Path, row: &mut Row, standing: Standing) {
+        let history = History::read_if(standing.state.is_final(), &folder.join(&row.folder));
+        let is_done = standing.state == State::Done;
+        let outputs = self.outputs.iter();
+        row.numbers = outputs
+            .map(|output| history.counted(output, is_done))
+            .collect();
+        row.standing = standing;
     }
 
     /// Reads the table of runs, as it was written.
@@ -412,12 +454,13 @@ impl Record {
             source,
         })?;
         let mut rows = Vec::new();
-        let n = self.parameters.len();
+        let (n, m) = (self.parameters.len(), self.outputs.len());
         for record in csv::Reader::from_reader(text.as_slice()).records() {
             let record = record.map_err(|error| not_ours(&path, &error))?;
             let cells: Vec<&str> = record.iter().collect();
             let index = cells.first().and_then(|index| index.parse().ok());
-            let (Some(index), true) = (index, cells.len() == FIRST.len() + n + LAST.len()) else {
+            let (Some(index), true) = (index, cells.len() == FIRST.len() + n + m + LAST.len())
+            else {
                 let why = format!("row {} is not one of this study", rows.len() + 1);
                 return Err(not_ours(&path, &why));
             };
@@ -425,9 +468,13 @@ impl Record {
                 index,
                 folder: cells[1].to_owned(),
                 values: cells[2..2 + n].iter().map(ToString::to_string).collect(),
+                numbers: cells[2 + n..][..m]
+                    .iter()
+                    .map(|cell| cell.parse().ok())
+                    .collect(),
                 standing: Standing {
-                    state: State::of_word(cells[2 + n]),
-                    reason: cells[3 + n].to_owned(),
+                    state: State::of_word(cells[2 + n + m]),
+                    reason: cells[3 + n + m].to_owned(),
                 },
             });
         }
@@ -461,6 +508,7 @@ mod tests {
             title: "t".to_owned(),
             design: "grid".to_owned(),
             is_grid: true,
+            is_saltelli: false,
             texts: String::new(),
             identity: String::new(),
             files: BTreeMap::new(),
@@ -481,6 +529,7 @@ mod tests {
             index,
             folder: format!("{index:05}"),
             values: vec!["a, \"b\"\nc".to_owned()],
+            numbers: vec![(index == 3).then_some(0.1 + 0.2)],
             standing: Standing {
                 state,
                 reason: reason.to_owned(),
@@ -497,6 +546,18 @@ mod tests {
         ];
         record().write_table(&folder, &rows).unwrap();
         assert_eq!(record().read_table(&folder).unwrap(), rows);
+        let mut twice = record();
+        twice.outputs.push(Output::last("phi"));
+        let columns = [
+            "index",
+            "folder",
+            "phi",
+            "tau",
+            "phi (output)",
+            "state",
+            "reason",
+        ];
+        assert_eq!(twice.columns(), columns);
         std::fs::write(folder.join(TABLE), "index,folder\n1,2\n").unwrap();
         assert!(record().read_table(&folder).is_err());
         std::fs::remove_dir_all(&folder).unwrap();

@@ -22,6 +22,7 @@ mod propagation;
 mod rates;
 mod reading;
 mod statistics;
+mod systematic;
 mod words;
 
 pub use coordinates::Parameter;
@@ -31,6 +32,7 @@ pub use fitted::{Fitted, FittedCurve};
 pub use least_squares::End;
 pub use profile::{Profile, Side};
 pub use statistics::Covariance;
+pub use systematic::{Follow, Systematic};
 
 use crate::Error;
 use crate::variants::keep;
@@ -80,6 +82,8 @@ pub struct Outcome {
     pub tests: Vec<Fitted>,
     /// What is to be said of them.
     pub words: Vec<String>,
+    /// So many of these, the first, are why values and intervals are not to be believed.
+    pub warnings: usize,
     /// The set to paste.
     pub block: String,
     /// Probability with which an interval holds the true value.
@@ -341,6 +345,7 @@ fn carry_out(
     }
     let (tests, of_tests) = fitted(model, &stages, &errors, &counted, wish)?;
     // What makes all the rest worth nothing comes first.
+    let warnings = of_tests.bad.len();
     words.splice(0..0, of_tests.bad);
     words.extend(of_tests.others);
     let values = model.values(&counted);
@@ -358,6 +363,7 @@ fn carry_out(
         stages,
         tests,
         words,
+        warnings,
         block,
         confidence: wish.confidence,
         variance: wish.variance,
@@ -387,14 +393,20 @@ fn groups(calibration: &Calibration, model: &Model) -> Vec<Group> {
             let name = &model.tests[test].name;
             stage.tests.is_empty() || stage.tests.iter().any(|other| other.get_ref() == name)
         };
+        let tests: Vec<usize> = fitted().filter(has).collect();
+        // How a curve was read is looked for wherever its test is.
+        let is_of_stage = |p: &Parameter| match p.of_curve {
+            Some((test, _)) => tests.contains(&test),
+            None => is_in(&p.name),
+        };
         let parameters = model.parameters.iter().enumerate();
         Group {
             name: stage.name.get_ref().clone(),
             parameters: parameters
-                .filter(|(_, p)| is_in(&p.name))
+                .filter(|(_, p)| is_of_stage(p))
                 .map(|(i, _)| i)
                 .collect(),
-            tests: fitted().filter(has).collect(),
+            tests,
         }
     };
     stages.iter().map(named).collect()

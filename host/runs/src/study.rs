@@ -20,7 +20,7 @@ use input::{Case, Study};
 use law::{Opener, hexadecimal_sha256};
 use mechanics::Simulation;
 use results::study::{
-    ParameterRecord, Record, Row, State, forget_run, identity_of_run, is_study, standing,
+    ParameterRecord, Record, Row, Standing, State, forget_run, identity_of_run, is_study, standing,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -66,12 +66,18 @@ impl Plan {
 
     /// What should be known of the plan before it is carried out.
     pub fn warnings(&self) -> Vec<String> {
-        let n = self.rows.len();
-        let is_even = self.study.file.method != Method::Sobol || n.is_power_of_two();
+        let (n, what) = match self.study.file.method {
+            Method::Sobol => (self.rows.len(), "runs"),
+            Method::Saltelli => {
+                let of_each = self.study.parameters.len() + 2;
+                (self.rows.len() / of_each, "base points (`runs`)")
+            }
+            _ => (1, ""),
+        };
         let below = n.next_power_of_two() / 2;
-        let warning = (!is_even).then(|| {
+        let warning = (!n.is_power_of_two()).then(|| {
             format!(
-                "the points of Sobol' are even for 2, 4, 8, … runs: rather {below} or {} than {n}",
+                "the points of Sobol' are even for 2, 4, 8, … {what}: rather {below} or {} than {n}",
                 2 * below
             )
         });
@@ -178,6 +184,7 @@ impl Plan {
             title,
             design: self.design(),
             is_grid: self.study.file.method == Method::Grid,
+            is_saltelli: self.study.file.method == Method::Saltelli,
             texts,
             identity: hexadecimal_sha256(identity.as_bytes()),
             files,
@@ -192,11 +199,15 @@ impl Plan {
             Method::Grid => "grid",
             Method::List => "list",
             Method::LatinHypercube => "Latin hypercube",
-            Method::Sobol => "points of Sobol'",
+            Method::Sobol => "points of Sobol', digital shift",
+            Method::Saltelli => "Saltelli's design on points of Sobol', digital shift",
         };
-        match &self.study.file.seed {
-            Some(seed) => format!("{method}, seed {}", seed.get_ref()),
-            None => method.to_owned(),
+        match (&self.study.file.seed, self.study.file.method) {
+            (None, Method::Grid | Method::List) => method.to_owned(),
+            (seed, _) => {
+                let seed = seed.as_ref().map_or(0, |seed| *seed.get_ref());
+                format!("{method}, seed {seed}")
+            }
         }
     }
 
@@ -228,21 +239,26 @@ impl Plan {
     }
 
     fn write(&self, record: &Record) -> Result<Vec<Row>, Error> {
-        let rows: Vec<Row> = (1..=self.rows.len()).map(|index| self.row(index)).collect();
+        let rows = (1..=self.rows.len()).map(|index| self.row(record, index));
+        let rows: Vec<Row> = rows.collect();
         record.write(&self.folder)?;
         record.write_table(&self.folder, &rows)?;
         Ok(rows)
     }
 
     /// The row of a run in the table, as its folder has it.
-    fn row(&self, index: usize) -> Row {
+    fn row(&self, record: &Record, index: usize) -> Row {
         let folder = folder_of_run(index);
-        Row {
+        let mut row = Row {
             index,
             values: self.rows[index - 1].iter().map(shown).collect(),
-            standing: standing(&self.folder.join(&folder)),
+            numbers: Vec::new(),
+            standing: Standing::plain(State::Planned),
             folder,
-        }
+        };
+        let standing = standing(&self.folder.join(&row.folder));
+        record.note(&self.folder, &mut row, standing);
+        row
     }
 
     /// Refuses a folder that holds another run than this one.

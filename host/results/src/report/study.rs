@@ -6,12 +6,16 @@ use super::budget::Budget;
 use super::page::{STYLE, running};
 use super::results::Run;
 use super::short::{Short, display, thinned};
-use crate::study::{Effect, History, Output, ParameterRecord, Record, Row, State, Take, effects};
+use crate::run_table::shown;
+use crate::study::{
+    Design, EFFECTS, Effect, History, Output, ParameterRecord, Record, Row, State, Take, effects,
+};
 use indexmap::{IndexMap, IndexSet};
 use minijinja::{Environment, Value as Template, context};
 use serde::Serialize;
 use std::path::Path;
 use text::Error;
+use text::write::replace_whole;
 
 const TEMPLATE: &str = include_str!("study.html");
 const SCRIPT: &str = include_str!("script/study.js");
@@ -68,7 +72,7 @@ struct Curve {
 }
 
 /// The text of the page of the study in a folder; while it is carried out with the present time, in seconds
-/// since 1970.
+/// since 1970. Its effects go into their table.
 pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
     let internal = |why: String| Error::Internal(format!("report: {why}"));
     let record = Record::read(folder)?;
@@ -98,12 +102,20 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
         .map(|(number, parameter)| varied(number, parameter, &rows))
         .collect();
     let columns: Vec<Vec<f64>> = parameters.iter().map(|p| p.numbers.clone()).collect();
+    let design = match (record.is_grid, record.is_saltelli) {
+        (true, _) => Design::Grid,
+        (_, true) => Design::Saltelli,
+        _ => Design::Other,
+    };
     let of_output = |(output, numbers): (&'_ Output, &Vec<Option<f64>>)| {
-        let found = effects(&columns, numbers, record.is_grid);
+        let found = effects(&columns, numbers, design);
         (output.name.clone(), found)
     };
     let found: IndexMap<String, Vec<Effect>> =
         record.outputs.iter().zip(&numbers).map(of_output).collect();
+    let table = effects_table(&record, &found);
+    let table = table.map_err(|error| internal(error.to_string()))?;
+    replace_whole(&folder.join(EFFECTS), table)?;
     let units = units(folder, &rows);
     let (history, left_out) = curves(&histories);
     let first = record.outputs.first();
@@ -132,7 +144,14 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
         parameters,
     };
     let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
-    let page = page(&record, &rows, &numbers, &drawn, (left_out, now), &data);
+    let page = page(
+        (&record, design),
+        &rows,
+        &numbers,
+        &drawn,
+        (left_out, now),
+        &data,
+    );
     let mut environment = Environment::new();
     environment
         .add_template("report.html", TEMPLATE)
@@ -163,6 +182,47 @@ fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
     units
         .map(|(name, unit)| (name.to_owned(), unit.to_owned()))
         .collect()
+}
+
+/// `effects.csv`: what each parameter does to each output.
+fn effects_table(
+    record: &Record,
+    found: &IndexMap<String, Vec<Effect>>,
+) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record([
+        "output",
+        "parameter",
+        "mean_at_lowest",
+        "mean_at_highest",
+        "share",
+        "share_lower",
+        "share_upper",
+        "total",
+        "total_lower",
+        "total_upper",
+    ])?;
+    for (output, effects) in found {
+        for effect in effects {
+            let mean = |level: Option<&crate::study::Level>| level.map(|level| level.mean);
+            let total = effect.total;
+            let intervals = [effect.interval, total.and_then(|total| total.interval)];
+            let [of_share, of_total] = intervals.map(|interval| match interval {
+                Some([low, high]) => [Some(low), Some(high)],
+                None => [None; 2],
+            });
+            let ends = [effect.levels.first(), effect.levels.last()];
+            let mut numbers: Vec<Option<f64>> = ends.into_iter().map(mean).collect();
+            numbers.push(effect.share);
+            numbers.extend(of_share);
+            numbers.push(total.map(|total| total.value));
+            numbers.extend(of_total);
+            let cells = numbers.into_iter().map(|number| shown(&number.into()));
+            let names = [output, &record.parameters[effect.parameter].name];
+            table.write_record(names.into_iter().cloned().chain(cells))?;
+        }
+    }
+    Ok(table.into_inner()?)
 }
 
 fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
@@ -245,7 +305,7 @@ fn curves(histories: &[History]) -> (Curves, Option<usize>) {
 }
 
 fn page(
-    record: &Record,
+    (record, design): (&Record, Design),
     rows: &[Row],
     numbers: &[Vec<Option<f64>>],
     drawn: &Drawn<'_>,
@@ -262,7 +322,7 @@ fn page(
         .zip(&drawn.outputs)
         .zip(numbers)
         .map(|((output, counted), numbers)| {
-            output_context(output, counted, (numbers, record.is_grid), drawn)
+            output_context(output, counted, (numbers, design), drawn)
         })
         .collect();
     let row = |(number, row): (usize, &Row)| {
@@ -288,6 +348,7 @@ fn page(
         title => record.title.clone(),
         design => record.design.clone(),
         program => record.program.clone(),
+        is_saltelli => design == Design::Saltelli,
         n_runs => rows.len(),
         done => rows.iter().filter(|row| row.standing.state == State::Done).count(),
         n_failed => failed().count(),
@@ -325,7 +386,7 @@ fn unfinished(rows: &[Row]) -> Vec<String> {
 fn output_context(
     output: &Output,
     counted: &Counted<'_>,
-    (numbers, is_grid): (&[Option<f64>], bool),
+    (numbers, design): (&[Option<f64>], Design),
     drawn: &Drawn<'_>,
 ) -> Template {
     let known: Vec<f64> = numbers.iter().copied().flatten().collect();
@@ -357,7 +418,8 @@ fn output_context(
                 low => mean(effect.levels.first()),
                 high => mean(effect.levels.last()),
                 range => display(effect.range()),
-                share => effect.share.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share)),
+                share => in_percent(effect.share, effect.interval),
+                total => in_percent(effect.total.map(|total| total.value), effect.total.and_then(|total| total.interval)),
             }
         })
         .collect();
@@ -367,15 +429,52 @@ fn output_context(
         words => in_words(output),
         range,
         effects,
-        levels => levels(is_grid, numbers),
+        levels => levels(design, numbers, drawn.parameters.len()),
+    }
+}
+
+/// A share with its interval. One whose interval holds 0 is not told from none.
+fn in_percent(share: Option<f64>, interval: Option<[f64; 2]>) -> String {
+    let percent = |share: f64| format!("{:.1}", 100.0 * share);
+    match (share, interval) {
+        (None, _) => "–".to_owned(),
+        (Some(share), None) => format!("{} %", percent(share)),
+        (Some(_), Some([low, high])) if low <= 0.0 => {
+            format!(
+                "not distinguishable from 0 (at most {} %)",
+                percent(high.max(0.0))
+            )
+        }
+        (Some(share), Some([low, high])) => {
+            format!(
+                "{} % ({} to {})",
+                percent(share),
+                percent(low),
+                percent(high)
+            )
+        }
     }
 }
 
 /// What is behind the shares of an output.
-fn levels(is_grid: bool, numbers: &[Option<f64>]) -> String {
+fn levels(design: Design, numbers: &[Option<f64>], parameters: usize) -> String {
     let of_scatter = "Kelley's ε², which counts what a parameter does alone and takes off what the scatter of the runs makes \
-                      up by chance.";
-    if !is_grid {
+                      up by chance, with its interval of 95 % (bootstrap).";
+    if design == Design::Saltelli {
+        let bases = numbers.chunks(parameters + 2);
+        let (n, holes) = bases.fold((0, 0), |(n, holes), base| {
+            (n + 1, holes + usize::from(base.iter().any(Option::is_none)))
+        });
+        let left_out = match holes {
+            0 => String::new(),
+            _ => format!("; {holes} are left out, for a run without a number that counts"),
+        };
+        return format!(
+            "First-order index: the share that a parameter brings alone (Saltelli 2010). Total index: alone and with others \
+             (Jansen 1999). Both with intervals of 95 % by drawing from the {n} base points (bootstrap){left_out}."
+        );
+    }
+    if design == Design::Other {
         return format!(
             "The values of a parameter that has more than twelve are divided into levels of as many runs each; the share is \
              {of_scatter}"

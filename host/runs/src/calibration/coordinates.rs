@@ -1,8 +1,9 @@
 //! Parameters as the search counts them: by their logarithm or in widths of their range, so that units do
 //! not matter.
 
-use crate::sampling::{Random, stratified};
+use crate::sampling::stratified;
 use input::calibration::Scale;
+use results::random::Random;
 
 /// A parameter that is looked for.
 #[derive(Clone, Debug)]
@@ -25,6 +26,8 @@ pub struct Parameter {
     pub range: [f64; 2],
     /// How it is counted.
     pub scale: Scale,
+    /// It is no law's, but says how a curve was read: numbers of test and curve.
+    pub of_curve: Option<(usize, usize)>,
 }
 
 impl Parameter {
@@ -95,6 +98,7 @@ mod tests {
             bounds: [1e-3, 1e6],
             range: [1.0, 101.0],
             scale,
+            of_curve: None,
         }
     }
 

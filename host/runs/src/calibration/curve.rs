@@ -25,8 +25,12 @@ pub struct Curve {
     pub points: Vec<(f64, f64)>,
     /// Standard deviation of each point, as told.
     pub deviations: Vec<f64>,
+    /// Whether the file says so, or these are the usual ones.
+    pub is_noise_given: bool,
     /// How often squared residuals count, of the curve and its test.
     pub weight: f64,
+    /// Parameters, by number, that say how it was read: offset and scale of x, offset and scale of y.
+    pub(super) readings: [Option<usize>; 4],
 }
 
 /// Why a curve has no value at a measured point.
@@ -104,17 +108,48 @@ impl Curve {
         }
     }
 
-    /// The computed points in order.
+    /// How it is read with these values of all parameters: offset and scale of x, offset and scale of y.
+    fn reading(&self, values: &[f64]) -> [f64; 4] {
+        let of = |place: usize, none: f64| self.readings[place].map_or(none, |p| values[p]);
+        [of(0, 0.0), of(1, 1.0), of(2, 0.0), of(3, 1.0)]
+    }
+
+    /// The computed points in order, as they would be measured: times the scale, plus the offset, where these are looked
+    /// for.
     ///
     /// # Errors
     /// They cannot be read off.
-    pub(super) fn line(&self, rows: &Rows) -> Result<Vec<(f64, f64)>, Gap> {
+    pub(super) fn line(&self, rows: &Rows, values: &[f64]) -> Result<Vec<(f64, f64)>, Gap> {
         let (places, [x, y]) = self.places(rows)?;
+        let [offset_x, scale_x, offset_y, scale_y] = self.reading(values);
+        let is_read = self.readings.iter().any(Option::is_some);
         let at = |&(stretch, row): &(usize, usize)| {
-            let values = &rows.stretches[stretch][row];
-            (values[x], values[y])
+            let computed = &rows.stretches[stretch][row];
+            if is_read {
+                (
+                    offset_x + scale_x * computed[x],
+                    offset_y + scale_y * computed[y],
+                )
+            } else {
+                (computed[x], computed[y])
+            }
         };
         Ok(places.iter().map(at).collect())
+    }
+
+    /// Whether a measured point lies before the first computed one, where a slack or a wrong zero is looked for: nothing
+    /// has moved there yet.
+    fn is_before(&self, line: &[(f64, f64)], x: f64) -> bool {
+        let rises = line[1].0 > line[0].0;
+        self.readings[0].is_some() && if rises { x < line[0].0 } else { x > line[0].0 }
+    }
+
+    /// Where a measured point lies among the computed ones.
+    pub(super) fn spot(&self, line: &[(f64, f64)], x: f64) -> Option<Spot> {
+        let first = self
+            .is_before(line, x)
+            .then_some(Spot { row: 0, part: 0.0 });
+        first.or_else(|| spot(line, x))
     }
 
     /// Derivatives of the computed values at the measured points where those of the rows are known.
@@ -125,21 +160,28 @@ impl Curve {
         &self,
         rows: &Rows,
         of_rows: &[Vec<Vec<f64>>],
+        values: &[f64],
     ) -> Result<Vec<f64>, Gap> {
         let (places, [x, y]) = self.places(rows)?;
-        let line = self.line(rows)?;
-        let derivative = |spot: Spot| {
+        let line = self.line(rows, values)?;
+        let [_, scale_x, _, scale_y] = self.reading(values);
+        let derivative = |(spot, (at, _)): (Spot, &(f64, f64))| {
             let rate = |number: usize, column: usize| {
                 let (stretch, row) = places[spot.row + number];
-                of_rows[stretch][row][column]
+                let scale = if column == x { scale_x } else { scale_y };
+                scale * of_rows[stretch][row][column]
             };
+            if self.is_before(&line, *at) {
+                return rate(0, y);
+            }
             let (a, b) = (line[spot.row], line[spot.row + 1]);
             // The measured x stays, the rows beside it move.
             let moved = rate(0, x) + spot.part * (rate(1, x) - rate(0, x));
             let part = -moved / (b.0 - a.0);
             rate(0, y) + spot.part * (rate(1, y) - rate(0, y)) + part * (b.1 - a.1)
         };
-        Ok(self.spots(&line)?.into_iter().map(derivative).collect())
+        let spots = self.spots(&line)?.into_iter();
+        Ok(spots.zip(&self.points).map(derivative).collect())
     }
 
     /// Where the measured points lie among computed ones.
@@ -147,7 +189,7 @@ impl Curve {
     /// # Errors
     /// [`Gap::Outside`].
     pub(super) fn spots(&self, line: &[(f64, f64)]) -> Result<Vec<Spot>, Gap> {
-        let all = self.points.iter().map(|(x, _)| spot(line, *x));
+        let all = self.points.iter().map(|(x, _)| self.spot(line, *x));
         let all: Option<Vec<Spot>> = all.collect();
         all.ok_or_else(|| Gap::Outside(extent(line)))
     }
@@ -156,8 +198,8 @@ impl Curve {
     ///
     /// # Errors
     /// There are none.
-    pub(super) fn computed(&self, rows: &Rows) -> Result<Vec<f64>, Gap> {
-        let line = self.line(rows)?;
+    pub(super) fn computed(&self, rows: &Rows, values: &[f64]) -> Result<Vec<f64>, Gap> {
+        let line = self.line(rows, values)?;
         let spots = self.spots(&line)?;
         Ok(spots
             .iter()
@@ -195,7 +237,7 @@ impl Spot {
 }
 
 /// Where `x` lies on a line whose x only grows or only falls.
-pub(super) fn spot(line: &[(f64, f64)], x: f64) -> Option<Spot> {
+fn spot(line: &[(f64, f64)], x: f64) -> Option<Spot> {
     let rises = line[1].0 > line[0].0;
     let is_before = |point: &(f64, f64)| if rises { point.0 < x } else { point.0 > x };
     let next = line.partition_point(is_before);
@@ -239,6 +281,8 @@ mod tests {
             points: points.to_vec(),
             deviations: vec![0.5; points.len()],
             weight: 4.0,
+            is_noise_given: true,
+            readings: [None; 4],
         }
     }
 
@@ -263,13 +307,13 @@ mod tests {
             (2.0, 21.0),
             (3.0, 30.0),
         ]);
-        let computed = curve.computed(&there).unwrap();
+        let computed = curve.computed(&there, &[]).unwrap();
         assert_eq!(computed, [0.0, 2.5, 10.0, 20.0, 30.0]);
         // (computed − measured)/0.5, times the root of the weight.
         assert_eq!(curve.residuals(&computed), [0.0, 2.0, 4.0, -4.0, 0.0]);
         let falling = rows(&[&[(0.0, 0.0), (-2.0, 4.0)]]);
         let falling_curve = super::tests::curve(&[(-0.5, 0.0)]);
-        assert_eq!(falling_curve.computed(&falling).unwrap(), [1.0]);
+        assert_eq!(falling_curve.computed(&falling, &[]).unwrap(), [1.0]);
     }
 
     #[test]
@@ -287,11 +331,11 @@ mod tests {
                 .map(f64::from)
                 .map(|k| vec![by_p * k, by_q * k * k])
                 .collect()];
-            let found = curve.derivatives(&of(1.0, 10.0), &of_rows).unwrap();
+            let found = curve.derivatives(&of(1.0, 10.0), &of_rows, &[]).unwrap();
             let found = curve.weighed(&found);
             let side = |sign: f64| {
                 let there = of(1.0 + sign * step * by_p, 10.0 + sign * step * by_q);
-                curve.residuals(&curve.computed(&there).unwrap())
+                curve.residuals(&curve.computed(&there, &[]).unwrap())
             };
             for ((found, above), below) in found.iter().zip(side(1.0)).zip(side(-1.0)) {
                 assert!((found - (above - below) / (2.0 * step)).abs() < 1e-6);
@@ -304,14 +348,17 @@ mod tests {
         let turning = rows(&[&[(0.0, 0.0), (1.0, 1.0)], &[(1.0, 1.0), (0.5, 0.0)]]);
         let mut one = curve(&[(0.5, 0.5)]);
         assert_eq!(
-            one.computed(&turning),
+            one.computed(&turning, &[]),
             Err(Gap::TurnsBack { row: 1, at: 1.0 })
         );
         one.stretch = Some(1);
-        assert_eq!(one.computed(&turning).unwrap(), [0.0]);
+        assert_eq!(one.computed(&turning, &[]).unwrap(), [0.0]);
         one.points[0].0 = 1.5;
-        assert_eq!(one.computed(&turning), Err(Gap::Outside([0.5, 1.0])));
+        assert_eq!(one.computed(&turning, &[]), Err(Gap::Outside([0.5, 1.0])));
         one.y = "v".to_owned();
-        assert_eq!(one.computed(&turning), Err(Gap::NoColumn("v".to_owned())));
+        assert_eq!(
+            one.computed(&turning, &[]),
+            Err(Gap::NoColumn("v".to_owned()))
+        );
     }
 }

@@ -163,7 +163,7 @@ impl Model {
             {
                 column.clear();
                 for curve in &self.tests[test].curves {
-                    let Ok(derivatives) = curve.derivatives(&rows, &of_rows) else {
+                    let Ok(derivatives) = curve.derivatives(&rows, &of_rows, &values) else {
                         return None;
                     };
                     column.extend(derivatives);

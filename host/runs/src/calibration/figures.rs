@@ -157,7 +157,11 @@ fn profile(outcome: &Outcome, parameter: usize, name: &str) -> Option<Figures> {
         name: name.to_owned(),
         title: Some(format!("{}: growth of the sum of squares", p.name)),
         x: "x".to_owned(),
-        x_label: Some(format!("{} ({})", p.name, p.unit)),
+        x_label: Some(if p.unit.is_empty() {
+            p.name.clone()
+        } else {
+            format!("{} ({})", p.name, p.unit)
+        }),
         y: columns[1..].to_vec(),
         y_label: Some("growth / variance".to_owned()),
         ..Figure::default()

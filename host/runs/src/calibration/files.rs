@@ -164,8 +164,13 @@ impl Outcome {
             }
         }
         text.push('\n');
-        for word in &self.words {
-            let _ = write!(text, "\nnote: {word}");
+        for (number, word) in self.words.iter().enumerate() {
+            let kind = if number < self.warnings {
+                "warning"
+            } else {
+                "note"
+            };
+            let _ = write!(text, "\n{kind}: {word}");
         }
         if !self.words.is_empty() {
             text.push('\n');
@@ -262,7 +267,8 @@ fn correlations(outcome: &Outcome) -> String {
 
 fn fit(outcome: &Outcome) -> String {
     let mut text =
-        "test,predicted,x_column,y_column,x,measured,computed,noise,deviation\n".to_owned();
+        "test,predicted,x_column,y_column,x,measured,computed,noise,deviation,beyond_noise\n"
+            .to_owned();
     for test in &outcome.tests {
         for fitted in &test.curves {
             let Curve {
@@ -274,9 +280,10 @@ fn fit(outcome: &Outcome) -> String {
             } = &fitted.curve;
             for (i, (at, measured)) in points.iter().enumerate() {
                 let values = [*at, *measured, fitted.computed[i], deviations[i]];
+                let is_far = fitted.systematic.far.iter().any(|(point, _)| *point == i);
                 let _ = writeln!(
                     text,
-                    "{},{},{x},{y},{},{}",
+                    "{},{},{x},{y},{},{},{is_far}",
                     cell(&test.name),
                     test.is_predicted,
                     values.map(number).join(","),
@@ -413,6 +420,13 @@ fn summary(outcome: &Outcome, calibration: &Calibration) -> Value {
                 "rms_over_noise": fitted.relative,
                 "explained": fitted.explained,
                 "correlation_of_neighbours": fitted.neighbours,
+                "residuals_follow_each_other": !fitted.systematic.follow.is_empty(),
+                "beyond_noise": fitted.systematic.far.iter().map(|&(point, times)| json!({
+                    "x": fitted.curve.points[point].0,
+                    "measured": fitted.curve.points[point].1,
+                    "computed": fitted.computed[point],
+                    "times": times,
+                })).collect::<Vec<_>>(),
                 "inside_interval_of_prediction": fitted.inside,
             })).collect::<Vec<_>>(),
         })
@@ -429,7 +443,8 @@ fn summary(outcome: &Outcome, calibration: &Calibration) -> Value {
         "parameters": parameters.collect::<Vec<_>>(),
         "stages": stages.collect::<Vec<_>>(),
         "tests": tests.collect::<Vec<_>>(),
-        "notes": outcome.words,
+        "warnings": outcome.words[..outcome.warnings],
+        "notes": outcome.words[outcome.warnings..],
         "block": outcome.block,
         "computations": outcome.computations,
     })

@@ -190,8 +190,11 @@ impl Problem for Search<'_> {
                     continue;
                 }
                 let derivative = match &by_law {
-                    Some(columns) => Some(columns[column].clone()),
-                    None => self.derivative(test, parameter)?,
+                    // A law's rates say nothing of how a curve was read.
+                    Some(columns) if self.model.parameters[parameter].of_curve.is_none() => {
+                        Some(columns[column].clone())
+                    }
+                    _ => self.derivative(test, parameter)?,
                 };
                 let Some(derivative) = derivative else {
                     return Ok(None);

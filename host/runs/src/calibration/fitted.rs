@@ -7,6 +7,7 @@ use super::model::{Model, Test};
 use super::profile::Side;
 use super::propagation::{Errors, Known};
 use super::statistics::{of_neighbours, two_sided};
+use super::systematic::{Limits, Systematic};
 use crate::Error;
 use input::calibration::Variance;
 
@@ -42,6 +43,8 @@ pub struct FittedCurve {
     pub relative: f64,
     /// Correlation of neighbouring residuals.
     pub neighbours: f64,
+    /// How its residuals are no noise; nothing of a curve that is predicted.
+    pub systematic: Systematic,
     /// R², the part of what measured values vary by that computed ones explain; `None` where they do not vary.
     pub explained: Option<f64>,
     /// Part of the measured points inside their interval of prediction, of those that have one.
@@ -51,7 +54,7 @@ pub struct FittedCurve {
 /// What is to be said of the tests.
 #[derive(Debug, Default)]
 pub(super) struct Said {
-    /// Fits that are none.
+    /// Fits that are none, and residuals that are no noise.
     pub(super) bad: Vec<String>,
     /// All else.
     pub(super) others: Vec<String>,
@@ -64,9 +67,6 @@ struct Scatter {
     quantile: f64,
 }
 
-/// Neighbouring residuals that go together more than this, on a curve of so many points.
-const FOLLOW: f64 = 0.5;
-const ENOUGH: usize = 10;
 /// Part of a prediction's deviation from which on a parameter without a limit is named.
 const COUNTS: f64 = 0.1;
 /// A prediction depends on what is not determined if it changes by more than this part of its noise
@@ -88,6 +88,8 @@ pub(super) fn fitted(
 ) -> Result<(Vec<Fitted>, Said), Error> {
     let scatter = scatter(model, errors, counted, wish)?;
     let of = errors.of_parameters();
+    let fitted = model.tests.iter().filter(|test| !test.is_predicted);
+    let limits = Limits::of(fitted.flat_map(|test| &test.curves));
     let mut said = Said::default();
     let mut all = Vec::new();
     for number in 0..model.tests.len() {
@@ -122,20 +124,23 @@ pub(super) fn fitted(
         ));
         said.others
             .extend(on_a_bound(model, test, (&held, &by_held), &deviations));
+        let values_found = model.values(counted);
         let values = test.of_curves(&computed).zip(test.of_curves(&deviations));
         let mut curves = Vec::new();
         for (place, ((curve, computed), (_, deviations))) in values.enumerate() {
-            let line = curve.line(&rows).map_err(|_| {
+            let line = curve.line(&rows, &values_found).map_err(|_| {
                 Error::internal(format!("a curve of test `{}` that is none", test.name))
             })?;
-            let fitted = curve_of(curve, computed, line, deviations, scatter);
+            let mut fitted = curve_of(curve, computed, line, deviations, scatter);
             if !test.is_predicted {
                 if misfit::is_bad(curve, computed) {
                     let at_start = &test.at_start[place];
                     said.bad
                         .push(misfit::in_words(&test.name, curve, computed, at_start));
                 }
-                said.others.extend(followed(&test.name, &fitted));
+                fitted.systematic = Systematic::of(curve, computed, limits);
+                said.bad
+                    .extend(fitted.systematic.in_words(&test.name, &fitted));
             }
             curves.push(fitted);
         }
@@ -203,6 +208,7 @@ fn curve_of(
         rms: root_mean_square(&mut differences()),
         relative: root_mean_square(&mut residuals.iter().map(|r| r / factor)),
         neighbours: of_neighbours(&residuals),
+        systematic: Systematic::default(),
         explained: misfit::explained(curve, computed),
         inside: (!with_interval.is_empty()).then(|| inside as f64 / with_interval.len() as f64),
         curve: curve.clone(),
@@ -354,23 +360,6 @@ fn on_a_bound(
              value that is known, and may be too narrow",
             test.name,
             names.join(" and ")
-        )
-    })
-}
-
-/// A curve whose residuals are no noise.
-fn followed(test: &str, fitted: &FittedCurve) -> Option<String> {
-    let rho = fitted.neighbours;
-    // So small a residual is the last digit of a measured value.
-    let is_exact = fitted.relative < 1e-3;
-    let is_noise = rho <= FOLLOW || fitted.curve.points.len() < ENOUGH || is_exact;
-    (!is_noise).then(|| {
-        let factor = ((1.0 + rho) / (1.0 - rho).max(1e-3)).sqrt();
-        format!(
-            "{test}, {}: residuals follow each other (correlation of neighbours {rho:.2}): that is no noise but what \
-             the law does not follow, or points that were measured too densely; the intervals are too narrow, \
-             by a factor of about {factor:.1} as far as this curve counts",
-            fitted.curve.y
         )
     })
 }

@@ -98,6 +98,8 @@ mod tests {
             points: y.iter().enumerate().map(|(i, y)| (i as f64, *y)).collect(),
             deviations: vec![noise; y.len()],
             weight: 1.0,
+            is_noise_given: true,
+            readings: [None; 4],
         }
     }
 

@@ -10,6 +10,7 @@ use input::material::{ParameterValue, set_parameters};
 use input::{Case, Driver, Kind};
 use law::{Stop, hexadecimal_sha256};
 use results::point_figure::{drawable, drawn};
+use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -28,7 +29,13 @@ pub(super) struct Model {
     /// Points that are left out.
     pub(super) notes: Vec<String>,
     pub(super) scratch: Scratch,
+    /// What tests whose curves are read in ways that are looked for computed last: another reading needs no other
+    /// computation.
+    pub(super) rows_of_late: VecDeque<(Key, Rows)>,
 }
+
+/// So many of these are kept.
+const OF_LATE: usize = 32;
 
 /// A test.
 #[derive(Debug)]
@@ -73,9 +80,9 @@ impl Model {
         let columns = if let Some(columns) = self.kept.find(&key) {
             columns.clone()
         } else {
-            let rows = self.rows(test, counted)?;
+            let rows = self.rows_for_readings(test, counted)?;
             let columns = rows.and_then(|rows| {
-                let values = self.tests[test].computed(&rows);
+                let values = self.tests[test].computed(&rows, &self.values(counted));
                 values
                     .map(|values| vec![values])
                     .map_err(|_| "a curve ends before its last measured point".to_owned())
@@ -87,6 +94,31 @@ impl Model {
             self.first_failure.get_or_insert_with(|| why.clone());
         }
         Ok(columns.map(|columns| columns.concat()))
+    }
+
+    /// As [`Self::rows`], which takes no account of how curves are read.
+    fn rows_for_readings(&mut self, test: usize, counted: &[f64]) -> Result<Computed<Rows>, Error> {
+        if !self.tests[test].is_read() {
+            return self.rows(test, counted);
+        }
+        let values = self.values(counted);
+        let targets = self.tests[test].targets.iter();
+        let key = Key {
+            test,
+            at: targets.map(|(p, ..)| values[*p].to_bits()).collect(),
+            by: Vec::new(),
+        };
+        if let Some((_, rows)) = self.rows_of_late.iter().find(|(other, _)| *other == key) {
+            return Ok(Ok(rows.clone()));
+        }
+        let rows = self.rows(test, counted)?;
+        if let Ok(rows) = &rows {
+            self.rows_of_late.push_back((key, rows.clone()));
+            if self.rows_of_late.len() > OF_LATE {
+                self.rows_of_late.pop_front();
+            }
+        }
+        Ok(rows)
     }
 
     /// All rows of a test at a place of the search.
@@ -154,6 +186,9 @@ impl Model {
             for curve in &test.curves {
                 let x: Vec<u64> = curve.points.iter().map(|(x, _)| x.to_bits()).collect();
                 let _ = writeln!(text, "{} {} {:?} {x:?}", curve.x, curve.y, curve.stretch);
+                if curve.readings.iter().any(Option::is_some) {
+                    let _ = writeln!(text, "{:?}", curve.readings);
+                }
             }
             match &test.subject {
                 Subject::Case(case) => text += &identity_of(case)?,
@@ -233,17 +268,25 @@ impl Test {
 
     /// Whether a free parameter has a say in it.
     pub(super) fn has(&self, parameter: usize) -> bool {
+        let mut read = self.curves.iter().flat_map(|curve| curve.readings);
         self.targets.iter().any(|(number, ..)| *number == parameter)
+            || read.any(|number| number == Some(parameter))
+    }
+
+    /// Whether it is looked for how a curve was read.
+    fn is_read(&self) -> bool {
+        let mut read = self.curves.iter().flat_map(|curve| curve.readings);
+        read.any(|number| number.is_some())
     }
 
     /// What all curves are at their measured points.
     ///
     /// # Errors
     /// One cannot be read off.
-    pub(super) fn computed(&self, rows: &Rows) -> Result<Vec<f64>, Gap> {
+    pub(super) fn computed(&self, rows: &Rows, values: &[f64]) -> Result<Vec<f64>, Gap> {
         let mut all = Vec::new();
         for curve in &self.curves {
-            all.extend(curve.computed(rows)?);
+            all.extend(curve.computed(rows, values)?);
         }
         Ok(all)
     }

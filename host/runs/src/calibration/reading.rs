@@ -1,7 +1,7 @@
 //! A calibration read: its tests with their laws, what its parameters stand for, where the search starts.
 
 use super::coordinates::Parameter;
-use super::curve::{Curve, Gap, Rows, extent, spot};
+use super::curve::{Curve, Gap, Rows, extent};
 use super::kept::Kept;
 use super::model::{Model, Subject, Test, words};
 use crate::trade_off::trial::Scratch;
@@ -13,6 +13,7 @@ use input::{Case, Driver};
 use law::{Bounds, LawDescription, Opener, ParameterDescription, Stop};
 use mechanics::equilibrium::Reuse;
 use results::wanted::Output;
+use std::collections::VecDeque;
 use std::path::Path;
 use text::suggestion;
 use toml::Spanned;
@@ -44,6 +45,7 @@ impl Model {
             first_failure: None,
             notes: Vec::new(),
             scratch: Scratch::new(folder, stop)?,
+            rows_of_late: VecDeque::new(),
         };
         let (mut subjects, mut laws) = (Vec::new(), Vec::new());
         for input in &calibration.file.test {
@@ -83,6 +85,7 @@ impl Model {
             }
             model.add(calibration, name, input.get_ref(), &own)?;
         }
+        model.add_readings(calibration);
         model.start(calibration)?;
         Ok(model)
     }
@@ -181,14 +184,51 @@ impl Model {
             bounds,
             range: range(bounds, usual, given, start, scale),
             scale,
+            of_curve: None,
         });
         Ok(())
+    }
+
+    /// Adds what is looked for of how curves were read.
+    fn add_readings(&mut self, calibration: &Calibration) {
+        for (test, input) in calibration.file.test.iter().enumerate() {
+            for (curve, written) in input.curve.iter().enumerate() {
+                let y = written.y.get_ref();
+                let is_alone = input.curve.iter().filter(|c| c.y.get_ref() == y).count() == 1;
+                let which = if is_alone {
+                    String::new()
+                } else {
+                    format!(", curve {}", curve + 1)
+                };
+                for (place, (key, none, reading)) in written.readings().into_iter().enumerate() {
+                    let Some(reading) = reading.map(|reading| reading.get_ref()) else {
+                        continue;
+                    };
+                    let bounds = [reading.min, reading.max];
+                    self.tests[test].curves[curve].readings[place] = Some(self.parameters.len());
+                    self.parameters.push(Parameter {
+                        name: format!("{key} of {}, {y}{which}", input.name.get_ref()),
+                        id: key.to_owned(),
+                        laws: Vec::new(),
+                        unit: String::new(),
+                        doc: format!("{key} of a measured curve"),
+                        start: reading.start.unwrap_or(none.clamp(bounds[0], bounds[1])),
+                        bounds,
+                        range: bounds,
+                        scale: Scale::Linear,
+                        of_curve: Some((test, curve)),
+                    });
+                }
+            }
+        }
     }
 
     /// Computes all tests with the starting values: what fails there is an error of the input. Measured
     /// points beyond the computed ones are left out.
     fn start(&mut self, calibration: &Calibration) -> Result<(), Error> {
         let start: Vec<f64> = self.parameters.iter().map(|p| p.counted(p.start)).collect();
+        let values = self.values(&start);
+        let bounds: Vec<[f64; 2]> = self.parameters.iter().map(|p| p.bounds).collect();
         for number in 0..self.tests.len() {
             let input = &calibration.file.test[number];
             let rows = self.rows(number, &start)?.map_err(|why| {
@@ -206,18 +246,30 @@ impl Model {
             })?;
             let test = &mut self.tests[number];
             for (curve, written) in test.curves.iter_mut().zip(&input.curve) {
-                let line = curve
-                    .line(&rows)
-                    .map_err(|gap| explain(calibration, written, gap, &rows))?;
+                let line = |values: &[f64]| {
+                    let line = curve.line(&rows, values);
+                    line.map_err(|gap| explain(calibration, written, gap, &rows))
+                };
+                // Whatever offset and scale may become, a point that is compared stays one.
+                let mut lines = vec![line(&values)?];
+                for ends in [[0, 0], [0, 1], [1, 0], [1, 1]] {
+                    let mut values = values.clone();
+                    for (place, end) in ends.into_iter().enumerate() {
+                        if let Some(parameter) = curve.readings[place] {
+                            values[parameter] = bounds[parameter][end];
+                        }
+                    }
+                    lines.push(line(&values)?);
+                }
                 let before = curve.points.len();
-                let is_there = |x: f64| spot(&line, x).is_some();
+                let is_there = |x: f64| lines.iter().all(|line| curve.spot(line, x).is_some());
                 let kept: Vec<bool> = curve.points.iter().map(|(x, _)| is_there(*x)).collect();
                 let mut keep = kept.iter();
                 curve.points.retain(|_| *keep.next().unwrap_or(&false));
                 let mut keep = kept.iter();
                 curve.deviations.retain(|_| *keep.next().unwrap_or(&false));
                 let left = before - curve.points.len();
-                let [low, high] = extent(&line);
+                let [low, high] = extent(&lines[0]);
                 if curve.points.is_empty() {
                     let message = format!(
                         "no measured point lies where `{}` is computed, from {low:e} to {high:e}: are units and \
@@ -238,7 +290,10 @@ impl Model {
                 }
             }
             let test = &mut self.tests[number];
-            let there = test.curves.iter().map(|curve| curve.computed(&rows));
+            let there = test
+                .curves
+                .iter()
+                .map(|curve| curve.computed(&rows, &values));
             test.at_start = there.map(Result::unwrap_or_default).collect();
         }
         Ok(())
@@ -752,6 +807,8 @@ fn curves(
             stretch,
             deviations: deviations(calibration, written, &points)?,
             points,
+            is_noise_given: written.noise.is_some() || written.relative_noise.is_some(),
+            readings: [None; 4],
             weight: written.weight.get_ref() * input.weight.get_ref(),
         })
     };

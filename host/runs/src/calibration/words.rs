@@ -125,6 +125,8 @@ pub(super) fn of_stage(
         let half = stage.quantile * error;
         let is_wide = match parameter.scale {
             Scale::Log => 2.0 * half > WIDE_FACTOR.ln(),
+            // No offset at all is as good an answer as any.
+            Scale::Linear if parameter.of_curve.is_some() => false,
             Scale::Linear => {
                 let value = parameter.value(stage.best[place]);
                 half * parameter.slope(value) > value.abs()
@@ -190,12 +192,29 @@ pub(super) fn of_stage(
             stage.failures
         ));
     }
-    if variance == Variance::Given && stage.degrees > 0 {
+    let curves = |test: &usize| model.tests[*test].curves.iter();
+    let is_given = variance == Variance::Given
+        || group
+            .tests
+            .iter()
+            .flat_map(curves)
+            .all(|c| c.is_noise_given);
+    if is_given && stage.degrees > 0 {
         let ratio = (stage.plain_sum / stage.degrees as f64).sqrt();
-        if !(0.5..=2.0).contains(&ratio) {
+        // Where only proportions are believed, a file may well give too much.
+        let least = if variance == Variance::Given {
+            0.5
+        } else {
+            0.0
+        };
+        if !(least..=2.0).contains(&ratio) {
+            let believed = match variance {
+                Variance::Given => "the intervals believe the noise",
+                Variance::Estimated => "the intervals take all of them for noise",
+            };
             words.push(format!(
                 "residuals are {ratio:.2} times the noise that is given: either that is not the noise, or the law does \
-                 not follow the tests; the intervals believe the noise"
+                 not follow the tests; {believed}"
             ));
         }
     }

@@ -110,7 +110,7 @@ pub fn carry_out(
                         index,
                         standing: standing.clone(),
                     };
-                    rows[index - 1].standing = standing;
+                    record.note(&plan.folder, &mut rows[index - 1], standing);
                     watch(&ended);
                 }
                 Err(RecvTimeoutError::Timeout) => {}

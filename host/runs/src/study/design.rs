@@ -2,10 +2,11 @@
 
 use super::sobol;
 use crate::Error;
-use crate::sampling::{Random, stratified};
+use crate::sampling::stratified;
 use input::Study;
 use input::study::{MOST_RUNS, Method, Parameter, Spread};
 use libm::erfc;
+use results::random::Random;
 use toml::Value;
 
 /// The values of the parameters, by run and parameter.
@@ -16,7 +17,8 @@ pub(super) fn rows(study: &Study) -> Result<Vec<Vec<Value>>, Error> {
     let method = study.file.method;
     let parameters = &study.parameters;
     let runs = study.file.runs.as_ref().map_or(0, |runs| *runs.get_ref());
-    let seed = study.file.seed.as_ref().map(|seed| *seed.get_ref());
+    let seed = study.file.seed.as_ref().map_or(0, |seed| *seed.get_ref());
+    let dimensions = parameters.len() * if method == Method::Saltelli { 2 } else { 1 };
     match method {
         Method::Grid => grid(study),
         Method::List => {
@@ -25,26 +27,29 @@ pub(super) fn rows(study: &Study) -> Result<Vec<Vec<Value>>, Error> {
             let row = |i: usize| columns.iter().map(|column| column[i].clone()).collect();
             Ok((0..n).map(row).collect())
         }
-        Method::Sobol if parameters.len() > sobol::MOST_DIMENSIONS => {
+        Method::Sobol | Method::Saltelli if dimensions > sobol::MOST_DIMENSIONS => {
             let message = format!(
-                "{} parameters: `sobol` has points for at most {}",
+                "{} parameters: `{}` has points for at most {}",
                 parameters.len(),
-                sobol::MOST_DIMENSIONS
+                method.name(),
+                sobol::MOST_DIMENSIONS * parameters.len() / dimensions
             );
             Err(study.source.error(0..0, message).into())
         }
-        Method::LatinHypercube | Method::Sobol => {
-            let columns: Vec<Vec<f64>> = (0..parameters.len())
+        Method::LatinHypercube | Method::Sobol | Method::Saltelli => {
+            let columns: Vec<Vec<f64>> = (0..dimensions)
                 .map(|dimension| {
-                    let mut random = Random::of(seed.unwrap_or(0), dimension);
-                    if method == Method::Sobol {
-                        let shift = seed.map_or(0, |_| (random.next() >> 32) as u32);
-                        sobol::coordinate(dimension, runs, shift)
-                    } else {
+                    let mut random = Random::of(seed, dimension);
+                    if method == Method::LatinHypercube {
                         stratified(runs, &mut random)
+                    } else {
+                        sobol::coordinate(dimension, runs, (random.next() >> 32) as u32)
                     }
                 })
                 .collect();
+            if method == Method::Saltelli {
+                return Ok(with_one_exchanged(parameters, &columns, runs));
+            }
             let with_columns = |i: usize| {
                 let with = parameters.iter().zip(&columns);
                 with.map(|(parameter, column)| value(parameter, column[i]))
@@ -53,6 +58,22 @@ pub(super) fn rows(study: &Study) -> Result<Vec<Vec<Value>>, Error> {
             Ok((0..runs).map(with_columns).collect())
         }
     }
+}
+
+/// The runs of each base point ([`results::study::indices`]): the first half of the columns is the sample A, the second B.
+fn with_one_exchanged(parameters: &[Parameter], columns: &[Vec<f64>], n: usize) -> Vec<Vec<Value>> {
+    let d = parameters.len();
+    // Run 0 of a point has all of A, run d + 1 all of B, run k parameter k of B.
+    let run = |point: usize, run: usize| {
+        let values = parameters.iter().enumerate().map(|(i, parameter)| {
+            let is_of_b = run == d + 1 || run == i + 1;
+            let column = if is_of_b { d + i } else { i };
+            value(parameter, columns[column][point])
+        });
+        values.collect()
+    };
+    let of_point = |point: usize| (0..d + 2).map(move |number| run(point, number));
+    (0..n).flat_map(of_point).collect()
 }
 
 /// All combinations; the last parameter varies fastest.
@@ -313,7 +334,59 @@ mod tests {
             assert_eq!(with("seed = 1", "", method), with("seed = 1", more, method));
             assert_ne!(with("seed = 1", "", method), with("seed = 2", "", method));
         }
-        assert_eq!(with("", "", "sobol")[..4], [0.0, 0.5, 0.75, 0.25]);
+        // Without a seed it is 0: neither the sequence itself nor other points at every call.
+        assert_eq!(with("", "", "sobol"), with("seed = 0", "", "sobol"));
+        assert_ne!(with("", "", "sobol")[..4], [0.0, 0.5, 0.75, 0.25]);
+    }
+
+    /// Indices of sin x + 7 sin² y + 0.1 z⁴ sin x between ±π (T. Ishigami & T. Homma 1990): variances 7²/8,
+    /// (1 + 0.1 π⁴/5)²/2 of x alone, 0.01 π⁸ (1/18 − 1/50) of x with z. With 2¹⁰ base points the largest error is 0.008.
+    /// Intervals of fewer points hold the truth, for points that are even, more often than 95 times in a hundred.
+    #[test]
+    fn indices_of_the_ishigami_function_are_those_of_the_closed_form() {
+        let pi = std::f64::consts::PI;
+        let of_x = (1.0 + 0.1 * pi.powi(4) / 5.0).powi(2) / 2.0;
+        let (of_y, of_both) = (49.0 / 8.0, 0.01 * pi.powi(8) * (1.0 / 18.0 - 1.0 / 50.0));
+        let whole = of_x + of_y + of_both;
+        let first = [of_x, of_y, 0.0].map(|part| part / whole);
+        let total = [of_x + of_both, of_y, of_both].map(|part| part / whole);
+        let of = |runs: usize, seed: u64| {
+            let mut text = format!("method = \"saltelli\"\nruns = {runs}\nseed = {seed}\n");
+            for name in ["x", "y", "z"] {
+                text += &format!(
+                    "[[parameter]]\nkey = \"{name}\"\nuniform = [{:?}, {pi:?}]\n",
+                    -pi
+                );
+            }
+            let rows = rows(&study(&text)).unwrap();
+            let [x, y, z] = [0, 1, 2].map(|parameter| numbers(&rows, parameter));
+            let f = |i: usize| x[i].sin() * (1.0 + 0.1 * z[i].powi(4)) + 7.0 * y[i].sin().powi(2);
+            let values: Vec<Option<f64>> = (0..rows.len()).map(|i| Some(f(i))).collect();
+            assert_eq!(values.len(), 5 * runs);
+            results::study::indices(&values, 3)
+        };
+        for (i, found) in of(1 << 10, 0).iter().enumerate() {
+            assert!(
+                (found.first.value - first[i]).abs() < 0.01,
+                "{i}: {found:?}"
+            );
+            assert!(
+                (found.total.value - total[i]).abs() < 0.01,
+                "{i}: {found:?}"
+            );
+        }
+        let mut hits = [0; 6];
+        for seed in 0..200 {
+            for (i, found) in of(64, seed).iter().enumerate() {
+                let with_truth = [(found.first, first[i]), (found.total, total[i])];
+                for (place, (estimate, truth)) in with_truth.into_iter().enumerate() {
+                    let [low, high] = estimate.interval.unwrap();
+                    hits[2 * i + place] += usize::from((low..=high).contains(&truth));
+                }
+            }
+        }
+        println!("{hits:?} of 200");
+        assert!(hits.iter().all(|hits| *hits >= 180), "{hits:?}");
     }
 
     #[test]

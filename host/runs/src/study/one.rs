@@ -233,7 +233,7 @@ fn note(plan: &Plan, index: usize, standing: &Standing) -> Result<(), Error> {
             let record = Record::read(&plan.folder)?;
             let mut rows = record.read_table(&plan.folder)?;
             if let Some(row) = rows.iter_mut().find(|row| row.index == index) {
-                row.standing = standing.clone();
+                record.note(&plan.folder, row, standing.clone());
             }
             record.write_table(&plan.folder, &rows)?;
             return Ok(());
