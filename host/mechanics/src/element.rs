@@ -115,6 +115,9 @@ impl Axes {
     }
 }
 
+/// Normal and tangential traction at a place, in the axes there.
+pub type Traction<'t> = &'t dyn Fn([f64; 2], &Axes) -> [f64; 2];
+
 /// The elements of one group.
 pub trait Kinematics: std::fmt::Debug + Send + Sync {
     /// Number of elements.
@@ -148,6 +151,12 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn add_gradients(&self, displacement: &[f64], out: &mut [f64]);
     /// Adds the nodal forces that balance the stresses (tractions) of all points to `force`.
     fn add_forces(&self, flux: &[f64], force: &mut [f64]);
+    /// Tractions at the points of an element whose nodal forces are those of a traction (normal, tangential, by place and
+    /// axes there), integrated exactly. `None` where the points integrate whatever is linear exactly, or no such
+    /// tractions can be found.
+    fn gathered(&self, _element: usize, _traction: Traction<'_>) -> Option<Vec<[f64; 2]>> {
+        None
+    }
     /// Some of the elements alone, if that can be had.
     fn only(&self, _elements: &[usize]) -> Option<Box<dyn Kinematics>> {
         None

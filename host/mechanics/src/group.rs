@@ -25,7 +25,7 @@ pub use look::{Deviation, Notice, Went};
 pub use state::GroupState;
 pub use tangent::Fault;
 
-use crate::element::Kinematics;
+use crate::element::{Axes, Kinematics};
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
 use algebra::threads;
@@ -219,6 +219,9 @@ pub struct Group {
     pub strain: Field,
     /// Stresses (zero thickness: tractions) in axes of the elements.
     pub stress: Field,
+    /// What exact integration adds to the tractions that an interface began with, point by point; empty where that is
+    /// nothing. Elements carry it beside the law's answer, so that ground at rest stays at rest.
+    correction: Vec<f64>,
     /// Internal variables of the law.
     pub internal: Field,
     /// The law.
@@ -274,6 +277,7 @@ impl Group {
             kinematics,
             strain: Field::new(vec![0.0; n]),
             stress: Field::new(stress),
+            correction: Vec::new(),
             internal: Field::default(),
             law: law.clone(),
             moment: Moment::default(),
@@ -355,10 +359,38 @@ impl Group {
         self.start_law(self.law.clone(), None)
     }
 
+    /// What exact integration adds to the tractions of an interface at its points; `traction` gives them by element,
+    /// place and axes there.
+    pub fn lost(
+        &self,
+        at_points: &[f64],
+        traction: impl Fn(usize, [f64; 2], &Axes) -> [f64; 2],
+    ) -> Vec<f64> {
+        let mut lost = vec![0.0; at_points.len()];
+        for element in 0..self.kinematics.n_elements() {
+            let of_element = |at: [f64; 2], axes: &Axes| traction(element, at, axes);
+            if let Some(exact) = self.kinematics.gathered(element, &of_element) {
+                let points = self.kinematics.points_of(element);
+                let own = 2 * points.start..2 * points.end;
+                let both = exact.as_flattened().iter().zip(&at_points[own.clone()]);
+                let all = lost[own].iter_mut().zip(both);
+                all.for_each(|(lost, (exact, own))| *lost = exact - own);
+            }
+        }
+        lost
+    }
+
+    /// Takes over what [`Self::lost`] gave.
+    pub fn correct(&mut self, lost: Vec<f64>) {
+        let is_any = lost.iter().any(|lost| *lost != 0.0);
+        self.correction = if is_any { lost } else { Vec::new() };
+    }
+
     /// A group that is no longer there: without stress and strain.
     pub fn disappear(&mut self) {
         self.is_active = false;
         self.pores = None;
+        self.correction = Vec::new();
         for field in self.fields() {
             field.committed.fill(0.0);
             field.forget_trial();
@@ -898,9 +930,10 @@ impl Group {
     /// (committed), kN. At an end that is not doubled the nodal forces of both sides cancel; the
     /// tractions do not.
     pub fn handed_on(&self, elements: &[usize], component: usize) -> f64 {
+        let carried = self.carried();
         let of_point = |point: usize| {
             let axes = self.kinematics.axes_at(point);
-            let [normal, tangential] = [0, 1].map(|c| self.stress.committed[2 * point + c]);
+            let [normal, tangential] = [0, 1].map(|c| carried[2 * point + c]);
             let traction = axes.across[component] * normal + axes.along[component] * tangential;
             self.kinematics.weight(point) * traction
         };

@@ -248,8 +248,17 @@ impl GroupBuilder<'_> {
         self.refuse_turned_signs(&material)?;
         let stress = self.initial_stress(&*kinematics);
         self.refuse_tension_at_rest(&*kinematics, &stress)?;
-        Group::new(name, formulation, kinematics, stress, thickness, material)
-            .map_err(|failure| BuildError::CannotStart(Box::new(failure)))
+        let cannot_start = |failure| BuildError::CannotStart(Box::new(failure));
+        let mut group = Group::new(name, formulation, kinematics, stress, thickness, material)
+            .map_err(cannot_start)?;
+        if formulation == Formulation::ZeroThickness {
+            let kinematics = &group.kinematics;
+            let traction = |element: usize, at: [f64; 2], axes: &Axes| {
+                self.initial_traction(kinematics.nodes(element), at, axes)
+            };
+            group.correct(group.lost(&group.stress.committed, traction));
+        }
+        Ok(group)
     }
 
     /// The group does not fit.
@@ -313,10 +322,11 @@ impl GroupBuilder<'_> {
         self.refuse(Cause::BadShape(self.group.name.clone()))
     }
 
-    /// Elements in global axes, in the order of the mesh: runs of one shape each.
+    /// Elements in global axes, in the order of the mesh: runs of one shape each, and of as many points.
     fn solid(&self) -> Result<Box<dyn Kinematics>, Refusal> {
         let solids: Vec<&Solid> = self.solids().collect();
-        let runs = solids.chunk_by(|a, b| a.shape() == b.shape());
+        let kind = |solid: &Solid| (solid.shape(), self.bent(solid));
+        let runs = solids.chunk_by(|a, b| kind(a) == kind(b));
         let mut parts = runs
             .map(|run| self.of_one_shape(run))
             .collect::<Result<Vec<_>, _>>()?;
@@ -325,6 +335,13 @@ impl GroupBuilder<'_> {
         } else {
             Box::new(Mixed::new(parts))
         })
+    }
+
+    /// Directions of a quad in which its sides are bent, so that it needs more points along them.
+    fn bent(&self, solid: &Solid) -> [bool; 2] {
+        let projected = self.integration(Integration::Projected) == Integration::Projected;
+        let nodes = solid.nodes().try_into().ok().filter(|_| projected);
+        nodes.map_or([false; 2], |nodes| Quad8::bent(&self.mesh.nodes, nodes))
     }
 
     /// Elements of one shape, at least one, in global axes.
@@ -343,13 +360,18 @@ impl GroupBuilder<'_> {
                     .map(|elements| Box::new(elements) as _)
             }
             Shape::Quad => {
-                let (strains, n) = match integration {
-                    Integration::BBar => (Strains::LinearVolume, 3),
-                    Integration::Reduced => (Strains::AtPoints, 2),
-                    Integration::Projected => (Strains::Projected, 2),
-                    _ => (Strains::AtPoints, 3),
+                let bent = self.bent(solids[0]);
+                let [along_xi, along_eta] = bent.map(|bent| if bent { 3 } else { 2 });
+                let (strains, rule) = match integration {
+                    Integration::BBar => (Strains::LinearVolume, (3, 3)),
+                    Integration::Reduced => (Strains::AtPoints, (2, 2)),
+                    Integration::Projected if bent == [false; 2] => (Strains::Projected, (2, 2)),
+                    Integration::Projected => {
+                        (Strains::ProjectedLinearVolume, (along_xi, along_eta))
+                    }
+                    _ => (Strains::AtPoints, (3, 3)),
                 };
-                let rule = |_| (n, n);
+                let rule = |_| rule;
                 Quad8::new(analysis, coordinates, nodes(solids), axes, strains, rule)
                     .map(|elements| Box::new(elements) as _)
             }
@@ -528,29 +550,32 @@ impl GroupBuilder<'_> {
         Ok(())
     }
 
-    /// Initial stress of all points, in axes of the elements. A zero-thickness element without
-    /// one of its own starts with that of the ground on its two sides, projected on its facet.
+    /// Initial stress of all points, in axes of the elements.
     fn initial_stress(&self, kinematics: &dyn Kinematics) -> Vec<f64> {
-        let is_given = self.group.initial_stress.is_some();
         let mut stress = Vec::with_capacity(kinematics.n_components() * kinematics.n_points());
         for point in 0..kinematics.n_points() {
             let (element, _) = kinematics.place_of(point);
             let (axes, at) = (kinematics.axes_at(point), kinematics.position(point));
-            let own = || self.initial.at(self.number, at).unwrap_or_default();
             if kinematics.n_components() == 4 {
-                stress.extend(axes.stress_from_global(own()));
+                let own = self.initial.at(self.number, at).unwrap_or_default();
+                stress.extend(axes.stress_from_global(own));
             } else {
-                let nodes = kinematics.nodes(element);
-                let found = if is_given {
-                    own()
-                } else {
-                    self.initial.beside(self.number, [nodes[2], nodes[5]], at)
-                };
-                let [_, normal, _, shear] = axes.stress_from_global(found);
-                stress.extend([normal, shear]);
+                stress.extend(self.initial_traction(kinematics.nodes(element), at, &axes));
             }
         }
         stress
+    }
+
+    /// Normal and shear stress with which a zero-thickness element begins at a place of it. Without an initial stress
+    /// of its own it is that of the ground on its two sides, projected on its facet.
+    fn initial_traction(&self, nodes: &[usize], at: [f64; 2], axes: &Axes) -> [f64; 2] {
+        let found = if self.group.initial_stress.is_some() {
+            self.initial.at(self.number, at).unwrap_or_default()
+        } else {
+            self.initial.beside(self.number, [nodes[2], nodes[5]], at)
+        };
+        let [_, normal, _, shear] = axes.stress_from_global(found);
+        [normal, shear]
     }
 }
 

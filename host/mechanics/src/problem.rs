@@ -377,7 +377,7 @@ pub enum Integration {
     Full,
     /// Quads: 2 × 2 Gauss points; triangles: 3 (zero thickness: 2 Gauss points).
     Reduced,
-    /// Solids: as many points as `reduced`, with strains whose nodal forces are integrated exactly.
+    /// Solids: as many points as `reduced` (quads: 3 along curved sides), with strains whose nodal forces are integrated exactly.
     Projected,
     /// Solids: all Gauss points (quads 9, triangles 6), with a volume strain that is linear in each element.
     BBar,

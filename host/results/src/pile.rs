@@ -348,16 +348,15 @@ impl Pile {
             let mut flux = vec![0.0; n * group.kinematics.n_points()];
             let carried = group.carried();
             for facet in own() {
-                for point in group.kinematics.points_of(facet.element) {
+                let (acting, problem) = (snapshot.acting, snapshot.problem);
+                let pressure = |at| acting.pore_pressure(number, problem, at);
+                let pores = group.pore_flux(facet.element, pressure);
+                let points = group.kinematics.points_of(facet.element);
+                for (point, pores) in points.zip(pores.chunks_exact(n)) {
                     let flux = &mut flux[n * point..n * (point + 1)];
                     if group.is_active {
                         flux.copy_from_slice(&carried[n * point..n * (point + 1)]);
-                        let at = group.kinematics.position(point);
-                        let pressure = snapshot.acting.pore_pressure(number, snapshot.problem, at);
-                        // Of a traction, the normal component.
-                        for stress in &mut flux[..if n == 2 { 1 } else { 3 }] {
-                            *stress -= pressure;
-                        }
+                        flux.iter_mut().zip(pores).for_each(|(f, pore)| *f -= pore);
                     } else if group.formulation == Formulation::ZeroThickness {
                         flux.copy_from_slice(&beside(snapshot, facet, point));
                     }

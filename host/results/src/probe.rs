@@ -261,16 +261,24 @@ fn water_between(
     elements: &[usize],
     component: usize,
 ) -> f64 {
-    let kinematics = &snapshot.groups[number].kinematics;
-    let points = elements
-        .iter()
-        .flat_map(|&element| kinematics.points_of(element));
-    let of_point = |point: usize| {
-        let at = kinematics.position(point);
-        let pressure = snapshot.acting.pore_pressure(number, snapshot.problem, at);
-        kinematics.weight(point) * kinematics.axes_at(point).across[component] * pressure
+    let group = &snapshot.groups[number];
+    let pressure = |at| snapshot.acting.pore_pressure(number, snapshot.problem, at);
+    let of_element = |&element: &usize| {
+        let pores = group.pore_flux(element, pressure);
+        let of_point = |(point, pore): (usize, &[f64])| {
+            let (axes, weight) = (
+                group.kinematics.axes_at(point),
+                group.kinematics.weight(point),
+            );
+            weight * axes.across[component] * pore[0] + weight * axes.along[component] * pore[1]
+        };
+        let points = group.kinematics.points_of(element);
+        points
+            .zip(pores.chunks_exact(2))
+            .map(of_point)
+            .collect::<Vec<f64>>()
     };
-    points.map(of_point).sum()
+    elements.iter().flat_map(of_element).sum()
 }
 
 impl PointQuantity {

@@ -1,7 +1,7 @@
 //! Zero-thickness elements of three double nodes.
 
 use super::shape::{gauss, line_shape};
-use super::{Axes, Kinematics, depth};
+use super::{Axes, Kinematics, Traction, depth};
 use crate::mesh::Joint;
 use crate::problem::{Analysis, Integration};
 use std::ops::Range;
@@ -15,6 +15,78 @@ pub struct Joint6 {
     lengths: Vec<f64>,
     points_per_element: usize,
     points: Vec<Point>,
+    /// Elements whose points are their nodes, and whose nodal forces are not exact where a traction is linear: where
+    /// they lie.
+    inexact: Vec<Option<Side>>,
+    analysis: Analysis,
+}
+
+/// Where the nodes of an element lie, and how.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    at: [[f64; 2]; 3],
+    chord: Axes,
+    is_straight: bool,
+}
+
+impl Side {
+    fn new(at: [[f64; 2]; 3]) -> Self {
+        let along = [at[1][0] - at[0][0], at[1][1] - at[0][1]];
+        let chord = Axes::of_facet(along);
+        let rise = [0, 1].map(|c| at[2][c] - f64::midpoint(at[0][c], at[1][c]));
+        let off = (rise[0] * chord.across[0] + rise[1] * chord.across[1]).abs();
+        Self {
+            at,
+            chord,
+            is_straight: off <= STRAIGHT * along[0].hypot(along[1]),
+        }
+    }
+
+    /// The point at ξ whose weight there is this one.
+    fn point(&self, analysis: Analysis, xi: f64, weight: f64) -> Point {
+        let (n, d) = line_shape(xi);
+        let sum = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * self.at[i][c]).sum() };
+        let position = [sum(&n, 0), sum(&n, 1)];
+        let direction = [sum(&d, 0), sum(&d, 1)];
+        let length = direction[0].hypot(direction[1]);
+        let axes = if self.is_straight {
+            self.chord
+        } else {
+            self.chord.turned_along(direction)
+        };
+        Point {
+            n,
+            weight: weight * length * depth(analysis, position[0]),
+            position,
+            axes,
+        }
+    }
+
+    /// Directions at the nodes of the arc through them. Those of the element's own curve are off by 2·10⁻³ at the ends of
+    /// an arc of 22°, and others in the element that follows. At an end the arc is turned from the chord to the middle
+    /// by as much as that one is from the chord of the other half.
+    fn along_arc(&self) -> [[f64; 2]; 3] {
+        let [a, b, m] = self.at;
+        let to = |from: [f64; 2], to: [f64; 2]| [to[0] - from[0], to[1] - from[1]];
+        let [first, second, whole] = [to(a, m), to(m, b), to(a, b)];
+        // Angles are added and subtracted as those of complex numbers u v / w.
+        let turned = |u: [f64; 2], v: [f64; 2], w: [f64; 2]| {
+            let [x, y] = [u[0] * v[0] - u[1] * v[1], u[0] * v[1] + u[1] * v[0]];
+            [x * w[0] + y * w[1], y * w[0] - x * w[1]]
+        };
+        [
+            turned(first, whole, second),
+            turned(second, whole, first),
+            turned(first, second, whole),
+        ]
+    }
+
+    /// Simpson's rule is exact to the third degree: for N t r where t is linear and the radius constant.
+    fn is_exact(&self, analysis: Analysis) -> bool {
+        let [a, b, _] = self.at.map(|at| at[0]);
+        let is_upright = (b - a).abs() <= STRAIGHT * a.abs();
+        self.is_straight && (analysis == Analysis::PlaneStrain || is_upright)
+    }
 }
 
 /// An integration point: jump = Σ N (u⁺ − u⁻).
@@ -30,6 +102,8 @@ struct Point {
 const ON_AXIS: f64 = 1e-9;
 /// A side whose middle lies off its chord by less than this part of it is straight.
 const STRAIGHT: f64 = 1e-12;
+/// Tractions that differ by less, as a part of the element's largest, are the same.
+const SAME: f64 = 1e-12;
 
 impl Joint6 {
     /// Elements with Gauss points, or with the nodes as points; those that reach the axis of symmetry have
@@ -54,37 +128,27 @@ impl Joint6 {
         let mut points = Vec::new();
         let mut axes = Vec::new();
         let mut lengths = Vec::new();
+        let mut inexact = Vec::new();
         for joint in joints {
-            let at = joint.minus.map(|n| coordinates[n]);
-            let along = [at[1][0] - at[0][0], at[1][1] - at[0][1]];
-            let chord = Axes::of_facet(along);
-            axes.push(chord);
-            let chord_length = along[0].hypot(along[1]);
+            let side = Side::new(joint.minus.map(|n| coordinates[n]));
+            let [start, end, _] = side.at;
+            axes.push(side.chord);
+            let chord_length = (end[0] - start[0]).hypot(end[1] - start[1]);
             lengths.push(chord_length);
-            let rise = [0, 1].map(|c| at[2][c] - f64::midpoint(at[0][c], at[1][c]));
-            let off = (rise[0] * chord.across[0] + rise[1] * chord.across[1]).abs();
-            let is_straight = off <= STRAIGHT * chord_length;
             let reaches_axis = analysis == Analysis::Axisymmetric
-                && at[0][0].min(at[1][0]) <= ON_AXIS * chord_length;
+                && start[0].min(end[0]) <= ON_AXIS * chord_length;
             let (xi, weights) = rule(reaches_axis);
-            for (&xi, weight) in xi.iter().zip(weights) {
-                let (n, d) = line_shape(xi);
-                let sum = |f: &[f64; 3], c: usize| -> f64 { (0..3).map(|i| f[i] * at[i][c]).sum() };
-                let position = [sum(&n, 0), sum(&n, 1)];
-                let direction = [sum(&d, 0), sum(&d, 1)];
-                let length = direction[0].hypot(direction[1]);
-                let axes = if is_straight {
-                    chord
-                } else {
-                    chord.turned_along(direction)
-                };
-                points.push(Point {
-                    n,
-                    weight: weight * length * depth(analysis, position[0]),
-                    position,
-                    axes,
-                });
+            let of_rule = xi.iter().zip(weights);
+            let own = of_rule.map(|(&xi, &weight)| side.point(analysis, xi, weight));
+            let mut own: Vec<Point> = own.collect();
+            let is_at_nodes = integration == Integration::Nodes && !reaches_axis;
+            if is_at_nodes && !side.is_straight {
+                for (point, direction) in own.iter_mut().zip(side.along_arc()) {
+                    point.axes = side.chord.turned_along(direction);
+                }
             }
+            points.extend(own);
+            inexact.push((is_at_nodes && !side.is_exact(analysis)).then_some(side));
         }
         let nodes = joints
             .iter()
@@ -96,6 +160,8 @@ impl Joint6 {
             lengths,
             points_per_element: rule(false).0.len(),
             points,
+            inexact,
+            analysis,
         }
     }
 
@@ -187,6 +253,44 @@ impl Kinematics for Joint6 {
                 }
             }
         }
+    }
+
+    fn gathered(&self, element: usize, traction: Traction<'_>) -> Option<Vec<[f64; 2]>> {
+        let side = self.inexact[element]?;
+        let global = |point: &Point| {
+            let [normal, shear] = traction(point.position, &point.axes);
+            let Axes { along, across } = point.axes;
+            [0, 1].map(|c| across[c] * normal + along[c] * shear)
+        };
+        // Of the seventh degree on a curve: N 2, σ 2, the normal 1, r 2.
+        let mut forces = [[0.0; 2]; 3];
+        let (xi, weights) = gauss(4);
+        for (&xi, &weight) in xi.iter().zip(weights) {
+            let point = side.point(self.analysis, xi, weight);
+            let traction = global(&point);
+            for (force, n) in forces.iter_mut().zip(point.n) {
+                (0..2).for_each(|c| force[c] += point.weight * n * traction[c]);
+            }
+        }
+        let own = self.own(element);
+        let at_points = own.iter().map(|p| traction(p.position, &p.axes));
+        let at_points: Vec<[f64; 2]> = at_points.collect();
+        let sizes = at_points.iter().flatten().map(|t| t.abs());
+        let size = sizes.fold(0.0, f64::max);
+        let at_node = |((point, force), found): ((&Point, [f64; 2]), &[f64; 2])| {
+            let along = |axis: [f64; 2]| (axis[0] * force[0] + axis[1] * force[1]) / point.weight;
+            let exact = [along(point.axes.across), along(point.axes.along)];
+            // Rounding is no difference.
+            let is_other = (0..2).any(|c| (exact[c] - found[c]).abs() > SAME * size);
+            if is_other { exact } else { *found }
+        };
+        Some(
+            own.iter()
+                .zip(forces)
+                .zip(&at_points)
+                .map(at_node)
+                .collect(),
+        )
     }
 
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {

@@ -23,24 +23,34 @@ pub(super) struct Reference<const N: usize> {
     /// Of a few points of the law, the function that is one at the first and zero at the others, at
     /// the second.
     pub(super) function: fn([f64; 2], [f64; 2]) -> f64,
-    /// What such functions have beside what is linear, if anything.
-    pub(super) beyond_linear: Option<fn([f64; 2]) -> f64>,
+    /// What such functions are made of besides what is linear, where there are so many points along ξ and along η.
+    pub(super) beyond_linear: fn([usize; 2], [f64; 2]) -> Vec<f64>,
 }
 
 impl<const N: usize> Reference<N> {
     /// Whether a side of an element whose nodes lie here has its middle off the middle.
     pub(super) fn is_curved(&self, places: &[[f64; 2]; N]) -> bool {
-        self.sides.iter().any(|&[a, b, m]| {
-            let [a, b, m] = [a, b, m].map(|node| places[node]);
-            let off = [0, 1].map(|c| m[c] - f64::midpoint(a[c], b[c]));
-            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-            off[0].hypot(off[1]) > STRAIGHT * length
-        })
+        let mut sides = self.sides.iter();
+        sides.any(|side| off(side.map(|node| places[node])) > STRAIGHT)
     }
+}
+
+/// How far the middle of a side (ends, middle) lies off that of its ends, as a part of its length.
+fn off([a, b, m]: [[f64; 2]; 3]) -> f64 {
+    let off = [0, 1].map(|c| m[c] - f64::midpoint(a[c], b[c]));
+    off[0].hypot(off[1]) / (b[0] - a[0]).hypot(b[1] - a[1])
+}
+
+/// Whether the sides of a quad along ξ, and those along η, turn by so much that two points along them do not follow.
+pub(super) fn bent(places: &[[f64; 2]; 8]) -> [bool; 2] {
+    let is_bent = |side: usize| off(QUAD8.sides[side].map(|node| places[node])) > BENT;
+    [0, 1].map(|first| is_bent(first) || is_bent(first + 2))
 }
 
 /// A side whose middle lies off the middle of its ends by less than this part of it is straight.
 const STRAIGHT: f64 = 1e-12;
+/// A side whose middle lies off by less turns by less than 5°: two points follow it within 10⁻⁴ (a ring's displacements).
+const BENT: f64 = 1e-2;
 
 /// An integration point of the reference element.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,7 +112,13 @@ pub(super) const QUAD8: Reference<8> = Reference {
     sides: Shape::Quad.edges(),
     // Bilinear between the 2 × 2 points at ±1/√3.
     function: |[a, b], [xi, eta]| 0.25 * (1.0 + 3.0 * a * xi) * (1.0 + 3.0 * b * eta),
-    beyond_linear: Some(|[xi, eta]| xi * eta),
+    beyond_linear: |[n_xi, n_eta], [xi, eta]| {
+        let all = (0..n_xi).flat_map(|a| (0..n_eta).map(move |b| (a, b)));
+        let beyond = all.filter(|(a, b)| a + b > 1);
+        beyond
+            .map(|(a, b)| xi.powi(a as i32) * eta.powi(b as i32))
+            .collect()
+    },
 };
 
 /// The 6-node triangle with corners (0, 0), (1, 0), (0, 1).
@@ -120,7 +136,7 @@ pub(super) const TRI6: Reference<6> = Reference {
         let products = area(a).into_iter().zip(area(at)).map(|(a, b)| a * b);
         4.0 * products.sum::<f64>() - 1.0
     },
-    beyond_linear: None,
+    beyond_linear: |_, _| Vec::new(),
 };
 
 /// Points and weights of the Gauss rule with `n` points on (−1, 1); exact to degree 2n − 1.

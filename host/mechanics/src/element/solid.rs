@@ -51,6 +51,8 @@ pub(super) struct Point<const N: usize> {
 pub(super) struct Rule {
     /// Points of the law.
     pub(super) points: Vec<RulePoint>,
+    /// How many of them there are along ξ and along η.
+    pub(super) along: [usize; 2],
     /// What becomes of the strains.
     pub(super) strains: Strains,
 }
@@ -64,6 +66,8 @@ pub enum Strains {
     LinearVolume,
     /// Their projection on as many functions as there are points (`projection.rs`).
     Projected,
+    /// The same, with a volume strain that is linear in the coordinates: of quads with more points along bent sides.
+    ProjectedLinearVolume,
 }
 
 /// An element that is turned inside out or has no area.
@@ -124,7 +128,10 @@ impl<const N: usize> Solid<N> {
             axes,
             lengths,
             volumes,
-            has_linear_volume: strains == Some(Strains::LinearVolume),
+            has_linear_volume: matches!(
+                strains,
+                Some(Strains::LinearVolume | Strains::ProjectedLinearVolume)
+            ),
             points_per_element,
             points,
         })
@@ -151,6 +158,7 @@ impl<const N: usize> Geometry<N> {
         axes: &Axes,
         Rule {
             points: rule,
+            along,
             strains,
         }: Rule,
     ) -> Option<Self> {
@@ -165,7 +173,8 @@ impl<const N: usize> Geometry<N> {
             };
             points.iter().map(point).collect()
         };
-        let curved = strains == Strains::Projected && reference.is_curved(places);
+        let is_projected = matches!(strains, Strains::Projected | Strains::ProjectedLinearVolume);
+        let curved = is_projected && reference.is_curved(places);
         let exact = if curved {
             (reference.exact_curved)()
         } else {
@@ -179,13 +188,13 @@ impl<const N: usize> Geometry<N> {
         };
         match strains {
             Strains::AtPoints | Strains::LinearVolume => {}
-            Strains::Projected if curved => {
-                let beyond = |point: &RulePoint| Some((reference.beyond_linear?)(point.at));
+            _ if curved => {
                 let basis = |rule: &[RulePoint], points: &[Point<N>]| -> Vec<Vec<f64>> {
                     let both = rule.iter().zip(points);
                     both.map(|(at, point)| {
                         let linear = [1.0, point.position[0], point.position[1]];
-                        linear.into_iter().chain(beyond(at)).collect()
+                        let beyond = (reference.beyond_linear)(along, at.at);
+                        linear.into_iter().chain(beyond).collect()
                     })
                     .collect()
                 };
@@ -193,7 +202,7 @@ impl<const N: usize> Geometry<N> {
                 let values = projection::cardinal(&at_own, &at_fine)?;
                 projection::project(&mut own, &fine, |q, fine| values[fine][q])?;
             }
-            Strains::Projected => {
+            _ => {
                 let of_point = |q: usize, at: [f64; 2]| (reference.function)(rule[q].at, at);
                 let value = |q: usize, fine: usize| of_point(q, exact[fine].at);
                 projection::project(&mut own, &fine, value)?;

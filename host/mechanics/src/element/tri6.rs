@@ -24,6 +24,7 @@ impl Tri6 {
     ) -> Result<Self, BadShape> {
         let rule = |_: usize| Rule {
             points: triangle_rule(n_points),
+            along: [0; 2],
             strains,
         };
         Self::of_reference(&TRI6, analysis, coordinates, nodes, axes, rule)

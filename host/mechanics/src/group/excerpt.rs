@@ -16,8 +16,10 @@ impl Group {
     /// Some elements alone; `None` if they cannot be had: the law is not linear with one tangent for all, or there
     /// is more to them than strains and stresses.
     pub fn excerpt(&self, elements: &[usize]) -> Option<Box<dyn Kinematics>> {
-        let has_more =
-            self.layer.is_some() || self.pores.is_some() || !self.internal.committed.is_empty();
+        let has_more = self.layer.is_some()
+            || self.pores.is_some()
+            || !self.correction.is_empty()
+            || !self.internal.committed.is_empty();
         if !self.tangents_are_constant || has_more {
             return None;
         }

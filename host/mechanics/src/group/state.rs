@@ -16,6 +16,7 @@ pub struct GroupState<'g> {
     strain: Cow<'g, [f64]>,
     #[serde(with = "crate::numbers")]
     stress: Cow<'g, [f64]>,
+    correction: Cow<'g, [f64]>,
     #[serde(with = "crate::numbers")]
     internal: Cow<'g, [f64]>,
     jump: Cow<'g, [f64]>,
@@ -36,6 +37,7 @@ impl GroupState<'_> {
             law: Cow::Owned(self.law.into_owned()),
             strain: Cow::Owned(self.strain.into_owned()),
             stress: Cow::Owned(self.stress.into_owned()),
+            correction: Cow::Owned(self.correction.into_owned()),
             internal: Cow::Owned(self.internal.into_owned()),
             jump: Cow::Owned(self.jump.into_owned()),
             stiffness: Cow::Owned(self.stiffness.into_owned()),
@@ -56,6 +58,7 @@ impl Group {
             law: (&self.law.name).into(),
             strain: (&self.strain.committed).into(),
             stress: (&self.stress.committed).into(),
+            correction: (&self.correction).into(),
             internal: (&self.internal.committed).into(),
             jump: jump.into(),
             stiffness: stiffness.into(),
@@ -87,6 +90,7 @@ impl Group {
         let (jump, stiffness) = self.of_layer();
         if state.strain.len() != self.strain.committed.len()
             || state.stress.len() != self.stress.committed.len()
+            || !(state.correction.is_empty() || state.correction.len() == state.stress.len())
             || state.internal.len() != n_internal
             || state.jump.len() != jump.len()
             || state.stiffness.len() != stiffness.len()
@@ -104,6 +108,7 @@ impl Group {
     pub fn restore(&mut self, state: GroupState<'_>, laws: &[Material]) -> Result<(), String> {
         let law = self.check(&state, laws)?;
         self.stress = Field::new(state.stress.into_owned());
+        self.correction = state.correction.into_owned();
         self.pores = state.pores.map(Cow::into_owned);
         self.start_law(law, Some(state.internal.to_vec()))
             .map_err(|failure| failure.to_string())?;

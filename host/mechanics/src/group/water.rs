@@ -11,6 +11,7 @@
 //! D + (K_w/n) δ δᵀ. Where it drains again, what is left of u goes in proportion to the phase's time, however long that is.
 
 use super::{Field, Group, PointFailure};
+use crate::element::Axes;
 use crate::problem::{Drainage, Water};
 use law::Operator;
 use serde::{Deserialize, Serialize};
@@ -138,7 +139,8 @@ impl Group {
         }
     }
 
-    /// Stresses that the elements carry, excess pore pressure included, of the committed state.
+    /// Stresses that the elements carry, of the committed state: with excess pore pressure, of interfaces with what exact
+    /// integration adds to the tractions that they began with.
     pub fn carried(&self) -> Cow<'_, [f64]> {
         self.with_excess(&self.stress.committed, |excess| &excess.committed)
     }
@@ -153,6 +155,10 @@ impl Group {
         stress: &'s [f64],
         of: impl Fn(&Field) -> &Vec<f64>,
     ) -> Cow<'s, [f64]> {
+        if !self.correction.is_empty() {
+            let both = stress.iter().zip(&self.correction);
+            return both.map(|(stress, more)| stress + more).collect();
+        }
         let Some(pores) = &self.pores else {
             return Cow::Borrowed(stress);
         };
@@ -163,26 +169,37 @@ impl Group {
         Cow::Owned(carried)
     }
 
+    /// Stresses of a pressure in the pores of an element, or between its faces, point by point.
+    pub fn pore_flux(&self, element: usize, pressure: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
+        let n = self.kinematics.n_components();
+        let between = |at: [f64; 2], _: &Axes| [pressure(at), 0.0];
+        if let Some(gathered) = self.kinematics.gathered(element, &between) {
+            return gathered.into_flattened();
+        }
+        let of_point = |point: usize| {
+            let mut flux = [0.0; 4];
+            // Of a traction, the normal component.
+            flux[..if n == 2 { 1 } else { 3 }].fill(pressure(self.kinematics.position(point)));
+            flux.into_iter().take(n)
+        };
+        self.kinematics
+            .points_of(element)
+            .flat_map(of_point)
+            .collect()
+    }
+
     /// Adds the nodal forces of hydrostatic pore pressures, in all elements or in some.
     pub fn add_pore_forces(&self, water: &Water, elements: Option<&[usize]>, force: &mut [f64]) {
         let n = self.kinematics.n_components();
         let mut flux = vec![0.0; n * self.kinematics.n_points()];
-        let mut is_dry = true;
-        let mut counts = vec![elements.is_none(); self.kinematics.n_elements()];
-        elements
-            .into_iter()
-            .flatten()
-            .for_each(|&element| counts[element] = true);
-        for (point, flux) in flux.chunks_exact_mut(n).enumerate() {
-            if !counts[self.kinematics.place_of(point).0] {
-                continue;
-            }
-            let pressure = water.pressure(self.kinematics.position(point));
-            is_dry &= pressure <= 0.0;
-            // Of a traction, the normal component.
-            flux[..if n == 2 { 1 } else { 3 }].fill(pressure);
+        let all = 0..self.kinematics.n_elements();
+        let some = elements.map_or_else(|| all.collect(), <[usize]>::to_vec);
+        for element in some {
+            let points = self.kinematics.points_of(element);
+            let own = self.pore_flux(element, |at| water.pressure(at));
+            flux[n * points.start..n * points.end].copy_from_slice(&own);
         }
-        if !is_dry {
+        if flux.iter().any(|pressure| *pressure != 0.0) {
             self.kinematics.add_forces(&flux, force);
         }
     }

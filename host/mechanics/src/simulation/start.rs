@@ -3,6 +3,7 @@
 
 use super::loads::Prescribed;
 use super::{Simulation, Warning, Watch};
+use crate::element::Axes;
 use crate::equilibrium::StepFailure;
 use crate::error::{Error, Place};
 use crate::ground::beside_joints;
@@ -44,7 +45,7 @@ impl Simulation {
             self.force = start.forces(&self.problem, &self.groups);
         }
         self.loading = [start.clone(), start.changed_by(&phase)];
-        let beside: Vec<Vec<f64>> = phase
+        let beside: Vec<[Vec<f64>; 2]> = phase
             .activate
             .iter()
             .map(|&g| self.stress_beside(g))
@@ -64,10 +65,11 @@ impl Simulation {
                 watch.warning(&Warning::Parted(phase.name.clone(), parted));
             }
         }
-        for (&group, stress) in phase.activate.iter().zip(beside) {
+        for (&group, [stress, lost]) in phase.activate.iter().zip(beside) {
             starts[group] = true;
             self.groups[group].moment = moment;
             self.groups[group].appear(stress).map_err(cannot_start)?;
+            self.groups[group].correct(lost);
         }
         let of_interfaces =
             |&group: &usize| self.groups[group].formulation == Formulation::ZeroThickness;
@@ -125,12 +127,13 @@ impl Simulation {
     }
 
     /// Stress with which a group appears: none in solids; in interfaces that computed beside them, in
-    /// axes of the elements. Water between the faces carries its own pressure.
-    fn stress_beside(&self, number: usize) -> Vec<f64> {
-        let kinematics = &self.groups[number].kinematics;
+    /// axes of the elements, and what exact integration adds to it. Water between the faces carries its own pressure.
+    fn stress_beside(&self, number: usize) -> [Vec<f64>; 2] {
+        let group = &self.groups[number];
+        let kinematics = &group.kinematics;
         let n = kinematics.n_points();
         if kinematics.n_components() == 4 {
-            return vec![0.0; 4 * n];
+            return [vec![0.0; 4 * n], Vec::new()];
         }
         let solids = &self.problem.mesh.solids;
         // Number of each solid within its group.
@@ -144,10 +147,8 @@ impl Simulation {
             .collect();
         let beside = beside_joints(&self.problem.mesh);
         let water = self.loading[0].water(&self.problem);
-        let mut stress = Vec::with_capacity(2 * n);
-        for point in 0..n {
-            let (element, _) = kinematics.place_of(point);
-            let (nodes, at) = (kinematics.nodes(element), kinematics.position(point));
+        let traction = |element: usize, at: [f64; 2], axes: &Axes| {
+            let nodes = kinematics.nodes(element);
             let pressure = water.as_ref().map_or(0.0, |water| water.pressure(at));
             let of_side = |face: usize| {
                 let solid = *beside.get(&face)?;
@@ -171,13 +172,23 @@ impl Simulation {
             let share = 1.0 / sides.len().max(1) as f64;
             let mean =
                 std::array::from_fn(|c| share * sides.iter().map(|side| side[c]).sum::<f64>());
-            let [_, mut normal, _, shear] = kinematics.axes_at(point).stress_from_global(mean);
+            let [_, mut normal, _, shear] = axes.stress_from_global(mean);
             if self.problem.groups[number].pore_water && !sides.is_empty() {
                 normal += pressure;
             }
-            stress.extend([normal, shear]);
-        }
-        stress
+            [normal, shear]
+        };
+        let at_point = |point: usize| {
+            let (element, _) = kinematics.place_of(point);
+            traction(
+                element,
+                kinematics.position(point),
+                &kinematics.axes_at(point),
+            )
+        };
+        let stress: Vec<f64> = (0..n).flat_map(at_point).collect();
+        let lost = group.lost(&stress, traction);
+        [stress, lost]
     }
 
     /// The largest component of all stresses.
