@@ -19,9 +19,12 @@ on_request() { # TARGET TEST
   rows+=("| \`$2\` | \`$1/\` | $(date +%F) | $commit | $((SECONDS - start)) s | $outcome |")
 }
 
+# The job array is tried in Slurm.
+[ -x /usr/sbin/slurmctld ] || { apt-get update -q && apt-get install -q -y --no-install-recommends slurm-wlm munge; } || exit 1
 # The program and all that its tests need, as `.ci/run` builds them.
 cargo test --workspace --release --no-run || exit 1
 on_request trade_off the_committed_errors_are_those_that_are_measured
+on_request command_line slurm::tasks_whose_time_is_over_are_sent_in_again_and_go_on
 on_request command_line trade_off::a_case_is_measured_on_its_mesh_and_against_a_finer_one
 printf '%s\n' "${rows[@]}"
 exit $status

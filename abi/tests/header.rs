@@ -383,8 +383,29 @@ fn compiler(variable: &str, default: &str) -> Option<String> {
     );
     // Past the capture of the test harness, so that it is seen.
     let _ = writeln!(std::io::stderr(), "SKIPPED: `{name}` is missing");
+    note(&name);
     None
 }
+
+/// As `tests/support/needs.rs` notes it, for the line at the end of `cargo test`.
+#[cfg(unix)]
+fn note(name: &str) {
+    let program = env::current_exe().unwrap_or_default();
+    let Some(built) = program.ancestors().nth(3) else {
+        return;
+    };
+    let (folder, program) = (built.join("tmp/skipped"), program.display());
+    let _ = fs::create_dir_all(&folder);
+    let starter = std::os::unix::process::parent_id().to_string();
+    let mut options = fs::OpenOptions::new();
+    if let Ok(mut file) = options.create(true).append(true).open(folder.join(starter)) {
+        let test = std::thread::current().name().unwrap_or_default().to_owned();
+        let _ = file.write_all(format!("{program} {test}\t`{name}`\n").as_bytes());
+    }
+}
+
+#[cfg(not(unix))]
+fn note(_: &str) {}
 
 /// A test without its compiler passes with a remark, or fails where nothing may be passed over.
 #[test]

@@ -239,8 +239,12 @@ pub(crate) enum Command {
         /// Which shell.
         shell: clap_complete::Shell,
     },
-    /// Print the manual page.
-    Man,
+    /// Print the manual page, or write those of all commands into a folder.
+    Man {
+        /// Write `pilum.1`, `pilum-run.1` and so on into this folder instead.
+        #[arg(long, value_name = "FOLDER")]
+        into: Option<PathBuf>,
+    },
     /// Try a library: what a child process does.
     #[command(name = vetting::COMMAND, hide = true)]
     ProbeLibrary { library: PathBuf, sha256: String },

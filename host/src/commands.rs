@@ -184,7 +184,8 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             clap_complete::generate(shell, &mut program, "pilum", &mut script);
             print(&String::from_utf8_lossy(&script))
         }
-        Command::Man => manual(&Arguments::command()),
+        Command::Man { into: None } => manual(&Arguments::command()),
+        Command::Man { into: Some(folder) } => manuals(&folder),
         Command::Inspect { library, json } => {
             let inspection = law::inspect::inspect(&library)?;
             if json {
@@ -355,6 +356,12 @@ fn print_schema(file: File) -> Result<(), Error> {
     }))
     .map_err(|error| Error::internal(error.to_string()))?;
     print(&format!("{text}\n"))
+}
+
+/// A manual page for the program and for each command.
+fn manuals(folder: &Path) -> Result<(), Error> {
+    let written = clap_mangen::generate_to(Arguments::command(), folder);
+    Ok(written.map_err(|source| text::Error::unwritable(folder, source))?)
 }
 
 /// The program's manual page, that of each command behind it.

@@ -10,7 +10,6 @@ mod foreign;
 mod guides;
 mod helpers;
 mod laws;
-mod links;
 mod names;
 mod on_request;
 mod pages;

@@ -1,5 +1,6 @@
 //! The tutorials and how-to pages of `host/docs` are sessions: what they show is typed, and what they
-//! say comes out is compared. A page is one session in one folder, from its top to its bottom.
+//! say comes out is compared. A page is one session in one folder, from its top to its bottom, with the program and the
+//! page of an unpacked archive, and no repository.
 //!
 //! - A block of `toml`, `python` or another language whose first line is a comment that is a file
 //!   name, `# case.toml`, is that file. `# case.toml, continued` goes on with it.
@@ -17,7 +18,7 @@
 //! A picture `![…](…/RUN/NAME.svg)` is `results/RUN/NAME.svg` at the end of the page; `PILUM_BLESS=1` rewrites it.
 
 use crate::compilers::repository;
-use crate::program::{pilum, shell};
+use crate::program::pilum;
 use crate::validator::Validator;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -26,6 +27,7 @@ use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 use tests::figure::{alike, bless};
+use tests::place::Place;
 
 /// A fenced block of a page.
 #[derive(Debug)]
@@ -140,7 +142,7 @@ fn squeezed<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<String> {
 /// A page while it is followed.
 struct Session<'a> {
     page: &'a str,
-    folder: TempDir,
+    place: Place,
     case: Validator,
     point: Validator,
     calibration: Validator,
@@ -165,7 +167,7 @@ impl Session<'_> {
                 };
                 let is_name = name.contains('.') && !name.contains([' ', '=', '[']);
                 if is_name {
-                    let path = self.folder.path().join(name);
+                    let path = self.place.work().join(name);
                     fs::create_dir_all(path.parent().unwrap()).unwrap();
                     let before = if goes_on {
                         fs::read_to_string(&path).unwrap_or_else(|why| panic!("{at}: {why}"))
@@ -204,10 +206,8 @@ impl Session<'_> {
             .lines()
             .next()
             .and_then(|line| line.strip_prefix("--- "));
-        let path = self
-            .folder
-            .path()
-            .join(name.unwrap_or_else(|| panic!("{at}: of which file?")));
+        let name = name.unwrap_or_else(|| panic!("{at}: of which file?"));
+        let path = self.place.work().join(name);
         let (mut old, mut new) = (String::new(), String::new());
         for line in text.lines().skip(1) {
             let (mark, line) = line.split_at(line.len().min(1));
@@ -247,7 +247,7 @@ impl Session<'_> {
             }
             assert_eq!(code, 0, "{at}: what comes before `{command}`");
             self.commands += 1;
-            let outcome = shell(self.folder.path(), &format!("{{ {command}\n}} 2>&1"));
+            let outcome = self.place.shell("", &format!("{{ {command}\n}} 2>&1"));
             code = outcome.code.unwrap();
             let (shown, printed) = (squeezed(shown.lines()), squeezed(outcome.stdout.lines()));
             assert!(
@@ -276,24 +276,26 @@ fn remarks<'a>(page: &'a str, kind: &str) -> impl Iterator<Item = &'a str> {
 
 /// Follows a page of `host/docs`; how many commands were typed.
 fn follow(name: &str) -> usize {
-    let text = fs::read_to_string(repository("host/docs").join(name)).unwrap();
+    let place = Place::new();
+    let docs = place.prefix.join("share/doc/pilum/host/docs");
+    let read = |name: &str| fs::read_to_string(docs.join(name)).unwrap();
+    let text = read(name);
     for program in remarks(&text, "needs") {
         if tests::needs::output(Command::new(program).arg("--version")).is_none() {
             return 0;
         }
     }
-    let docs = repository("host/docs");
     let mut session = Session {
         page: name,
-        folder: TempDir::new().unwrap(),
+        place,
         case: validator("case"),
         point: validator("point"),
         calibration: validator("calibration"),
         commands: 0,
     };
+    let work = session.place.work();
     for other in remarks(&text, "files of") {
-        let other = fs::read_to_string(repository("host/docs").join(other)).unwrap();
-        for block in blocks(&other)
+        for block in blocks(&read(other))
             .iter()
             .filter(|block| block.language == "toml")
         {
@@ -302,20 +304,15 @@ fn follow(name: &str) -> usize {
     }
     for file in remarks(&text, "has") {
         let to = Path::new(file).file_name().unwrap();
-        fs::copy(docs.join(file), session.folder.path().join(to)).unwrap();
+        fs::copy(docs.join(file), work.join(to)).unwrap();
     }
     for block in blocks(&text) {
         session.follow(&block);
     }
     for picture in pictures(&text) {
-        let shown = docs.join(name).with_file_name(picture);
+        let shown = repository("host/docs").join(name).with_file_name(picture);
         let parts: Vec<&str> = picture.rsplitn(3, '/').collect();
-        let drawn = session
-            .folder
-            .path()
-            .join("results")
-            .join(parts[1])
-            .join(parts[0]);
+        let drawn = work.join("results").join(parts[1]).join(parts[0]);
         let drawn = fs::read_to_string(&drawn).unwrap_or_else(|why| panic!("{picture}: {why}"));
         if bless() {
             fs::write(shown, drawn).unwrap();
@@ -401,7 +398,7 @@ fn files_of_results_are_those_described() {
 #[test]
 fn every_page_says_what_it_is_for() {
     let mut pages = Vec::new();
-    crate::links::pages(&repository("host/docs"), &mut pages);
+    tests::links::pages(&repository("host/docs"), &mut pages);
     for path in pages {
         let text = fs::read_to_string(&path).unwrap();
         let lines = text.lines().filter(|line| !line.starts_with("<!--"));
@@ -452,7 +449,7 @@ fn mistakes_of_a_page_are_found() {
     let follow = |text: &str| {
         let mut session = Session {
             page: "a page",
-            folder: TempDir::new().unwrap(),
+            place: Place::new(),
             case: validator("case"),
             point: validator("point"),
             calibration: validator("calibration"),
@@ -479,6 +476,13 @@ fn mistakes_of_a_page_are_found() {
     }
 }
 
+#[test]
+fn every_link_leads_somewhere() {
+    let (links, broken) = tests::links::followed(&repository(""));
+    assert!(links > 100, "{links} links");
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
 /// Every file of `host/docs` is reached from its map.
 #[test]
 fn the_map_names_every_page() {
@@ -486,7 +490,7 @@ fn the_map_names_every_page() {
     let map = fs::read_to_string(host.join("README.md")).unwrap();
     assert!(map.lines().count() <= 150, "{} lines", map.lines().count());
     let mut pages = Vec::new();
-    crate::links::pages(&host.join("docs"), &mut pages);
+    tests::links::pages(&host.join("docs"), &mut pages);
     for page in pages {
         let page: &Path = page.strip_prefix(&host).unwrap();
         let name = page.to_str().unwrap().to_owned();

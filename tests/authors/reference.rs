@@ -3,7 +3,6 @@
 //! and every example of a page is run.
 
 use crate::compilers::repository;
-use crate::links::anchor;
 use crate::pages::{Block, blocks};
 use crate::program::pilum;
 use serde_json::Value;
@@ -12,6 +11,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use tests::links::anchor;
 
 /// What the program puts out.
 fn printed(arguments: &[&str]) -> String {

@@ -52,25 +52,18 @@ fn root() -> PathBuf {
 
 /// All packages that any build of the workspace may need, as cargo tells it.
 fn packages() -> Vec<Value> {
-    let metadata = |more: &[&str]| {
-        let output = Command::new(env!("CARGO"))
-            .args(["metadata", "--format-version", "1", "--locked"])
-            .args(more)
-            .current_dir(root())
-            .output()
-            .unwrap();
-        output.status.success().then_some(output.stdout)
+    let metadata = |more: &[&str], crates: &str| {
+        let arguments = [&["metadata", "--format-version", "1"], more].concat();
+        tests::needs::of_cargo(&root(), &arguments, crates)
     };
     // Without a network, those of this platform.
     let platform = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
-    let found = metadata(&[]).or_else(|| {
-        tests::needs::missing("some crate of another platform (`cargo fetch --locked`)");
-        metadata(&["--offline", "--filter-platform", &platform])
-    });
+    let found = metadata(&["--all-features"], "some crate of another platform")
+        .or_else(|| metadata(&["--filter-platform", &platform], "some crate"));
     let Some(found) = found else {
         panic!("`cargo metadata --locked` fails: is Cargo.lock up to date?");
     };
-    let mut found: Value = serde_json::from_slice(&found).unwrap();
+    let mut found: Value = serde_json::from_str(&found).unwrap();
     let Value::Array(packages) = found["packages"].take() else {
         panic!("no packages");
     };

@@ -478,10 +478,7 @@ fn ended(place: &Place, signal: &str, n: usize) -> Option<(Option<i32>, usize, S
         }
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-    let sent = std::process::Command::new("kill")
-        .args([signal, &child.id().to_string()])
-        .status();
-    assert!(sent.unwrap().success());
+    assert!(tests::needs::signal(signal, &child.id().to_string()));
     let code = child.wait().unwrap().code();
     let said = std::fs::read_to_string(place.path("said")).unwrap();
     (!place.path("out/calibration.json").exists()).then(|| (code, kept(), said))
@@ -497,9 +494,9 @@ fn a_calibration_that_was_ended_goes_on_with_what_it_has_computed() {
     assert!(!undisturbed.path("out/computations.jsonl").exists());
     let place = long();
     let mut before = 0;
-    for (signal, more) in [("-INT", 5), ("-KILL", 7), ("-TERM", 9)] {
+    for (signal, more) in [("INT", 5), ("KILL", 7), ("TERM", 9)] {
         let (code, kept, said) = ended(&place, signal, before + more).unwrap();
-        if signal != "-KILL" {
+        if signal != "KILL" {
             assert_eq!(code, Some(130), "{said}");
             assert!(said.contains("computations are kept in out"), "{said}");
             assert!(said.contains("the same command goes on"), "{said}");
@@ -524,7 +521,7 @@ fn a_calibration_that_was_ended_goes_on_with_what_it_has_computed() {
 #[test]
 fn what_was_computed_of_something_else_is_not_taken_over() {
     let place = long();
-    ended(&place, "-KILL", 5).unwrap();
+    ended(&place, "KILL", 5).unwrap();
     place.write(
         "driver.toml",
         DRIVER.replacen("increments = 20", "increments = 30", 1),
@@ -533,13 +530,13 @@ fn what_was_computed_of_something_else_is_not_taken_over() {
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     assert!(outcome.says("begun anew"), "{}", outcome.stderr);
     let place = long();
-    ended(&place, "-KILL", 5).unwrap();
+    ended(&place, "KILL", 5).unwrap();
     // The noise is no part of it.
     place.write("joint.toml", FILE.replace("noise = 0.1", "noise = 0.2"));
     let outcome = place.run(&LONG);
     assert!(outcome.says("are taken over"), "{}", outcome.stderr);
     let place = long();
-    ended(&place, "-KILL", 5).unwrap();
+    ended(&place, "KILL", 5).unwrap();
     let outcome = place.run(&[&LONG[..], &["--anew"]].concat());
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     assert!(!outcome.says("taken over"), "{}", outcome.stderr);

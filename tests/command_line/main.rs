@@ -25,6 +25,7 @@ mod run_table;
 mod running;
 mod settings;
 mod shear_zone;
+mod slurm;
 mod stopping;
 mod streams;
 mod study;

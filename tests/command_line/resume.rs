@@ -340,11 +340,8 @@ fn stopped_and_resumed(text: &str, expected: &BTreeMap<String, Vec<u8>>, what: &
 
 #[cfg(unix)]
 fn interrupt(process: u32) {
-    let sent = std::process::Command::new("kill")
-        .args(["-INT", &process.to_string()])
-        .output();
     // It may have ended by itself.
-    drop(sent.unwrap());
+    tests::needs::signal("INT", &process.to_string());
 }
 
 #[test]

@@ -5,7 +5,7 @@
 use crate::program::{CASE, JOINT, Place, edited};
 use crate::troubled;
 use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// What a shell says of a program that was stopped.
@@ -36,8 +36,7 @@ fn wait_for(place: &Place, text: &str) {
 
 /// Sends a signal to a process, or with `-` before its number to its group.
 fn send(signal: &str, to: &str) {
-    let sent = Command::new("kill").args([signal, "--", to]).status();
-    assert!(sent.unwrap().success(), "{signal} to {to}");
+    assert!(tests::needs::signal(signal, to), "{signal} to {to}");
 }
 
 /// The exit code, which must come in time.
@@ -78,7 +77,7 @@ fn ctrl_c_to_the_whole_group_stops_a_run() {
         let arguments = [&["run", "case.toml", "--out", "out"], isolate].concat();
         let mut child = start(&place, &arguments);
         wait_for(&place, "phase push: increment 1/");
-        send("-INT", &format!("-{}", child.id()));
+        send("INT", &format!("-{}", child.id()));
         assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
         assert!(!said(&place).contains("crashed"), "{}", said(&place));
         assert_eq!(summary(&place)["status"], "interrupted");
@@ -88,7 +87,7 @@ fn ctrl_c_to_the_whole_group_stops_a_run() {
 /// The law takes the signals for itself; they are the program's all the same.
 #[test]
 fn stolen_signals_stop_a_run() {
-    for signal in ["-INT", "-TERM"] {
+    for signal in ["INT", "TERM"] {
         let Some(place) = troubled::place("TROUBLE_IN_CREATE=SIGNALS") else {
             return;
         };
@@ -110,7 +109,7 @@ fn a_law_that_never_returns_is_stopped() {
     let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
     wait_for(&place, "phase push");
     std::thread::sleep(Duration::from_millis(300));
-    send("-TERM", &child.id().to_string());
+    send("TERM", &child.id().to_string());
     assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
     let text = said(&place);
     assert!(
@@ -124,10 +123,10 @@ fn a_law_that_never_returns_is_stopped() {
     place.write("driver.toml", troubled::driver("loop"));
     let mut child = start(&place, &["point", "driver.toml", "--csv", "out.csv"]);
     std::thread::sleep(Duration::from_millis(500));
-    send("-INT", &child.id().to_string());
+    send("INT", &child.id().to_string());
     std::thread::sleep(Duration::from_millis(200));
     let again = Instant::now();
-    send("-INT", &child.id().to_string());
+    send("INT", &child.id().to_string());
     assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
     assert!(
         again.elapsed() < Duration::from_secs(2),
@@ -156,7 +155,7 @@ fn a_hopeless_increment_is_stopped_within_it() {
     );
     let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
     wait_for(&place, "phase weight");
-    send("-TERM", &child.id().to_string());
+    send("TERM", &child.id().to_string());
     assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
     let text = said(&place);
     assert!(text.contains("within the increment"), "{text}");
@@ -182,7 +181,7 @@ fn studies_say_how_far_they_are_and_stop() {
     for (command, file, until) in commands {
         let mut child = start(&place, &[command, file, "--out", "out"]);
         wait_for(&place, until);
-        send("-INT", &format!("-{}", child.id()));
+        send("INT", &format!("-{}", child.id()));
         assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
         let text = said(&place);
         assert!(
@@ -202,7 +201,7 @@ fn a_stopped_study_has_its_rows_and_goes_on() {
     let stop_after = |arguments: &[&str], until: &str| {
         let mut child = start(&place, arguments);
         wait_for(&place, until);
-        send("-INT", &format!("-{}", child.id()));
+        send("INT", &format!("-{}", child.id()));
         assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
         let rows = tests::case::table(&place.path("out/trade_off.csv"));
         let measured = rows.into_iter().map(|row| {
@@ -254,7 +253,7 @@ fn a_stopped_search_for_an_accuracy_goes_on() {
     );
     let mut child = start(&place, &["run", "pile.toml", "--out", "out"]);
     wait_for(&place, "accuracy: run 3");
-    send("-INT", &format!("-{}", child.id()));
+    send("INT", &format!("-{}", child.id()));
     assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
     let rows = || tests::case::table(&place.path("out/accuracy.csv"));
     let first = rows();

@@ -8,7 +8,7 @@ use crate::troubled;
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// Three by two runs.
@@ -745,10 +745,7 @@ fn kills_lose_nothing() {
         } else {
             kill as usize % family.len()
         }];
-        let _ = Command::new("kill")
-            .args(["-9", &victim.to_string()])
-            .stderr(Stdio::null())
-            .status();
+        tests::needs::signal("KILL", &victim.to_string());
         if victim == child.id() {
             child.wait().unwrap();
         } else {
@@ -813,13 +810,7 @@ fn ctrl_c_stops_a_study_and_the_same_command_goes_on() {
     }
     // As a terminal does: to the whole group.
     let group = format!("-{}", child.id());
-    assert!(
-        Command::new("kill")
-            .args(["-INT", "--", &group])
-            .status()
-            .unwrap()
-            .success()
-    );
+    assert!(tests::needs::signal("INT", &group));
     let code = child.wait().unwrap().code();
     assert_eq!(code, Some(130), "{}", text());
     assert!(text().contains("have come to an end"), "{}", text());

@@ -9,29 +9,29 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tests::needs;
 
-fn case(name: &str) -> String {
+pub(crate) fn case(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../cases")
         .join(name);
     path.canonicalize().unwrap().display().to_string()
 }
 
-/// What `pilum study` makes of a case's study, as a table.
-fn by_itself(name: &str) -> String {
+/// What `pilum study` makes of a study of `cases/`, or one by its path, as a table.
+pub(crate) fn by_itself(name: &str) -> String {
     let place = Place::new();
     let outcome = place.run(&["study", &case(name), "--out", "out"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     table(&place)
 }
 
-fn table(place: &Place) -> String {
+pub(crate) fn table(place: &Place) -> String {
     let outcome = place.run(&["table", "out"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     outcome.stdout
 }
 
 /// A program with `pilum` on its path, in the folder of a place.
-fn with_pilum(place: &Place, program: &str) -> Command {
+pub(crate) fn with_pilum(place: &Place, program: &str) -> Command {
     let pilum = place.command(&[]);
     let mut path = OsString::from(Path::new(pilum.get_program()).parent().unwrap());
     path.push(":");

@@ -1,9 +1,9 @@
 //! Laws that are built with the installed headers, by pkg-config and by CMake.
 
-use crate::place::{Compilers, Place, are_there};
 use std::fs;
 use std::process::Command;
 use tests::needs::{assert_named, output};
+use tests::place::{Compilers, Place, are_there};
 
 /// A project without its own copy of the contract.
 fn bare(place: &Place, language: &str) {

@@ -3,6 +3,6 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
 
 mod laws;
-mod place;
+mod pages;
 mod program;
 mod projects;

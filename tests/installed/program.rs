@@ -1,10 +1,10 @@
 //! What the archive holds, and the program of it.
 
-use crate::place::{Place, built_program, repository};
 use serde_json::Value;
 use std::fs;
 use std::process::Command;
 use tests::case::column;
+use tests::place::{Place, built_program, repository};
 
 #[test]
 fn the_archive_has_all_its_parts() {

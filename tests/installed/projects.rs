@@ -1,9 +1,9 @@
 //! What `pilum new-law` writes, by the installed program: built, checked and run as its README says.
 
-use crate::place::{Compilers, Place, are_there};
 use approx::assert_relative_eq;
 use std::fs;
 use tests::case::column;
+use tests::place::{Compilers, Place, are_there};
 
 fn follow(language: &str, compilers: Compilers) {
     if !are_there(compilers) {

@@ -2,5 +2,7 @@
 
 pub mod case;
 pub mod figure;
+pub mod links;
 pub mod needs;
+pub mod place;
 pub mod tolerance;

@@ -1,9 +1,12 @@
-//! What tests need beside cargo: compilers, a browser, programs of others. Without them a test says
-//! so and does nothing; where `PILUM_REQUIRE_ALL` or `CI` is set, as in `.ci/run`, it fails.
+//! What tests need besides cargo: compilers, a browser, programs of others. Without them a test says
+//! so and does nothing; where `PILUM_REQUIRE_ALL` or `CI` is set, as in `.ci/run`, it fails. The last of all test
+//! programs says in one line what was skipped (`tests/what_was_skipped.rs`).
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::{env, fs, thread};
 
 /// Variables that forbid passing over a test.
 pub const STRICT: [&str; 2] = ["PILUM_REQUIRE_ALL", "CI"];
@@ -31,6 +34,98 @@ pub fn missing(what: &str) {
 pub fn passed_over(what: &str) {
     // Past the test harness, which keeps what passing tests print to itself.
     let _ = writeln!(std::io::stderr(), "SKIPPED: {what} is missing");
+    let test = thread::current().name().unwrap_or_default().to_owned();
+    note(&test, what);
+}
+
+/// Where skipped tests are noted: a folder in cargo's `target/tmp` with a file for each process that starts test
+/// programs. A test program that a test starts has another one, which nobody reads.
+fn notes() -> Option<PathBuf> {
+    let program = env::current_exe().ok()?;
+    Some(program.ancestors().nth(3)?.join("tmp/skipped"))
+}
+
+#[cfg(unix)]
+fn starter() -> String {
+    std::os::unix::process::parent_id().to_string()
+}
+
+#[cfg(not(unix))]
+fn starter() -> String {
+    "cargo".to_owned()
+}
+
+/// A line of the test program, the test and what is missing. `abi/tests/header.rs` writes the same one.
+fn note(test: &str, what: &str) {
+    let Some(folder) = notes() else { return };
+    let _ = fs::create_dir_all(&folder);
+    let mut options = fs::OpenOptions::new();
+    let file = options.create(true).append(true);
+    if let Ok(mut file) = file.open(folder.join(starter())) {
+        let program = env::current_exe().unwrap_or_default();
+        let line = format!("{} {test}\t{what}\n", program.display());
+        let _ = file.write_all(line.as_bytes());
+    }
+}
+
+/// What was skipped since `cargo test` began, in one line; the notes are taken away.
+pub fn skipped() -> String {
+    let folder = notes().unwrap_or_default();
+    let notes = fs::read_to_string(folder.join(starter())).unwrap_or_default();
+    let _ = fs::remove_dir_all(&folder);
+    summary(&notes)
+}
+
+/// Every test counts once, whatever it lacks.
+fn summary(notes: &str) -> String {
+    let lines = notes.lines().filter_map(|line| line.split_once('\t'));
+    let mut tests = BTreeSet::new();
+    let mut lacking: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for (test, what) in lines {
+        tests.insert(test);
+        lacking.entry(what).or_default().insert(test);
+    }
+    if tests.is_empty() {
+        return "SKIPPED: no test".to_owned();
+    }
+    let named = lacking
+        .iter()
+        .map(|(what, of)| format!("{what} ({})", of.len()));
+    let named: Vec<String> = named.collect();
+    format!(
+        "SKIPPED, in whole or in part: {} tests, for lack of {}",
+        tests.len(),
+        named.join(", ")
+    )
+}
+
+/// What cargo prints where it may lack crates that nothing has fetched yet: it is asked without a network first, then
+/// with one. `None`, with a remark, if they are [`missing`].
+///
+/// # Panics
+/// If it cannot be started, or crates are missing where nothing may be passed over.
+#[track_caller]
+#[expect(clippy::expect_used, reason = "part of the tests")]
+pub fn of_cargo(repository: &Path, arguments: &[&str], crates: &str) -> Option<String> {
+    let ask = |more: &[&str]| {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(arguments).args(more).current_dir(repository);
+        let output = cargo.output().expect("cargo starts");
+        output.status.success().then_some(output.stdout)
+    };
+    let printed = ask(&["--locked", "--offline"]).or_else(|| ask(&["--locked"]));
+    if printed.is_none() {
+        missing(&format!("{crates} (`cargo fetch --locked`)"));
+    }
+    String::from_utf8(printed?).ok()
+}
+
+/// Sends a signal, `INT` say, to a process, or with `-` before its number to its group, by the shell's own `kill`: the
+/// program is not on every system. Whether there was one to send it to.
+pub fn signal(signal: &str, to: &str) -> bool {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &format!("kill -{signal} {to}")]);
+    shell.output().is_ok_and(|output| output.status.success())
 }
 
 /// What a program puts out; `None`, with a remark, if it is [`missing`].
@@ -110,5 +205,18 @@ pub fn assert_named(test: &str, what: &str) {
         assert_eq!(output.status.success(), passes, "{strict:?}\n{said}");
         assert!(said.contains("running 1 test"), "{said}");
         assert!(said.contains(&remark), "{remark}, {strict:?}\n{said}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::summary;
+
+    #[test]
+    fn tests_are_counted_once_and_what_they_lack_is_named() {
+        let notes = "a x\t`cc`\na y\t`cc`\na x\t`cmake`\na x\t`cc`\nb x\t`cc`\n";
+        let line = "SKIPPED, in whole or in part: 3 tests, for lack of `cc` (3), `cmake` (1)";
+        assert_eq!(summary(notes), line);
+        assert_eq!(summary(""), "SKIPPED: no test");
     }
 }

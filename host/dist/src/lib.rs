@@ -8,7 +8,7 @@
 //! lib/pkgconfig/pilum.pc     for build systems of laws
 //! lib/cmake/pilum/
 //! include/pilum/             the contract in C and C++
-//! share/pilum/               the contract in Fortran, symbols for linkers, cases
+//! share/pilum/               the contract in Fortran, symbols for linkers, all cases
 //! share/man, share/bash-completion, share/zsh, share/fish
 //! share/doc/pilum/           pages, licences
 //! ```
@@ -16,10 +16,12 @@
 mod error;
 mod licences;
 mod metadata;
+mod pages;
 
 pub use error::Error;
 pub use metadata::Metadata;
 
+use crate::pages::Places;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -44,8 +46,8 @@ impl Built {
     }
 }
 
-/// A page or file of the repository, and the folder that it goes to.
-const FILES: [(&str, &str); 16] = [
+/// A page, file or folder of the repository, and the folder that it goes to.
+const FILES: [(&str, &str); 17] = [
     ("abi/include/pilum_law.h", "include/pilum"),
     ("abi/include/pilum_point.h", "include/pilum"),
     ("abi/include/pilum_law.hpp", "include/pilum"),
@@ -55,18 +57,23 @@ const FILES: [(&str, &str); 16] = [
         "host/docs/tutorial/my_pile.msh",
         "share/pilum/cases/tutorial",
     ),
-    ("cases/chamber_mesh1", "share/pilum/cases/chamber_mesh1"),
+    ("cases", "share/pilum/cases"),
+    // The user material of a case.
     (
-        "cases/chamber_oriented",
-        "share/pilum/cases/chamber_oriented",
+        "tests/fixtures/umat/hypoplastic.f90",
+        "share/pilum/cases/shear_zone",
     ),
-    ("cases/shear_box", "share/pilum/cases/shear_box"),
+    (
+        "tests/fixtures/umat/hypoplasticity.inc",
+        "share/pilum/cases/shear_zone",
+    ),
     ("LICENSE-MIT", "share/doc/pilum"),
     ("LICENSE-APACHE", "share/doc/pilum"),
     ("CHANGELOG.md", "share/doc/pilum"),
     // Pages keep their places among each other, for their links.
     ("abi/README.md", "share/doc/pilum/abi"),
     ("abi/interoperability.md", "share/doc/pilum/abi"),
+    ("host/README.md", "share/doc/pilum/host"),
     ("host/docs", "share/doc/pilum/host/docs"),
     ("models/README.md", "share/doc/pilum/models"),
 ];
@@ -87,9 +94,11 @@ impl Kind {
     }
 }
 
+/// Where `man` looks for the pages of the program and of its commands.
+const MANUAL: &str = "share/man/man1";
+
 /// What the program prints, and the file that it goes to.
-const PRINTED: [(&[&str], &str); 4] = [
-    (&["man"], "share/man/man1/pilum.1"),
+const PRINTED: [(&[&str], &str); 3] = [
     (
         &["completions", "bash"],
         "share/bash-completion/completions/pilum",
@@ -116,7 +125,7 @@ const WRITTEN: [(&str, &str); 4] = [
 ];
 
 /// Lays all files out below a folder, which is made; files of an earlier version are replaced. A wheel has neither
-/// manual page nor completions, which no shell would find in it.
+/// manual pages nor completions, which no shell would find in it.
 ///
 /// # Errors
 /// [`Error::File`] if a file cannot be read or written, [`Error::Command`] if the program does not run,
@@ -133,29 +142,27 @@ pub fn lay_out(
     for law in metadata.laws() {
         let name = format!("{DLL_PREFIX}{law}{DLL_SUFFIX}");
         copy_built(&built.laws.join(&name), &into.join("lib/pilum").join(&name))?;
-        let page = format!("models/{law}/LAW.md");
-        copy(
-            &repository.join(&page),
-            &into.join("share/doc/pilum").join(&page),
-        )?;
     }
-    for (from, to) in FILES {
-        let (from, to) = (repository.join(from), into.join(to));
-        if from.is_dir() {
-            copy_folder(&from, &to)?;
+    let places = places(repository, metadata)?;
+    for (from, to) in &places {
+        let (path, to) = (repository.join(from), into.join(to));
+        let is_page = from.extension().is_some_and(|e| e == "md" || e == "ipynb");
+        if is_page {
+            let text = fs::read_to_string(&path).map_err(Error::of(&path))?;
+            let text = pages::moved(&text, from, &places, repository);
+            write(&to, text.as_bytes())?;
         } else {
-            let name = from.file_name().unwrap_or_default();
-            copy(&from, &to.join(name))?;
+            copy(&path, &to)?;
         }
     }
-    let printed = if kind == Kind::Archive {
-        &PRINTED[..]
-    } else {
-        &[]
-    };
-    for &(arguments, to) in printed {
-        let printed = output(Command::new(&program).args(arguments))?;
-        write(&into.join(to), &printed)?;
+    if kind == Kind::Archive {
+        let manual = into.join(MANUAL);
+        fs::create_dir_all(&manual).map_err(Error::of(&manual))?;
+        output(Command::new(&program).args(["man", "--into"]).arg(&manual))?;
+        for (arguments, to) in PRINTED {
+            let printed = output(Command::new(&program).args(arguments))?;
+            write(&into.join(to), &printed)?;
+        }
     }
     for (text, to) in WRITTEN {
         let text = text.replace("@VERSION@", &metadata.version);
@@ -180,7 +187,8 @@ pub fn pack(folder: &Path, archive: &Path) -> Result<(), Error> {
         let inner = path.strip_prefix(folder).unwrap_or(&path);
         let content = fs::read(&path).map_err(Error::of(&path))?;
         let mut header = tar::Header::new_gnu();
-        let is_program = inner.starts_with("bin") || inner.starts_with("lib/pilum");
+        let is_script = inner.extension().is_some_and(|ending| ending == "sh");
+        let is_program = is_script || inner.starts_with("bin") || inner.starts_with("lib/pilum");
         header.set_mode(if is_program { 0o755 } else { 0o644 });
         header.set_size(content.len() as u64);
         header.set_mtime(0);
@@ -208,18 +216,38 @@ fn below(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(found)
 }
 
-/// Files of a repository's folder that users read or run. Others may lie there that a run has left.
-fn copy_folder(from: &Path, to: &Path) -> Result<(), Error> {
-    for path in below(from)? {
-        let ending = path.extension().and_then(|ending| ending.to_str());
-        if matches!(
-            ending,
-            Some("md" | "ipynb" | "toml" | "csv" | "svg" | "msh" | "geo")
-        ) {
-            copy(&path, &to.join(path.strip_prefix(from).unwrap_or(&path)))?;
+/// Every file of the repository that is in the archive, and where.
+fn places(repository: &Path, metadata: &Metadata) -> Result<Places, Error> {
+    let mut places = Places::new();
+    for law in metadata.laws() {
+        let page = PathBuf::from(format!("models/{law}/LAW.md"));
+        let to = Path::new("share/doc/pilum").join(&page);
+        places.insert(page, to);
+    }
+    for (from, to) in FILES {
+        let path = repository.join(from);
+        if path.is_dir() {
+            let files = below(&path)?;
+            let inner = files.iter().filter_map(|file| file.strip_prefix(&path).ok());
+            for inner in inner.filter(|file| is_for_users(file)) {
+                places.insert(Path::new(from).join(inner), Path::new(to).join(inner));
+            }
+        } else {
+            let name = path.file_name().unwrap_or_default();
+            places.insert(from.into(), Path::new(to).join(name));
         }
     }
-    Ok(())
+    Ok(places)
+}
+
+/// Files that users read or run. Others may lie in the repository that a run has left.
+fn is_for_users(file: &Path) -> bool {
+    let is_left = file.components().any(|part| part.as_os_str() == "results");
+    let endings = [
+        "md", "ipynb", "toml", "csv", "svg", "msh", "geo", "py", "sh", "sbatch", "txt",
+    ];
+    let ending = file.extension().and_then(|ending| ending.to_str());
+    !is_left && (file.ends_with("Snakefile") || ending.is_some_and(|e| endings.contains(&e)))
 }
 
 fn copy_built(from: &Path, to: &Path) -> Result<(), Error> {

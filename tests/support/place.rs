@@ -1,5 +1,12 @@
-//! A folder without a repository above it, with the archive unpacked.
+//! Installed, not built: a folder without a repository above it, with the archive unpacked.
+#![expect(
+    clippy::missing_panics_doc,
+    clippy::new_without_default,
+    clippy::unwrap_used,
+    reason = "part of the tests, which panic to fail"
+)]
 
+use crate::needs::compiler;
 use dist::{Built, Metadata};
 use std::collections::BTreeSet;
 use std::env::{self, consts::EXE_SUFFIX};
@@ -9,13 +16,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 use tempfile::TempDir;
-use tests::needs::compiler;
 
 /// Compilers that a test needs: variables, and what stands for them.
-pub(crate) type Compilers = &'static [(&'static str, &'static str)];
+pub type Compilers = &'static [(&'static str, &'static str)];
 
 /// Whether all are there; with a remark where one is not.
-pub(crate) fn are_there(compilers: Compilers) -> bool {
+pub fn are_there(compilers: Compilers) -> bool {
     let found = compilers
         .iter()
         .map(|(variable, name)| compiler(variable, name));
@@ -24,22 +30,26 @@ pub(crate) fn are_there(compilers: Compilers) -> bool {
 
 /// What became of a command.
 #[derive(Debug)]
-pub(crate) struct Outcome {
-    pub(crate) code: Option<i32>,
-    pub(crate) stdout: String,
-    pub(crate) stderr: String,
+pub struct Outcome {
+    /// Exit code.
+    pub code: Option<i32>,
+    /// What it prints.
+    pub stdout: String,
+    /// What it says.
+    pub stderr: String,
 }
 
 /// The archive, unpacked.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub struct Place {
     /// Home and working folder are in it too.
     folder: TempDir,
     /// Where `bin` and the others are.
-    pub(crate) prefix: PathBuf,
+    pub prefix: PathBuf,
 }
 
-pub(crate) fn repository() -> PathBuf {
+/// The root of the repository.
+pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
@@ -49,7 +59,7 @@ fn deps() -> PathBuf {
 }
 
 /// The program that cargo has built.
-pub(crate) fn built_program() -> PathBuf {
+pub fn built_program() -> PathBuf {
     let program = deps().parent().unwrap().join(format!("pilum{EXE_SUFFIX}"));
     assert!(
         program.is_file(),
@@ -60,11 +70,11 @@ pub(crate) fn built_program() -> PathBuf {
 }
 
 /// Makes the archive once, as `pilum-dist` does. Its path, and the name of the folder in it.
-pub(crate) fn archive() -> &'static (PathBuf, String) {
+pub fn archive() -> &'static (PathBuf, String) {
     static ARCHIVE: OnceLock<(PathBuf, String)> = OnceLock::new();
     ARCHIVE.get_or_init(|| {
         let metadata = Metadata::of(&repository()).unwrap();
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("installed");
+        let folder = deps().join("../../tmp/installed");
         let _ = fs::remove_dir_all(&folder);
         let laid_out = folder.join(metadata.name());
         let built = Built {
@@ -87,7 +97,7 @@ pub(crate) fn archive() -> &'static (PathBuf, String) {
 
 impl Place {
     /// Unpacks the archive as a user does.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         let folder = TempDir::new().unwrap();
         let above = folder.path().ancestors().skip(1);
         for above in above {
@@ -110,12 +120,12 @@ impl Place {
     }
 
     /// The folder that commands are given in.
-    pub(crate) fn work(&self) -> PathBuf {
+    pub fn work(&self) -> PathBuf {
         self.folder.path().join("work")
     }
 
     /// All files below the prefix.
-    pub(crate) fn files(&self) -> BTreeSet<String> {
+    pub fn files(&self) -> BTreeSet<String> {
         let mut files = BTreeSet::new();
         let mut open = vec![self.prefix.clone()];
         while let Some(folder) = open.pop() {
@@ -134,12 +144,12 @@ impl Place {
 
     /// Runs a line in a shell, in a folder below the working one. `PATH` has the installed program, then
     /// cargo itself, which then asks nothing of a home, then what this test has.
-    pub(crate) fn shell(&self, folder: &str, line: &str) -> Outcome {
+    pub fn shell(&self, folder: &str, line: &str) -> Outcome {
         self.shell_with(folder, line, &[])
     }
 
     /// The same, with more variables.
-    pub(crate) fn shell_with(&self, folder: &str, line: &str, more: &[(&str, &str)]) -> Outcome {
+    pub fn shell_with(&self, folder: &str, line: &str, more: &[(&str, &str)]) -> Outcome {
         let cargo = Path::new(env!("CARGO")).parent().unwrap();
         let mut path = OsString::from(self.prefix.join("bin"));
         for part in [Some(cargo.into()), env::var_os("PATH")]
@@ -156,6 +166,8 @@ impl Place {
             .env_clear()
             .env("PATH", path)
             .env("HOME", self.folder.path().join("home"))
+            // Help is broken at this width.
+            .env("COLUMNS", "100")
             .envs(more.iter().copied());
         let output = command.output().unwrap();
         Outcome {
@@ -167,7 +179,7 @@ impl Place {
 
     /// Runs a line that has to succeed. What it prints.
     #[track_caller]
-    pub(crate) fn done(&self, folder: &str, line: &str) -> String {
+    pub fn done(&self, folder: &str, line: &str) -> String {
         let outcome = self.shell(folder, line);
         assert_eq!(
             outcome.code,
