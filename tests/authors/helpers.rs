@@ -5,7 +5,7 @@
 use crate::compilers::{library, repository};
 use crate::program::pilum;
 use abi::Hypothesis;
-use law::{Operator, SearchPath, Strided};
+use law::{Opener, Operator, SearchPath, Strided};
 use std::process::Command;
 use tempfile::TempDir;
 use tests::needs::compiler;
@@ -51,6 +51,66 @@ fn a_library_holds_several_laws() {
             outcome.stdout,
             outcome.stderr
         );
+    }
+}
+
+/// In C++ the initial state is told the number of components; a class that was written without it compiles as well.
+#[test]
+fn an_initial_state_in_cpp_knows_its_components() {
+    let source = repository("tests/authors/counted.cpp");
+    let text = std::fs::read_to_string(&source).unwrap();
+    let folder = TempDir::new().unwrap();
+    let earlier = folder.path().join("earlier.cpp");
+    let without = text
+        .replace("uint32_t n, const double *flux", "const double *flux")
+        .replace("state[0] = n;", "state[0] = 7;")
+        .replace("\"counted\"", "\"earlier\"");
+    assert_ne!(text, without);
+    std::fs::write(&earlier, without).unwrap();
+    for (source, id, expected) in [
+        (&source, "counted", [2.0, 3.0]),
+        (&earlier, "earlier", [7.0; 2]),
+    ] {
+        if library(source, id, folder.path()).is_none() {
+            return;
+        }
+        let law = SearchPath::new(&[folder.path().to_owned()])
+            .law(id)
+            .unwrap();
+        let states = [Hypothesis::Interface2d, Hypothesis::Interface3d].map(|hypothesis| {
+            let n = hypothesis.components().len();
+            let built = law.build(hypothesis, &[]).unwrap();
+            built
+                .initial_state(1, (&vec![-1.0; n], Strided::rows(n)))
+                .unwrap()[0]
+        });
+        assert_eq!(states.to_vec(), expected, "{id}");
+    }
+}
+
+/// Classes of one name in two libraries that hide nothing: C++ has the tables of such classes once in a process.
+#[test]
+fn classes_of_one_name_in_two_libraries_stay_apart() {
+    let Some(cxx) = compiler("CXX", "c++") else {
+        return;
+    };
+    let folder = TempDir::new().unwrap();
+    let text = std::fs::read_to_string(repository("tests/authors/two_laws.cpp")).unwrap();
+    let opener = Opener::default();
+    for (id, factor) in [("spring_cpp", "factor"), ("feather", "share")] {
+        let changed = text
+            .replace("spring_cpp", id)
+            .replace("counter_cpp", &format!("counter_{id}"))
+            .replace("\"factor\"", &format!("{factor:?}"));
+        let source = folder.path().join(format!("{id}.cpp"));
+        std::fs::write(&source, changed).unwrap();
+        let to = folder.path().join(format!("lib{id}.so"));
+        let mut command = Command::new(&cxx);
+        command.args(["-std=c++17", "-O1", "-shared", "-fPIC", "-I"]);
+        command.arg(repository("abi/include"));
+        crate::compilers::run(command.arg(&source).arg("-o").arg(&to));
+        let law = opener.open(&to).unwrap().law(id).unwrap();
+        assert_eq!(law.description().parameters[1].id, factor);
     }
 }
 

@@ -37,7 +37,12 @@ pub(crate) fn place(name: &str) -> Option<Place> {
         let called = (name == "elastic_tangent").then(|| source("drucker_prager.f"));
         let sources = sources.into_iter().chain(called);
         let sources: Vec<PathBuf> = sources.filter(|path| path.is_file()).collect();
-        gfortran(&["-shared", "-fPIC"], &sources, &out)?;
+        let in_cpp = source(&format!("{name}.cpp"));
+        if in_cpp.is_file() {
+            compile("g++", &["-std=c++17", "-shared", "-fPIC"], &[in_cpp], &out)?;
+        } else {
+            gfortran(&["-shared", "-fPIC"], &sources, &out)?;
+        }
         compiled.insert(name.to_owned(), std::fs::read(out).unwrap());
     }
     let place = Place::new();
@@ -53,7 +58,11 @@ fn source(name: &str) -> PathBuf {
 }
 
 fn gfortran(arguments: &[&str], sources: &[PathBuf], out: &Path) -> Option<Output> {
-    let mut compiler = Command::new("gfortran");
+    compile("gfortran", arguments, sources, out)
+}
+
+fn compile(compiler: &str, arguments: &[&str], sources: &[PathBuf], out: &Path) -> Option<Output> {
+    let mut compiler = Command::new(compiler);
     compiler
         .args(["-O1", "-o"])
         .arg(out)
@@ -315,7 +324,14 @@ fn a_routine_that_asks_for_smaller_steps_gets_them() {
 
 #[test]
 fn each_material_has_variables_of_its_own() {
-    let Some(place) = place("saves") else {
+    // In SAVE and COMMON, and in variables that C++ has once in a process.
+    for name in ["saves", "unique"] {
+        has_variables_of_its_own(name);
+    }
+}
+
+fn has_variables_of_its_own(name: &str) {
+    let Some(place) = place(name) else {
         return;
     };
     let edits: &[Edit] = &[
@@ -339,6 +355,7 @@ fn each_material_has_variables_of_its_own() {
         "law = \"umat_saves\"\nadapter = \"umat\"\nlibrary = \"libsaves.so\"\nKEYS",
         1,
     );
+    let text = text.replace("saves", name);
     for keys in ["", "in_process = true"] {
         let outcome = place.run_case(text.replace("KEYS", keys));
         assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);

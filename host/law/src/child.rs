@@ -31,6 +31,8 @@ pub struct Work {
     pub arguments: Vec<OsString>,
     /// Working directory; this process's if left out.
     pub folder: Option<PathBuf>,
+    /// Variables of the environment that are others than this process's.
+    pub variables: Vec<(&'static str, &'static str)>,
     /// The child is killed after this time.
     pub time: Duration,
     /// Most address space, in bytes. Kept by [`enter`], on Unix only.
@@ -135,6 +137,7 @@ pub fn run(work: &Work) -> io::Result<Outcome> {
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
+    command.envs(work.variables.iter().copied());
     if let Some(folder) = &work.folder {
         command.current_dir(folder);
     }
@@ -327,6 +330,7 @@ mod tests {
                 .map(OsString::from)
                 .to_vec(),
             folder: None,
+            variables: Vec::new(),
             time: Duration::from_secs(seconds),
             memory,
         })

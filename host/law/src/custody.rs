@@ -1,10 +1,11 @@
 //! What belongs to the whole process, and a law that is called in it may change: the working
 //! folder, the limits, the standard streams. It is looked at after a law was built and before
-//! results are written, and set back as it was at the start.
+//! results are written, and set back as it was at the start. What is found while a library is loaded is said with the
+//! first law of it that is built.
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 // Of the whole process by nature: limits, signals and folders belong to it.
 static AT_START: OnceLock<Custody> = OnceLock::new();
@@ -34,6 +35,28 @@ pub fn begin() {
             streams: streams(),
         }
     });
+}
+
+/// What is to be said of libraries, and whether it was said. Of the whole process: a library is loaded for all of it.
+static REMARKS: Mutex<Vec<(String, bool)>> = Mutex::new(Vec::new());
+
+/// Has this said once, however often it is found.
+pub(crate) fn remark(words: String) {
+    let mut all = REMARKS.lock().unwrap_or_else(PoisonError::into_inner);
+    if !all.iter().any(|(known, _)| *known == words) {
+        all.push((words, false));
+    }
+}
+
+/// What is to be said of libraries that this process has loaded, and was not said yet.
+pub fn remarks() -> Vec<String> {
+    let mut all = REMARKS.lock().unwrap_or_else(PoisonError::into_inner);
+    let new = all.iter_mut().filter(|(_, is_said)| !is_said);
+    new.map(|(words, is_said)| {
+        *is_said = true;
+        words.clone()
+    })
+    .collect()
 }
 
 /// Sets it back. Says what had been changed.

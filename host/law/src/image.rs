@@ -1,8 +1,11 @@
 //! The bytes of a library, read once: what is hashed is what is opened.
 //!
 //! On Linux they are copied into a sealed file in memory while they are hashed, so that nobody can
-//! change them in between. Elsewhere, and with `PILUM_LOAD_IN_PLACE=1` (for debuggers and
+//! change them in between; variables that the copy would share with others become its [own](unique). Elsewhere, and with `PILUM_LOAD_IN_PLACE=1` (for debuggers and
 //! profilers, which look for the file), the file itself is opened after it was hashed.
+
+#[cfg(target_os = "linux")]
+mod unique;
 
 use super::trust;
 use sha2::{Digest, Sha256};
@@ -71,7 +74,7 @@ impl Image {
             warnings,
             path: path.to_owned(),
             #[cfg(target_os = "linux")]
-            sealed: memory.and_then(seal),
+            sealed: memory.and_then(|memory| seal(memory, path)),
         })
     }
 
@@ -124,8 +127,9 @@ pub(crate) fn memory_file(name: &str) -> io::Result<File> {
 }
 
 #[cfg(target_os = "linux")]
-fn seal(memory: File) -> Option<std::os::fd::OwnedFd> {
+fn seal(memory: File, path: &Path) -> Option<std::os::fd::OwnedFd> {
     use rustix::fs::{SealFlags, fcntl_add_seals};
+    unique::make_ordinary(&memory, path).ok()?;
     let seals = SealFlags::SEAL | SealFlags::SHRINK | SealFlags::GROW | SealFlags::WRITE;
     fcntl_add_seals(&memory, seals).ok()?;
     Some(memory.into())

@@ -345,6 +345,16 @@ fn wrapped(names: &[String]) -> String {
     text
 }
 
+/// Reads the libraries that an ELF file needs, and those that these need; those that are not found are passed over.
+#[cfg(target_os = "linux")]
+pub(crate) fn each_supplier(path: &Path, bytes: &[u8], mut look: impl FnMut(&[u8])) {
+    let file = File::parse(bytes).ok();
+    let wanted = file.and_then(|file| needs(&file, bytes).ok());
+    if let Some((needs, search)) = wanted {
+        suppliers::each(path, (&needs, &search), |_, bytes| look(bytes));
+    }
+}
+
 /// The name that Rust's target names use.
 fn architecture(architecture: Architecture) -> String {
     match architecture {

@@ -27,6 +27,7 @@ pub use instance::Strided;
 #[cfg(unix)]
 pub use shared::SharedMemory;
 
+use super::custody;
 use super::description::LawDescription;
 use super::image::Image;
 use abi::raw::{self, Host, Law, MagicBlock};
@@ -36,7 +37,9 @@ pub(crate) use instance::{Call, CallFailure, OwnedInstance};
 use instance::{NOTHING, NOWHERE};
 use probe::kept::{self, KeptPhase, Phase};
 use std::ffi::CStr;
+use std::hint::black_box;
 use std::mem::size_of;
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -143,7 +146,7 @@ fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
 unsafe fn load_image(path: &Path, image: Image) -> Result<libloading::Library, String> {
     if let Some(sealed) = image.sealed_path() {
         // SAFETY: passed on to the caller.
-        if let Ok(library) = unsafe { load(&sealed) } {
+        if let Ok(library) = unsafe { load(&sealed, path) } {
             image.keep();
             return Ok(library);
         }
@@ -152,23 +155,60 @@ unsafe fn load_image(path: &Path, image: Image) -> Result<libloading::Library, S
         }
     }
     // SAFETY: passed on to the caller.
-    unsafe { load(path) }.map_err(|error| {
+    unsafe { load(path, path) }.map_err(|error| {
         let why = std::error::Error::source(&error).map_or(String::new(), |why| format!(": {why}"));
         format!("it cannot be loaded: {error}{why}")
     })
 }
 
 #[cfg(unix)]
-unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
+unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
     // SAFETY: passed on to the caller.
-    unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }.map(Into::into)
+    apart(path, || unsafe {
+        Library::open(Some(file), RTLD_NOW | RTLD_LOCAL)
+    })
+    .map(Into::into)
 }
 
 #[cfg(not(unix))]
-unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
+unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloading::Error> {
     // SAFETY: passed on to the caller.
-    unsafe { libloading::Library::new(path) }
+    apart(path, || unsafe { libloading::Library::new(file) })
+}
+
+/// Stack of the thread in which initialisers run: as large as that of a main thread.
+const STACK: usize = 8 << 20;
+
+/// Opens the library at `path` in a thread of its own. What its initialisers do to the arithmetic of their thread, as
+/// those that `-Ofast` links do, ends with that thread. Where there can be none it is opened in this one.
+fn apart<T: Send>(path: &Path, open: impl Fn() -> T + Sync) -> T {
+    let watched = || {
+        let did_flush = flushes();
+        let opened = open();
+        if flushes() && !did_flush {
+            custody::remark(format!(
+                "library {} has the thread that opens it take numbers below 2.2e-308 for zero, as `-Ofast` and \
+                 `-ffast-math` link it; it was opened in a thread of its own, so that the program still computes with \
+                 them",
+                path.display()
+            ));
+        }
+        opened
+    };
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(STACK);
+        match thread.spawn_scoped(scope, watched) {
+            Ok(thread) => thread.join().unwrap_or_else(|panic| resume_unwind(panic)),
+            Err(_) => watched(),
+        }
+    })
+}
+
+/// Whether this thread takes numbers below the least normal one for zero.
+fn flushes() -> bool {
+    // The product is formed here, and not where it is needed later. Such a thread takes it for zero in comparisons, too.
+    black_box(black_box(f64::MIN_POSITIVE) * black_box(0.5)).to_bits() == 0
 }
 
 /// The second check, for libraries written in Rust with the same minor version and `abi_stable`:

@@ -45,6 +45,7 @@ pub(crate) fn vet(path: &Path, sha256: &str) -> Result<(), Error> {
             OsString::from(sha256),
         ],
         folder: None,
+        variables: Vec::new(),
         time: TIME,
         memory: Some(MEMORY),
     };

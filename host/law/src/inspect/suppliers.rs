@@ -48,7 +48,29 @@ pub(super) fn of(
         ours: ours.collect(),
         ..Suppliers::default()
     };
+    suppliers.not_found = each(path, (needs, search), |supplier, _| {
+        for symbol in supplier.dynamic_symbols() {
+            if !symbol.is_undefined()
+                && let Ok(name) = symbol.name()
+            {
+                wanted.remove(name);
+            }
+        }
+    });
+    if suppliers.not_found.is_empty() {
+        suppliers.missing = wanted.into_iter().collect();
+    }
+    suppliers
+}
+
+/// Reads the libraries that one needs, and those that these need. Names of those that are not found.
+pub(super) fn each(
+    path: &Path,
+    (needs, search): (&[String], &[String]),
+    mut look: impl FnMut(&File<'_>, &[u8]),
+) -> Vec<String> {
     let folders = folders();
+    let mut not_found = Vec::new();
     let mut seen = HashSet::new();
     let mut queue: VecDeque<(String, Vec<PathBuf>)> = VecDeque::new();
     let own = expanded(search, path);
@@ -61,28 +83,19 @@ pub(super) fn of(
         let read = |path: PathBuf| Some((file::read_library(&path).ok()?, path));
         let found = places.find(|path| path.is_file()).and_then(read);
         let Some((bytes, path)) = found else {
-            suppliers.not_found.push(name);
+            not_found.push(name);
             continue;
         };
         let Ok(supplier) = File::parse(&*bytes) else {
-            suppliers.not_found.push(name);
+            not_found.push(name);
             continue;
         };
-        for symbol in supplier.dynamic_symbols() {
-            if !symbol.is_undefined()
-                && let Ok(name) = symbol.name()
-            {
-                wanted.remove(name);
-            }
-        }
+        look(&supplier, &bytes);
         let (needs, search) = super::needs(&supplier, &bytes).unwrap_or_default();
         let next = expanded(&search, &path);
         queue.extend(needs.into_iter().map(|name| (name, next.clone())));
     }
-    if suppliers.not_found.is_empty() {
-        suppliers.missing = wanted.into_iter().collect();
-    }
-    suppliers
+    not_found
 }
 
 /// The folders that a library asks for, from where it lies.

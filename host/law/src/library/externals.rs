@@ -103,7 +103,10 @@ fn open_needed(name: &str, search: &[String], origin: &Path) -> Option<Library> 
     let mut found = expanded.filter(|path| path.is_file());
     let path = found.next().unwrap_or_else(|| PathBuf::from(name));
     // SAFETY: the library that the user named would have it loaded, too.
-    unsafe { Library::open(Some(path), RTLD_LAZY | RTLD_LOCAL) }.ok()
+    super::apart(&path, || unsafe {
+        Library::open(Some(&path), RTLD_LAZY | RTLD_LOCAL)
+    })
+    .ok()
 }
 
 /// Names that an ELF file must be given, and whether they are only called. Weak ones may be absent.

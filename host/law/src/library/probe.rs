@@ -1001,7 +1001,7 @@ fn begin(phase: Phase) -> Result<(), String> {
 fn symbols(path: &Path) -> Result<&'static libloading::Library, String> {
     begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
-    let library = unsafe { load(path) }.map_err(|error| {
+    let library = unsafe { load(path, path) }.map_err(|error| {
         std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string)
     })?;
     Ok(Box::leak(Box::new(library)))

@@ -144,7 +144,7 @@ pub(super) unsafe fn load_private(
     static IN_PLACE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
     if let Some(sealed) = image.sealed_path() {
         // SAFETY: passed on to the caller.
-        if let Ok(library) = unsafe { load(&sealed) } {
+        if let Ok(library) = unsafe { load(&sealed, path) } {
             image.keep();
             return Ok(library);
         }
@@ -161,7 +161,7 @@ pub(super) unsafe fn load_private(
         );
     }
     // SAFETY: passed on to the caller.
-    let library = unsafe { load(path) }.map_err(|error| {
+    let library = unsafe { load(path, path) }.map_err(|error| {
         let why = std::error::Error::source(&error).map_or(String::new(), |why| format!(": {why}"));
         format!("it cannot be loaded: {error}{why}")
     })?;
@@ -171,17 +171,20 @@ pub(super) unsafe fn load_private(
 
 /// With its own symbols first: a routine that brings its own `sprind` uses that one.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
+unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
     const RTLD_DEEPBIND: std::ffi::c_int = 8;
     super::abaqus::keep();
     // SAFETY: passed on to the caller.
-    unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND) }.map(Into::into)
+    super::apart(path, || unsafe {
+        Library::open(Some(file), RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND)
+    })
+    .map(Into::into)
 }
 
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-unsafe fn load(path: &Path) -> Result<libloading::Library, libloading::Error> {
+unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloading::Error> {
     super::abaqus::keep();
     // SAFETY: passed on to the caller.
-    unsafe { super::load(path) }
+    unsafe { super::load(file, path) }
 }
