@@ -13,8 +13,9 @@
  *         pilum_status update(const pilum_point &point, pilum_tangent tangent,
  *                             pilum_response &end) const;
  *
- *         // The rest as needed. Internal variables that depend on the initial stress:
- *         pilum_status initial_state(const double *flux, double *state,
+ *         // The rest as needed. Internal variables that depend on the initial stress, which has n
+ *         // components:
+ *         pilum_status initial_state(uint32_t n, const double *flux, double *state,
  *                                    const char *&reason) const;
  *         // The consistent tangent by differences, as pilum_differentiate has it; update is then
  *         // asked for the elastic operator or none:
@@ -245,7 +246,13 @@ template <class Law> struct Exported {
         const auto *instance = reinterpret_cast<const Instance *>(opaque);
         return guarded(instance, *reason, [&](const Law &law) {
             if constexpr (HasInitialState<Law>::value) {
-                return law.initial_state(flux, state, *reason);
+                /* Without the count, as it was declared at first. */
+                if constexpr (std::is_invocable_v<decltype(&Law::initial_state), const Law &,
+                                                  const double *, double *, const char *&>) {
+                    return law.initial_state(flux, state, *reason);
+                } else {
+                    return law.initial_state(instance->n_components, flux, state, *reason);
+                }
             } else {
                 (void)law, (void)flux, (void)state;
                 return PILUM_OK;

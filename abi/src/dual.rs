@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use abi::dual::{ByDuals, DualInterfaceLaw, InterfaceEnd, Number};
-//! use abi::{Description, Failure, InterfacePoint, Parameter, Refusal, Variable};
+//! use abi::{Description, Failure, InterfaceLaw, InterfacePoint, Parameter, Refusal, Tangent, Variable};
 //!
 //! abi::parameters! {
 //!     /// Parameters of the law.
@@ -53,11 +53,28 @@
 //!         })
 //!     }
 //!
-//!     fn elastic(p: &Parameters<f64>, _: &State<f64>) -> [[f64; 2]; 2] {
-//!         [[p.stiffness, 0.0], [0.0, p.stiffness]]
+//!     // The softer the more of the strength is carried.
+//!     fn elastic(p: &Parameters<f64>, traction: &[f64; 2], _: &State<f64>) -> [[f64; 2]; 2] {
+//!         let part = traction[1] / p.strength;
+//!         [[p.stiffness, 0.0], [0.0, p.stiffness * (1.0 - part * part)]]
 //!     }
 //! }
 //! const _: abi::raw::Law = abi::export::law::<abi::export::Interface<ByDuals<Joint>>>();
+//!
+//! let joint = ByDuals::<Joint>::new(Parameters { stiffness: 1e4, strength: 50.0 }).unwrap();
+//! let point = InterfacePoint {
+//!     jump: [0.0; 2],
+//!     jump_increment: [0.0, 5e-3],
+//!     traction: [-100.0, 0.0],
+//!     state: State { slip: 0.0 },
+//!     time: 0.0,
+//!     time_increment: 1.0,
+//!     step_time: 0.0,
+//! };
+//! let [elastic, consistent] =
+//!     [Tangent::Elastic, Tangent::Consistent].map(|of| joint.update(&point, of).unwrap().tangent);
+//! // d tanh(x) = 1 − tanh²(x).
+//! assert!((elastic[1][1] - consistent[1][1]).abs() < 1e-9 * consistent[1][1]);
 //! ```
 
 use crate::descriptor::{Description, InternalVariables, Parameters};
@@ -424,8 +441,12 @@ pub trait DualInterfaceLaw: Sized + Send + Sync + 'static {
         point: &InterfacePoint<Self::State<T>, T>,
     ) -> Result<InterfaceEnd<Self::State<T>, T>, Failure>;
 
-    /// The elastic operator in a state, row by row, kPa/m.
-    fn elastic(fixed: &Self::Fixed<f64>, state: &Self::State<f64>) -> [[f64; 2]; 2];
+    /// The elastic operator of a point that carries this traction in this state, row by row, kPa/m.
+    fn elastic(
+        fixed: &Self::Fixed<f64>,
+        traction: &[f64; 2],
+        state: &Self::State<f64>,
+    ) -> [[f64; 2]; 2];
 }
 
 /// A [`DualInterfaceLaw`] as a law: its consistent tangent by duals with two derivatives, its rates
@@ -564,7 +585,8 @@ where
             Tangent::None => Ok(without(L::update(&self.fixed, point)?, [[0.0; 2]; 2])),
             Tangent::Elastic => {
                 let end = L::update(&self.fixed, point)?;
-                Ok(without(end, L::elastic(&self.fixed, &end.state)))
+                let operator = L::elastic(&self.fixed, &end.traction, &end.state);
+                Ok(without(end, operator))
             }
             Tangent::Consistent => {
                 let lift = |values: &[f64; 2]| values.map(Dual::constant);

@@ -77,7 +77,8 @@ public:
         }
     }
 
-    pilum_status initial_state(const double *flux, double *state, const char *&reason) const {
+    pilum_status initial_state(uint32_t, const double *flux, double *state,
+                               const char *&reason) const {
         const Stress start(flux);
         if (!(start.p > 0.0)) {
             reason = "the initial mean stress is not compressive";

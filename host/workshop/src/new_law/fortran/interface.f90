@@ -53,8 +53,9 @@ contains
     ! (1) In contact the traction carries what is known of the past, open the gap does.
     normal = point%flux(1) + k_n*(point%state(GAP) + point%increment(1))
     shear = point%flux(2) + k_t*point%increment(2)
-    end%tangent(1, 1) = k_n
-    end%tangent(2, 2) = k_t
+    ! Arrays have room for solids in space: here the first two components count.
+    end%tangent(1, :2) = [k_n, 0.0_dp]
+    end%tangent(2, :2) = [0.0_dp, k_t]
     end%state(PLASTIC_SLIP) = point%state(PLASTIC_SLIP)
     if (normal > 0) then ! (2)
       end%state(GAP) = point%state(GAP) + point%increment(1) + point%flux(1)/k_n
@@ -69,8 +70,7 @@ contains
       end%flux(2) = -sign_of_shear*normal*tan_phi
       end%state(PLASTIC_SLIP) = end%state(PLASTIC_SLIP) + excess/k_t
       if (tangent == TANGENT_CONSISTENT) then
-        end%tangent(2, 1) = -sign_of_shear*k_n*tan_phi
-        end%tangent(2, 2) = 0
+        end%tangent(2, :2) = [-sign_of_shear*k_n*tan_phi, 0.0_dp]
       end if
     end if
   end subroutine
