@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{Report, check, compiled, compiled_with, folder, library_of, pilum, words};
+use std::hint::black_box;
 use std::path::Path;
 
 /// Faults that a host can see before it is too late: `pilum point` refuses the library or stops
@@ -14,7 +15,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 82] = [
+const GALLERY: [(&str, &str, &str, Point); 84] = [
     (
         "bad_init_zero",
         "initial-states-are-written",
@@ -246,6 +247,18 @@ const GALLERY: [(&str, &str, &str, Point); 82] = [
         CannotTell,
     ),
     (
+        "bad_first_instance",
+        "independent-of-first-instance",
+        "failed",
+        CannotTell,
+    ),
+    (
+        "bad_environment",
+        "independent-of-environment",
+        "failed",
+        CannotTell,
+    ),
+    (
         "bad_fork",
         "environment-is-left-alone",
         "failed",
@@ -355,7 +368,7 @@ const GALLERY: [(&str, &str, &str, Point); 82] = [
 ];
 
 /// Mistakes that may be meant: the fixture, and the one check that warns.
-const WARNED: [(&str, &str); 18] = [
+const WARNED: [(&str, &str); 20] = [
     ("bad_idle_parameter", "parameters-matter"),
     ("bad_idle_variable", "paths-leave-elasticity"),
     ("bad_plastic_variable", "plastic-variables-rest"),
@@ -372,6 +385,8 @@ const WARNED: [(&str, &str); 18] = [
     ("bad_init_unfit", "initial-states-fit"),
     ("bad_jump", "response-is-continuous"),
     ("bad_not_summed", "states-are-carried-on"),
+    ("bad_blown_up", "results-do-not-blow-up"),
+    ("bad_fast_math", "environment-is-left-alone"),
     ("bad_time", "independent-of-time"),
     ("bad_time_increment", "independent-of-time"),
 ];
@@ -453,6 +468,82 @@ fn what_may_be_meant_is_a_warning_of_the_check_that_names_it() {
         assert_eq!(report.check(id)["outcome"], "warning", "{fixture}");
         assert_eq!(report.code, Some(0), "{fixture}: {}", report.stderr);
     }
+}
+
+/// Where warnings count, they end the program as failures do; they are named among what failed, too.
+#[test]
+fn warnings_count_where_that_is_asked_for() {
+    let folder = folder();
+    let Some(library) = compiled("bad_unit", folder.path()) else {
+        return;
+    };
+    let only = "--only=units-are-known";
+    let report = check(&library, &[only, "--strict", "--only-failed"]);
+    assert_eq!(report.code, Some(3), "{}", report.stderr);
+    let said = words(&report.stderr);
+    assert!(
+        said.contains("`--strict` asks for no warnings: units-are-known"),
+        "{said}"
+    );
+    assert_eq!(report.with(&["warning"]), ["units-are-known"]);
+    let good = check(&library_of("elastic"), &["--strict", "--only-failed"]);
+    assert_eq!(good.code, Some(0), "{}", good.stderr);
+    assert!(good.checks().is_empty(), "{}", good.stdout);
+}
+
+/// What a variable of the environment and the instance that came first change is named, with both results.
+#[test]
+fn what_comes_from_outside_of_a_call_is_named() {
+    for (fixture, id, says) in [
+        (
+            "bad_environment",
+            "independent-of-environment",
+            "with another HOME it gives flux [",
+        ),
+        (
+            "bad_first_instance",
+            "independent-of-first-instance",
+            "as the first instance of a process it gives flux [",
+        ),
+    ] {
+        let folder = folder();
+        let Some(library) = compiled(fixture, folder.path()) else {
+            return;
+        };
+        let report = check(&library, &["--only", id]);
+        let details = report.check(id)["details"].as_str().unwrap();
+        assert!(details.contains(says), "{details}");
+    }
+}
+
+/// A law that has the thread that loads it flush subnormal numbers changes nothing for whoever opens it.
+#[test]
+fn a_library_that_flushes_subnormal_numbers_leaves_the_program_alone() {
+    let folder = folder();
+    let Some(library) = compiled("bad_fast_math", folder.path()) else {
+        return;
+    };
+    law::Opener::default().open(&library).unwrap();
+    let subnormal = black_box(f64::MIN_POSITIVE) * black_box(0.5);
+    assert_eq!(subnormal.to_bits(), 1 << 51);
+    let case = folder.path().join("case.toml");
+    let named = folder.path().join("libfixture.so");
+    std::fs::rename(&library, named).unwrap();
+    std::fs::write(&case, CASE).unwrap();
+    let out = folder.path().join("out");
+    let outcome = pilum(&[
+        "run",
+        case.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    let said = words(&String::from_utf8(outcome.stderr).unwrap());
+    assert_eq!(outcome.status.code(), Some(0), "{said}");
+    assert_eq!(
+        said.matches("take numbers below 2.2e-308 for zero").count(),
+        1,
+        "{said}"
+    );
 }
 
 /// The gallery and the folder of fixtures are the same.

@@ -77,9 +77,12 @@ pub struct Arguments {
     /// `results/check/<library>`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print only the checks that failed or crashed.
+    /// Print only the checks that failed or crashed, and warnings.
     #[arg(long)]
     only_failed: bool,
+    /// End with exit code 3 where a check warns, too.
+    #[arg(long)]
+    strict: bool,
     /// Seconds after which a check is ended.
     #[arg(long, default_value_t = 60.0, value_parser = positive)]
     time_limit: f64,
@@ -356,7 +359,6 @@ fn with_place(why: &law::Error) -> String {
 /// # Errors
 /// [`text::Error::Usage`] for an unknown check or settings that no law can have, [`text::Error::Unreadable`],
 /// [`law::Error::Library`] if there is no such law or a check fails or crashes.
-#[expect(clippy::too_many_lines, reason = "what is asked for, case by case")]
 pub fn run(
     arguments: &Arguments,
     opener: &Opener,
@@ -439,7 +441,7 @@ pub fn run(
         *counts.entry(finding.outcome.name()).or_insert(0) += 1;
     }
     if arguments.only_failed {
-        findings.retain(|finding| finding.outcome.is_bad());
+        findings.retain(|finding| finding.outcome.is_bad() || finding.outcome == Outcome::Warning);
     }
     let report = Report {
         library: path.display().to_string(),
@@ -453,23 +455,38 @@ pub fn run(
     } else {
         print(&text(&report));
     }
-    let bad: Vec<&str> = findings
-        .iter()
-        .filter(|finding| finding.outcome.is_bad())
-        .map(|finding| finding.id)
-        .collect();
-    if bad.is_empty() {
-        return Ok(());
-    }
-    let keeps = match routine::adapter(&path) {
-        None => "does not keep the contract",
-        Some(Adapter::Umat) => "is not what its sidecar says",
-        Some(_) => "is not what it says of itself",
+    judged(arguments, &path, &findings)
+}
+
+/// What the findings say of the library in the end.
+///
+/// # Errors
+/// [`law::Error::Library`] if a check fails or crashes, or warns where that counts.
+fn judged(arguments: &Arguments, path: &Path, findings: &[Finding]) -> Result<(), Error> {
+    let with = |is_meant: fn(Outcome) -> bool| -> Vec<&str> {
+        let those = findings.iter().filter(|finding| is_meant(finding.outcome));
+        those.map(|finding| finding.id).collect()
+    };
+    let mut named = with(Outcome::is_bad);
+    let what = if named.is_empty() {
+        named = with(|outcome| outcome == Outcome::Warning);
+        if named.is_empty() || !arguments.strict {
+            return Ok(());
+        }
+        "is warned of, and `--strict` asks for no warnings"
+    } else {
+        match routine::adapter(path) {
+            None => "does not keep the contract",
+            // Without a sidecar nothing was held against one.
+            Some(Adapter::Umat) if named.contains(&"sidecar-is-read") => "cannot be checked",
+            Some(Adapter::Umat) => "is not what its sidecar says",
+            Some(_) => "is not what it says of itself",
+        }
     };
     Err(Error::library(format!(
-        "library {} {keeps}: {}",
+        "library {} {what}: {}",
         path.display(),
-        bad.join(", ")
+        named.join(", ")
     )))
 }
 
@@ -866,6 +883,7 @@ fn asked_in_child(
     let outcome = child::run(&Work {
         arguments: all,
         folder: Some(folder.clone()),
+        variables: Vec::new(),
         time: Duration::from_secs_f64(arguments.time_limit),
         memory: Some(MEMORY),
     })

@@ -92,6 +92,12 @@ fn a_new_sidecar_can_be_used_at_once() {
     assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
     let said = "--nprops N --nstatv M` writes one to fill in";
     assert!(outcome.says(said), "{}", outcome.stderr);
+    // Nothing is held against a sidecar that is not there.
+    let outcome = place.run(&["check", "libelastic.so"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let said = "cannot be checked: sidecar-is-read";
+    assert!(outcome.says(said), "{}", outcome.stderr);
+    assert!(!outcome.says("its sidecar says"), "{}", outcome.stderr);
     let outcome = place.run(&["new-sidecar", "libelastic.so", "--nprops", "2"]);
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let said = "sidecar in elastic.law.toml: 2 parameters, 0 internal variables";

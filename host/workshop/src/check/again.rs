@@ -36,6 +36,7 @@ pub(crate) fn ask(
         driver: None,
         out: None,
         only_failed: false,
+        strict: false,
         time_limit: PATIENCE,
         list: false,
         in_process: opener.trust().isolate.is_none(),

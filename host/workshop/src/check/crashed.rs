@@ -71,6 +71,7 @@ pub(super) fn repeated(
     let work = Work {
         arguments: tell,
         folder: None,
+        variables: Vec::new(),
         time: READING,
         memory: None,
     };

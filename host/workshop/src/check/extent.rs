@@ -8,18 +8,60 @@ use super::{Check, Family, Found, Subject, Verdict, skipped};
 use law::probe::{PointEnd, PointStart};
 use std::fmt::Write as _;
 
-pub(super) const CHECKS: &[Check] = &[Check {
-    id: "paths-leave-elasticity",
-    family: Family::Mathematics,
-    description: "Where a law has internal variables, some increments of the paths are not elastic, or change one of \
+pub(super) const CHECKS: &[Check] = &[
+    Check {
+        id: "results-do-not-blow-up",
+        family: Family::Mathematics,
+        description: "On the paths no flux and no internal variable exceeds 10³⁰, whatever its unit, as in a scheme that is \
+                      unstable or an exponential that nothing bounds; the other checks go no farther than there \
+                      (warning, since a path may be longer than is meant).",
+        needs: NEEDS,
+        run: results_do_not_blow_up,
+    },
+    Check {
+        id: "paths-leave-elasticity",
+        family: Family::Mathematics,
+        description: "Where a law has internal variables, some increments of the paths are not elastic, or change one of \
                   them after the first, else what comes after yielding was not looked at; no component of the flux for which the tangent has a stiffness \
                   stays what it was in all of them (warning). Internal variables that never change are told.",
-    needs: NEEDS,
-    run: paths_leave_elasticity,
-}];
+        needs: NEEDS,
+        run: paths_leave_elasticity,
+    },
+];
 
-/// Increments of the random part of a path.
+fn results_do_not_blow_up(subject: &Subject) -> Found {
+    let mut random = Random::new(subject.seed, "blow up");
+    let mut n = 0;
+    for specimen in subject.specimens_by_default(4, &mut random)? {
+        let walk = specimen.paths(N_FAR, &mut random)?;
+        n += walk.steps.len();
+        if let Some(step) = walk.blown_up {
+            let names = specimen.hypothesis.components().iter().copied();
+            let variables = specimen.formulation.internal_variables.iter();
+            let names = names.chain(variables.map(|v| v.id.as_str()));
+            let values = step.end.flux.iter().chain(&step.end.state);
+            let before = step.start.flux0.iter().chain(&step.start.state0);
+            let all = names.zip(before.zip(values));
+            let worst = all.max_by(|(_, (_, a)), (_, (_, b))| a.abs().total_cmp(&b.abs()));
+            let (name, (before, after)) = worst.unwrap_or(("n", (&0.0, &0.0)));
+            let why = format!(
+                "it has blown up: `{name}` goes from {before:e} to {after:e} in an increment. A scheme that is not \
+                 stable over it asks for a smaller one (PILUM_CUT_STEP) or takes substeps; what is not meant \
+                 to go so far ends with PILUM_E_DOMAIN. No check looks farther. At {}",
+                specimen.at(&step.start)
+            );
+            return Err(specimen.warns_at(&step.start, why));
+        }
+    }
+    if n == 0 {
+        return Err(skipped("no increment succeeded"));
+    }
+    Ok(format!("{n} increments"))
+}
+
+/// Increments of the random part of a path, and the most of any check.
 const N_INCREMENTS: usize = 24;
+const N_FAR: usize = 36;
 /// Inelastic flux, relative to what is elastic in an increment.
 const INELASTIC: f64 = 1e-6;
 

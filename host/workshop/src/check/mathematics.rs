@@ -20,6 +20,7 @@ pub(super) const NEEDS: &[&str] = &[
     "repeatable",
     "independent-of-split",
     "independent-of-request",
+    "independent-of-first-instance",
     "results-are-finite",
     "writes-stay-inside",
 ];

@@ -1,5 +1,6 @@
 //! Is an update a function of its arguments, and of nothing else?
 
+mod afresh;
 mod arguments;
 mod earlier;
 mod environment;
@@ -89,6 +90,21 @@ pub(super) const CHECKS: &[Check] = &[
                       instance that stands where another one stood.",
         needs: &["instances-are-independent"],
         run: earlier::independent_of_earlier_calls,
+    },
+    Check {
+        id: "independent-of-first-instance",
+        family: Family::Purity,
+        description: "An instance gives the same bits after another one with other parameters as it gives as the \
+                      first one of a process of its own: no `static` is set by whoever comes first.",
+        needs: &["repeatable"],
+        run: afresh::independent_of_first_instance,
+    },
+    Check {
+        id: "independent-of-environment",
+        family: Family::Purity,
+        description: "A process with another HOME, LANG, LC_ALL, TZ, USER and LOGNAME gives the same bits.",
+        needs: &["independent-of-first-instance"],
+        run: afresh::independent_of_environment,
     },
     Check {
         id: "environment-is-left-alone",

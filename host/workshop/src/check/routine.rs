@@ -128,7 +128,7 @@ pub(super) const SHARED: [&str; 3] = [
 
 /// Those that mean the same for a routine, too, whose parameters and increments are random or far away. What
 /// they fail of a law they warn of here: public routines are often imprecise, and are of use all the same.
-pub(super) const OF_RESPONSES: [&str; 9] = [
+pub(super) const OF_RESPONSES: [&str; 10] = [
     "response-is-isotropic",
     "compression-is-negative",
     "angles-are-degrees",
@@ -137,6 +137,7 @@ pub(super) const OF_RESPONSES: [&str; 9] = [
     "states-are-carried-on",
     "plastic-variables-rest",
     "units-belong-together",
+    "results-do-not-blow-up",
     "paths-leave-elasticity",
 ];
 

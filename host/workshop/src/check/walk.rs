@@ -22,6 +22,8 @@ const FAR_JUMP: f64 = 0.1;
 const FAR_STRAIN: f64 = 0.2;
 /// Movement of components that neither lead nor hold a flux, relative to the leading one.
 const DRIFT: f64 = 1e-3;
+/// Largest flux or internal variable that means something, in any unit.
+const LARGEST: f64 = 1e30;
 /// How near held fluxes are kept, relative to the largest; they need not be met.
 const HELD: f64 = 1e-3;
 
@@ -51,6 +53,8 @@ pub(super) struct Walk {
     pub(super) refusals: Vec<Refused>,
     /// Starts of the points that are said to have succeeded, finite or not.
     pub(super) successes: Vec<PointStart>,
+    /// The first increment whose results are finite and larger than any that mean something.
+    pub(super) blown_up: Option<Step>,
 }
 
 impl Walk {
@@ -481,6 +485,15 @@ impl Walk {
     /// Notes what became of an increment, and carries the point on. `false`: it has to begin anew.
     fn take(&mut self, point: &mut PointStart, stiffness: f64, end: PointEnd, text: &str) -> bool {
         let success = is_success(end.status);
+        let is_sound = success && is_finite(&end);
+        if is_sound && end.flux.iter().chain(&end.state).any(|v| v.abs() > LARGEST) {
+            self.blown_up.get_or_insert_with(|| Step {
+                start: point.clone(),
+                end,
+                stiffness,
+            });
+            return false;
+        }
         if success {
             self.successes.push(point.clone());
         } else {
@@ -490,8 +503,7 @@ impl Walk {
                 start: point.clone(),
             });
         }
-        let goes_on = success && is_finite(&end);
-        if goes_on {
+        if is_sound {
             let next = PointStart {
                 gradient0: point.gradient1.clone(),
                 gradient1: point.gradient1.clone(),
@@ -505,7 +517,7 @@ impl Walk {
                 stiffness,
             });
         }
-        goes_on
+        is_sound
     }
 }
 

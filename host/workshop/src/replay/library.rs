@@ -82,6 +82,7 @@ pub(crate) fn run(path: &Path, limit: Duration) -> Result<(String, Option<String
     let work = Work {
         arguments: vec!["replay".into(), path.into(), "--in-process".into()],
         folder: None,
+        variables: Vec::new(),
         time: limit,
         memory: None,
     };

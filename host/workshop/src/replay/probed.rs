@@ -13,6 +13,8 @@ use std::time::Duration;
 
 /// What is said of a law that takes longer than it may.
 const STUCK: &str = "the law does not return";
+/// How long a law may take for some points in a process of their own.
+const PATIENCE: Duration = Duration::from_secs(20);
 /// What is said as soon as the law has returned.
 const RETURNED: &str = "the call returned";
 
@@ -61,6 +63,26 @@ pub(super) fn outside(
     Err(fails())
 }
 
+/// What the call of a capsule gives in a process that does nothing else, with these variables of its environment:
+/// a line of each point, or the last words of one that gives no result.
+///
+/// # Errors
+/// There is no process, or the capsule cannot be used.
+pub(crate) fn afresh(
+    capsule: &Capsule,
+    variables: &[(&'static str, &'static str)],
+) -> Result<Vec<String>, Error> {
+    let file = ScratchFile::new();
+    capsule.write(&file.0)?;
+    let (said, crash) = run_with(&file.0, PATIENCE, variables)?;
+    let lines = || said.lines().map(str::to_owned);
+    Ok(match (crash, said.contains(FAULTLESS)) {
+        (Some(crash), _) => vec![crash],
+        (None, true) => lines().filter(|line| line.starts_with(FLUX)).collect(),
+        (None, false) => lines().next_back().into_iter().collect(),
+    })
+}
+
 /// A file for capsules of shorter increments, removed at the end.
 struct ScratchFile(PathBuf);
 
@@ -84,10 +106,20 @@ impl Drop for ScratchFile {
 /// # Errors
 /// There is no process, or the capsule cannot be used.
 pub(crate) fn run(path: &Path, limit: Duration) -> Result<(String, Option<String>), Error> {
+    run_with(path, limit, &[])
+}
+
+/// The same with these variables of its environment.
+fn run_with(
+    path: &Path,
+    limit: Duration,
+    variables: &[(&'static str, &'static str)],
+) -> Result<(String, Option<String>), Error> {
     let internal = |why: std::io::Error| Error::internal(why.to_string());
     let work = Work {
         arguments: vec!["replay".into(), path.into(), "--in-process".into()],
         folder: None,
+        variables: variables.to_vec(),
         time: limit,
         memory: None,
     };
@@ -123,6 +155,16 @@ pub(super) fn refusal_of(outcome: &child::Outcome) -> Option<String> {
     let first = lines.iter().position(|line| line.starts_with("error: "));
     let why = lines[first.filter(|_| is_ours)?..].join("\n");
     Some(why.trim_start_matches("error: ").trim().to_owned())
+}
+
+/// Most points of a batch whose results are shown.
+const SHOWN: usize = 16;
+/// How the line of a point begins.
+const FLUX: &str = "flux ";
+
+/// The results of a point, to the last bit.
+pub(crate) fn shown(end: &PointEnd) -> String {
+    format!("{FLUX}{:?}, internal variables {:?}", end.flux, end.state)
 }
 
 /// What is said where nothing is wrong.
@@ -219,10 +261,9 @@ pub(super) fn inside(
             variables[k].id
         ))
     });
-    let shown = |end: &PointEnd| format!("flux {:?}, internal variables {:?}", end.flux, end.state);
     let differs = |found: &[PointEnd], when: &str| {
         let i = first_difference(&first.points, found)?;
-        let found = found.get(i).map_or(String::new(), &shown);
+        let found = found.get(i).map_or(String::new(), shown);
         Some(format!(
             "point {i}: {}; {when}: {found}",
             shown(&first.points[i])
@@ -254,7 +295,8 @@ pub(super) fn inside(
         return Err(fails("internal"));
     }
     say(FAULTLESS);
-    first.points.iter().take(1).for_each(|end| say(&shown(end)));
+    let shown = first.points.iter().take(SHOWN).map(shown);
+    shown.for_each(|line| say(&line));
     Ok(())
 }
 
