@@ -3,7 +3,7 @@
 A grid of n × m cells is mapped into the plane; each cell is a quad of 8 nodes or two triangles of 6.
 Gmsh format 2.2, text. Nothing but Python is needed.
 """
-from math import cos, radians, sin
+from math import asin, cos, radians, sin
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -165,6 +165,36 @@ def activated_interface():
         "right": column(m, 2 * n),
     }
     write("activated_interface/wave.msh", n, m, place, group, lines, points=[("corner", (0, 0))])
+
+    # A pile: shaft upright to -4 m, then inclined to a corner at (0.4, -6), a round tip below it.
+    n, m, across, below, inclined = 7, 10, 3, 4, 2
+
+    def pile(i, j):
+        if i > 2 * across and i % 2:
+            return tuple((u + v) / 2 for u, v in zip(pile(i - 1, j), pile(i + 1, j)))
+        angle = min(i / (2 * across), 1.0) * asin(0.8)
+        x, y = (0.5 * sin(angle), -5.7 - 0.5 * cos(angle)) if i < 2 * across else (0.4, -6.0)
+        if j <= 2 * below:
+            y = -12 + j / (2 * below) * (y + 12)
+        elif j <= 2 * (below + inclined):
+            t = (j - 2 * below) / (2 * inclined)
+            x, y = x * (1 + 0.25 * t), y + t * (-4 - y)
+        else:
+            x, y = 1.25 * x, -4 + (j - 2 * (below + inclined)) / (m - below - inclined) * 2
+        beyond = max(i / (2 * across) - 1, 0) * across / (n - across)
+        return x + beyond**2 * (6 - x), y
+
+    group = lambda a, b: "pile" if a < across and b >= below else "ground"
+    lines = {
+        "axis": column(m, 0),
+        "far": column(m, 2 * n),
+        "bottom": row(n, 0),
+        "head": row(n, 2 * m)[:across],
+        "shaft": column(m, 2 * across)[below:],
+        "base": row(n, 2 * below)[:across],
+    }
+    for name in ["quads", "triangles"]:
+        write(f"activated_interface/pile_{name}.msh", n, m, pile, group, lines, name == "triangles")
 
 
 def level_ground():

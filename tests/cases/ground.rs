@@ -120,6 +120,21 @@ fn a_textbook_pile_carries_what_the_alpha_method_gives_on_its_shaft() {
     assert!((280.0..320.0).contains(&net(60)), "at 0.3 D: {}", net(60));
 }
 
+/// The table of its README: triangles carry more at the singular toe, and lose a piece of the joint above it.
+#[test]
+fn on_triangles_a_textbook_pile_carries_more_at_its_base_and_less_on_its_shaft() {
+    let [quads, triangles] =
+        ["textbook_pile", "textbook_pile/triangles.toml"].map(|case| finished(case, ""));
+    let at = |run: &Run, quantity: &str| run.probe("load test", quantity)[19];
+    let net = |run: &Run| at(run, "base") - 16.0 * 8.0 * PI / 4.0;
+    let shaft = |run: &Run| at(run, "head") + 24.0 * 8.0 * PI / 4.0 - at(run, "base");
+    assert!((net(&triangles) - 249.0).abs() < 0.5, "{}", net(&triangles));
+    let share = net(&triangles) / net(&quads) - 1.0;
+    assert!((0.05..0.07).contains(&share), "{share}");
+    let lost = shaft(&quads) - shaft(&triangles);
+    assert!((lost - 18.5).abs() < 0.5, "{lost}");
+}
+
 #[test]
 fn a_pile_that_is_pulled_leaves_its_base() {
     let run = finished("tension_pile", "");

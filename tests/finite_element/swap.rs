@@ -2,8 +2,8 @@
 //!
 //! Goal        the stress that a swap changes is said, and the force that this leaves out of balance is
 //!             taken off in proportion to the phase's course; the way there does not matter where the
-//!             path does not; a resumed run has the same bits
-//! Geometry    a square between smooth walls, 1 × 1; the sliding block
+//!             path does not, and by how much where it does; a resumed run has the same bits
+//! Geometry    a square between smooth walls, 1 × 1; a strip on ground; the sliding block
 //!
 //! ```text
 //!      ↓ ↓ ↓ p
@@ -155,6 +155,69 @@ fn a_swap_ends_where_two_swaps_end() {
         assert_close(probe, one.last(probe), two.last(probe), EQUILIBRIUM, scale);
     }
     assert_close("s_22", one.last("s_22"), -P, EQUILIBRIUM, P);
+}
+
+/// Settlement of a strip whose ground becomes clay of 20 kPa in swaps of so many increments, in one or in two.
+fn strip(increments: usize, in_two: bool) -> f64 {
+    let law = |name: &str, cohesion: f64| {
+        tresca(name, cohesion).replace("poisson_ratio = 0.25", "poisson_ratio = 0.3")
+    };
+    let (first, weak, swapped) = (
+        swap("first", increments, "middling"),
+        swap("swap", increments, "weak"),
+        elastic("stiff", YOUNG, 0.3) + &law("middling", 25.0) + &law("weak", 20.0),
+    );
+    let phases = if in_two { first + &weak } else { weak };
+    let text = format!(
+        r#"
+analysis = "plane_strain"
+[mesh]
+columns = [{{ n = 4, to = 1.0 }}, {{ n = 6, to = 5.0, ratio = 1.3 }}]
+rows = [{{ n = 8, to = 4.0, ratio = 0.85 }}]
+region = [{{ group = "ground" }}]
+lines = {{ left = {{ x = 0.0 }}, right = {{ x = 5.0 }}, bottom = {{ y = 0.0 }}, strip = {{ y = 4.0, x = [0.0, 1.0] }} }}
+[laws]
+{swapped}
+[groups.ground]
+formulation = "solid"
+law = "stiff"
+unit_weight = 18.0
+initial_stress = {{ k_0 = 0.6 }}
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[supports]]
+line = "right"
+fixed = ["x"]
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "load"
+increments = 2
+pressure = [{{ line = "strip", value = 95.0 }}]
+{phases}
+[probes]
+settlement = {{ line = "strip", quantity = "displacement_y", scale = -1.0 }}
+"#
+    );
+    run(&text).last("settlement")
+}
+
+/// The table of the page on swaps: what increments do fades, what the way does stays.
+#[test]
+fn where_ground_yields_one_swap_and_two_differ_by_their_increments_and_by_the_way() {
+    let [coarse, ten, twenty, forty] = [1, 10, 20, 40].map(|n| [strip(n, false), strip(n, true)]);
+    let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0);
+    let between = |what: &str, value: f64, least: f64, most: f64| {
+        assert!(value > least && value < most, "{what}: {value} %");
+    };
+    let differ = |[one, two]: [f64; 2]| percent(two, one);
+    between("one increment", percent(coarse[0], forty[0]), 3.5, 4.0);
+    between("ten increments", percent(ten[0], forty[0]), 0.2, 0.5);
+    between("two swaps of one increment", differ(coarse), -1.2, -1.0);
+    between("two swaps of 20", differ(twenty), 0.38, 0.48);
+    between("two swaps of 40", differ(forty), 0.43, 0.53);
 }
 
 #[test]

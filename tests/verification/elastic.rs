@@ -56,9 +56,9 @@ fn thick_sphere() {
     let results = run("thick_sphere");
     let (a, b, p, young) = (1.0_f64, 2.0_f64, 100.0, 3e4);
     for (mesh, bound) in [
-        ("quads_2", 0.01),
-        ("quads_4", 0.001),
-        ("quads_8", 2e-4),
+        ("quads_2", 0.003),
+        ("quads_4", 2e-4),
+        ("quads_8", 2e-5),
         ("triangles_4", 0.015),
         ("triangles_8", 0.005),
     ] {

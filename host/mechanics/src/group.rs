@@ -5,6 +5,7 @@
 
 mod aside;
 mod carry;
+mod correction;
 mod differences;
 mod excerpt;
 mod joined;
@@ -25,7 +26,7 @@ pub use look::{Deviation, Notice, Went};
 pub use state::GroupState;
 pub use tangent::Fault;
 
-use crate::element::{Axes, Kinematics};
+use crate::element::Kinematics;
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
 use algebra::threads;
@@ -357,33 +358,6 @@ impl Group {
         self.strain.committed.fill(0.0);
         self.stress = Field::new(stress);
         self.start_law(self.law.clone(), None)
-    }
-
-    /// What exact integration adds to the tractions of an interface at its points; `traction` gives them by element,
-    /// place and axes there.
-    pub fn lost(
-        &self,
-        at_points: &[f64],
-        traction: impl Fn(usize, [f64; 2], &Axes) -> [f64; 2],
-    ) -> Vec<f64> {
-        let mut lost = vec![0.0; at_points.len()];
-        for element in 0..self.kinematics.n_elements() {
-            let of_element = |at: [f64; 2], axes: &Axes| traction(element, at, axes);
-            if let Some(exact) = self.kinematics.gathered(element, &of_element) {
-                let points = self.kinematics.points_of(element);
-                let own = 2 * points.start..2 * points.end;
-                let both = exact.as_flattened().iter().zip(&at_points[own.clone()]);
-                let all = lost[own].iter_mut().zip(both);
-                all.for_each(|(lost, (exact, own))| *lost = exact - own);
-            }
-        }
-        lost
-    }
-
-    /// Takes over what [`Self::lost`] gave.
-    pub fn correct(&mut self, lost: Vec<f64>) {
-        let is_any = lost.iter().any(|lost| *lost != 0.0);
-        self.correction = if is_any { lost } else { Vec::new() };
     }
 
     /// A group that is no longer there: without stress and strain.

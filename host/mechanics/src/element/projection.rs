@@ -16,6 +16,10 @@
 //! so that Σ_q W_q σ_q · ε_q = ∫ σ · B dV u: the virtual work of (1). (1) contains every stress that is
 //! linear in the coordinates, on curved sides too, so that weight and earth pressure at rest balance to
 //! round-off. In plane strain, and in rectangles, (2) is the strain at the point itself.
+//!
+//! A quad with four functions has one motion that none of (2) sees. Where sides are bent, stresses whose directions turn with
+//! the side do work in it, so that a free wall moves to and fro: there are three points along such sides, functions ξᵃηᵇ
+//! for them, and a linear volume strain.
 
 use super::Axes;
 use super::solid::Point;

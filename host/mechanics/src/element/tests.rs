@@ -439,3 +439,125 @@ fn an_interface_on_the_axis_carries_a_linear_traction_and_holds_the_node_there()
     let radii = [0, 1, 2].map(|point| element.position(point)[0]);
     assert_relative_eq!(radii[..], [1.0, 1.4, 1.2][..], max_relative = 1e-15);
 }
+
+/// A quad around (2, 1) whose first and third side, and whose others, are bowed by parts of their lengths.
+fn bowed([across, up]: [f64; 2]) -> [[f64; 2]; 8] {
+    let corners = [[1.2, 0.1], [3.0, 0.0], [2.8, 2.0], [1.0, 1.7]];
+    std::array::from_fn(|i| {
+        if i < 4 {
+            return corners[i];
+        }
+        let [a, b] = [corners[i - 4], corners[(i - 3) % 4]];
+        let by = if i % 2 == 0 { across } else { up };
+        let across = [a[1] - b[1], b[0] - a[0]];
+        std::array::from_fn(|c| f64::midpoint(a[c], b[c]) + by * across[c])
+    })
+}
+
+/// Of three points along bent sides, too, nodal forces of a linear stress are exact, and those of rest are those of ground
+/// at rest.
+#[test]
+fn bent_quads_carry_a_linear_stress() {
+    for (bows, n) in [
+        ([0.1, 0.0], (3, 2)),
+        ([0.0, -0.1], (2, 3)),
+        ([0.1, 0.05], (3, 3)),
+    ] {
+        let coordinates = bowed(bows);
+        let nodes = [0, 1, 2, 3, 4, 5, 6, 7];
+        assert_eq!(Quad8::bent(&coordinates, nodes), [n.0 == 3, n.1 == 3]);
+        for analysis in ANALYSES {
+            let forces = |strains, rule| {
+                let axes = vec![Axes::GLOBAL];
+                let quad = Quad8::new(analysis, &coordinates, vec![nodes], axes, strains, |_| rule);
+                let quad = quad.unwrap();
+                let stress = |point| {
+                    let [x, y] = quad.position(point);
+                    let at = |a: f64, b: f64, c: f64| a + b * x + c * y;
+                    [
+                        at(5.0, 1.0, -7.0),
+                        at(-2.0, 3.0, 9.0),
+                        at(1.0, -4.0, 2.0),
+                        at(3.0, 6.0, -5.0),
+                    ]
+                };
+                let stress: Vec<f64> = (0..quad.n_points()).flat_map(stress).collect();
+                let mut force = vec![0.0; 16];
+                quad.add_forces(&stress, &mut force);
+                force
+            };
+            let exact = forces(Strains::AtPoints, (4, 4));
+            let found = forces(Strains::ProjectedLinearVolume, n);
+            for (found, exact) in found.iter().zip(&exact) {
+                assert_relative_eq!(found, exact, epsilon = 1e-11);
+            }
+        }
+    }
+    assert_eq!(
+        Quad8::bent(&bowed([0.009, -0.009]), [0, 1, 2, 3, 4, 5, 6, 7]),
+        [false; 2]
+    );
+}
+
+/// Nodes do not integrate N t r where all three grow along a side, nor anything on a curve; where the radius is the same,
+/// or there is none, they do.
+#[test]
+fn tractions_that_are_gathered_at_nodes_have_exact_nodal_forces() {
+    use super::Joint6;
+    use crate::mesh::Joint;
+    use crate::problem::Integration;
+    let joint = Joint {
+        minus: [0, 1, 2],
+        plus: [3, 4, 5],
+        group: 0,
+    };
+    let stress = |[x, y]: [f64; 2], axes: &Axes| {
+        let [_, normal, _, shear] =
+            axes.stress_from_global([3.0 + x, 5.0 - 2.0 * y, 0.0, 1.0 + 0.5 * x - y]);
+        [normal, shear]
+    };
+    let of = |analysis, places: [[f64; 2]; 3], integration| {
+        let coordinates: Vec<[f64; 2]> = places.into_iter().chain(places).collect();
+        Joint6::new(analysis, &coordinates, &[joint], integration)
+    };
+    let forces = |element: &Joint6, flux: &[f64]| {
+        let mut force = vec![0.0; 12];
+        element.add_forces(flux, &mut force);
+        force
+    };
+    let at_points = |element: &Joint6| -> Vec<f64> {
+        let points = 0..element.n_points();
+        points
+            .flat_map(|point| stress(element.position(point), &element.axes_at(point)))
+            .collect()
+    };
+    let (s, c) = 0.2_f64.sin_cos();
+    let (s_2, c_2) = 0.4_f64.sin_cos();
+    let inclined = [[1.0, 0.0], [1.6, 1.0], [1.3, 0.5]];
+    let arc = [[1.0, 0.0], [c_2, s_2], [c, s]];
+    let upright = [[1.0, 0.0], [1.0, 1.0], [1.0, 0.5]];
+    for (analysis, places, is_exact) in [
+        (Analysis::PlaneStrain, inclined, true),
+        (Analysis::Axisymmetric, upright, true),
+        (Analysis::Axisymmetric, inclined, false),
+        (Analysis::PlaneStrain, arc, false),
+    ] {
+        let nodal = of(analysis, places, Integration::Nodes);
+        let gathered = nodal.gathered(0, &stress);
+        assert_eq!(gathered.is_none(), is_exact, "{analysis:?} {places:?}");
+        let flux = gathered.map_or_else(|| at_points(&nodal), Vec::into_flattened);
+        // Three Gauss points: to the fifth degree, which is all there is here.
+        let gauss = of(analysis, places, Integration::Full);
+        let exact = forces(&gauss, &at_points(&gauss));
+        for (found, exact) in forces(&nodal, &flux).iter().zip(exact) {
+            assert_relative_eq!(*found, exact, epsilon = 1e-12);
+        }
+    }
+    // Axes at the nodes of an arc are those of the circle.
+    let nodal = of(Analysis::PlaneStrain, arc, Integration::Nodes);
+    for point in 0..3 {
+        let [x, y] = nodal.position(point);
+        let across = nodal.axes_at(point).across;
+        assert_relative_eq!(x * across[0] + y * across[1], 1.0, epsilon = 1e-14);
+    }
+}
