@@ -52,6 +52,51 @@ fn place() -> Place {
     place
 }
 
+/// The same points with a slack of 0.3 mm: the warning comes before all notes, in the text, the page and the files, and
+/// names the points; an offset that is looked for has an interval, in the text and in the table.
+#[test]
+fn slack_is_warned_of_everywhere_and_an_offset_is_a_row() {
+    let place = place();
+    let slack = "slip,tau\n0.1,0.1\n0.2,-0.1\n0.3,0.1\n0.5,10.1\n0.7,19.9\n0.9,30.1\n1.1,39.9\n1.3,50.1\n1.7,59.9\n1.9,60.1\n";
+    place.write("box.csv", slack);
+    let outcome = place.run(&["calibrate", "joint.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let says = "residuals are too large for noise";
+    let warning = outcome.stdout.find("warning: box, traction_t: ").unwrap();
+    assert!(
+        outcome.stdout[warning..].contains(says),
+        "{}",
+        outcome.stdout
+    );
+    assert!(
+        outcome
+            .stdout
+            .find("note: ")
+            .is_none_or(|note| warning < note)
+    );
+    let read = |name: &str| std::fs::read_to_string(place.path("out").join(name)).unwrap();
+    assert!(read("report.html").contains("not to be believed"));
+    assert!(read("report.html").contains(says));
+    let json: Value = serde_json::from_str(&read("calibration.json")).unwrap();
+    assert!(json["warnings"][0].as_str().unwrap().contains(says));
+    let far = json["tests"][0]["curves"][0]["beyond_noise"]
+        .as_array()
+        .unwrap();
+    let marked = read("fit.csv")
+        .lines()
+        .filter(|line| line.ends_with(",true"))
+        .count();
+    assert!(marked > 0 && marked == far.len(), "{marked}");
+    let to = "noise = 0.1\noffset_x = { min = 0.0, max = 1.0 }";
+    let outcome = edited(&place, "noise = 0.1", to, &[]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(!outcome.stdout.contains("warning: "), "{}", outcome.stdout);
+    assert!(outcome.stdout.contains("\noffset_x of box, traction_t  "));
+    assert!(read("parameters.csv").contains("\n\"offset_x of box, traction_t\",2.9"));
+    assert!(!read("report.html").contains("not to be believed"));
+    assert!(!read("parameters.toml").contains("offset"));
+}
+
 /// The file after an edit.
 fn edited(place: &Place, from: &str, to: &str, more: &[&str]) -> Outcome {
     assert!(FILE.contains(from), "{from:?}");
@@ -303,6 +348,24 @@ fn mistakes_are_told_with_file_line_and_key() {
         ),
         ("noise = 0.1", "noise = -0.1", 17, "`noise` is -0.1"),
         ("noise = 0.1", "noise = 0.0", 17, "has no noise"),
+        (
+            "noise = 0.1",
+            "noise = 0.1\noffset_x = { min = 1.0, max = 0.0 }",
+            18,
+            "`offset_x`: `min` is 1, expected a number below `max`, 0",
+        ),
+        (
+            "noise = 0.1",
+            "noise = 0.1\nscale_y = { min = 0.0, max = 2.0 }",
+            18,
+            "`scale_y`: `min` is 0, expected a number above 0",
+        ),
+        (
+            "noise = 0.1",
+            "noise = 0.1\noffset_y = { min = 1.0, max = 2.0, start = 3.0 }",
+            18,
+            "`offset_y`: `start` is 3, expected 1 to 2",
+        ),
     ] {
         let outcome = edited(&place, from, to, &[]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{to:?}: {}", outcome.stderr);

@@ -227,14 +227,14 @@ fn the_table_does_not_depend_on_who_carries_it_out() {
     assert!(scattered.path("out/report.html").is_file());
 }
 
-/// Chance has the same points at every call; `saltelli` has the runs for indices, which stand in `effects.csv`. With the
-/// cohesion τ = c in the end: it brings everything, the title nothing.
+/// Chance has the same points at every call; `saltelli` has the runs for indices, which stand in `effects.csv`. The
+/// stiffness of the layer brings everything, the title nothing.
 #[test]
 fn saltelli_gives_indices_with_intervals() {
     let study_of = |method: &str| {
         format!(
             "case = \"case.toml\"\nmethod = \"{method}\"\nruns = 8\n\
-             [[parameter]]\nname = \"cohesion\"\nkey = \"laws.joint.parameters.cohesion\"\nuniform = [2.0, 3.0]\n\
+             [[parameter]]\nname = \"stiffness\"\nkey = \"laws.joint.parameters.shear_stiffness\"\nuniform = [1e5, 4e5]\n\
              [[parameter]]\nname = \"title\"\nkey = \"title\"\nvalues = [\"a\", \"b\"]\n\
              [outputs]\ntau = {{ probe = \"tau\" }}\n"
         )
@@ -248,7 +248,7 @@ fn saltelli_gives_indices_with_intervals() {
     assert_eq!(std::fs::read(place.path("out/runs.csv")).unwrap(), plan);
     done(&study(&place, &[]));
     let effects = std::fs::read_to_string(place.path("out/effects.csv")).unwrap();
-    assert_eq!(column(&effects, "parameter"), ["cohesion", "title"]);
+    assert_eq!(column(&effects, "parameter"), ["stiffness", "title"]);
     let of = |name: &str| -> Vec<f64> {
         let cells = column(&effects, name).into_iter();
         cells.map(|cell| cell.parse().unwrap()).collect()
@@ -282,7 +282,7 @@ fn saltelli_gives_indices_with_intervals() {
     assert!(!report.contains(">0.0 %<"));
     assert!(report.contains("digital shift, seed 0"));
     let runs = std::fs::read_to_string(other.path("out/runs.csv")).unwrap();
-    assert_ne!(column(&runs, "cohesion")[0], "2.0");
+    assert_ne!(column(&runs, "stiffness")[0], "100000.0");
 }
 
 /// What is wrong, the edit of the study that makes it so, and what the message says; `^` marks the place.
