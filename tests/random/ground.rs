@@ -489,7 +489,9 @@ impl Ground {
                 && is_rigid(n)
             {
                 let nodes = &simulation.problem().mesh.lines["head"].nodes;
-                let is_off = |node: &&usize| state.displacement[2 * **node + 1] != -value;
+                let is_off = |node: &&usize| {
+                    state.displacement[2 * **node + 1].to_bits() != (-value).to_bits()
+                };
                 if let Some(node) = nodes.iter().find(is_off) {
                     let at = state.displacement[2 * node + 1];
                     return Err(format!(
