@@ -13,7 +13,7 @@
 //!
 //! Remarks at the top of a page: `<!-- needs: gfortran -->`, it is passed over where that program is
 //! missing; `<!-- files of: how-to/slice.md -->`, the files of that page are there from the start;
-//! `<!-- has: tutorial/my_pile.msh -->`, so is this file.
+//! `<!-- has: tutorial/my_pile.msh -->`, so is this file of the cases.
 //!
 //! A picture `![…](…/RUN/NAME.svg)` is `results/RUN/NAME.svg` at the end of the page; `PILUM_BLESS=1` rewrites it.
 
@@ -294,6 +294,7 @@ fn follow(name: &str) -> usize {
         commands: 0,
     };
     let work = session.place.work();
+    let cases = session.place.prefix.join("share/pilum/cases");
     for other in remarks(&text, "files of") {
         for block in blocks(&read(other))
             .iter()
@@ -304,7 +305,8 @@ fn follow(name: &str) -> usize {
     }
     for file in remarks(&text, "has") {
         let to = Path::new(file).file_name().unwrap();
-        fs::copy(docs.join(file), work.join(to)).unwrap();
+        let from = cases.join(file);
+        fs::copy(from, work.join(to)).unwrap();
     }
     for block in blocks(&text) {
         session.follow(&block);

@@ -9,8 +9,8 @@ use tests::place::{Outcome, Place};
 /// What a command does not do within this time is stopped as by Ctrl-C: it has read its files and opened its laws by then.
 const LONG_ENOUGH: f64 = 1.0;
 
-/// Files that the reader brings.
-const OF_THE_READER: [&str; 2] = ["mysand.f", "driver.toml"];
+/// Files and names that the reader brings.
+const OF_THE_READER: [&str; 3] = ["mysand.f", "driver.toml", "<id>"];
 
 /// Programs of others that commands start. Their examples have tests of their own, where there is a repository.
 const OF_OTHERS: [&str; 6] = [

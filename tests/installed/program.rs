@@ -131,13 +131,13 @@ fn the_commands_of_its_readme_work() {
     assert!(
         place
             .work()
-            .join("../home/pilum-cases/results/chamber_mesh1/report.html")
+            .join("../home/piles/results/chamber_mesh1/report.html")
             .is_file()
     );
     assert!(
         place
             .work()
-            .join("../home/pilum-cases/my_law/README.md")
+            .join("../home/piles/my_law/README.md")
             .is_file()
     );
 }

@@ -53,10 +53,6 @@ const FILES: [(&str, &str); 17] = [
     ("abi/include/pilum_law.hpp", "include/pilum"),
     ("abi/include/pilum_law.f90", "share/pilum"),
     ("abi/include/exports.map", "share/pilum"),
-    (
-        "host/docs/tutorial/my_pile.msh",
-        "share/pilum/cases/tutorial",
-    ),
     ("cases", "share/pilum/cases"),
     // The user material of a case.
     (
@@ -75,6 +71,10 @@ const FILES: [(&str, &str); 17] = [
     ("abi/interoperability.md", "share/doc/pilum/abi"),
     ("host/README.md", "share/doc/pilum/host"),
     ("host/docs", "share/doc/pilum/host/docs"),
+    (
+        "host/docs/tutorial/my_pile.msh",
+        "share/pilum/cases/tutorial",
+    ),
     ("models/README.md", "share/doc/pilum/models"),
 ];
 
@@ -228,7 +228,9 @@ fn places(repository: &Path, metadata: &Metadata) -> Result<Places, Error> {
         let path = repository.join(from);
         if path.is_dir() {
             let files = below(&path)?;
-            let inner = files.iter().filter_map(|file| file.strip_prefix(&path).ok());
+            let inner = files
+                .iter()
+                .filter_map(|file| file.strip_prefix(&path).ok());
             for inner in inner.filter(|file| is_for_users(file)) {
                 places.insert(Path::new(from).join(inner), Path::new(to).join(inner));
             }

@@ -19,7 +19,7 @@ pub(crate) fn moved(text: &str, page: &Path, places: &Places, repository: &Path)
     let mut block = None;
     let mut written = String::new();
     for line in text.split_inclusive('\n') {
-        if let Some(language) = line.strip_prefix("```") {
+        if let Some(language) = line.trim_start().strip_prefix("```") {
             block = block.is_none().then(|| language.trim_end());
             written.push_str(line);
         } else if block == Some("sh") {
