@@ -7,6 +7,7 @@
 )]
 
 mod bodies;
+mod bonds;
 mod condensed;
 mod cut_back;
 mod cylinder;

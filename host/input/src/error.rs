@@ -2,7 +2,8 @@
 
 use law::Stopped;
 use mechanics::NoEquilibrium;
-use mechanics::equilibrium::{Iterations, Reason, Singularity};
+use mechanics::equilibrium::{Iterations, Mechanism, Reason, Singularity};
+use mechanics::group::Gives;
 use mechanics::settings::Control;
 use text::{InputError, add_hint};
 use thiserror::Error;
@@ -85,6 +86,19 @@ impl From<mechanics::Error> for Error {
     }
 }
 
+impl Error {
+    /// What gave way where no equilibrium was found.
+    pub fn mechanism(&self) -> Option<&Mechanism> {
+        match self {
+            Self::Simulation { error, .. } => match &**error {
+                mechanics::Error::NoEquilibrium(none) => none.failure.mechanism.as_ref(),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+}
+
 /// What the user could do about an error of a simulation, whatever it is of.
 fn hint(error: &mechanics::Error) -> Option<String> {
     let hint = match error {
@@ -129,12 +143,29 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
         Reason::Singular(Some((Singularity::Limit, _))) => creep.into_iter().collect(),
         _ => Vec::new(),
     };
+    let bond = none.failure.mechanism.as_ref().and_then(remedy);
     let written = "results up to the last whole increment in equilibrium are written, the last equilibrium itself is \
                    `stopped_at` in summary.json; log.jsonl lists the iterations";
-    ways.into_iter()
+    bond.into_iter()
+        .chain(ways)
         .chain([written])
         .collect::<Vec<_>>()
         .join("; ")
+}
+
+/// What keeps a bond that breaks at once and leaves no equilibrium.
+fn remedy(mechanism: &Mechanism) -> Option<&'static str> {
+    match mechanism.how {
+        Gives::BondBreaks | Gives::Opens if mechanism.is_bare => Some(
+            "a normal stress to begin with (initial stresses, or a phase of weight or pressure before), or a tensile strength, \
+             keeps the bond; without cohesion there is none to break",
+        ),
+        Gives::BondBreaks => Some(
+            "a bond that breaks at once may leave nothing that carries the load: prescribe a displacement instead, or give the \
+             law a tensile strength",
+        ),
+        _ => None,
+    }
 }
 
 /// Whether a step that failed so may be made in another way: not one that the model does not allow, or the laws.

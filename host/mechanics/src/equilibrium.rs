@@ -3,9 +3,11 @@
 
 mod diagnosis;
 mod linear_domain;
+mod mechanism;
 mod newton;
 
 pub use linear_domain::{Held, LinearDomain, LookedAt, Reuse, Standing};
+pub use mechanism::Mechanism;
 pub use newton::{
     Clock, Costs, Criterion, Culprit, DomainFailure, Guess, Imbalance, Iteration, Iterations,
     Loads, Matrix, Measure, Motion, Newton, Open, PointPlace, Reason, Runaway, Singularity,

@@ -173,6 +173,9 @@ impl fmt::Display for NoEquilibrium {
         if let Some(culprit) = &failure.culprit {
             write!(f, "\n  {culprit}")?;
         }
+        if let Some(mechanism) = &failure.mechanism {
+            write!(f, "\n  {mechanism}")?;
+        }
         Ok(())
     }
 }

@@ -769,6 +769,7 @@ pub fn end_summary(folder: &Path, ending: &Ending) -> Result<bool, Error> {
     };
     summary.insert("status".to_owned(), ending.status.into());
     summary.insert("error".to_owned(), json!(ending.error));
+    summary.insert("mechanism".to_owned(), json!(ending.mechanism));
     write_summary(folder, &summary.into())?;
     Ok(true)
 }

@@ -50,6 +50,8 @@ pub struct Ending {
     pub status: &'static str,
     /// What went wrong, if something did.
     pub error: Option<String>,
+    /// What gave way where no equilibrium was found.
+    pub mechanism: Option<Value>,
 }
 
 impl Ending {
@@ -58,6 +60,7 @@ impl Ending {
         Self {
             status: "done",
             error: None,
+            mechanism: None,
         }
     }
 }
@@ -252,6 +255,7 @@ impl Summary {
         let mut summary = self.head.clone();
         summary.insert("status".to_owned(), ending.status.into());
         summary.insert("error".to_owned(), json!(ending.error));
+        summary.insert("mechanism".to_owned(), json!(ending.mechanism));
         summary.insert("warnings".to_owned(), json!(warnings));
         let at_rest = |phase: &str| {
             let found = self.course.at_rest.as_ref().filter(|(of, _)| of == phase);
@@ -276,6 +280,8 @@ impl Summary {
                     "relaxed_steps": p.relaxed,
                     "crept_steps": p.crept,
                     "crept_from": p.crept_from,
+                    "released_points": p.released,
+                    "released_from": p.released_from,
                     "tolerated_steps": p.tolerated,
                     "tolerated_residual": p.tolerated_residual,
                     "tolerated_force": p.tolerated_force,

@@ -2,6 +2,7 @@
 
 use input::{Error, Kind};
 use results::Ending;
+use serde_json::json;
 
 /// How a run ended, in a word and in its error's own.
 pub fn ending(error: Option<&Error>) -> Ending {
@@ -18,6 +19,7 @@ pub fn ending(error: Option<&Error>) -> Ending {
     Ending {
         status,
         error: Some(error.to_string()),
+        mechanism: error.mechanism().map(|mechanism| json!(mechanism)),
     }
 }
 

@@ -122,14 +122,7 @@ pub(super) fn compare(groups: &[Group], before: &Snapshot, period: (f64, f64)) -
 
 /// What happens at a point.
 fn culprit(group: &Group, point: usize, what: Symptom, others: usize) -> Culprit {
-    let (element, within) = group.kinematics.place_of(point);
-    let at = PointPlace {
-        group: group.name.clone(),
-        law: group.law.built.law.description().id.clone(),
-        element: element + 1,
-        point: within + 1,
-        position: group.kinematics.position(point),
-    };
+    let at = PointPlace::of(group, point);
     Culprit { at, what, others }
 }
 

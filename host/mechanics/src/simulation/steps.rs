@@ -6,6 +6,7 @@ use super::path::PathEnd;
 use super::{Simulation, UnderWay, Warning, Watch, go_on, stopped};
 use crate::equilibrium::{Guess, Newton, StepFailure, StepSuccess};
 use crate::error::{Error, Place};
+use crate::group::Group;
 use crate::settings::{Control, Settings};
 
 /// Step, as a fraction of an increment, below which arc-length control takes over, if a step may
@@ -51,6 +52,8 @@ enum Then {
     Path,
     /// Creep, which leads from here on.
     Creep,
+    /// Bonds that break one after another, from here on, with a first step of this length.
+    Release(f64),
     /// Nothing.
     End,
 }
@@ -85,7 +88,7 @@ impl Simulation {
             }
             let step = way.next(phase);
             let guess = phase.course.history.guess(step[1] - step[0]);
-            let attempt = self.attempt(phase, way.lead.control, step, guess);
+            let attempt = self.attempt(phase, (way.lead.control, way.lead.releases), step, guess);
             match self.without_leap(attempt, phase, step[1] - step[0]) {
                 Ok(success) => self.go_forward(success, step, &mut way, phase, watch)?,
                 Err(failure) => self.go_otherwise(failure, step, &mut way, phase, watch)?,
@@ -104,16 +107,18 @@ impl Simulation {
         watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         self.look_after(&success, (self.clock(phase.number), step), watch);
-        if success.relaxed {
+        if !success.released.is_empty() {
+            self.note_release(&success.released, (way.place, phase), watch);
+        } else if success.relaxed {
             self.note_motion(&success, step, way.lead.control, (way.place, phase), watch);
         }
         // Of a motion, and of what is tolerated, more is said already.
-        if way.was_cut && !success.relaxed && success.tolerated == 0.0 {
+        if way.was_cut && !success.has_moved() && success.tolerated == 0.0 {
             self.note_cut_back(&success, step, (way.place, phase), watch);
         }
         way.lead.goes_on();
         // A motion takes many iterations, and steps of any length.
-        if success.was_motion || success.iterations.len() as f64 <= way.easy {
+        if success.was_motion || !success.released.is_empty() || success.iterations.len() as f64 <= way.easy {
             phase.course.step = (REGROWTH * way.longest(phase)).min(1.0 / way.n as f64);
         }
         self.take_over(success, step[1], way.place, phase, watch, &mut way.done)
@@ -172,6 +177,11 @@ impl Simulation {
                 }
                 Ok(())
             }
+            Then::Release(step) => {
+                way.was_cut = false;
+                phase.course.step = step;
+                Ok(())
+            }
         }
     }
 
@@ -183,11 +193,19 @@ impl Simulation {
         let is_small = step < way.smallest.max(PATIENCE / n);
         let is_out = step < way.smallest;
         let stays = way.lead.stays(is_out, step * n);
-        let turns = !stays && way.lead.turns(failure, is_out);
+        // Where bonds have broken one after another before, nothing else is tried first.
+        let again = phase.record.released > 0 && way.lead.has_waited();
+        let turns = !stays && !again && way.lead.turns(failure, is_out);
+        let is_over = is_out && !stays && !(turns && way.lead.creeps());
         if failure.defect().is_some() {
             Then::End
         } else if follows && is_small {
             Then::Path
+        } else if (again || is_over)
+            && self.groups.iter().any(Group::may_break)
+            && let Some(step) = way.lead.release(failure, way.smallest, n)
+        {
+            Then::Release(step)
         } else if turns && way.lead.creeps() {
             Then::Creep
         } else if is_out && !stays {
@@ -276,7 +294,7 @@ impl Simulation {
     pub(super) fn attempt(
         &mut self,
         phase: &mut UnderWay,
-        control: Control,
+        (control, releases): (Control, bool),
         [from, to]: [f64; 2],
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
@@ -294,7 +312,7 @@ impl Simulation {
             &settings,
             &mut phase.record.costs,
         );
-        newton = newton.stopped_by(&self.stop);
+        newton = newton.stopped_by(&self.stop).releasing(releases);
         newton.step(&phase.course.loads, [from, to], clock, guess)
     }
 }
@@ -303,7 +321,7 @@ impl Way<'_> {
     /// Length that the next step may have.
     fn longest(&self, phase: &UnderWay) -> f64 {
         let step = phase.course.step;
-        if self.lead.creeps() {
+        if self.lead.is_short() {
             step.min(creeping::LONGEST / self.n as f64)
         } else {
             step

@@ -6,6 +6,8 @@ use super::iterate::{Control, Correction, State};
 use super::outcome::Iteration;
 use super::residual::Task;
 use crate::equilibrium::diagnosis::{self, Snapshot};
+use crate::equilibrium::mechanism::{self, Mechanism};
+use crate::group::Break;
 use law::Operator;
 
 impl Newton<'_> {
@@ -23,6 +25,11 @@ impl Newton<'_> {
             ..failure
         };
         if failure.is_singular() {
+            let mechanism = self.mechanism(&[], &[], period.0);
+            let failure = StepFailure {
+                mechanism,
+                ..failure
+            };
             let singularity = self.singularity(period);
             self.tangents = Operator::None;
             self.will_compute(Operator::Elastic);
@@ -44,23 +51,29 @@ impl Newton<'_> {
         let unmet = self.unmet(&state.balance, correction);
         // What ran away did so in the last iterate, not in the one that is only tried.
         let runaway = self.runaway;
-        let culprit = self.diagnose(control, state, task);
+        let (culprit, breaks) = self.diagnose(control, state, task).unwrap_or_default();
         self.runaway = runaway;
         StepFailure {
             culprit,
+            mechanism: self.mechanism(&state.balance.residual, &breaks, task.period.0),
             ..Reason::Unmet(Iterations::Newton(n, in_vain), unmet).into()
         }
     }
 
     /// Does one iteration more and compares: what keeps Newton iterations from settling. With a
     /// kept matrix they are slow, which says nothing of a point.
-    fn diagnose(&mut self, control: &impl Control, state: &State, task: &Task) -> Option<Culprit> {
+    fn diagnose(
+        &mut self,
+        control: &impl Control,
+        state: &State,
+        task: &Task,
+    ) -> Option<(Option<Culprit>, Vec<(usize, Break)>)> {
         if !self.settings.method.is_newton() {
             return None;
         }
         self.kept.contraction = f64::INFINITY;
         self.prepare(&state.increment, task).ok()?;
-        let before = Snapshot::of(self.groups);
+        let (before, jumps) = (Snapshot::of(self.groups), self.jumps());
         let correction = Correction {
             increment: self.solve(&state.balance.residual, None).ok()?,
             rise: 0.0,
@@ -68,6 +81,22 @@ impl Newton<'_> {
         let (_, moved) = self.search(control, state, &correction, true).ok()?;
         self.evaluate(&moved.increment, task, Operator::Consistent)
             .ok()?;
-        diagnosis::compare(self.groups, &before, task.period)
+        let culprit = diagnosis::compare(self.groups, &before, task.period);
+        Some((culprit, self.breaks_since(&jumps, task.period.0)))
+    }
+
+    /// What gives way in the trial state, with this residual by equation.
+    fn mechanism(
+        &self,
+        residual: &[f64],
+        breaks: &[(usize, Break)],
+        time: f64,
+    ) -> Option<Mechanism> {
+        let mut by_dof = vec![0.0; self.displacement.len()];
+        for (&dof, force) in self.system.free().iter().zip(residual) {
+            by_dof[dof] = *force;
+        }
+        let includes = |number| self.system.includes(number);
+        mechanism::find(self.groups, includes, &by_dof, breaks, time)
     }
 }

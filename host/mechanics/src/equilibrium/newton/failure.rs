@@ -3,7 +3,9 @@
 mod words;
 
 use super::outcome::Iteration;
-use crate::group::{Fault, PointFailure};
+use crate::equilibrium::mechanism::Mechanism;
+use crate::group::{Fault, Group, PointFailure};
+use serde::Serialize;
 
 /// A criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,7 +169,7 @@ pub struct Culprit {
 }
 
 /// An integration point.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PointPlace {
     /// Name of the group.
     pub group: String,
@@ -179,6 +181,20 @@ pub struct PointPlace {
     pub point: usize,
     /// Coordinates.
     pub position: [f64; 2],
+}
+
+impl PointPlace {
+    /// That of a point of a group.
+    pub(in crate::equilibrium) fn of(group: &Group, point: usize) -> Self {
+        let (element, within) = group.kinematics.place_of(point);
+        Self {
+            group: group.name.clone(),
+            law: group.law.built.law.description().id.clone(),
+            element: element + 1,
+            point: within + 1,
+            position: group.kinematics.position(point),
+        }
+    }
 }
 
 /// What happens at a point from one iteration to the next.
@@ -205,6 +221,10 @@ pub struct StepFailure {
     pub runaway: Option<Runaway>,
     /// What keeps the iterations from settling, if that could be found out.
     pub culprit: Option<Culprit>,
+    /// What gives way, if that could be found out.
+    pub mechanism: Option<Mechanism>,
+    /// Points broke one after another, in vain.
+    pub has_released: bool,
 }
 
 impl From<Reason> for StepFailure {
@@ -214,6 +234,8 @@ impl From<Reason> for StepFailure {
             reason,
             runaway: None,
             culprit: None,
+            mechanism: None,
+            has_released: false,
         }
     }
 }
