@@ -122,20 +122,31 @@ fn a_load_that_no_bond_carries_names_what_gives_way() {
         "{message}"
     );
     assert!(message.contains("what gives way: a "), "{message}");
-    assert!(message.contains("group `joint`, element 1, point"), "{message}");
+    assert!(
+        message.contains("group `joint`, element 1, point"),
+        "{message}"
+    );
 }
 
 /// Without dilatancy and cohesion a block slides away.
 #[test]
 fn a_block_that_slides_away_is_said_to_slide() {
-    let text = pushed(5, "cohesion = 0.0", "force = [{ line = \"top\", x = 70.0 }]", "");
+    let text = pushed(
+        5,
+        "cohesion = 0.0",
+        "force = [{ line = \"top\", x = 70.0 }]",
+        "",
+    );
     // A flat block does not topple.
     let flat = text.replace("to = 1.0 }]\nlines", "to = 0.52 }]\nlines");
     let flat = flat.replace("top = { y = 1.0 }", "top = { y = 0.52 }");
     let failed = fail(&flat);
     let (how, message) = gives_way(&failed);
     assert_eq!(how, "slides", "{message}");
-    assert!(message.contains("what gives way: a joint slides"), "{message}");
+    assert!(
+        message.contains("what gives way: a joint slides"),
+        "{message}"
+    );
 }
 
 fn gives_way(failed: &Failed) -> (String, String) {
@@ -153,7 +164,10 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
@@ -170,7 +184,11 @@ fn random(seed: u64) -> String {
     let (columns, increments) = (1 + draw(0.0, 3.0) as usize, 2 + draw(0.0, 8.0) as usize);
     let height = draw(0.3, 1.5);
     let (cohesion, friction) = (10_f64.powf(draw(0.0, 1.7)), draw(15.0, 40.0));
-    let dilatancy = if draw(0.0, 1.0) < 0.3 { friction / 4.0 } else { 0.0 };
+    let dilatancy = if draw(0.0, 1.0) < 0.3 {
+        friction / 4.0
+    } else {
+        0.0
+    };
     let normal = 10_f64.powf(draw(5.0, 7.0));
     let shear = normal * draw(0.3, 1.0);
     let modulus = 10_f64.powf(draw(6.0, 8.0));

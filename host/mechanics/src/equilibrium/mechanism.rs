@@ -73,9 +73,8 @@ pub(super) fn find(
             let (element, _) = group.kinematics.place_of(point);
             let out = group.kinematics.nodes(element).iter().map(at_node);
             let out = out.fold(0.0, f64::max);
-            let is_worse = worst.is_none_or(|(most, worst, ..)| {
-                out > most || (out >= most && how < worst)
-            });
+            let is_worse =
+                worst.is_none_or(|(most, worst, ..)| out > most || (out >= most && how < worst));
             if is_worse {
                 let alike = all.iter().filter(|other| **other == Some(how)).count();
                 worst = Some((out, how, number, point, alike));

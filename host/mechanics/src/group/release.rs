@@ -72,7 +72,10 @@ impl Group {
         let traction = |s: f64| -> Option<Reached> {
             let jump = [0, 1].map(|c| from[c] + s * (to[c] - from[c]));
             let (traction, _) = self.answer(point, &jump, Operator::None, (time, 0.0))?;
-            traction.iter().all(|t| t.is_finite()).then_some((s, traction))
+            traction
+                .iter()
+                .all(|t| t.is_finite())
+                .then_some((s, traction))
         };
         let (first, middle, last) = (traction(0.0)?, traction(0.5)?, traction(1.0)?);
         let most = [&first, &middle, &last].map(|(_, t)| size(t));
@@ -87,7 +90,11 @@ impl Group {
             let after = traction(part as f64 / PARTS as f64)?;
             if let Some((before, after)) = narrowed((&before, &after), least, HALVINGS, &traction) {
                 let onward = size(&after.1) <= size(&before.1);
-                let (at, end) = if onward { (after.0, 1.0) } else { (before.0, 0.0) };
+                let (at, end) = if onward {
+                    (after.0, 1.0)
+                } else {
+                    (before.0, 0.0)
+                };
                 return Some((at + BEYOND * (end - at), onward));
             }
             before = after;

@@ -66,7 +66,11 @@ impl Lead {
         }
         self.left -= 1;
         let longest = LONGEST / n;
-        let length = if self.releases { longest } else { shortest.min(longest) };
+        let length = if self.releases {
+            longest
+        } else {
+            shortest.min(longest)
+        };
         self.releases = true;
         if self.may_creep {
             self.control = Control::Auto;

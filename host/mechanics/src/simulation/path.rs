@@ -75,7 +75,12 @@ impl Simulation {
                     contraction: None,
                     was_motion: false,
                 };
-                let onto = self.attempt(phase, (Control::ArcLength, false), [from, target], Some(guess));
+                let onto = self.attempt(
+                    phase,
+                    (Control::ArcLength, false),
+                    [from, target],
+                    Some(guess),
+                );
                 step = onto.map(|success| (success, target));
             }
             match step {

@@ -118,7 +118,10 @@ impl Simulation {
         }
         way.lead.goes_on();
         // A motion takes many iterations, and steps of any length.
-        if success.was_motion || !success.released.is_empty() || success.iterations.len() as f64 <= way.easy {
+        if success.was_motion
+            || !success.released.is_empty()
+            || success.iterations.len() as f64 <= way.easy
+        {
             phase.course.step = (REGROWTH * way.longest(phase)).min(1.0 / way.n as f64);
         }
         self.take_over(success, step[1], way.place, phase, watch, &mut way.done)

@@ -136,7 +136,16 @@ impl Newton<'_> {
         let mut found = self.breaks_since(&from, task.period.0);
         for (n, b) in &found {
             let g = &self.groups[*n];
-            eprintln!("  cand {} {} at {:?} at={:.3e} onward={} other={} r={:.3e}", g.name, b.point, g.kinematics.position(b.point), b.at, b.onward, others.contains(&(*n,b.point)), balance.relative);
+            eprintln!(
+                "  cand {} {} at {:?} at={:.3e} onward={} other={} r={:.3e}",
+                g.name,
+                b.point,
+                g.kinematics.position(b.point),
+                b.at,
+                b.onward,
+                others.contains(&(*n, b.point)),
+                balance.relative
+            );
         }
         eprintln!(" -- iterate r={:.3e} n={}", balance.relative, found.len());
         found.retain(|(number, found)| !others.contains(&(*number, found.point)));
@@ -158,16 +167,19 @@ impl Newton<'_> {
     /// Jumps of the trial state, of interfaces that may break.
     pub(super) fn jumps(&self) -> Vec<(usize, Vec<f64>)> {
         let groups = self.groups.iter().enumerate();
-        let breaking = groups.filter(|(number, group)| {
-            self.system.includes(*number) && group.may_break()
-        });
+        let breaking =
+            groups.filter(|(number, group)| self.system.includes(*number) && group.may_break());
         breaking
             .map(|(number, group)| (number, group.trial_jumps()))
             .collect()
     }
 
     /// Points, by group, whose traction breaks off between an earlier trial state and the present one.
-    pub(super) fn breaks_since(&self, jumps: &[(usize, Vec<f64>)], time: f64) -> Vec<(usize, Break)> {
+    pub(super) fn breaks_since(
+        &self,
+        jumps: &[(usize, Vec<f64>)],
+        time: f64,
+    ) -> Vec<(usize, Break)> {
         let of_group = |&(number, ref from): &(usize, Vec<f64>)| {
             let group = &self.groups[number];
             let breaks = group.breaks([from, &group.trial_jumps()], time);
@@ -194,7 +206,15 @@ impl Newton<'_> {
             let own = points.iter().filter(|(of, _)| *of == number);
             let own: Vec<usize> = own.map(|(_, point)| *point).collect();
             if !own.is_empty() {
-                for p in &own { eprintln!("RELEASE {} {} jump {:?} t {:?}", group.name, p, &group.strain.trial[2*p..2*p+2], &group.stress.trial[2*p..2*p+2]); }
+                for p in &own {
+                    eprintln!(
+                        "RELEASE {} {} jump {:?} t {:?}",
+                        group.name,
+                        p,
+                        &group.strain.trial[2 * p..2 * p + 2],
+                        &group.stress.trial[2 * p..2 * p + 2]
+                    );
+                }
                 group.release(&own);
             }
         }
