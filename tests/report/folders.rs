@@ -175,6 +175,7 @@ pub(crate) fn study(folder: &std::path::Path) {
         title: "A study of <b>".to_owned(),
         design: "grid".to_owned(),
         is_grid: true,
+        is_saltelli: false,
         texts: String::new(),
         identity: String::new(),
         files: std::collections::BTreeMap::new(),
@@ -204,6 +205,7 @@ pub(crate) fn study(folder: &std::path::Path) {
             folder: format!("{index:05}"),
             values: vec![phi.to_string(), law.to_owned()],
             standing: Standing::plain(State::Planned),
+            numbers: vec![None; 2],
         });
     }
     record.write(folder).unwrap();
