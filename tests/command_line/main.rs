@@ -2,6 +2,7 @@
 
 mod arguments;
 mod bases;
+mod bonds;
 mod calibrate;
 mod capsule;
 mod ended;

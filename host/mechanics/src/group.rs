@@ -4,6 +4,7 @@
 //! from it, so a failed increment leaves nothing behind.
 
 mod aside;
+mod breaks;
 mod carry;
 mod correction;
 mod differences;
@@ -13,7 +14,6 @@ mod joined;
 mod layer;
 mod look;
 mod operator;
-mod release;
 mod state;
 mod takeover;
 mod tangent;
@@ -26,7 +26,6 @@ pub use excerpt::Excerpted;
 pub use gives::Gives;
 pub use joined::joined;
 pub use look::{Deviation, Notice, Went};
-pub use release::Break;
 pub use state::GroupState;
 pub use tangent::Fault;
 
@@ -99,10 +98,10 @@ impl Field {
     }
 }
 
-/// What a group has committed: of strains, stresses, internal variables, jumps of a layer, and pore
-/// pressures; and what is ahead of it.
+/// Committed state of a group: strains, stresses, internal variables, jumps of a layer, and pore
+/// pressures.
 #[derive(Clone, Debug)]
-pub struct Committed(Vec<Vec<f64>>, Vec<(usize, f64)>);
+pub struct Committed(Vec<Vec<f64>>);
 
 /// How often a group has called a law, calls included that came to nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -256,8 +255,6 @@ pub struct Group {
     is_asked: bool,
     /// What its law started as.
     bond: Bond,
-    /// Components of strain that are committed ahead of the step's start, and by how much.
-    ahead: Vec<(usize, f64)>,
 }
 
 impl Group {
@@ -300,7 +297,6 @@ impl Group {
             origin: Origin::default(),
             is_asked: false,
             bond: Bond::default(),
-            ahead: Vec::new(),
         };
         group.start_law(law, None)?;
         Ok(group)
@@ -555,7 +551,6 @@ impl Group {
         copy(&self.strain.committed, &mut self.strain.trial);
         self.kinematics
             .add_gradients(increment, &mut self.strain.trial);
-        self.count_from_ahead();
         self.follow_pores(time, time_increment);
         if self.tangents_are_constant {
             self.evaluate_linear();
@@ -777,7 +772,6 @@ impl Group {
     /// Makes the trial state the committed one.
     pub fn commit(&mut self) {
         self.fields().for_each(Field::commit);
-        self.ahead.clear();
     }
 
     /// The committed state of all points, to be restored.
@@ -786,8 +780,7 @@ impl Group {
         let excess = self.pores.as_ref().map(|pores| &pores.excess);
         let own = [&self.strain, &self.stress, &self.internal];
         let fields = own.into_iter().chain(jump).chain(excess);
-        let fields = fields.map(|field| field.committed.clone()).collect();
-        Committed(fields, self.ahead.clone())
+        Committed(fields.map(|field| field.committed.clone()).collect())
     }
 
     /// Takes a committed state back.
@@ -795,7 +788,6 @@ impl Group {
         for (field, committed) in self.fields().zip(committed.0) {
             field.committed = committed;
         }
-        self.ahead = committed.1;
     }
 
     /// Gives up the room of the trial state until the next one is computed.

@@ -1,7 +1,7 @@
 //! What gives way where no equilibrium is found: the point, and how, where most is out of balance.
 
 use super::newton::PointPlace;
-use crate::group::{Break, Gives, Group};
+use crate::group::{Gives, Group};
 use serde::Serialize;
 use std::fmt;
 
@@ -39,13 +39,16 @@ impl fmt::Display for Mechanism {
     }
 }
 
+/// Jumps of all points of groups, by the group's number.
+pub(super) type Jumps = Vec<(usize, Vec<f64>)>;
+
 /// What gives way in the trial state of the groups under iteration, whose residual is given by degree of freedom; points
-/// whose traction broke off between two iterates are known.
+/// whose traction breaks off since an earlier iterate, with these jumps by group, are told from others.
 pub(super) fn find(
     groups: &[Group],
     includes: impl Fn(usize) -> bool,
     residual: &[f64],
-    breaks: &[(usize, Break)],
+    before: &[(usize, Vec<f64>)],
     time: f64,
 ) -> Option<Mechanism> {
     let at_node = |&node: &usize| residual[2 * node].hypot(residual[2 * node + 1]);
@@ -54,13 +57,12 @@ pub(super) fn find(
         if !includes(number) || group.is_linear() || !group.is_active {
             continue;
         }
-        let is_broken = |point: usize| {
-            let mut own = breaks.iter().filter(|(of, _)| *of == number);
-            own.any(|(_, found)| found.point == point)
-        };
+        let before = before.iter().find(|(of, _)| *of == number);
+        let breaks =
+            |point: usize| before.is_some_and(|(_, jumps)| group.breaks(point, jumps, time));
         let n_points = group.kinematics.n_points();
         let how = |point: usize| {
-            if is_broken(point) {
+            if breaks(point) {
                 return Some(Gives::BondBreaks);
             }
             group.gives(point, time)

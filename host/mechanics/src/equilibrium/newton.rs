@@ -5,7 +5,7 @@
 //! |---|---|
 //! | [`iterate`] | the loop: predict, evaluate, accept, correct |
 //! | [`load`], [`path`] | what it asks: steps to a load factor, steps along the path of equilibrium |
-//! | [`kept`], [`acceleration`], [`relaxation`], [`creep`], [`release`] | strategies of steps to a load factor |
+//! | [`kept`], [`acceleration`], [`relaxation`], [`creep`] | strategies of steps to a load factor |
 //! | [`line_search`] | how far a correction is followed |
 //! | [`residual`], [`matrix`] | evaluation; assembly, factorisation, solution |
 //! | [`acceptance`] | when a state counts as equilibrium, of numbers alone |
@@ -30,7 +30,6 @@ mod matrix;
 mod outcome;
 mod path;
 mod relaxation;
-mod release;
 mod residual;
 mod round_off;
 mod verdict;
@@ -124,8 +123,8 @@ pub struct Newton<'a> {
     /// evaluations.
     displacement: Vec<f64>,
     force: Vec<f64>,
-    /// Bonds break one after another where iterations stand still.
-    releases: bool,
+    /// Viscous steps of creep are single corrections.
+    creeps_singly: bool,
     /// Who may want to stop the step, and when it was last asked for.
     stop: Stop,
     asked: Instant,
@@ -161,7 +160,7 @@ impl<'a> Newton<'a> {
             base: None,
             displacement: vec![0.0; system.n_dofs()],
             force: vec![0.0; system.n_dofs()],
-            releases: false,
+            creeps_singly: false,
             stop: Stop::never(),
             asked: Instant::now(),
         }
@@ -174,10 +173,10 @@ impl<'a> Newton<'a> {
         self
     }
 
-    /// The same iterations; where they stand still bonds may break one after another.
+    /// The same iterations, with viscous steps of creep that are single corrections, or not.
     #[must_use]
-    pub fn releasing(mut self, releases: bool) -> Self {
-        self.releases = releases;
+    pub fn creeping_singly(mut self, singly: bool) -> Self {
+        self.creeps_singly = singly;
         self
     }
 
@@ -281,19 +280,11 @@ impl<'a> Newton<'a> {
                 Ok(StepSuccess {
                     was_kept: self.keeps(),
                     was_motion,
-                    released: control.release.into_points(),
                     open,
                     ..equilibrium.reached(iterations, relaxed)
                 })
             }
-            Err(failure) => {
-                let has_released = control.release.undo(self);
-                let failure = StepFailure {
-                    has_released,
-                    ..failure
-                };
-                Err(self.explained(failure, iterations, lambda_start, period))
-            }
+            Err(failure) => Err(self.explained(failure, iterations, lambda_start, period)),
         }
     }
 
@@ -348,7 +339,6 @@ impl Equilibrium {
             relaxed,
             was_kept: false,
             was_motion: false,
-            released: Vec::new(),
             round_off: self.round_off,
             tolerated: self.tolerated,
             scales: balance.scales,

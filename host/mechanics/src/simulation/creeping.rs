@@ -1,6 +1,6 @@
 //! What leads the steps of an increment under `control = "auto"`: the load; where ever shorter steps by the load fail,
-//! creep by short steps, to the end of the increment; by turns, where creep fails too. Where all of that has failed, short steps
-//! in which bonds break one after another.
+//! creep by short steps, to the end of the increment; by turns, where creep fails too. Where all of that, or `control = "creep"`,
+//! has led no further and interfaces may break, creep by single corrections.
 
 use crate::equilibrium::{Reason, Singularity, StepFailure};
 use crate::settings::{Control, Settings};
@@ -15,9 +15,8 @@ pub(super) const LONGEST: f64 = 0.125;
 /// Shortest one, where the load may not be cut any further: creep has some cuts of its own.
 const SHORTEST: f64 = LONGEST / 8.0;
 
-/// How often steps in which bonds break are begun with in an increment: with the shortest one; if bonds have broken in vain, with
-/// the longest.
-const RELEASES: usize = 2;
+/// How often creep by single corrections is begun with in an increment: with the shortest step, then with the longest.
+const BEGINNINGS: usize = 2;
 
 /// What leads the steps of an increment.
 #[derive(Clone, Copy, Debug)]
@@ -29,63 +28,70 @@ pub(super) struct Lead {
     was_in_vain: bool,
     /// Steps that failed in a row.
     failures: usize,
-    /// Bonds break one after another where iterations stand still.
-    pub(super) releases: bool,
+    /// Creep goes by single corrections.
+    pub(super) singly: bool,
     /// How often that may be begun with.
-    left: usize,
+    beginnings: usize,
 }
 
 impl Lead {
     /// Of an increment that begins.
     pub(super) fn new(settings: &Settings) -> Self {
         let is_auto = settings.control == Control::Auto;
-        let may_move = settings.relaxation && settings.method.is_newton();
-        // A path of equilibrium has a way of its own to leave a branch.
-        let may_release = may_move && settings.control != Control::ArcLength;
+        let is_newton = settings.method.is_newton();
+        let may_creep = is_auto && settings.relaxation && is_newton;
+        let creeps = settings.control == Control::Creep && is_newton;
         Self {
             control: settings.control,
-            may_creep: is_auto && may_move,
+            may_creep,
             was_in_vain: false,
             failures: 0,
-            releases: false,
-            left: if may_release { RELEASES } else { 0 },
+            singly: false,
+            beginnings: if may_creep || creeps { BEGINNINGS } else { 0 },
         }
     }
 
-    /// Whether steps are short: of a motion what flows stays, and of bonds those break that break first.
-    pub(super) fn is_short(&self) -> bool {
-        self.creeps() || self.releases
-    }
-
-    /// Turns to steps in which bonds break, if they may be begun with once more after a step that failed: the first one's
-    /// length, as a load factor, between the `shortest` one and the longest of one of `n` increments.
-    pub(super) fn release(&mut self, failure: &StepFailure, shortest: f64, n: f64) -> Option<f64> {
-        let is_in_vain = self.releases && !failure.has_released;
-        if self.left == 0 || is_in_vain || failure.failed().is_some() || is_free(failure) {
+    /// Turns to creep by single corrections after a step that failed, if it may be begun with: the length of the first step
+    /// as a load factor, between the `shortest` one and the longest of one of `n` increments.
+    pub(super) fn begins_singly(
+        &mut self,
+        failure: &StepFailure,
+        shortest: f64,
+        n: f64,
+    ) -> Option<f64> {
+        if self.beginnings == 0 || failure.failed().is_some() || is_free(failure) {
             return None;
         }
-        self.left -= 1;
+        self.beginnings -= 1;
         let longest = LONGEST / n;
-        let length = if self.releases {
+        let length = if self.singly {
             longest
         } else {
             shortest.min(longest)
         };
-        self.releases = true;
-        if self.may_creep {
-            self.control = Control::Auto;
-        }
+        self.singly = true;
+        self.control = Control::Creep;
         Some(length)
     }
 
-    /// Whether steps by the load have failed as often in a row as creep waits for, this one included.
+    /// Whether steps have failed as often in a row as any other way but the load waits for, this one included.
     pub(super) fn has_waited(&self) -> bool {
-        !self.releases && self.failures + 1 >= PATIENCE
+        !self.singly && self.failures + 1 >= PATIENCE
+    }
+
+    /// Whether single corrections end with a next step of this fraction of an increment: they may not be begun with again.
+    pub(super) fn is_at_its_end(&self, step: f64) -> bool {
+        self.singly && self.beginnings == 0 && step < SHORTEST
+    }
+
+    /// Whether steps are short.
+    pub(super) fn is_short(&self) -> bool {
+        self.creeps() || self.singly
     }
 
     /// Whether creep leads where the load would have to.
     pub(super) fn creeps(&self) -> bool {
-        self.may_creep && self.control == Control::Creep
+        self.may_creep && self.control == Control::Creep && !self.singly
     }
 
     /// Whether creep goes on with a step of this fraction of an increment after one that failed: where the load may
@@ -112,7 +118,7 @@ impl Lead {
             return false;
         }
         self.failures += 1;
-        if !self.may_creep || self.releases {
+        if !self.may_creep || self.singly {
             return false;
         }
         let turns = if creeps || self.was_in_vain {

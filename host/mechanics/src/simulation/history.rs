@@ -122,7 +122,6 @@ mod tests {
                 relaxed: false,
                 was_kept: false,
                 was_motion: false,
-                released: Vec::new(),
                 tolerated: 0.0,
                 round_off: 0.0,
                 scales: Vec::new(),

@@ -60,26 +60,6 @@ impl Simulation {
         }
     }
 
-    /// Counts points that broke one after another, and speaks of the first ones of a phase.
-    pub(super) fn note_release(
-        &mut self,
-        points: &[(usize, usize)],
-        (place, phase): (&Place, &mut UnderWay),
-        watch: &mut dyn Watch,
-    ) {
-        phase.record.released += points.len();
-        if phase.record.released_from.is_none() {
-            phase.record.released_from = Some(place.increment);
-            let (group, point) = points[0];
-            let group = &self.groups[group];
-            watch.warning(&Warning::Released {
-                place: place.clone(),
-                group: group.name.clone(),
-                position: group.kinematics.position(point),
-            });
-        }
-    }
-
     /// Says of the first step of a phase, in an increment that was cut, whose two halves lead elsewhere how far that is. Before it
     /// may be steps in which nothing flows.
     pub(super) fn note_cut_back(

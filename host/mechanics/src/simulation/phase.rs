@@ -188,12 +188,6 @@ impl Simulation {
                 crept: record.crept,
             });
         }
-        if record.released > 1 {
-            watch.warning(&Warning::ReleasedOften(
-                record.name.clone(),
-                record.released,
-            ));
-        }
         if record.tolerated > 1 {
             watch.warning(&Warning::ToleratedOften {
                 phase: record.name.clone(),

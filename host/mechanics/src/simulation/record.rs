@@ -54,12 +54,9 @@ pub struct PhaseRecord {
     pub arc_length: usize,
     /// The first increment, from 1, in which creep led under `auto`, as steps by the load found no equilibrium.
     pub crept_from: Option<usize>,
-    /// Points of bonds that broke one after another, where nothing else found an equilibrium.
+    /// The first increment, from 1, in which creep led by single corrections, as nothing else found an equilibrium.
     #[serde(default)]
-    pub released: usize,
-    /// The first increment, from 1, in which they did.
-    #[serde(default)]
-    pub released_from: Option<usize>,
+    pub singly_from: Option<usize>,
     /// Matrices factorised.
     pub factorisations: u64,
     /// How many of them needed full row exchanges.

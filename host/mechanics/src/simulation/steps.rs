@@ -52,8 +52,8 @@ enum Then {
     Path,
     /// Creep, which leads from here on.
     Creep,
-    /// Bonds that break one after another, from here on, with a first step of this length.
-    Release(f64),
+    /// Creep by single corrections, from here on, with a first step of this length.
+    Singly(f64),
     /// Nothing.
     End,
 }
@@ -88,7 +88,7 @@ impl Simulation {
             }
             let step = way.next(phase);
             let guess = phase.course.history.guess(step[1] - step[0]);
-            let attempt = self.attempt(phase, (way.lead.control, way.lead.releases), step, guess);
+            let attempt = self.attempt(phase, (way.lead.control, way.lead.singly), step, guess);
             match self.without_leap(attempt, phase, step[1] - step[0]) {
                 Ok(success) => self.go_forward(success, step, &mut way, phase, watch)?,
                 Err(failure) => self.go_otherwise(failure, step, &mut way, phase, watch)?,
@@ -107,21 +107,16 @@ impl Simulation {
         watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         self.look_after(&success, (self.clock(phase.number), step), watch);
-        if !success.released.is_empty() {
-            self.note_release(&success.released, (way.place, phase), watch);
-        } else if success.relaxed {
+        if success.relaxed {
             self.note_motion(&success, step, way.lead.control, (way.place, phase), watch);
         }
         // Of a motion, and of what is tolerated, more is said already.
-        if way.was_cut && !success.has_moved() && success.tolerated == 0.0 {
+        if way.was_cut && !success.relaxed && success.tolerated == 0.0 {
             self.note_cut_back(&success, step, (way.place, phase), watch);
         }
         way.lead.goes_on();
         // A motion takes many iterations, and steps of any length.
-        if success.was_motion
-            || !success.released.is_empty()
-            || success.iterations.len() as f64 <= way.easy
-        {
+        if success.was_motion || success.iterations.len() as f64 <= way.easy {
             phase.course.step = (REGROWTH * way.longest(phase)).min(1.0 / way.n as f64);
         }
         self.take_over(success, step[1], way.place, phase, watch, &mut way.done)
@@ -169,6 +164,15 @@ impl Simulation {
                     }
                 }
             }
+            Then::Singly(step) => {
+                way.was_cut = false;
+                phase.course.step = step;
+                if phase.record.singly_from.is_none() {
+                    phase.record.singly_from = Some(place.increment);
+                    watch.warning(&Warning::CreepsSingly(place.clone()));
+                }
+                Ok(())
+            }
             Then::Creep => {
                 way.was_cut = false;
                 if !way.lead.was_in_vain() {
@@ -178,11 +182,6 @@ impl Simulation {
                     phase.record.crept_from = Some(place.increment);
                     watch.warning(&Warning::Creeps(place.clone()));
                 }
-                Ok(())
-            }
-            Then::Release(step) => {
-                way.was_cut = false;
-                phase.course.step = step;
                 Ok(())
             }
         }
@@ -196,22 +195,23 @@ impl Simulation {
         let is_small = step < way.smallest.max(PATIENCE / n);
         let is_out = step < way.smallest;
         let stays = way.lead.stays(is_out, step * n);
-        // Where bonds have broken one after another before, nothing else is tried first.
-        let again = phase.record.released > 0 && way.lead.has_waited();
+        // Where it has led before, nothing else is tried first.
+        let again = phase.record.singly_from.is_some() && way.lead.has_waited();
         let turns = !stays && !again && way.lead.turns(failure, is_out);
         let is_over = is_out && !stays && !(turns && way.lead.creeps());
+        let is_over = is_over || way.lead.is_at_its_end(step * n);
         if failure.defect().is_some() {
             Then::End
         } else if follows && is_small {
             Then::Path
         } else if (again || is_over)
             && self.groups.iter().any(Group::may_break)
-            && let Some(step) = way.lead.release(failure, way.smallest, n)
+            && let Some(step) = way.lead.begins_singly(failure, way.smallest, n)
         {
-            Then::Release(step)
+            Then::Singly(step)
         } else if turns && way.lead.creeps() {
             Then::Creep
-        } else if is_out && !stays {
+        } else if is_over {
             Then::End
         } else {
             Then::Shorter
@@ -297,7 +297,7 @@ impl Simulation {
     pub(super) fn attempt(
         &mut self,
         phase: &mut UnderWay,
-        (control, releases): (Control, bool),
+        (control, singly): (Control, bool),
         [from, to]: [f64; 2],
         guess: Option<Guess>,
     ) -> Result<StepSuccess, StepFailure> {
@@ -315,7 +315,7 @@ impl Simulation {
             &settings,
             &mut phase.record.costs,
         );
-        newton = newton.stopped_by(&self.stop).releasing(releases);
+        newton = newton.stopped_by(&self.stop).creeping_singly(singly);
         newton.step(&phase.course.loads, [from, to], clock, guess)
     }
 }

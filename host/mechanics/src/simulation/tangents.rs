@@ -35,7 +35,7 @@ impl Simulation {
     ) {
         let went = match success.iterations.len() {
             // What was committed on the way is not where the step began.
-            _ if success.was_motion || !success.released.is_empty() => return,
+            _ if success.was_motion => return,
             _ if success.tolerated > 0.0 || success.relaxed => Went::Badly,
             // Nor do tangents have to answer for corrections without them.
             _ if success.was_kept => return,

@@ -118,17 +118,8 @@ pub enum Warning {
     Unasked(String, String),
     /// Steps of the load found no equilibrium: creep leads from here on.
     Creeps(Place),
-    /// Bonds break one after another, from this increment of a phase on.
-    Released {
-        /// The increment.
-        place: Place,
-        /// The group of the first point.
-        group: String,
-        /// Its coordinates.
-        position: [f64; 2],
-    },
-    /// So many points broke one after another in a phase.
-    ReleasedOften(String, usize),
+    /// Nothing else found an equilibrium either: creep leads by single corrections from here on.
+    CreepsSingly(Place),
     /// The path of equilibrium was followed, from one load factor, between two others.
     FollowedPath {
         /// The increment.
@@ -243,19 +234,11 @@ impl fmt::Display for Warning {
                  end of the increment; what flows on its way stays, so that others may lie near: hold the results \
                  against those of other increments"
             ),
-            Self::Released {
-                place,
-                group,
-                position: [x, y],
-            } => write!(
+            Self::CreepsSingly(place) => write!(
                 f,
-                "{place}: nothing else found an equilibrium: points of interfaces break one after another by short steps, the \
-                 first one in group `{group}` at ({x:.4}, {y:.4}); which one is next can depend on the steps: hold the results \
-                 against those of other increments"
-            ),
-            Self::ReleasedOften(phase, points) => write!(
-                f,
-                "phase `{phase}`: {points} points of interfaces broke one after another in all"
+                "{place}: nothing found an equilibrium, as it is where bonds break: creep by single corrections is tried, after which \
+                 what has broken stays so; which points break can depend on the steps: hold the results against those of \
+                 other increments"
             ),
             Self::FollowedPath {
                 place,

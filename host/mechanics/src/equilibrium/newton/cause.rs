@@ -6,8 +6,7 @@ use super::iterate::{Control, Correction, State};
 use super::outcome::Iteration;
 use super::residual::Task;
 use crate::equilibrium::diagnosis::{self, Snapshot};
-use crate::equilibrium::mechanism::{self, Mechanism};
-use crate::group::Break;
+use crate::equilibrium::mechanism::{self, Jumps, Mechanism};
 use law::Operator;
 
 impl Newton<'_> {
@@ -51,11 +50,11 @@ impl Newton<'_> {
         let unmet = self.unmet(&state.balance, correction);
         // What ran away did so in the last iterate, not in the one that is only tried.
         let runaway = self.runaway;
-        let (culprit, breaks) = self.diagnose(control, state, task).unwrap_or_default();
+        let (culprit, before) = self.diagnose(control, state, task).unwrap_or_default();
         self.runaway = runaway;
         StepFailure {
             culprit,
-            mechanism: self.mechanism(&state.balance.residual, &breaks, task.period.0),
+            mechanism: self.mechanism(&state.balance.residual, &before, task.period.0),
             ..Reason::Unmet(Iterations::Newton(n, in_vain), unmet).into()
         }
     }
@@ -67,7 +66,7 @@ impl Newton<'_> {
         control: &impl Control,
         state: &State,
         task: &Task,
-    ) -> Option<(Option<Culprit>, Vec<(usize, Break)>)> {
+    ) -> Option<(Option<Culprit>, Jumps)> {
         if !self.settings.method.is_newton() {
             return None;
         }
@@ -82,14 +81,23 @@ impl Newton<'_> {
         self.evaluate(&moved.increment, task, Operator::Consistent)
             .ok()?;
         let culprit = diagnosis::compare(self.groups, &before, task.period);
-        Some((culprit, self.breaks_since(&jumps, task.period.0)))
+        Some((culprit, jumps))
     }
 
-    /// What gives way in the trial state, with this residual by equation.
+    /// Jumps of the trial state, of the interfaces that may break.
+    fn jumps(&self) -> Jumps {
+        let groups = self.groups.iter().enumerate();
+        let may_break = groups.filter(|(_, group)| group.may_break());
+        may_break
+            .map(|(number, group)| (number, group.trial_jumps()))
+            .collect()
+    }
+
+    /// What gives way in the trial state, with this residual by equation, and jumps of an iterate before.
     fn mechanism(
         &self,
         residual: &[f64],
-        breaks: &[(usize, Break)],
+        before: &[(usize, Vec<f64>)],
         time: f64,
     ) -> Option<Mechanism> {
         let mut by_dof = vec![0.0; self.displacement.len()];
@@ -97,6 +105,6 @@ impl Newton<'_> {
             by_dof[dof] = *force;
         }
         let includes = |number| self.system.includes(number);
-        mechanism::find(self.groups, includes, &by_dof, breaks, time)
+        mechanism::find(self.groups, includes, &by_dof, before, time)
     }
 }

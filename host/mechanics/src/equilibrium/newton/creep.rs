@@ -20,9 +20,15 @@
 //! any more, and α falls, at last to nothing: a Newton correction. The same tolerances decide. What
 //! is accepted is an equilibrium of the laws alone, without overstress.
 
+//! Where a point breaks off what it carries a viscous step may have no answer: whole, the point opens; open, what it no longer carries
+//! moves the body so that it closes, and its law, which sees the one increment from the start of the viscous step, finds it
+//! whole. Iterations alternate between both, with any viscosity and however short the step. A real point stays broken. So
+//! where nothing else is left each viscous step is **one correction**, and the state it leads to is committed, whatever it leaves:
+//! what has broken stays so, what is out of balance then drives the next one, and α follows the residual as in viscous relaxation.
+
 use super::failure::{Iterations, Reason, StepFailure};
 use super::outcome::Iteration;
-use super::relaxation::stands_still;
+use super::relaxation::{follows, stands_still};
 use super::residual::{Balance, Task};
 use super::{Newton, norm};
 use crate::assembly::norms;
@@ -53,6 +59,8 @@ const LEAST: f64 = 1e-3;
 /// Viscous steps of one motion, and how many without the residual falling to half end it.
 const MAX_STEPS: usize = 200;
 const IDLE: usize = 40;
+/// The same of single corrections: every point that breaks raises the residual.
+const IDLE_SINGLY: usize = 120;
 /// Lengths of a correction that are tried.
 const LENGTHS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// A motion of more viscous steps lets expect another one in the next step.
@@ -208,7 +216,12 @@ impl Newton<'_> {
         let mut residuals: Vec<f64> = Vec::new();
         for step in 1..=MAX_STEPS {
             let before = balance.relative;
-            let went = self.viscous_step(&mut motion, &mut balance, task, iterations)?;
+            let went = if self.creeps_singly {
+                self.single_correction(&mut motion, &mut balance, task, iterations)?;
+                None
+            } else {
+                Some(self.viscous_step(&mut motion, &mut balance, task, iterations)?)
+            };
             residuals.push(balance.relative);
             let ratio = if step == 1 {
                 1.0
@@ -220,7 +233,12 @@ impl Newton<'_> {
                 self.matrix.held = false;
                 return Ok((step, motion.increment, balance));
             }
-            let idle = residuals.len().checked_sub(IDLE + 1);
+            let idle = if self.creeps_singly {
+                IDLE_SINGLY
+            } else {
+                IDLE
+            };
+            let idle = residuals.len().checked_sub(idle + 1);
             if idle.is_some_and(|idle| balance.relative > 0.5 * residuals[idle]) {
                 break;
             }
@@ -230,7 +248,10 @@ impl Newton<'_> {
                 self.commit(&motion.increment, (start + length, 0.0));
                 motion.from.clone_from(&motion.increment);
                 motion.given.fill(0.0);
-                motion.go_on(&went);
+                match went {
+                    Some(went) => motion.go_on(&went),
+                    None => motion.follow(balance.relative / before),
+                }
             }
         }
         let correction = iterations.last().and_then(|last| last.correction);
@@ -262,6 +283,30 @@ impl Newton<'_> {
             increment,
             viscosity: VISCOSITY,
         })
+    }
+
+    /// One correction of a viscous step, whatever it leaves.
+    ///
+    /// # Errors
+    /// A law or the equations failed.
+    fn single_correction(
+        &mut self,
+        motion: &mut Motion,
+        balance: &mut Balance,
+        task: &Task,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<(), StepFailure> {
+        self.may_go_on()?;
+        let residual = self.viscous_residual(motion, &motion.increment, balance);
+        let correction = self.viscous_correction(&residual, (motion.viscosity, &motion.elastic))?;
+        motion.increment = moved(&motion.increment, 1.0, &correction);
+        *balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
+        let taken = self.took_to(balance, &correction, &motion.increment, 1.0);
+        iterations.push(Iteration {
+            viscosity: motion.viscosity,
+            ..taken
+        });
+        Ok(())
     }
 
     /// Solves one viscous step, with a larger viscosity where that of the motion leads to no answer.
@@ -424,6 +469,18 @@ impl Newton<'_> {
 }
 
 impl Motion {
+    /// The viscosity of the next single correction, after one that changed the residual in this ratio: at least a
+    /// little where it grew.
+    fn follow(&mut self, ratio: f64) {
+        let now = if ratio > 1.0 {
+            self.viscosity.max(LEAST)
+        } else {
+            self.viscosity
+        };
+        let next = follows(ratio) * now;
+        self.viscosity = if next < LEAST { 0.0 } else { next.min(MOST) };
+    }
+
     /// The viscosity of the next viscous step, after one that went like this.
     fn go_on(&mut self, went: &Went) {
         self.viscosity = if went.is_cut || went.corrections > MANY {

@@ -223,8 +223,6 @@ pub struct StepFailure {
     pub culprit: Option<Culprit>,
     /// What gives way, if that could be found out.
     pub mechanism: Option<Mechanism>,
-    /// Points broke one after another, in vain.
-    pub has_released: bool,
 }
 
 impl From<Reason> for StepFailure {
@@ -235,7 +233,6 @@ impl From<Reason> for StepFailure {
             runaway: None,
             culprit: None,
             mechanism: None,
-            has_released: false,
         }
     }
 }

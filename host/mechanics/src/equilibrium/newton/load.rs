@@ -1,6 +1,6 @@
 //! Steps whose load factor is given: the strategies of Newton's method under load control.
 //!
-//! A standstill is [relaxed](super::relaxation) or [crept](super::creep) away, or bonds [break](super::release); a [kept matrix](super::kept) is tried before that of
+//! A standstill is [relaxed](super::relaxation) or [crept](super::creep) away; a [kept matrix](super::kept) is tried before that of
 //! the present state; slow corrections are [accelerated](super::acceleration).
 
 use super::acceleration::Acceleration;
@@ -10,8 +10,7 @@ use super::iterate::{Control, Correction, State};
 use super::line_search::{LineSearch, Otherwise};
 use super::outcome::Iteration;
 use super::relaxation::{self, Relaxation};
-use super::release::Release;
-use super::residual::{Balance, Task};
+use super::residual::Task;
 use super::{Newton, norm};
 use crate::settings::Method;
 use law::Operator;
@@ -36,7 +35,6 @@ pub(super) struct LoadControl {
     acceleration: Option<Acceleration>,
     pub(super) relaxation: Relaxation,
     pub(super) creep: Creep,
-    pub(super) release: Release,
     /// The first iterate, where it did not come from the tangent.
     first: Option<Vec<f64>>,
     /// Displacement increments that left the least out of balance, and how much, relative.
@@ -64,7 +62,6 @@ impl LoadControl {
             acceleration: is_slow.then(Acceleration::default),
             relaxation: Relaxation::new(newton.settings),
             creep: Creep::new(newton.settings, is_expected),
-            release: Release::new(newton.releases),
             least: None,
             first: None,
             predicted: None,
@@ -251,7 +248,7 @@ impl Control for LoadControl {
 impl LoadControl {
     /// Whether a motion may lead away from a state that no correction can be computed for.
     fn is_at_hand(&self) -> bool {
-        self.creep.is_at_hand() || self.relaxation.is_at_hand() || self.release.is_at_hand()
+        self.creep.is_at_hand() || self.relaxation.is_at_hand()
     }
 
     /// The state that a motion leads to where Newton iterations get on no further. `None` where they do.
@@ -268,16 +265,6 @@ impl LoadControl {
             rise,
             balance,
         };
-        let series = self.series(iterations);
-        let here = (state, is_singular);
-        let released = self.release.relieve(newton, &self.task, here, series)?;
-        if let Some(balance) = released {
-            self.begin_again(newton, iterations, &balance);
-            return Ok(Some(at((state.increment.clone(), balance))));
-        }
-        if self.release.waits(self.series(iterations), is_singular) {
-            return Ok(None);
-        }
         if self.creep.is_due(iterations, is_singular) {
             let first = self.first.as_deref();
             if let Some(reached) = self.creep.relieve(newton, &self.task, first, iterations)? {
@@ -293,22 +280,6 @@ impl LoadControl {
             self.relaxation
                 .relieve(newton, &self.task, (from, is_singular), iterations)?;
         Ok(relaxed.map(at))
-    }
-
-    /// Newton iterations begin again, and what is tried where they stand still.
-    fn begin_again(
-        &mut self,
-        newton: &Newton<'_>,
-        iterations: &mut Vec<Iteration>,
-        balance: &Balance,
-    ) {
-        let here = iterations.len();
-        iterations.push(Iteration::first(balance));
-        self.relaxation = Relaxation::new(newton.settings);
-        self.relaxation.starts_at(here);
-        self.creep = Creep::new(newton.settings, false);
-        self.creep.starts_at(here);
-        self.least = None;
     }
 
     /// The state that a correction of this one leads to.

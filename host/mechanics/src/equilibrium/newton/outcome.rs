@@ -66,8 +66,6 @@ pub struct StepSuccess {
     pub was_kept: bool,
     /// It took many viscous steps.
     pub was_motion: bool,
-    /// Points, by group, that broke one after another where iterations stood still.
-    pub released: Vec<(usize, usize)>,
     /// Relative residual that had to be taken for round-off, above the tolerance; else 0.
     pub round_off: f64,
     /// Relative residual that is tolerated above the tolerance, where iterations had come to a standstill;
@@ -77,13 +75,6 @@ pub struct StepSuccess {
     pub scales: Vec<f64>,
     /// What is left open where the residual alone decides.
     pub open: Option<Open>,
-}
-
-impl StepSuccess {
-    /// Whether a motion, or bonds that broke, led to it.
-    pub fn has_moved(&self) -> bool {
-        self.relaxed || !self.released.is_empty()
-    }
 }
 
 /// What a state leaves open that the residual alone made an equilibrium.

@@ -179,6 +179,12 @@ impl Relaxation {
     }
 }
 
+/// Factor by which α follows a residual that has changed in this ratio.
+pub(super) fn follows(ratio: f64) -> f64 {
+    let [least, most] = FOLLOWS;
+    ratio.clamp(least, most)
+}
+
 /// Whether these Newton iterations have come to a standstill.
 pub(super) fn stands_still(iterations: &[Iteration]) -> bool {
     let Some(start) = iterations
@@ -252,9 +258,7 @@ impl Newton<'_> {
             balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
             let taken = self.took_to(&balance, &correction, &motion.increment, 1.0);
             iterations.push(Iteration { viscosity, ..taken });
-            let [least, most] = FOLLOWS;
-            let factor = (balance.relative / before).clamp(least, most);
-            viscosity = (factor * viscosity).min(MOST);
+            viscosity = (follows(balance.relative / before) * viscosity).min(MOST);
             largest = largest.max(balance.relative);
             if balance.relative < before && balance.relative <= FALL * largest {
                 return Ok((motion.increment.clone(), balance));
