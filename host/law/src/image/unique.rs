@@ -13,7 +13,16 @@ use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 /// How the names of the compiler's library begin, behind what marks statics of functions and their guards.
-const SHARED: [&str; 6] = ["St", "NSt", "NKSt", "N9__gnu_cxx", "NK9__gnu_cxx", "Ns"];
+const SHARED: [&str; 8] = [
+    "St",
+    "NSt",
+    "NKSt",
+    "N9__gnu_cxx",
+    "NK9__gnu_cxx",
+    "Ns",
+    "NSs",
+    "NKSs",
+];
 /// Bytes before the binding in an entry of the table.
 const BINDING: u64 = 4;
 
