@@ -96,7 +96,7 @@ pub(super) const CHECKS: &[Check] = &[
         family: Family::Purity,
         description: "An instance gives the same bits after another one with other parameters as it gives as the \
                       first one of a process of its own: no `static` is set by whoever comes first.",
-        needs: &["repeatable"],
+        needs: &["independent-of-order", "independent-of-earlier-calls"],
         run: afresh::independent_of_first_instance,
     },
     Check {

@@ -64,22 +64,22 @@ pub(super) fn outside(
 }
 
 /// What the call of a capsule gives in a process that does nothing else, with these variables of its environment:
-/// a line of each point, or the last words of one that gives no result.
+/// a line of each point, or how a call ends that gives no results.
 ///
 /// # Errors
 /// There is no process, or the capsule cannot be used.
 pub(crate) fn afresh(
     capsule: &Capsule,
     variables: &[(&'static str, &'static str)],
-) -> Result<Vec<String>, Error> {
+) -> Result<Result<Vec<String>, String>, Error> {
     let file = ScratchFile::new();
     capsule.write(&file.0)?;
     let (said, crash) = run_with(&file.0, PATIENCE, variables)?;
     let lines = || said.lines().map(str::to_owned);
     Ok(match (crash, said.contains(FAULTLESS)) {
-        (Some(crash), _) => vec![crash],
-        (None, true) => lines().filter(|line| line.starts_with(FLUX)).collect(),
-        (None, false) => lines().next_back().into_iter().collect(),
+        (Some(crash), _) => Err(crash),
+        (None, true) => Ok(lines().filter(|line| line.starts_with(FLUX)).collect()),
+        (None, false) => Err(lines().next_back().unwrap_or_default()),
     })
 }
 

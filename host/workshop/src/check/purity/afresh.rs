@@ -77,14 +77,18 @@ impl<'a> Here<'a> {
         let capsule = capsule.ok_or_else(|| skipped("the library has no place"))?;
         let there = probed::afresh(&capsule, variables)
             .map_err(|why| skipped(format!("there is no other process: {why}")))?;
-        let differs = |(i, end): (usize, &PointEnd)| {
-            let pair = [
-                shown(end),
-                there.get(i).or(there.last()).cloned().unwrap_or_default(),
-            ];
-            (pair[0] != pair[1]).then_some((i, pair))
+        let here = self.ends.iter().map(shown);
+        let there = match there {
+            Ok(there) if there.len() == self.ends.len() => there,
+            Ok(_) => return Err(skipped("what it prints cannot be told from its results")),
+            // It gives no results there.
+            Err(words) => vec![words; self.ends.len()],
         };
-        Ok(self.ends.iter().enumerate().find_map(differs))
+        let mut pairs = here
+            .zip(there)
+            .map(|(here, there)| [here, there])
+            .enumerate();
+        Ok(pairs.find(|(_, [here, there])| here != there))
     }
 
     /// The failure of a difference.
