@@ -63,7 +63,7 @@ impl Drop for Cluster<'_> {
 /// Two runs that take longer than their two minutes, of which Slurm leaves them one at most: each ends early with a
 /// checkpoint, is sent in again, goes on, and comes to the results of a run in one go.
 #[test]
-#[ignore = "six minutes, and Slurm"]
+#[ignore = "ten minutes, and Slurm"]
 fn tasks_whose_time_is_over_are_sent_in_again_and_go_on() {
     let is_there = |folder: &str| Path::new(folder).join("slurmctld").is_file();
     if !is_there("/usr/sbin") {
@@ -74,7 +74,7 @@ fn tasks_whose_time_is_over_are_sent_in_again_and_go_on() {
     let base = format!("base = \"{}/chamber.toml\"\n", case("study_parallel"));
     place.write(
         "study/long.toml",
-        &(base + "[[phase]]\nname = \"loading\"\nincrements = 5000\n"),
+        &(base + "[[phase]]\nname = \"loading\"\nincrements = 300000\n"),
     );
     place.write(
         "study/study.toml",
@@ -87,7 +87,7 @@ fn tasks_whose_time_is_over_are_sent_in_again_and_go_on() {
     let sent = cluster.ask("sbatch", &["--array=1-2", "--time=2", &log, &script]);
     assert!(sent.status.success(), "{sent:?}");
     let queue = || cluster.ask("squeue", &["--noheader", "--array"]);
-    cluster.wait_for("the array", Duration::from_mins(20), || {
+    cluster.wait_for("the array", Duration::from_mins(30), || {
         queue().stdout.is_empty()
     });
 
