@@ -1,6 +1,6 @@
 //! Analysis and factorisation where nodes do not lie on a grid, by number of unknowns: items are
 //! unknowns. Wall-clock time. `operations` prints what orders cost, instead of timing them; `again`
-//! SIZE COUNT factorises 8-node quads on a grid so many times, for profilers.
+//! SIZE COUNT factorises 8-node quads on a grid COUNT times, for profilers.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -19,7 +19,7 @@ use std::time::Instant;
 /// Cells along a side: 12 800 to 200 000 unknowns of triangles.
 const SIZES: [usize; 5] = [40, 56, 80, 112, 158];
 
-/// Makes a mesh with so many cells along a side.
+/// Makes a mesh with this number of cells along a side.
 type Make = fn(usize) -> Mesh;
 
 fn main() {

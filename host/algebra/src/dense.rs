@@ -29,8 +29,9 @@ pub fn largest(values: &[f64]) -> f64 {
     all.fold(0.0, larger)
 }
 
-/// Rows from which on a matrix is factorised by blocks of columns, what follows from a block for the columns to its
-/// right being shared among threads; the columns of a block, and how many are left to one thread at the end. Fixed,
+/// Matrices with at least this many rows are factorised by blocks of columns. Threads share the
+/// update of the columns to the right of a block. Then: the columns of a block, and the number of
+/// columns that one thread finishes. Fixed,
 /// so that the result is the same for any number of threads.
 const LARGE: usize = 256;
 const BLOCK: usize = 64;
@@ -145,7 +146,7 @@ fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
     }
 }
 
-/// Columns beside a block that is factorised.
+/// Columns to the right of a factorised block.
 enum Beside<'m> {
     Left(MatMut<'m, f64>),
     Right(MatMut<'m, f64>),

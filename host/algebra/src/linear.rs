@@ -52,7 +52,7 @@ impl Dense {
     }
 }
 
-/// A dense matrix that stands beside the sparse one: the condensed stiffness of a domain.
+/// A dense block of the matrix: the condensed stiffness of a domain.
 #[derive(Clone, Debug)]
 pub struct Block {
     /// Its equations, ascending.
@@ -167,7 +167,7 @@ impl LinearSolver {
         Ok(Self::of(multifrontal, Arc::clone(pattern), block))
     }
 
-    /// Another one for matrices of its own on the same equations, which need not be symmetric. If these need not either,
+    /// Another solver for other matrices of the same equations, which need not be symmetric. If these need not either,
     /// nothing is analysed again.
     ///
     /// # Errors
@@ -217,7 +217,7 @@ impl LinearSolver {
         std::mem::take(&mut self.room)
     }
 
-    /// Factorises the matrix with these values, the block as it is.
+    /// Factorises the matrix with these values and the unchanged block.
     ///
     /// # Errors
     /// [`Singular`].

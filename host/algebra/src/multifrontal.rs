@@ -51,14 +51,14 @@ struct Front {
     values: Vec<f64>,
     /// Row exchanges inside the pivot block.
     exchanges: dense::Exchanges,
-    /// What it leaves to its parent (m × m, column-major; the lower half if symmetric), until that
+    /// Its Schur complement (m × m, column-major; the lower half if symmetric), until the parent
     /// has taken it.
     update: Vec<f64>,
     /// The update stays for the next matrix, once it is there.
     is_retained: bool,
 }
 
-/// What is known of the last matrix, for the next one.
+/// Data of the last matrix that the next one can reuse.
 #[derive(Clone, Copy, Debug)]
 pub enum Before<'m> {
     /// Its values.
@@ -79,7 +79,7 @@ pub struct Multifrontal {
     /// Where the updates of small branches wait, for one thread each.
     memory: Mutex<Vec<[Pile; 2]>>,
     schur: Vec<f64>,
-    /// What is worth keeping for other matrices is kept.
+    /// Keeps whatever other matrices can reuse.
     others_follow: bool,
     /// All fronts hold the factors of one matrix.
     is_complete: bool,
@@ -115,7 +115,7 @@ impl Multifrontal {
         }
     }
 
-    /// Another one of the same pattern, kind and order, for matrices of its own. Not of one that has been gathered.
+    /// Another factorisation of the same pattern, kind and order, for other matrices. Not of one that has been gathered.
     #[must_use]
     pub fn alike(&self) -> Self {
         Self::of(Arc::clone(&self.analysis))

@@ -1,7 +1,7 @@
 //! Orders of elimination: along mesh lines where nodes lie on a grid, by nested dissection of the
 //! graph where they do not, by minimum degree where there are few unknowns.
 //!
-//! Which one is taken is decided by the operations that the factorisation would do. Any order gives
+//! The order with the fewest operations is taken. Any order gives
 //! a right factorisation.
 
 mod bisection;

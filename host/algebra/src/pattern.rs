@@ -1,4 +1,4 @@
-//! Which entries of a sparse matrix are not zero.
+//! The pattern of a sparse matrix: its entries that are not zero.
 
 use crate::threads;
 use std::ops::Range;
@@ -18,7 +18,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Entries on the diagonal of a matrix of these values; zero where there is none.
+    /// Entries on the diagonal of a matrix of these values; zero if the entry is missing.
     pub fn diagonal(&self, values: &[f64]) -> Vec<f64> {
         let of_column = |column: usize| {
             let own = self.places(column);
@@ -86,7 +86,7 @@ impl Pattern {
         pattern
     }
 
-    /// What it is among some of the equations, ascending.
+    /// The pattern restricted to some of the equations, ascending.
     pub(crate) fn among(&self, equations: &[u32]) -> Self {
         let mut number = vec![u32::MAX; self.n()];
         for (new, &equation) in (0..).zip(equations) {
@@ -109,7 +109,7 @@ impl Pattern {
         self.column_start.len() - 1
     }
 
-    /// Where the entries of a column stand.
+    /// Positions of the entries of a column.
     pub fn places(&self, column: usize) -> Range<usize> {
         self.column_start[column] as usize..self.column_start[column + 1] as usize
     }

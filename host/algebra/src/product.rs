@@ -1,4 +1,4 @@
-//! Dense matrices times a vector, which every iteration beside a condensed domain needs.
+//! Dense matrices times a vector, which every iteration with a condensed domain needs.
 #![expect(
     clippy::inline_always,
     reason = "only what is inlined is compiled for the processor's own vector instructions"

@@ -3,8 +3,8 @@
 //!
 //! The threads of `rayon` sleep as soon as there is nothing to do, and it takes 50 to 100 µs until one that
 //! sleeps is at work. Here one of them stays awake for a while after such work ([`stay_awake`]), and who is done
-//! first waits awake, as long, for the others. Who computes what depends on chance, so results are handed out in
-//! the order of what they are from.
+//! first waits awake, as long, for the others. The distribution of work depends on chance, so
+//! results are returned in the order of the items.
 
 use rayon::Yield;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -27,7 +27,7 @@ pub fn each<T: Send>(items: impl IntoIterator<Item = T>, act: impl Fn(T) + Sync)
     }
 }
 
-/// What becomes of every item, in the order of the items; on several threads if there are some.
+/// Results of every item, in the order of the items, computed on several threads if available.
 pub fn map<T: Send, R: Send>(
     items: impl IntoIterator<Item = T>,
     act: impl Fn(T) -> R + Sync,

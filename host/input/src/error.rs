@@ -212,7 +212,7 @@ impl Error {
         law::Error::library(message).into()
     }
 
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn help(&self) -> Option<String> {
         let help = match self {
             Self::Text(error) => error.help(),

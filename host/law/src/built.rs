@@ -149,7 +149,7 @@ impl fmt::Display for BuildFailure {
 impl std::error::Error for BuildFailure {}
 
 impl BuildFailure {
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn hint(&self) -> Option<String> {
         let names = |names: &[String], given: &str| {
             suggestion(given, names.iter().map(String::as_str).collect::<Vec<_>>())

@@ -43,7 +43,7 @@ impl Error {
         text::Error::Internal(message.into()).into()
     }
 
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn help(&self) -> Option<&str> {
         match self {
             Self::Text(error) => error.help(),

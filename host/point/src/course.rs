@@ -224,7 +224,7 @@ impl Driver {
         })
     }
 
-    /// What a halt stands for.
+    /// The meaning of a halt.
     fn cause(&self, halt: Halt) -> Cause {
         let why = match halt {
             Halt::Asked => return Cause::Stopped,

@@ -1,4 +1,4 @@
-//! What is followed: a law, where it starts, and its path.
+//! A driver: a law, its start, and its path.
 
 use crate::error::{Cause, Error, Failure, Misuse, Moved, Place, Warning};
 use crate::path::{self, Segment};
@@ -62,7 +62,7 @@ impl Driver {
         Ok(())
     }
 
-    /// What is known before the first call and belongs among the warnings.
+    /// Warnings that are known before the first call.
     pub fn set_notes(&mut self, notes: Vec<String>) {
         self.notes = notes;
     }

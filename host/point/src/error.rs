@@ -6,7 +6,7 @@ use law::{BatchFailure, TimeDependence};
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Where a point is on its path.
+/// Position of a point on its path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Before the first increment.
@@ -24,7 +24,7 @@ pub enum Place {
     },
 }
 
-/// What of a driver cannot be as it is.
+/// A defect of a driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Misuse {
     /// There is no segment.
@@ -62,7 +62,7 @@ pub enum Error {
     Misuse {
         /// Number of the segment, from 1, if it is one.
         segment: Option<usize>,
-        /// What is wrong.
+        /// The defect.
         misuse: Misuse,
     },
     /// The law cannot start from the initial state.
@@ -133,7 +133,7 @@ pub struct Unmet {
     pub found: f64,
     /// What it was to be.
     pub goal: f64,
-    /// What is left of the difference.
+    /// The remaining difference.
     pub residual: f64,
     /// What may be left of it.
     pub tolerance: f64,
@@ -146,7 +146,7 @@ pub enum Criterion {
     Flux {
         /// The component.
         component: &'static str,
-        /// What it is to be at the end of the increment.
+        /// The goal at the end of the increment.
         at_end: f64,
     },
     /// The flux of a component that changes by −stiffness × jump.
@@ -186,7 +186,7 @@ pub enum Warning {
         hypothesis: Hypothesis,
         /// The component.
         component: &'static str,
-        /// Where it has come to.
+        /// The position reached.
         gradient: f64,
     },
     /// A controlled flux stays away from its goal by what rounding the gradients makes of the law's

@@ -8,7 +8,7 @@
 //! those of the law's [hypothesis](abi::Hypothesis::components), in their order; arrays over them
 //! are padded to [`N_MAX`]. An increment lasts one unit of time unless its segment says otherwise.
 //!
-//! What goes wrong comes back as data ([`Error`]): where ([`Place`]), with which law, why ([`Cause`]),
+//! Failures come back as data ([`Error`]): where ([`Place`]), with which law, why ([`Cause`]),
 //! and the call of the law behind it. Its `Display` says the same in a sentence.
 //!
 //! ```no_run

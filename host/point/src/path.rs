@@ -82,9 +82,9 @@ pub struct Segment {
     pub step: u32,
     /// Increments of that step before it.
     pub first: usize,
-    /// What the components are; other than Cartesian ones in three dimensions only.
+    /// The kind of components; other than Cartesian ones in three dimensions only.
     pub frame: Frame,
-    /// How long it takes; an increment takes one unit of time if nothing is said.
+    /// How long it takes; by default an increment takes one unit of time.
     pub time: Option<f64>,
     /// What holds in place of the controls, in three dimensions only.
     pub restrictions: Option<Restrictions>,

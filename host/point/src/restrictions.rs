@@ -1,5 +1,5 @@
 //! Linear restrictions between the changes of stress and strain over a segment, in place of
-//! components that are controlled: A Δσ + B Δε = b, as many as there are components.
+//! components that are controlled: A Δσ + B Δε = b, one for each component.
 
 use crate::state::{N_MAX, Point, Vector};
 

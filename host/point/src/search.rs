@@ -10,9 +10,10 @@
 //! Under [`Restrictions`] all components are free, and what these make of the changes since the start of
 //! the segment stands for the flux.
 //!
-//! Newton's method with the law's tangent, restricted to f, comes first ([`newton`]). Where that matrix
-//! is singular, the step is the least-squares solution of minimum norm ([`direction`]). A line search
-//! keeps ‖r‖ falling. Where it does not fall, the flux does not answer to what is left of r: on an edge,
+//! Newton's method with the law's tangent, restricted to f, comes first ([`newton`]). If that
+//! matrix is singular, the step is the least-squares solution of minimum norm ([`direction`]). A
+//! line search
+//! keeps ‖r‖ falling. If it does not fall, the flux does not respond to the remaining r: on an edge,
 //! at an apex, over an open gap. Then a search along the elastic direction leaves that zone. Where this
 //! ends too, fixed-point iterations with the elastic operator go on ([`relaxation`]). What counts as the
 //! end is said in [`acceptance`].
@@ -69,14 +70,14 @@ pub(crate) struct Search<'a> {
     base: Sample,
     trial: Sample,
     obstacle: Obstacle,
-    /// Which segment and increment it is.
+    /// The segment and the increment.
     pub(crate) moment: Moment,
     frame: Frame,
     /// Restrictions, scaled, and the point where they begin.
     restricted: Option<(Restrictions, Point)>,
     /// Calls of the law.
     pub(crate) calls: usize,
-    /// Who may want the search to stop: then the law refuses whatever it is asked.
+    /// A request to stop: from then on the law refuses every call.
     pub(crate) stop: Stop,
     /// Number of updates that the law called unreliable, and its first words about them.
     pub(crate) unreliable: (usize, String),
@@ -138,8 +139,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Puts restrictions from this point on in the place of controlled components. What they have
-    /// to become at the end.
+    /// Puts restrictions from this point on in the place of controlled components. Their goals at
+    /// the end.
     pub(crate) fn restrict(&mut self, restrictions: &Restrictions, from: &Point) -> Vector {
         self.control(0..self.n, [0.0; N_MAX], [0.0; N_MAX]);
         let scaled = restrictions.scaled(self.elastic_norm);
@@ -163,7 +164,7 @@ impl<'a> Search<'a> {
         self.anchor.modulus(self.elastic_norm);
     }
 
-    /// Whether restrictions stand in the place of controlled components.
+    /// Whether restrictions replace controlled components.
     pub(crate) fn is_restricted(&self) -> bool {
         self.restricted.is_some()
     }
@@ -195,7 +196,7 @@ impl<'a> Search<'a> {
         Ok(Some(self.trial.point.flux))
     }
 
-    /// What the components of points and goals are from now on.
+    /// Sets the kind of components of points and goals.
     pub(crate) fn set_frame(&mut self, frame: Frame) {
         self.frame = frame;
         self.elastic.copy_from_slice(&self.elastic_cartesian);
@@ -203,7 +204,7 @@ impl<'a> Search<'a> {
         self.elastic_norm = largest(&self.elastic);
     }
 
-    /// What the components of points and goals are.
+    /// The kind of components of points and goals.
     pub(crate) fn frame(&self) -> Frame {
         self.frame
     }

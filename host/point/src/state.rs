@@ -16,7 +16,7 @@ pub(crate) struct Point {
     pub(crate) internal: Vec<f64>,
 }
 
-/// What a step has to reach: gradients where they are prescribed, F where the flux is.
+/// The goals of a step: prescribed gradients, and F for prescribed fluxes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Goal {
     pub(crate) gradient: Vector,

@@ -57,7 +57,7 @@ impl Display for Misuse {
 }
 
 impl Misuse {
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
             Self::NegativeStiffness(_) => Some("the traction changes by −stiffness × jump"),
@@ -83,7 +83,7 @@ impl Display for Error {
 }
 
 impl Error {
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Misuse { misuse, .. } => misuse.hint().map(str::to_owned),
@@ -162,7 +162,7 @@ impl Failure {
         warnings.try_for_each(|warning| write!(f, "\n  warning: {warning}"))
     }
 
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn hint(&self) -> Option<String> {
         let own = match &self.cause {
             // A stress without stiffness is not one beyond strength.

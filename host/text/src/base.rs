@@ -29,7 +29,7 @@ pub type Variants<T> = Vec<(Option<String>, T)>;
 pub struct OtherKind {
     /// Top-level keys that give it away.
     pub keys: &'static [&'static str],
-    /// What the file is and what was expected.
+    /// The kind of file found and the kind expected.
     pub message: &'static str,
     /// The command that takes it.
     pub command: &'static str,

@@ -26,7 +26,7 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
-    /// What was asked for does not fit what there is.
+    /// The request does not fit the files.
     #[error("{0}")]
     Usage(String),
     /// A defect of the program.
@@ -49,7 +49,7 @@ impl Error {
         }
     }
 
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn help(&self) -> Option<&str> {
         match self {
             Self::Input(input) => input.help(),

@@ -73,7 +73,7 @@ fn open_if(path: &Path, fits: impl Fn(&Metadata) -> bool) -> io::Result<File> {
     File::open(path)
 }
 
-/// What is in a file, unless it is longer than plausible, whatever length the system says.
+/// The content of a file, unless it is implausibly long, whatever length the system reports.
 fn up_to(file: File, most: u64, what: &str) -> io::Result<Vec<u8>> {
     let length = file.metadata()?.len();
     let too_long = || {

@@ -48,8 +48,8 @@ pub(crate) fn deserialize_or<T: DeserializeOwned>(
 /// Longest text, in bytes, whose contents are kept a second time for the sake of a message.
 const MOST_COPIED: usize = 1 << 20;
 
-/// The error of a value that stands where a choice is expected and is no text. What the choices
-/// are is said of a text that is none of them.
+/// The error of a value that stands where a choice is expected and is no text. The error for an
+/// unknown word lists the choices.
 fn choice_error<T: DeserializeOwned>(
     source: &Source,
     mut table: Spanned<DeTable<'_>>,
@@ -64,7 +64,7 @@ fn choice_error<T: DeserializeOwned>(
     (refused.span()? == span).then(|| wording::no_choice(source, &refused, &found).into())
 }
 
-/// The value that stands at this place of the text.
+/// The value at this place of the text.
 fn value_at<'t, 'i: 't>(
     values: &mut dyn Iterator<Item = &'t mut Spanned<DeValue<'i>>>,
     span: &Range<usize>,

@@ -20,12 +20,12 @@ pub(crate) struct Setting<'i> {
     value: Spanned<DeValue<'i>>,
 }
 
-/// A table that a setting has made on its way, since the file has none there.
+/// A table that a setting has created, because the file lacks it.
 #[derive(Debug)]
 pub(crate) struct Made {
-    /// Where the setting stands.
+    /// Place of the setting.
     range: Range<usize>,
-    /// What to say if it is not complete: the setting was rather meant for one that is there.
+    /// The hint if it is incomplete: the existing table that was probably meant.
     error: InputError,
 }
 
@@ -77,7 +77,7 @@ impl<'i> Setting<'i> {
         self.put_into(source, file, 0)
     }
 
-    /// Puts it into a table that so many of its keys lead to.
+    /// Puts it into the table that the first `n` of its keys lead to.
     fn put_into(
         &self,
         source: &Source,
@@ -114,7 +114,7 @@ impl<'i> Setting<'i> {
         }))
     }
 
-    /// Puts it below a value that so many of its keys lead to.
+    /// Puts it below the value that the first `n` of its keys lead to.
     fn put_below(
         &self,
         source: &Source,
@@ -183,8 +183,8 @@ pub fn key(name: &str) -> String {
     toml::Value::from(name).to_string()
 }
 
-/// The keys that lead to a byte of a text, as a setting has them: to the value or the key that stands there, else to the
-/// table whose header does. `None` if there is none, or the text is no TOML.
+/// The keys that lead to a byte of a text, as a setting has them: to the value or the key there, else to the
+/// table whose header does. `None` if no key leads there, or the text is no TOML.
 pub(crate) fn key_at(text: &str, at: usize) -> Option<String> {
     let table = DeTable::parse(text).ok()?;
     path_in(table.get_ref(), at).map(|(_, path)| path)
@@ -251,7 +251,7 @@ fn equals_sign(text: &str) -> Option<usize> {
     None
 }
 
-/// A dotted path whose names with blanks stand in quotes; `None` if there is no such name, or if some
+/// A dotted path whose names with blanks are in quotes; `None` if there is no such name, or if some
 /// are quoted already.
 fn with_quotes(path: &str) -> Option<String> {
     let path = path.trim();
@@ -306,7 +306,7 @@ fn refuse_keys_of_files(source: &Source, keys: &[Spanned<DeString<'_>>]) -> Resu
     Err(source.error(first.span(), message).hint(hint).into())
 }
 
-/// The value of a table that has only this one, so many keys deep.
+/// The value of a table that has only this one, `n` keys deep.
 fn only_value(table: Spanned<DeTable<'_>>, depth: usize) -> Option<Spanned<DeValue<'_>>> {
     let span = table.span();
     let mut value = Spanned::new(span, DeValue::Table(table.into_inner()));
@@ -324,8 +324,8 @@ fn only_value(table: Spanned<DeTable<'_>>, depth: usize) -> Option<Spanned<DeVal
     Some(value)
 }
 
-/// A word or a path without quotes stands for a text. What else starts like one is refused with an error of
-/// its own. `start` is where the setting starts.
+/// A word or a path without quotes stands for a text. Other texts that start like one get a
+/// separate error. `start` is where the setting starts.
 fn bare_word<'i>(
     source: &Source,
     start: usize,

@@ -4,7 +4,7 @@ use crate::InputError;
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::error::Error;
 
-/// What is said of an error: its message, the `place` it is about, the errors behind it, and a hint
+/// The text of an error: its message, the `place` it is about, the errors behind it, and a hint
 /// if there is one; with or without the colours of a terminal.
 pub fn shown(
     error: &dyn Error,

@@ -25,7 +25,7 @@ pub struct Source {
     has_settings_in_memory: bool,
 }
 
-/// What a setting of the command line is called where a file has its name.
+/// The name of a command-line setting in place of a file name.
 const SETTING: &str = "--set";
 
 impl Source {
@@ -44,7 +44,7 @@ impl Source {
     }
 
     /// Takes a text as if it came from a file of this name. A byte order mark is no part of it:
-    /// columns count without, and it may stand in the middle once another file comes before.
+    /// columns count without it, and it may be in the middle once another file precedes.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<Arc<str>>) -> Self {
         let path = path.into();
         let text = text.into();
@@ -128,17 +128,17 @@ impl Source {
         &self.text[..end]
     }
 
-    /// Where the files stand in the text.
+    /// Ranges of the files in the text.
     pub fn files(&self) -> impl Iterator<Item = Range<usize>> {
         self.parts().take(self.files.len() - self.n_settings)
     }
 
-    /// Where the settings stand in the text.
+    /// Ranges of the settings in the text.
     pub fn settings(&self) -> impl Iterator<Item = Range<usize>> {
         self.parts().skip(self.files.len() - self.n_settings)
     }
 
-    /// Where the last setting stands that gives this key, or one below it; dots between the keys.
+    /// Place of the last setting that gives this key, or one below it; dots between the keys.
     pub fn setting_of(&self, path: &str) -> Option<Range<usize>> {
         let gives = |range: &Range<usize>| {
             let key = self.text[range.clone()].split('=').next();
@@ -148,7 +148,7 @@ impl Source {
         self.settings().filter(gives).last()
     }
 
-    /// Where files and settings stand in the text.
+    /// Ranges of files and settings in the text.
     fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         (0..self.files.len()).map(|number| {
             let end = self
@@ -276,7 +276,7 @@ pub struct Line<'e> {
     pub at: (usize, usize),
     /// The line itself.
     pub text: &'e str,
-    /// What is said beside the place.
+    /// The label of the place.
     pub label: Option<&'e str>,
 }
 
@@ -312,7 +312,7 @@ impl InputError {
         self.span.clone()
     }
 
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn help(&self) -> Option<&str> {
         self.hint.as_deref()
     }
@@ -322,7 +322,7 @@ impl InputError {
         &mut self.hint
     }
 
-    /// Of an error in a setting of the command line: that setting, and where in it.
+    /// For an error in a command-line setting: that setting, and the place in it.
     pub fn setting(&self) -> Option<(&str, usize)> {
         (self.path == SETTING).then(|| (&*self.text, self.span.start))
     }
@@ -347,7 +347,7 @@ impl InputError {
         }
     }
 
-    /// Adds a word beside the underlined place.
+    /// Adds a label to the underlined place.
     #[must_use]
     pub fn label(self, label: impl Into<String>) -> Self {
         Self {

@@ -69,7 +69,7 @@ fn first_line(source: &Source, error: &toml::de::Error) -> Range<usize> {
     span.start..span.start + length
 }
 
-/// The error of a key that there is not; `more` keys may stand there than the reader knows.
+/// The error of a key that there is not; `more` keys may be there than the reader knows.
 pub(super) fn unknown_key(
     source: &Source,
     error: &toml::de::Error,

@@ -18,7 +18,7 @@ pub fn refuse_other(path: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// What is said where something else than a file has a name.
+/// The message if the name belongs to something other than a file.
 pub fn other() -> io::Error {
     io::Error::other("there is something else than a file of this name")
 }
@@ -82,11 +82,11 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// What a file is, whatever it is called: its device and its number there; `None` where that is not
+/// The identity of a file, whatever its name: its device and its number there; `None` where that is not
 /// known.
 pub type Identity = Option<(u64, u64)>;
 
-/// What an open file is.
+/// The identity of an open file.
 pub fn identity(file: &File) -> Identity {
     file.metadata().ok().and_then(|found| identity_of(&found))
 }

@@ -1,5 +1,5 @@
-//! What follows from a pattern alone: the order of elimination, the fronts, and where every entry
-//! of a matrix goes.
+//! Symbolic analysis of a pattern: the order of elimination, the fronts, and the place of every
+//! entry of a matrix.
 
 use super::Kind;
 use super::supernodes::Supernodes;
@@ -18,7 +18,7 @@ pub(super) struct Analysis {
     pub(super) fronts: Vec<Shape>,
     /// Rows below the pivot block of all fronts: positions in `order`, then, counted on, in `kept`.
     pub(super) rows: Vec<u32>,
-    /// Where they stand in the parents' fronts; without a parent, in `kept`.
+    /// Their positions in the parents' fronts; without a parent, in `kept`.
     pub(super) runs: Vec<Run>,
     /// Entries of the matrix by front: their places in the pattern, and where they go.
     pub(super) sources: Vec<u32>,
@@ -33,7 +33,7 @@ pub(super) struct Analysis {
     /// Fronts of no branch, in levels that come one after the other: those above others first, and of each level none
     /// above another one.
     pub(super) top: Vec<Vec<usize>>,
-    /// Where every pivot stands among those of its branch.
+    /// Position of every pivot among those of its branch.
     pub(super) in_branch: Vec<u32>,
 }
 
@@ -58,7 +58,7 @@ const WORTH_KEEPING: f64 = 1.0 / 64.0;
 /// Tasks that fronts are shared among where their entries are placed.
 const TASKS: usize = 16;
 
-/// Where an entry between kept equations goes.
+/// Place of an entry between kept equations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub(super) source: u32,
@@ -308,7 +308,7 @@ impl Analysis {
         self.fronts[front].rows.clone()
     }
 
-    /// Where the rows of every front stand in its parent's.
+    /// Positions of the rows of every front in its parent's.
     fn place_rows(&mut self, parent: &[Option<usize>]) {
         let n_eliminated = self.order.len();
         let mut place = vec![0_u32; n_eliminated + self.kept.len()];
@@ -394,8 +394,8 @@ impl Analysis {
         (self.sources, self.targets) = (sources, targets);
     }
 
-    /// Entries in the columns of the pivots of a front: which of the pivots, where the entry stands in the pattern, and
-    /// the position of its row. Of a symmetric matrix those of the lower half.
+    /// Entries in the columns of the pivots of a front: which of the pivots, the position of the entry in the pattern, and
+    /// the position of its row. If the matrix is symmetric, those of the lower half only.
     fn entries_of(
         &self,
         shape: &Shape,
@@ -434,7 +434,7 @@ impl Analysis {
 }
 
 /// Entries of a front whose rows have these places in it: where they come from and, in the lower half of the number,
-/// where they go; in the order in which they stand in memory.
+/// where they go; in the order of their addresses.
 fn put_in_order(
     shape: &Shape,
     of_columns: impl Iterator<Item = (usize, usize, usize)>,

@@ -130,7 +130,7 @@ impl Multifrontal {
         }
     }
 
-    /// Of every front, whether its entries are those of the last matrix.
+    /// For every front, whether its entries equal those of the last matrix.
     fn unchanged(&self, before: &Before<'_>, values: &[f64]) -> Vec<bool> {
         let (shapes, sources) = (&self.analysis.fronts, &self.analysis.sources);
         match before {
@@ -311,8 +311,8 @@ impl Multifrontal {
     }
 
     /// Assembles a front from the matrix and the updates of its children, and eliminates its pivots.
-    /// What it leaves goes to the pile, if there is one and it is not to be kept. What its children
-    /// have left is with them, or the last on their pile.
+    /// Its Schur complement goes to the pile, unless it is to be kept. The Schur complements of its
+    /// children are with them, or last on their pile.
     fn eliminate(
         &self,
         number: usize,
@@ -410,7 +410,7 @@ fn eliminate_pivots(
     Ok(())
 }
 
-/// What stands below the pivots.
+/// The entries below the pivots.
 fn below(l: &[f64], n: usize, k: usize) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(l, n, k).split_at_row(k).1
 }

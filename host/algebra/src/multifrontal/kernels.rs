@@ -12,7 +12,7 @@ use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 use std::ops::Range;
 
-/// Branches with fewer floating-point operations than this are not worth a task of their own.
+/// Branches with fewer floating-point operations than this are not worth a separate task.
 pub(super) const WORTHWHILE: f64 = 4e6;
 /// Columns of an update matrix that are computed as one piece, or two where they are shared among threads. Fixed,
 /// so that the result is the same for any number of them.
@@ -136,7 +136,7 @@ fn in_pieces(
     }
 }
 
-/// Where `n` columns are parted; nowhere if they are few. A column alone would be left to another kernel, with other
+/// Splits `n` columns into parts; one part if they are few. A column alone would be left to another kernel, with other
 /// last bits.
 pub(super) fn half(n: usize) -> usize {
     if n < FEW {
@@ -163,7 +163,7 @@ pub(super) fn factorise_symmetric(l: &mut [f64], n: usize, k: usize) -> Result<(
     Ok(())
 }
 
-/// L U of the pivots of a front, with L below (n × k) and U beside them (k × m).
+/// L U of the pivots of a front, with L below (n × k) and U to the right (k × m).
 pub(super) fn factorise_unsymmetric(
     l: &mut [f64],
     u: &mut [f64],
@@ -183,13 +183,13 @@ pub(super) fn factorise_unsymmetric(
     Ok(())
 }
 
-/// What stands below the pivots of a front or beside them.
+/// The blocks below the pivots of a front, or to their right.
 enum Side<'v> {
     Below(MatMut<'v, f64>),
     Right(&'v mut [f64]),
 }
 
-/// L below (m × k) and U beside (k × m) the factorised pivots, in parallel where it pays.
+/// L below (m × k) and U to the right (k × m) of the factorised pivots, in parallel if that is faster.
 fn solve_beside(
     pivots: MatRef<'_, f64>,
     kind: Kind,

@@ -157,7 +157,7 @@ impl Multifrontal {
         places.iter().map(|&place| x[place as usize]).collect()
     }
 
-    /// Of every equation, its place in the order of elimination, or behind it among those that are kept.
+    /// For every equation, its place in the order of elimination; kept equations follow at the end.
     pub fn places(&self) -> Vec<u32> {
         let all = self.analysis.order.iter().chain(&self.analysis.kept);
         let mut places = vec![0; self.analysis.order.len() + self.analysis.kept.len()];
@@ -282,7 +282,7 @@ impl Analysis {
     }
 }
 
-/// Where ascending rows of a front stand: among the pivots of its branch, or the rows above it.
+/// Positions of ascending rows of a front: among the pivots of its branch, or the rows above it.
 struct Places<'b> {
     in_branch: &'b [u32],
     /// Position of the first pivot above the branch.

@@ -1,4 +1,4 @@
-//! What fronts leave to their parents: where it waits, and how it is added.
+//! Schur complements that fronts pass to their parents: storage and assembly.
 #![expect(
     clippy::inline_always,
     reason = "only what is inlined is compiled for the processor's own vector instructions"
@@ -12,7 +12,7 @@ use std::ops::Range;
 pub(super) struct Run {
     /// The first row below the pivots of the front.
     row: u32,
-    /// Where it stands in the parent.
+    /// Its position in the parent.
     at: u32,
     len: u32,
 }
@@ -32,7 +32,7 @@ impl Run {
         (first..last).map(move |column| (column - at + row, column))
     }
 
-    /// The part from a row on; empty at the end of the run if there is none.
+    /// The part from a row on; empty at the end of the run if nothing is left.
     fn from(&self, row: usize) -> Self {
         let skipped = (row as u32).saturating_sub(self.row).min(self.len);
         Self {
@@ -43,7 +43,7 @@ impl Run {
     }
 }
 
-/// Appends the runs of rows that stand at these places of the parent, which has `k` pivots.
+/// Appends the runs of rows at these positions of the parent, which has `k` pivots.
 pub(super) fn add_runs(places: impl Iterator<Item = u32>, k: usize, runs: &mut Vec<Run>) {
     let start = runs.len();
     for (row, at) in (0..).zip(places) {
@@ -208,7 +208,7 @@ pub(super) struct Pile {
 }
 
 impl Pile {
-    /// Room for one more. What stands in it means nothing.
+    /// Room for one more. Its content is undefined.
     pub(super) fn add(&mut self, len: usize) -> &mut [f64] {
         let start = self.used;
         self.used += len;

@@ -1,4 +1,4 @@
-//! What an order of elimination costs: the operations of the factorisation, from the number of
+//! Cost of an order of elimination: the operations of the factorisation, from the number of
 //! entries in every column of the factors (Gilbert, Ng & Peyton 1994).
 
 use super::graph::Compressed;

@@ -8,7 +8,7 @@ use super::separator::SEPARATOR;
 
 /// Parts of so few vertices are not cut any more, but ordered by minimum degree.
 const SMALLEST: usize = 200;
-/// Parts with more vertices than this are worth a task of their own.
+/// Parts with more vertices than this get a separate task.
 const TASK: usize = 2_000;
 
 /// An order of elimination of some vertices of a graph; the others are eliminated after them or

@@ -23,7 +23,7 @@ impl Graph {
         &self.neighbours[self.start[vertex] as usize..self.start[vertex + 1] as usize]
     }
 
-    /// The graph of some of the vertices, which are numbered anew in this order. `number` has
+    /// The graph of some of the vertices, renumbered in this order. `number` has
     /// `u32::MAX` everywhere, and is left like that.
     pub(super) fn part(&self, vertices: &[u32], number: &mut [u32]) -> Self {
         for (new, &vertex) in (0..).zip(vertices) {
@@ -178,7 +178,7 @@ impl Compressed {
         &self.unknowns[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
     }
 
-    /// Vertices in the order in which the first of their unknowns stands in an order of unknowns.
+    /// Vertices sorted by the position of their first unknown in an order of unknowns.
     pub(super) fn vertices_by(&self, order: &[u32]) -> Vec<u32> {
         let mut place = vec![u32::MAX; self.unknowns.len()];
         for (at, &unknown) in (0..).zip(order) {

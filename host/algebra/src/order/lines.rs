@@ -2,7 +2,7 @@
 //!
 //! A set of unknowns is cut along the mesh line that halves it across its longer side; the
 //! unknowns on the line are eliminated after those on both sides, which do not touch each other
-//! (George 1973). What is cut where only bears on speed: any order gives a right factorisation.
+//! (George 1973). The cuts affect speed only: any order gives a correct factorisation.
 
 use std::cmp::Ordering;
 
@@ -31,7 +31,7 @@ pub fn mesh_lines(positions: &[[f64; 2]]) -> Vec<[u32; 2]> {
 }
 
 /// Whether the lines are those of a grid, most crossings of which are nodes: of 8-node quads three
-/// quarters are. Nodes that lie anyhow have lines of their own, which separate nothing.
+/// quarters are. Scattered nodes have separate lines, which separate nothing.
 pub(super) fn are_a_grid(lines: &[[u32; 2]]) -> bool {
     let number = |axis: usize| {
         let last = lines.iter().map(|line| line[axis]).max().unwrap_or(0);

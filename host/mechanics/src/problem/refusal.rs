@@ -653,7 +653,7 @@ impl fmt::Display for Cause {
 }
 
 impl Cause {
-    /// What the user could do, if something is known.
+    /// A hint for the user, if one is known.
     pub fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::LostPressure(_) => {

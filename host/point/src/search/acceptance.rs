@@ -30,7 +30,7 @@ pub(super) enum Verdict {
 }
 
 impl Search<'_> {
-    /// What is compared with the goal F.
+    /// The quantity compared with the goal F.
     pub(super) fn answer(&self, point: &Point) -> Vector {
         match &self.restricted {
             None => point.flux,

@@ -99,7 +99,7 @@ impl Search<'_> {
         Ok(false)
     }
 
-    /// What a step d leaves of the residual of `base`, to first order; the whole of it where that
+    /// The residual after a step d of `base`, to first order; the whole of it where that
     /// is next to nothing.
     fn left_over(&self, d: &Vector) -> Vector {
         let mut left = self.base.residual;

@@ -23,7 +23,7 @@ pub(crate) struct Obstacle {
     pub(crate) refusal: Option<Box<BatchFailure>>,
     /// How near the best attempt came.
     pub(crate) miss: Option<Miss>,
-    /// What its components are.
+    /// The kind of its components.
     pub(crate) frame: Frame,
     /// Its components are restrictions.
     pub(crate) is_restricted: bool,

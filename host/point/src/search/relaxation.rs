@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 use std::mem::swap;
 
 const MAX_RELAXATIONS: usize = 160;
-/// Newton is tried again after so many fixed-point iterations.
+/// Newton is tried again after this many fixed-point iterations.
 const NEWTON_EVERY: usize = 8;
 /// Differences that Anderson's acceleration remembers.
 const MEMORY: usize = 4;
